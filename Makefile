@@ -1,0 +1,52 @@
+# Two commands are all the set-up: `make demo` and `make test`. Each makes .venv on first use.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+SHELL := /bin/bash
+# Commands of a virtual environment that the user has activated must not leak into ours.
+unexport PYTHONPATH PYTHONHOME
+
+.PHONY: demo test check bench format docs clean system install browser
+
+demo: $(STAMP)
+	$(BIN)/rhot demo $(ARGS)
+
+test: $(STAMP)
+	$(BIN)/pytest $(ARGS)
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest -q tests/test_architecture.py
+
+bench: $(STAMP)
+	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+browser: $(STAMP)
+	$(BIN)/pytest -q tests/browser $(ARGS)
+
+docs: $(STAMP)
+	$(BIN)/python docs/make_topics.py
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+install: $(STAMP)
+
+# Names what is missing and the command that installs it, before pip fails with a page of text.
+system:
+	@command -v $(PYTHON) >/dev/null || { echo "python3 is missing: sudo apt install python3 python3-venv"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "rhot needs Python 3.11 or newer, this is $$($(PYTHON) --version); on Debian 12+ and Raspberry Pi OS (bookworm): sudo apt install python3 python3-venv, elsewhere: make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python's venv is missing: sudo apt install python3-venv"; exit 1; }
+	@$(PYTHON) -c 'import struct, sys; sys.exit(struct.calcsize("P") != 8)' || { echo "rhot needs a 64-bit system (there are no 32-bit packages of OpenCV and Zenoh): install the 64-bit Raspberry Pi OS"; exit 1; }
+
+$(STAMP): pyproject.toml | system
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,83 @@
+"""The client SDK: a rig's poses in a few lines.
+
+    async with rhot.connect("tcp/127.0.0.1:7447") as rig:
+        async for pose in rig.hand_poses("right"):
+            print(pose.wrist.position_m)
+
+Streams end with the `async with` block. Nothing arrives while nothing is sent; a router that dies and returns is met again
+by itself. By default a stream skips to the newest message (`latest`); with queue=n it delivers every message through a queue
+of n that drops the oldest.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator
+from typing import TypeVar
+
+from rhot import clock, topics
+from rhot.bus import Bus, open_bus
+from rhot.bus_streams import AliveWatch, Subscription
+from rhot.hand import HandName
+from rhot.messages import HandPoints, HandPose, Health, MarkerFrame, ObjectPose, Session
+from rhot.topics import Topic
+
+T = TypeVar("T")
+
+
+class RigClient:
+    """A rig seen from outside. `bus` is there for whatever has no method of its own."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+
+    def hand_poses(self, hand: HandName | None = None, queue: int | None = None) -> Subscription[HandPose]:
+        """Full hand poses, of one hand or of both."""
+        return self._stream(topics.POSE, queue, hand=hand)
+
+    def hand_points(self, hand: HandName | None = None, queue: int | None = None) -> Subscription[HandPoints]:
+        """3D landmarks, of one hand or of both."""
+        return self._stream(topics.POINTS, queue, hand=hand)
+
+    def object_poses(self, name: str | None = None, queue: int | None = None) -> Subscription[ObjectPose]:
+        """Object poses, of one object or of all."""
+        return self._stream(topics.OBJECT, queue, object=name)
+
+    def markers(self, camera: str | None = None, queue: int | None = None) -> Subscription[MarkerFrame]:
+        """Markers in the image of one camera or of all."""
+        return self._stream(topics.MARKERS, queue, camera=camera)
+
+    def health(self) -> Subscription[Health]:
+        """Every service's health, once a second."""
+        return self.bus.every(topics.HEALTH, 256)
+
+    def services(self) -> AliveWatch:
+        """Services as they come and go, beginning with those that are there."""
+        return self.bus.watch_alive()
+
+    async def session(self) -> Session | None:
+        """The session's state, or None if no master answers."""
+        answers = await self.bus.get(topics.SESSION)
+        return answers[0] if answers else None
+
+    def start(self) -> None:
+        """Broadcast the start to all trackers (needs the rig's name in `connect`)."""
+        self.bus.publisher(topics.SESSION).put(Session(running=True, start_ns=clock.now_ns()))
+
+    def stop(self) -> None:
+        """Broadcast the stop to all trackers (needs the rig's name in `connect`)."""
+        self.bus.publisher(topics.SESSION).put(Session(running=False, start_ns=clock.now_ns()))
+
+    def _stream(self, topic: Topic[T], queue: int | None, **names: str | None) -> Subscription[T]:
+        given = {field: name for field, name in names.items() if name is not None}
+        return self.bus.latest(topic, **given) if queue is None else self.bus.every(topic, queue, **given)
+
+
+@contextlib.asynccontextmanager
+async def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str = "*") -> AsyncIterator[RigClient]:
+    """A session with the router at endpoint; waits for it as long as it takes (cancel, or use asyncio.timeout, to give up).
+
+    rig is the name in [rig] of rig.toml; "*" listens to every rig of that router.
+    """
+    async with open_bus(rig, [endpoint]) as bus:
+        yield RigClient(bus)

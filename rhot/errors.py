@@ -1,0 +1,42 @@
+"""The one base error of rhot.
+
+Every error a user can meet derives from RhotError, and its message says three things: what is wrong,
+which values are valid, and what to do next. The commands print it in one line; services log it and exit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+
+class RhotError(Exception):
+    """Base of every error rhot raises on purpose."""
+
+
+class ConfigError(RhotError):
+    """A file people write (rig.toml) is missing, malformed or contradicts itself."""
+
+
+class CalibrationError(RhotError):
+    """A file tools write (calibration/*.json) is missing, malformed or does not fit the data."""
+
+
+class CaptureError(RhotError):
+    """A capture, video or recording cannot be read or written."""
+
+
+class SourceError(RhotError):
+    """A camera or pose source cannot be opened, or has failed for good."""
+
+
+class BusError(RhotError):
+    """Zenoh refused a session, a key or a query."""
+
+
+def leaves(error: BaseException) -> Iterator[BaseException]:
+    """The errors inside an ExceptionGroup, however deep, or the error itself."""
+    if isinstance(error, BaseExceptionGroup):
+        for inner in error.exceptions:
+            yield from leaves(inner)
+    else:
+        yield error

@@ -1,0 +1,286 @@
+"""Every message that crosses the wire, and nothing else.
+
+JSON, readable with any Zenoh command-line tool. Fields may be added, never renamed; unknown ones are ignored, missing or
+wrong ones make the decoder raise, which the bus counts as `rejected`. Units are part of the names. `stamp_ns` is
+CLOCK_REALTIME at the instant the content describes, `sent_ns` the instant the sender handed the message to Zenoh, on the
+sender's own clock (0 in files).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from rhot.hand import HandName
+
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+# A name that is one chunk of a Zenoh key.
+Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+# int64 nanoseconds reach to the year 2262; anything else is not a stamp.
+Stamp = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+Offset = Annotated[int, msgspec.Meta(ge=-(2**62), le=2**62)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
+Unit = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of all messages."""
+
+
+class Marker(Message, frozen=True, kw_only=True):
+    """One coloured blob in one image; sigma_px is one standard deviation of each coordinate, quality 0..1."""
+
+    color: Name
+    x_px: float
+    y_px: float
+    area_px: NonNegative
+    sigma_px: NonNegative
+    quality: Unit
+
+
+class MarkerFrame(Message, frozen=True, kw_only=True):
+    """All markers of one image, also when there are none.
+
+    stamp_ns is mid-exposure of row 0 on the camera's own clock; a marker's own instant is stamp_ns + y_px * row_time_ns, and
+    subtracting clock_offset_ns brings it to the master's clock. clock_sigma_ns is -1 while the offset is unknown.
+    """
+
+    camera: Name
+    seq: Count
+    stamp_ns: Stamp
+    row_time_ns: Annotated[float, msgspec.Meta(ge=0.0, le=1e8)]
+    clock_offset_ns: Offset
+    clock_sigma_ns: Annotated[int, msgspec.Meta(ge=-1, le=2**62)]
+    size_px: tuple[Annotated[int, msgspec.Meta(ge=1, le=65536)], Annotated[int, msgspec.Meta(ge=1, le=65536)]]
+    markers: Annotated[list[Marker], msgspec.Meta(max_length=256)]
+    sent_ns: Stamp = 0
+
+
+PointSource = Literal["measured", "predicted"]
+
+
+class HandPoint(Message, frozen=True, kw_only=True):
+    """A landmark in the rig frame; sigma_m is one standard deviation along each rig axis."""
+
+    name: Name
+    position_m: Vec3
+    sigma_m: tuple[NonNegative, NonNegative, NonNegative]
+    cameras: list[Name]
+    source: PointSource
+
+
+class HandPoints(Message, frozen=True, kw_only=True):
+    """The marked landmarks of one hand at one instant of the master's clock."""
+
+    hand: HandName
+    seq: Count
+    stamp_ns: Stamp
+    points: Annotated[list[HandPoint], msgspec.Meta(max_length=64)]
+    sent_ns: Stamp = 0
+
+
+JointSource = Literal["measured", "solved", "predicted"]
+
+
+class WristPose(Message, frozen=True, kw_only=True):
+    """Pose of the wrist joint in the rig frame."""
+
+    position_m: Vec3
+    orientation_wxyz: Quat
+
+
+class HandJoint(Message, frozen=True, kw_only=True):
+    """One of the 26 OpenXR joints in the rig frame."""
+
+    name: str
+    position_m: Vec3
+    orientation_wxyz: Quat
+    radius_m: NonNegative
+    source: JointSource
+
+
+class FingerAngles(Message, frozen=True, kw_only=True, omit_defaults=True):
+    """Joint angles of one digit in radians; flexion is positive towards the palm, abduction towards the thumb side.
+
+    Fingers: abduction and mcp at the MCP joint, pip, dip. Thumb: abduction and cmc at the CMC joint, mcp at the MCP joint,
+    dip at the interphalangeal joint; pip is 0, as the thumb has no middle phalanx.
+    """
+
+    abduction: float
+    mcp: float
+    pip: float
+    dip: float
+    cmc: float = 0.0
+
+
+FingerStatus = Literal["solved", "unreachable", "not_converged", "predicted"]
+
+
+class FingerPose(Message, frozen=True, kw_only=True):
+    """One digit's solution: residual_m is the distance left between the model's marker and the measured one."""
+
+    name: Literal["thumb", "index", "middle", "ring", "little"]
+    angles_rad: FingerAngles
+    residual_m: NonNegative
+    iterations: Count
+    status: FingerStatus
+
+
+class HandPose(Message, frozen=True, kw_only=True):
+    """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from thumb to little."""
+
+    hand: HandName
+    seq: Count
+    stamp_ns: Stamp
+    method: str
+    wrist: WristPose
+    joints: Annotated[list[HandJoint], msgspec.Meta(min_length=26, max_length=26)]
+    fingers: Annotated[list[FingerPose], msgspec.Meta(min_length=5, max_length=5)]
+    sent_ns: Stamp = 0
+
+
+class OpenVrDevice(Message, frozen=True, kw_only=True, rename={"device_class": "class"}):
+    """What SteamVR knows of a device beside its pose."""
+
+    index: int
+    serial: Name
+    device_class: str
+    model: str
+    battery: float
+    charging: bool
+
+
+Row4 = tuple[float, float, float, float]
+
+
+class OpenVrPose(Message, frozen=True, kw_only=True):
+    """A TrackedDevicePose_t under Valve's own field names, with what it lacks: device, universe, stamp.
+
+    mDeviceToAbsoluteTracking is 3x4 row by row, column 3 the translation in metres, in the `lighthouse` frame.
+    """
+
+    v: int
+    seq: Count
+    stamp_ns: Stamp
+    universe: str
+    device: OpenVrDevice
+    mDeviceToAbsoluteTracking: tuple[Row4, Row4, Row4]  # noqa: N815 - Valve's name
+    vVelocity: Vec3  # noqa: N815
+    vAngularVelocity: Vec3  # noqa: N815
+    eTrackingResult: int  # noqa: N815
+    bPoseIsValid: bool  # noqa: N815
+    bDeviceIsConnected: bool  # noqa: N815
+    sent_ns: Stamp = 0
+
+
+ObjectTracking = Literal["ok", "out_of_range", "rotation_only", "calibrating", "lost"]
+
+
+class ObjectPose(Message, frozen=True, kw_only=True):
+    """A tracked object; in the rig frame if registered is true, else still in the lighthouse frame."""
+
+    object: Name
+    serial: Name
+    seq: Count
+    stamp_ns: Stamp
+    position_m: Vec3
+    orientation_wxyz: Quat
+    velocity_m_s: Vec3
+    angular_velocity_rad_s: Vec3
+    tracking: ObjectTracking
+    registered: bool
+    sent_ns: Stamp = 0
+
+
+class Session(Message, frozen=True, kw_only=True):
+    """The start broadcast: trackers work while running is true. start_ns is on the master's clock."""
+
+    running: bool
+    start_ns: Stamp
+    sent_ns: Stamp = 0
+
+
+class ClockEcho(Message, frozen=True, kw_only=True):
+    """Answer to a clock query: the master's clock when it answered."""
+
+    master_ns: Stamp
+
+
+class StreamHealth(Message, frozen=True, kw_only=True):
+    """One stream of a service since the last beat.
+
+    age is (now - stamp_ns) of what was sent, hop is (now - sent_ns) of what arrived; -1 where nothing was measured.
+    ok compares rate_hz with expected_hz (0: no expectation) from the topics table.
+    """
+
+    key: str
+    direction: Literal["in", "out"]
+    count: Count
+    rate_hz: NonNegative
+    expected_hz: NonNegative
+    ok: bool
+    dropped: Count
+    rejected: Count
+    latency_p50_ms: float
+    latency_p99_ms: float
+
+
+class Health(Message, frozen=True, kw_only=True):
+    """A service's state once a second. values holds its own figures, e.g. stage times in ms or the clock offset."""
+
+    service: Name
+    instance: Name
+    stamp_ns: Stamp
+    version: str
+    pid: Count
+    uptime_s: NonNegative
+    state: str
+    streams: list[StreamHealth]
+    errors: Count
+    last_error: str
+    cpu_percent: NonNegative
+    rss_mb: NonNegative
+    values: dict[str, float] = {}
+    sent_ns: Stamp = 0
+
+
+class HandTruth(Message, frozen=True, kw_only=True):
+    """What the simulator knows of one hand; points_m maps a landmark to its OpenXR joint's position in the rig frame."""
+
+    points_m: dict[str, Vec3]
+    wrist: WristPose
+    angles_rad: dict[str, FingerAngles]
+
+
+class ObjectTruth(Message, frozen=True, kw_only=True):
+    """What the simulator knows of one object, in the rig frame."""
+
+    position_m: Vec3
+    orientation_wxyz: Quat
+
+
+class Truth(Message, frozen=True, kw_only=True):
+    """One line of truth.jsonl, and the simulator's live topic."""
+
+    stamp_ns: Stamp
+    hands: dict[str, HandTruth]
+    objects: dict[str, ObjectTruth]
+    sent_ns: Stamp = 0
+
+
+class SimFrame(Message, frozen=True, kw_only=True):
+    """The attachment of a simulated camera's image (I420 bytes), standing for what a camera driver tells.
+
+    clock_skew_ns is what the simulated camera computer's clock reads more than the real one at this instant.
+    """
+
+    camera: Name
+    seq: Count
+    stamp_ns: Stamp
+    row_time_ns: NonNegative
+    size_px: tuple[int, int]
+    clock_skew_ns: Offset

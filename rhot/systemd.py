@@ -1,0 +1,30 @@
+"""sd_notify in a few lines: what a service tells systemd over $NOTIFY_SOCKET. Does nothing where there is no systemd."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+
+def notify(state: str) -> bool:
+    """Send a state such as "READY=1"; whether somebody was there to hear it (sd_notify(3))."""
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
+        return False
+    # A leading @ stands for the abstract namespace.
+    target = "\0" + address[1:] if address.startswith("@") else address
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as channel:
+        try:
+            channel.sendto(state.encode(), target)
+        except OSError:
+            return False
+    return True
+
+
+def watchdog_s() -> float | None:
+    """How often systemd wants to hear from us: half of WatchdogSec (sd_watchdog_enabled(3)), or None."""
+    usec = os.environ.get("WATCHDOG_USEC", "")
+    pid = os.environ.get("WATCHDOG_PID", "")
+    if not usec.isdigit() or (pid and pid != str(os.getpid())):
+        return None
+    return int(usec) * 0.5e-6

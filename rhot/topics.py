@@ -1,0 +1,170 @@
+"""THE table of topics: key, message, expected rate, quality of service, recorded or not.
+
+No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and docs/topics.md derive from TOPICS.
+A key is `rhot/<rig>/` + the template with its fields filled in; a field left out becomes the wildcard `*`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+import rhot.messages as m
+from rhot.errors import BusError
+
+T = TypeVar("T")
+
+ROOT = "rhot"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
+_FIELD = re.compile(r"\{(\w+)\}")
+
+
+class Kind(Enum):
+    """How a topic travels."""
+
+    STREAM = "stream"  # published, and dropped rather than late
+    QUERY = "query"  # asked for
+    STATE = "state"  # published on change, and asked for by late comers
+    TOKEN = "token"  # liveliness
+
+
+class Rate(Enum):
+    """Where a stream's expected rate comes from; rig.toml turns it into Hz (RigConfig.rate_hz)."""
+
+    CAMERA = "frame rate of that camera"
+    HAND = "fusion output rate"
+    OBJECT = "rate of the pose source"
+    BEAT = "1 Hz"
+    DEMAND = "on demand"
+
+
+class Priority(Enum):
+    """Zenoh priority of a topic: poses before health, health before pictures."""
+
+    REAL_TIME = "real time"
+    DATA = "data"
+    BACKGROUND = "background"
+
+
+@dataclass(frozen=True)
+class Topic(Generic[T]):
+    """One row of the table. message is None where the payload is not JSON (media_type says what it is)."""
+
+    template: str
+    message: type[T] | None
+    kind: Kind
+    rate: Rate
+    priority: Priority
+    recorded: bool
+    about: str
+    media_type: str = "application/json"
+    # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the largest (HandPose, 9 kB).
+    max_bytes: int = 65_536
+
+    @property
+    def name(self) -> str:
+        """The template without its fields, to speak of the topic: `camera/markers`."""
+        return re.sub(r"\{\w+\}/?", "", self.template).rstrip("/")
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields in the template."""
+        return tuple(_FIELD.findall(self.template))
+
+    @property
+    def encoding(self) -> str:
+        """Zenoh encoding of the payload."""
+        return self.media_type if self.message is None else f"{self.media_type};rhot.{self.message.__name__}.1"
+
+    def key(self, rig: str, **names: str) -> str:
+        """The key of one stream, or a key expression where fields are left out."""
+        unknown = set(names) - set(self.fields)
+        if unknown:
+            raise BusError(f"topic {self.template} has no field {sorted(unknown)}; it has {list(self.fields)}")
+        for field, value in {"rig": rig, **names}.items():
+            if not _NAME.match(value) and not (field == "rig" and value == "*"):
+                raise BusError(
+                    f"{field} name {value!r} cannot be part of a key; "
+                    "use letters, digits, '_', '-' and '.', starting with a letter or digit"
+                )
+        return f"{ROOT}/{rig}/" + _FIELD.sub(lambda match: names.get(match[1], "*"), self.template)
+
+    def names(self, key: str) -> dict[str, str] | None:
+        """The fields of a key of this topic, or None if the key is another's."""
+        pattern = _FIELD.sub(r"(?P<\1>[^/]+)", self.template)
+        match = re.fullmatch(rf"{ROOT}/[^/]+/{pattern}", key)
+        return match.groupdict() if match else None
+
+
+def _stream(template: str, message: type[T], rate: Rate, about: str, *, recorded: bool = True) -> Topic[T]:
+    return Topic(template, message, Kind.STREAM, rate, Priority.REAL_TIME, recorded, about)
+
+
+MARKERS = _stream("camera/{camera}/markers", m.MarkerFrame, Rate.CAMERA, "coloured blobs of every image")
+POINTS = _stream("hand/{hand}/points", m.HandPoints, Rate.HAND, "3D landmarks")
+POSE = _stream("hand/{hand}/pose", m.HandPose, Rate.HAND, "the full hand")
+OPENVR = _stream("openvr/{serial}/pose", m.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them")
+OBJECT = _stream("object/{object}/pose", m.ObjectPose, Rate.OBJECT, "objects in the rig frame")
+TRUTH = _stream("sim/truth", m.Truth, Rate.CAMERA, "the simulator's ground truth")
+PREVIEW: Topic[bytes] = Topic(
+    "camera/{camera}/preview",
+    None,
+    Kind.STREAM,
+    Rate.DEMAND,
+    Priority.BACKGROUND,
+    False,
+    "JPEG, published while somebody subscribes",
+    "image/jpeg",
+    4_000_000,
+)
+FRAME: Topic[bytes] = Topic(
+    "camera/{camera}/frame",
+    None,
+    Kind.QUERY,
+    Rate.DEMAND,
+    Priority.BACKGROUND,
+    False,
+    "one lossless frame for calibration",
+    "image/png",
+    40_000_000,
+)
+SIM_FRAME: Topic[bytes] = Topic(
+    "sim/{camera}/frame",
+    None,
+    Kind.STREAM,
+    Rate.CAMERA,
+    Priority.DATA,
+    False,
+    "I420 images of a simulated camera; SimFrame in the attachment",
+    "application/octet-stream",
+    40_000_000,
+)
+SESSION = Topic("control/session", m.Session, Kind.STATE, Rate.DEMAND, Priority.REAL_TIME, True, "the start broadcast")
+CLOCK = Topic("control/clock", m.ClockEcho, Kind.QUERY, Rate.DEMAND, Priority.REAL_TIME, False, "the master's clock")
+HEALTH = Topic("service/{service}/{instance}/health", m.Health, Kind.STREAM, Rate.BEAT, Priority.DATA, True, "state of each service")
+ALIVE: Topic[bytes] = Topic(
+    "service/{service}/{instance}/alive", None, Kind.TOKEN, Rate.DEMAND, Priority.DATA, False, "liveliness token", "", 0
+)
+
+TOPICS: tuple[Topic, ...] = (
+    MARKERS,
+    POINTS,
+    POSE,
+    OPENVR,
+    OBJECT,
+    TRUTH,
+    PREVIEW,
+    FRAME,
+    SIM_FRAME,
+    SESSION,
+    CLOCK,
+    HEALTH,
+    ALIVE,
+)
+
+
+def find(key: str) -> Topic | None:
+    """The topic a full key belongs to, or None."""
+    return next((topic for topic in TOPICS if topic.names(key) is not None), None)

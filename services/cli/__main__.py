@@ -1,0 +1,66 @@
+"""The `rhot` command. Every subcommand is one function in the file of its name; here they are only gathered."""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import typer
+
+from rhot.errors import RhotError, leaves
+from rhot.lifecycle import EXIT_USER
+from rhot.service import rhot_version
+from services.cli.check import check
+from services.cli.demo import demo
+from services.cli.plot import plot
+from services.cli.record import record
+from services.cli.replay import replay
+from services.cli.router import router
+from services.cli.score import score
+from services.cli.session import session
+from services.cli.simulate import simulate
+from services.cli.top import top
+from services.cli.track import track
+from services.cli.up import up
+
+COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(rhot_version())
+        raise typer.Exit
+
+
+def application() -> typer.Typer:
+    """The command with all its subcommands."""
+    app = typer.Typer(
+        name="rhot",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        help="Real-time hand and object tracking from low-cost parts.",
+    )
+
+    @app.callback()
+    def options(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="print the version")) -> None:
+        pass
+
+    for function in COMMANDS:
+        app.command(name=function.__name__)(function)
+    return app
+
+
+def main() -> None:
+    """Run `rhot`; what a user can mend is one line on standard error and exit code 2."""
+    logging.basicConfig(level="WARNING", format="rhot: %(message)s")
+    try:
+        application()()
+    except* RhotError as group:
+        for error in leaves(group):
+            typer.echo(f"rhot: error: {error}", err=True)
+        sys.exit(EXIT_USER)
+
+
+if __name__ == "__main__":
+    main()

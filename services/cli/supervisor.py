@@ -1,0 +1,124 @@
+"""Child processes that are restarted when they end, and all ended together: what systemd does for an installed rig.
+
+Each child leads its own process group (Ctrl-C reaches only the supervisor, which ends them in order) and is killed by the
+kernel should the supervisor die without a word. Their JSON log lines come out as one line of text each, warnings only unless
+asked for more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ctypes
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rhot.lifecycle import EXIT_USER
+
+# As systemd's RestartSec of the installed units: poses are back within a second of a crash.
+_RESTART_S = 0.5
+# A service that stops with a message for the user will say the same at once; asking again every five seconds is enough.
+_RESTART_AFTER_USER_ERROR_S = 5.0
+# A service ends within a second of SIGTERM; five are for a loaded machine.
+_STOP_S = 5.0
+_PR_SET_PDEATHSIG = 1
+_LINE_LIMIT = 1 << 20
+
+
+@dataclass(frozen=True)
+class Child:
+    """A process to keep running."""
+
+    name: str
+    argv: Sequence[str]
+
+
+def service_argv(package: str, *options: str) -> list[str]:
+    """Command line of one of our own services, in this very Python."""
+    return [sys.executable, "-m", f"services.{package}", *options]
+
+
+class Supervisor:
+    """Runs children until cancelled. say(name, level, text) gets what they log."""
+
+    def __init__(self, say: Callable[[str, str, str], None]) -> None:
+        self.restarts: dict[str, int] = {}
+        self.pids: dict[str, int] = {}
+        self._say = say
+
+    async def keep(self, child: Child) -> None:
+        """Keep one child running; ends it when cancelled."""
+        while True:
+            started_s = time.monotonic()
+            code = await self._run_once(child)
+            pause_s = _RESTART_AFTER_USER_ERROR_S if code == EXIT_USER else _RESTART_S
+            self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
+            lived_s = time.monotonic() - started_s
+            self._say(child.name, "warning", f"ended with {_describe(code)} after {lived_s:.1f} s, starting again in {pause_s:g} s")
+            await asyncio.sleep(pause_s)
+
+    async def _run_once(self, child: Child) -> int:
+        process = await asyncio.create_subprocess_exec(
+            *child.argv,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+            process_group=0,
+            preexec_fn=_die_with_parent,
+            limit=_LINE_LIMIT,
+        )
+        self.pids[child.name] = process.pid
+        try:
+            await self._listen(child.name, process)
+            return await process.wait()
+        finally:
+            await asyncio.shield(_end(process))
+
+    async def _listen(self, name: str, process: asyncio.subprocess.Process) -> None:
+        if process.stdout is None:
+            return
+        while True:
+            try:
+                line = await process.stdout.readline()
+            except ValueError:  # a line beyond the limit: asyncio has dropped it
+                continue
+            if not line:
+                return
+            level, text = _parse(line.decode(errors="replace").rstrip())
+            if text:
+                self._say(name, level, text)
+
+
+def _die_with_parent() -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    """SIGTERM, and SIGKILL for what does not listen."""
+    if process.returncode is not None:
+        return
+    with contextlib.suppress(ProcessLookupError):
+        process.terminate()
+        try:
+            await asyncio.wait_for(process.wait(), _STOP_S)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+
+
+def _parse(line: str) -> tuple[str, str]:
+    """(level, text) of a JSON log line; anything else is information as it stands."""
+    try:
+        record = json.loads(line)
+        text = str(record["text"]) + ("\n" + record["trace"] if "trace" in record else "")
+        return str(record["level"]), text
+    except (json.JSONDecodeError, KeyError, TypeError):
+        return "info", line
+
+
+def _describe(code: int) -> str:
+    return f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"

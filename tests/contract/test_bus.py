@@ -1,0 +1,257 @@
+"""What the bus promises, on a real loopback router."""
+
+from __future__ import annotations
+
+import asyncio
+
+import msgspec
+import pytest
+import zenoh
+
+from rhot import clock, topics
+from rhot.bus import open_bus, router_config
+from rhot.bus_streams import RawSubscription, Sample
+from rhot.errors import BusError
+from rhot.messages import ClockEcho, HandPoint, HandPoints, Session
+from rhot.stats import StreamStats
+
+DEADLINE_S = 10.0
+
+
+def points(seq: int, hand: str = "right") -> HandPoints:
+    return HandPoints(hand=hand, seq=seq, stamp_ns=clock.now_ns(), points=[])
+
+
+async def until(condition) -> None:
+    async with asyncio.timeout(DEADLINE_S):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+@pytest.fixture
+async def pair(router):
+    async with open_bus("test", [router]) as sender, open_bus("test", [router]) as receiver:
+        yield sender, receiver
+
+
+async def publisher_of(sender, topic, **names):
+    publisher = sender.publisher(topic, **names)
+    await until(lambda: publisher.wanted)
+    return publisher
+
+
+async def take(subscription, count):
+    async with asyncio.timeout(DEADLINE_S):
+        return [await anext(subscription) for _ in range(count)]
+
+
+async def test_every_delivers_all_in_order_and_stamps_the_sending(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 256)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    before_ns = clock.now_ns()
+    for seq in range(200):
+        publisher.put(points(seq))
+    received = await take(subscription, 200)
+    assert [message.seq for message in received] == list(range(200))
+    assert all(before_ns <= message.sent_ns <= clock.now_ns() for message in received)
+
+
+async def test_every_drops_the_oldest_and_counts(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 10)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    for seq in range(50):
+        publisher.put(points(seq))
+    await until(lambda: subscription.stats.dropped == 40)
+    assert [message.seq for message in await take(subscription, 10)] == list(range(40, 50))
+
+
+async def test_latest_keeps_the_newest_of_each_key(pair):
+    sender, receiver = pair
+    subscription = receiver.latest(topics.POINTS)
+    publishers = {hand: await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")}
+    for seq in range(20):
+        for hand, publisher in publishers.items():
+            publisher.put(points(seq, hand))
+    await until(lambda: subscription.stats.dropped == 38)
+    assert {(message.hand, message.seq) for message in await take(subscription, 2)} == {("left", 19), ("right", 19)}
+
+
+async def test_garbage_is_rejected_counted_and_passed_over(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 64)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    key = publisher.key
+    garbage = [
+        b"",
+        b"\xff\xfe\x00",
+        b"null",
+        b"[]",
+        b"{}",
+        b'{"hand":"right"}',
+        b"[" * 30_000,
+        msgspec.json.encode(points(1, hand="left")),  # another hand's message on this key
+        b" " * (topics.POINTS.max_bytes + 1),
+    ]
+    for payload in garbage:
+        sender.put_raw(key, payload)
+    publisher.put(points(7))
+    assert [message.seq for message in await take(subscription, 1)] == [7]
+    # Poses travel at a higher priority and may have overtaken: a second message flushes what came before it is read.
+    async with asyncio.timeout(DEADLINE_S):
+        while subscription.stats.rejected < len(garbage):
+            publisher.put(points(8))
+            assert (await take(subscription, 1))[0].seq == 8
+    assert subscription.stats.rejected == len(garbage)
+
+
+async def test_what_is_not_finite_is_not_sent(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 64)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    bad = HandPoint(name="wrist", position_m=(float("nan"), 0.0, 0.0), sigma_m=(1.0, 1.0, 1.0), cameras=[], source="measured")
+    publisher.put(msgspec.structs.replace(points(1), points=[bad]))
+    publisher.put(msgspec.structs.replace(points(2), points=[msgspec.structs.replace(bad, name="null", position_m=(0.0, 0.0, 0.0))]))
+    assert [message.seq for message in await take(subscription, 1)] == [2]
+
+
+async def test_a_slow_consumer_stalls_nobody_else(pair):
+    sender, receiver = pair
+    idle = receiver.every(topics.POINTS, 4, hand="left")
+    busy = receiver.every(topics.POINTS, 64, hand="right")
+    left, right = [await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")]
+    for seq in range(50):
+        left.put(points(seq, "left"))
+        right.put(points(seq))
+    assert [message.seq for message in await take(busy, 50)] == list(range(50))
+    await until(lambda: idle.stats.dropped == 46)
+
+
+async def test_a_flood_leaves_the_loop_to_others():
+    buffer = RawSubscription(asyncio.get_running_loop(), StreamStats(topics.POINTS, "k", {}, "in"), 4096)
+    for number in range(2000):
+        buffer.push("k", Sample("k", str(number).encode(), b"", 0))
+    turns = 0
+
+    async def other():
+        nonlocal turns
+        while True:
+            turns += 1
+            await asyncio.sleep(0)
+
+    task = asyncio.create_task(other())
+    assert [sample.payload for sample in await take(buffer, 2000)] == [str(number).encode() for number in range(2000)]
+    task.cancel()
+    assert turns >= 50
+
+
+async def test_queries_are_answered_by_functions_and_coroutines(pair):
+    sender, receiver = pair
+
+    async def picture():
+        await asyncio.sleep(0)
+        return b"png"
+
+    def broken():
+        raise ValueError("no session")
+
+    sender.answer(topics.SESSION, lambda: Session(running=True, start_ns=5))
+    sender.answer(topics.FRAME, picture, camera="left")
+    sender.answer(topics.FRAME, broken, camera="right")
+    async with asyncio.timeout(DEADLINE_S):
+        while not await receiver.get(topics.SESSION, timeout_s=0.5):
+            pass
+    assert await receiver.get(topics.SESSION) == [Session(running=True, start_ns=5)]
+    assert await receiver.get(topics.FRAME, camera="left") == [b"png"]
+    assert await receiver.get(topics.FRAME, camera="right") == []
+    assert await receiver.get(topics.FRAME, timeout_s=0.2, camera="nobody") == []
+
+
+async def test_echo_reads_the_callers_clock(pair):
+    sender, receiver = pair
+    sender.answer(topics.CLOCK, lambda: ClockEcho(master_ns=clock.now_ns()))
+    exchange = None
+    async with asyncio.timeout(DEADLINE_S):
+        while exchange is None:
+            exchange = await receiver.echo(lambda: clock.now_ns() + 1_000_000_000)
+    asked_ns, master_ns, answered_ns = exchange
+    assert asked_ns <= answered_ns
+    assert abs((asked_ns + answered_ns) / 2 - master_ns - 1e9) <= (answered_ns - asked_ns) / 2 + 1e6
+
+
+async def test_liveliness_tells_who_is_there_who_comes_and_who_goes(router):
+    async with open_bus("test", [router]) as watcher:
+        async with open_bus("test", [router]) as service:
+            service.alive("fusion", "main")
+            watch = watcher.watch_alive()
+            (there,) = await take(watch, 1)
+            assert (there.service, there.instance, there.alive) == ("fusion", "main", True)
+        (gone,) = await take(watch, 1)
+        assert not gone.alive
+
+
+async def test_survives_the_routers_death_and_return(endpoint):
+    router = zenoh.open(router_config([endpoint]))
+    async with open_bus("test", [endpoint]) as sender, open_bus("test", [endpoint]) as receiver:
+        subscription = receiver.every(topics.POINTS, 1024)
+        receiver.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+        publisher = await publisher_of(sender, topics.POINTS, hand="right")
+        await asyncio.to_thread(router.close)
+        publisher.put(points(1))  # neither raises nor blocks
+        router = await asyncio.to_thread(zenoh.open, router_config([endpoint]))
+
+        async def pump():
+            while True:
+                publisher.put(points(2))
+                await asyncio.sleep(0.01)
+
+        task = asyncio.create_task(pump())
+        assert (await take(subscription, 1))[0].seq in (1, 2)
+        task.cancel()
+        async with asyncio.timeout(DEADLINE_S):
+            while not await sender.get(topics.SESSION, timeout_s=0.5):
+                pass
+    await asyncio.to_thread(router.close)
+
+
+async def test_open_waits_for_the_router_and_can_be_cancelled(endpoint):
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0.5), open_bus("test", [endpoint]):
+            pytest.fail("there is no router")
+
+    async def enter():
+        async with open_bus("test", [endpoint]) as bus:
+            return bus.rig
+
+    task = asyncio.create_task(enter())
+    router = await asyncio.to_thread(zenoh.open, router_config([endpoint]))
+    async with asyncio.timeout(DEADLINE_S):
+        assert await task == "test"
+    await asyncio.to_thread(router.close)
+
+
+async def test_iterations_end_with_the_bus(router):
+    async with open_bus("test", [router]) as bus:
+        subscription = bus.every(topics.POINTS, 4)
+        task = asyncio.create_task(_collect(subscription))
+        await asyncio.sleep(0)
+    async with asyncio.timeout(DEADLINE_S):
+        assert await task == []
+
+
+async def _collect(subscription):
+    return [message async for message in subscription]
+
+
+async def test_misuse_is_refused(pair):
+    sender, receiver = pair
+    with pytest.raises(BusError, match="cannot publish on the pattern"):
+        sender.publisher(topics.POINTS)
+    with pytest.raises(BusError, match="use raw"):
+        receiver.every(topics.PREVIEW, 4)
+    with pytest.raises(BusError, match="holds nothing"):
+        receiver.every(topics.POINTS, 0)
+    with pytest.raises(BusError, match="Zenoh refuses"):
+        async with open_bus("test", ["nonsense"]):
+            pass
