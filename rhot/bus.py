@@ -261,6 +261,12 @@ class Bus:
         """Publish bytes on a full key, for replay."""
         self._session.put(key, payload, encoding=encoding, congestion_control=zenoh.CongestionControl.DROP)
 
+    def close(self, subscription: Subscription[Any] | RawSubscription) -> None:
+        """End one subscription before the session ends; its stream leaves health with it."""
+        subscription.undeclare()
+        self._open = [entity for entity in self._open if entity is not subscription]
+        self.streams[:] = [stats for stats in self.streams if stats is not subscription.stats]
+
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""
         for task in self._tasks:

@@ -183,26 +183,26 @@ class RawSubscription(_Buffer[Sample]):
 
     def __init__(self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None) -> None:
         super().__init__(loop, capacity)
-        self._stats = stats
+        self.stats = stats
 
     def declare(self, session: zenoh.Session, key: str) -> None:
         self._entity = session.declare_subscriber(key, self._on_sample)
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         received_ns = clock.now_ns()
-        if len(sample.payload) > self._stats.topic.max_bytes:
-            self._stats.rejected += 1
+        if len(sample.payload) > self.stats.topic.max_bytes:
+            self.stats.rejected += 1
             return
         attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
         key = str(sample.key_expr)
-        self._stats.dropped += self.push(key, Sample(key, sample.payload.to_bytes(), attachment, received_ns))
+        self.stats.dropped += self.push(key, Sample(key, sample.payload.to_bytes(), attachment, received_ns))
 
     def __aiter__(self) -> RawSubscription:
         return self
 
     async def __anext__(self) -> Sample:
         sample = await self.take()
-        self._stats.count += 1
+        self.stats.count += 1
         return sample
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -15,6 +16,7 @@ import msgspec
 import numpy as np
 
 from rhot.camera import Camera
+from rhot.config import RigConfig
 from rhot.errors import CalibrationError
 from rhot.hand import HandModel, HandName, default_hand
 
@@ -174,6 +176,15 @@ def load_cameras(folder: Path, names: list[str]) -> dict[str, Camera]:
         T = np.array(place.T_rig_from_camera)
         cameras[name] = Camera(name, lens.size_px, np.array(lens.matrix), np.array(lens.distortion), _rigid(T, folder / "rig.json", name))
     return cameras
+
+
+def load_rig_cameras(config: RigConfig, names: list[str] | None = None) -> dict[str, Camera]:
+    """The cameras of rig.toml (or those of these names) in the rig frame: as load_cameras, with [rig.world] applied."""
+    cameras = load_cameras(config.calibration_dir, [c.name for c in config.camera] if names is None else names)
+    if config.rig.world is None:
+        return cameras
+    T_rig_from_first = _rigid(np.array(config.rig.world.T_rig_from_camera), Path("rig.toml, [rig.world]"), "the first camera")
+    return {n: replace(camera, T_rig_from_camera=T_rig_from_first @ camera.T_rig_from_camera) for n, camera in cameras.items()}
 
 
 def _rigid(T: np.ndarray, path: Path, name: str) -> np.ndarray:

@@ -78,6 +78,8 @@ class Disparity(Table, frozen=True, kw_only=True):
     k: Positive = 4543.3
     z: Annotated[float, msgspec.Meta(ge=-3.0, le=-0.1)] = -1.035
     phi_rad: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)] = 0.0
+    # "power": eq. (9) with k and z above; "geometry": z = -1 and k from eq. (10) with baseline, field of view and phi_rad.
+    law: Literal["power", "geometry"] = "power"
 
 
 class Fusion(Table, frozen=True, kw_only=True):
@@ -92,6 +94,8 @@ class Fusion(Table, frozen=True, kw_only=True):
     hold_s: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.15
     # Working volume in front of the cameras; points outside it are mismatches. RHOT section 6: 100 x 100 x 100 cm.
     max_distance_m: Positive = 2.0
+    # Learn what is left of the cameras' clock errors from the markers' motion (epipolar residual against image speed).
+    tune_clocks: bool = True
     one_euro: OneEuro = OneEuro()
     disparity: Disparity = Disparity()
 

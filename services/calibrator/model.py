@@ -1,0 +1,110 @@
+"""The camera model as the adjustment needs it: projection with derivatives, and undistortion that converges. Pure.
+
+The model is rhot.camera's (pinhole, Brown-Conrady k1, k2, p1, p2, k3); a lens is one vector of nine numbers. Points behind a camera
+project to NaN; a pixel that no ray of the model reaches undistorts to NaN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot.camera import Camera
+from rhot.transforms import Array
+
+# Order of a lens vector.
+FX, FY, CX, CY, K1, K2, P1, P2, K3 = range(9)
+LENS_SIZE = 9
+
+
+def lens_camera(name: str, size_px: tuple[int, int], lens: Array, T_rig_from_camera: Array) -> Camera:
+    """rhot's Camera of a lens vector (9,)."""
+    matrix = np.array([[lens[FX], 0.0, lens[CX]], [0.0, lens[FY], lens[CY]], [0.0, 0.0, 1.0]])
+    return Camera(name, size_px, matrix, lens[K1:].copy(), T_rig_from_camera)
+
+
+def lens_vector(matrix: Array, distortion: Array) -> Array:
+    """The lens vector (9,) of a pinhole matrix (3, 3) and (k1, k2, p1, p2, k3)."""
+    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion], dtype=np.float64)
+
+
+def project(lens: Array, p_camera: Array) -> Array:
+    """Pixels (n, 2) of points (n, 3) in the camera frame, of one lens (9,) or a lens for each point (n, 9)."""
+    z = np.where(p_camera[:, 2] > 0.0, p_camera[:, 2], np.nan)
+    return _pixels(lens, _distort(lens, p_camera[:, 0] / z, p_camera[:, 1] / z))
+
+
+def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array, Array]:
+    """Pixels (n, 2), their derivatives by the point in the camera frame (n, 2, 3) and by the lens (n, 2, 9).
+
+    lens is (n, 9): one row for each point. OpenCV's documentation of calib3d gives the model.
+    """
+    z = np.where(p_camera[:, 2] > 0.0, p_camera[:, 2], np.nan)
+    x, y = p_camera[:, 0] / z, p_camera[:, 1] / z
+    fx, fy = lens[:, FX], lens[:, FY]
+    distorted = _distort(lens, x, y)
+    (a, b), (c, d) = _distortion_derivatives(lens, x, y)
+    by_point = np.empty((len(z), 2, 3))
+    by_point[:, 0] = np.stack([fx * a, fx * b, -fx * (a * x + b * y)], axis=1) / z[:, None]
+    by_point[:, 1] = np.stack([fy * c, fy * d, -fy * (c * x + d * y)], axis=1) / z[:, None]
+    r2 = x * x + y * y
+    by_lens = np.zeros((len(z), 2, LENS_SIZE))
+    by_lens[:, 0, FX], by_lens[:, 1, FY] = distorted
+    by_lens[:, 0, CX] = by_lens[:, 1, CY] = 1.0
+    for power, name in ((r2, K1), (r2 * r2, K2), (r2 * r2 * r2, K3)):
+        by_lens[:, 0, name], by_lens[:, 1, name] = fx * x * power, fy * y * power
+    by_lens[:, 0, P1], by_lens[:, 1, P1] = fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)
+    by_lens[:, 0, P2], by_lens[:, 1, P2] = fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y
+    return _pixels(lens, distorted), by_point, by_lens
+
+
+def rays(lens: Array, pixels: Array) -> Array:
+    """Undistorted image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the model has no inverse.
+
+    Newton's method, since the fixed-point iteration diverges at the corners of wide-angle lenses.
+    """
+    target = (pixels - lens[[CX, CY]]) / lens[[FX, FY]]
+    # Start on the radius that the radial part alone gives, so that Newton stays on the near branch.
+    xy = target.copy()
+    # 30 damped steps: quadratic convergence needs 5 for |k1| = 0.4.
+    for _ in range(30):
+        x, y = xy[:, 0], xy[:, 1]
+        miss = target - np.stack(_distort(lens, x, y), axis=1)
+        (a, b), (c, d) = _distortion_derivatives(lens, x, y)
+        determinant = a * d - b * c
+        safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
+        step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
+        # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))
+    off = np.abs(np.stack(_distort(lens, xy[:, 0], xy[:, 1]), axis=1) - target).max(axis=1)
+    (a, b), (c, d) = _distortion_derivatives(lens, xy[:, 0], xy[:, 1])
+    good = (off < 1e-9) & (a * d - b * c > 0.0)
+    return np.where(good[:, None], xy, np.nan)
+
+
+def _pixels(lens: Array, distorted: tuple[Array, Array]) -> Array:
+    x, y = distorted
+    return np.stack([lens[..., FX] * x + lens[..., CX], lens[..., FY] * y + lens[..., CY]], axis=1)
+
+
+def _distort(lens: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    k1, k2, p1, p2, k3 = (lens[..., name] for name in (K1, K2, P1, P2, K3))
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return (
+        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+    )
+
+
+def _distortion_derivatives(lens: Array, x: Array, y: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """The 2x2 derivative of the distorted by the undistorted image point, by rows."""
+    k1, k2, p1, p2, k3 = (lens[..., name] for name in (K1, K2, P1, P2, K3))
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    mixed = x * y * slope + 2.0 * (p1 * x + p2 * y)
+    return (
+        (radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, mixed),
+        (mixed, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
+    )

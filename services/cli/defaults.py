@@ -1,0 +1,28 @@
+"""Where the ready-made configurations are: config/ of the source tree, or the copy that the wheel carries beside this file.
+
+pyproject.toml (hatch, force-include) puts the copy there, so the two cannot differ; a source tree has no copy.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rhot.errors import ConfigError
+
+
+def config_dir() -> Path:
+    """The folder that holds sim.toml, rig.example.toml and calibration/.
+
+    Raises ConfigError where the installation is incomplete.
+    """
+    here = Path(__file__).parent
+    # The copy first: beside an installed package, ../../config would be some other package's.
+    for folder in (here / "config", here.parents[1] / "config"):
+        if (folder / "sim.toml").is_file():
+            return folder
+    raise ConfigError(f"{here / 'config'}: rhot's own sim.toml is missing; install rhot again, or name a file with --config")
+
+
+def sim_toml() -> Path:
+    """The simulated rig of `rhot demo` and `rhot simulate`."""
+    return config_dir() / "sim.toml"

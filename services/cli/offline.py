@@ -1,0 +1,96 @@
+"""The whole rig without its processes: frames of all cameras in, markers, points and poses out, in the order of time.
+
+The step objects are the services' own; here they only meet without a bus. Pure: the same frames give the same messages. With one
+camera, without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame whose size is not its
+lens calibration's is a CalibrationError at once, as nothing could be made of it.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from rhot.calibration import load_hand, load_rig_cameras
+from rhot.camera import Camera
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError
+from rhot.hand import HandModel, HandName
+from rhot.messages import HandPoints, HandPose, MarkerFrame
+from services.fusion.step import FusionStep
+from services.pi_tracker.frame import Frame
+from services.pi_tracker.step import TrackerStep
+from services.solver.step import SolverStep
+
+
+@dataclass(frozen=True)
+class Output:
+    """What one frame led to."""
+
+    markers: list[MarkerFrame] = field(default_factory=list)
+    points: list[HandPoints] = field(default_factory=list)
+    poses: list[HandPose] = field(default_factory=list)
+
+
+class Pipeline:
+    """Trackers of all cameras, fusion and solver."""
+
+    def __init__(
+        self, config: RigConfig, trackers: dict[str, TrackerStep], clock_sigma_ns: dict[str, int], cameras: dict[str, Camera] | None
+    ) -> None:
+        """trackers and the uncertainty of their stamps (-1: unknown) by camera; cameras as `geometry` returns them."""
+        self._trackers = trackers
+        self._clock_sigma_ns = clock_sigma_ns
+        self._cameras = cameras or {}
+        self.hands: dict[HandName, HandModel] = {}
+        self._fusion: FusionStep | None = None
+        self._solver: SolverStep | None = None
+        if cameras is not None:
+            self.hands = {hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()}
+            self._fusion = FusionStep(config, cameras, self.hands)
+            self._solver = SolverStep(config, self.hands)
+
+    @property
+    def refusals(self) -> dict[str, int]:
+        """Frames and markers that fusion could not use, by reason."""
+        counts = self._fusion.refusals if self._fusion is not None else {}
+        return {reason: count for reason, count in sorted(counts.items()) if count}
+
+    def step(self, frame: Frame) -> Output:
+        """One frame through every stage."""
+        camera = self._cameras.get(frame.camera)
+        if camera is not None and camera.size_px != frame.size_px:
+            raise CalibrationError(
+                f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, its lens was calibrated at "
+                f"{camera.size_px[0]} x {camera.size_px[1]}; use images of that size, or run `rhot calibrate lens {frame.camera}`"
+            )
+        markers = self._trackers[frame.camera].step(frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera])
+        points = self._fusion.step(markers) if self._fusion is not None else []
+        return Output([markers], points, self._solve(points))
+
+    def flush(self) -> Output:
+        """What was still waiting for later frames."""
+        points = self._fusion.flush() if self._fusion is not None else []
+        return Output([], points, self._solve(points))
+
+    def _solve(self, points: list[HandPoints]) -> list[HandPose]:
+        if self._solver is None:
+            return []
+        return [pose for one in points if (pose := self._solver.step(one)) is not None]
+
+
+def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | None, str]:
+    """The calibrated cameras that 3D needs, or None and the reason why there will be markers only.
+
+    Raises CalibrationError, naming the command that helps, if hands are configured, two cameras are there and one is uncalibrated.
+    """
+    if not config.hand:
+        return None, "markers only: rig.toml has no [hand.right.markers] table that says which colour is which landmark"
+    if len(names) < 2:
+        return None, f"markers only: 3D needs two cameras, this is {names[0]!r} alone"
+    return load_rig_cameras(config, names), ""
+
+
+def merged(streams: Iterable[Iterable[Frame]]) -> Iterator[Frame]:
+    """All frames by stamp, then by name of the camera; each stream must be in order itself."""
+    return heapq.merge(*streams, key=lambda frame: (frame.stamp_ns, frame.camera))

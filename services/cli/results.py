@@ -1,0 +1,122 @@
+"""The folder `rhot track` writes: markers, points, poses and objects as .jsonl in wire format, and summary.json last of all.
+
+Each file is written as NAME.partial and gets its name when all are complete. A run that fails takes its .partial files away and
+leaves what was there before; one that is interrupted leaves them, and readers recognise that. A folder that holds anything else is
+refused, so that nobody's files are lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+import msgspec
+
+from rhot.errors import CaptureError, RhotError
+
+STREAMS = ("markers", "points", "poses", "objects")
+SUMMARY = "summary.json"
+PARTIAL = ".partial"
+# What `rhot plot` leaves beside them; a second run may overwrite the folder although it holds pictures of the first.
+PICTURES = ".png"
+
+
+class CameraSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """One camera's share: frames read, frames with a marker, and markers found, all and per colour."""
+
+    frames: int
+    frames_with_markers: int
+    detections: int
+    colors: dict[str, int]
+
+
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """What a run of `rhot track` did. No times of day and no durations: the same input writes the same bytes.
+
+    refusals counts what fusion could not use, by reason; complete is false if a recording could not be read to its end, and
+    warnings say which; notes say what was left out or looks odd.
+    """
+
+    rig: str
+    cameras: dict[str, CameraSummary]
+    markers: int
+    points: int
+    poses: int
+    objects: int
+    refusals: dict[str, int]
+    complete: bool
+    warnings: list[str]
+    notes: list[str]
+
+
+class ResultWriter:
+    """Context manager: open files to write messages to, named for good on `finish`."""
+
+    def __init__(self, folder: Path) -> None:
+        """Raises CaptureError if the folder cannot be made or holds foreign files."""
+        self.folder = folder
+        self.counts = dict.fromkeys(STREAMS, 0)
+        self._files: dict[str, BinaryIO] = {}
+        self._stack = ExitStack()
+        _prepare(folder)
+
+    def __enter__(self) -> Self:
+        for name in STREAMS:
+            path = self.folder / f"{name}.jsonl{PARTIAL}"
+            self._files[name] = self._stack.enter_context(path.open("wb"))
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+        if kind is not None and issubclass(kind, RhotError):
+            for path in self.folder.glob(f"*{PARTIAL}"):
+                path.unlink()
+            if not any(self.folder.iterdir()):
+                self.folder.rmdir()
+
+    def write(self, stream: str, messages: Iterable[msgspec.Struct]) -> None:
+        """Append messages, one a line."""
+        for message in messages:
+            self._files[stream].write(msgspec.json.encode(message) + b"\n")
+            self.counts[stream] += 1
+
+    def finish(self, summary: Summary) -> None:
+        """Give the files their names and write summary.json."""
+        self._stack.close()
+        # Without its summary a result counts as incomplete, so that old and new files are never taken for one.
+        (self.folder / SUMMARY).unlink(missing_ok=True)
+        for name in STREAMS:
+            (self.folder / f"{name}.jsonl{PARTIAL}").replace(self.folder / f"{name}.jsonl")
+        partial = self.folder / f"{SUMMARY}{PARTIAL}"
+        partial.write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
+        partial.replace(self.folder / SUMMARY)
+
+
+def check_result(folder: Path, *streams: str) -> None:
+    """Raises CaptureError unless the folder holds a complete result with these streams."""
+    if not folder.is_dir():
+        raise CaptureError(f"{folder}: no such folder; make it with `rhot track CAPTURE --out {folder}`")
+    if any(folder.glob(f"*{PARTIAL}")):
+        raise CaptureError(f"{folder}: holds {PARTIAL} files of a run that was interrupted; run `rhot track` into it again")
+    if not (folder / SUMMARY).is_file():
+        raise CaptureError(f"{folder}: has no {SUMMARY}, so it is no complete result; make one with `rhot track CAPTURE --out {folder}`")
+    for stream in streams:
+        if not (folder / f"{stream}.jsonl").is_file():
+            raise CaptureError(f"{folder}: has no {stream}.jsonl; make it with `rhot track CAPTURE --out {folder}`")
+
+
+def _prepare(folder: Path) -> None:
+    own = {f"{name}.jsonl" for name in STREAMS} | {SUMMARY}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        present = sorted(path.name for path in folder.iterdir())
+        foreign = [name for name in present if name.removesuffix(PARTIAL) not in own and not name.endswith(PICTURES)]
+        if foreign:
+            raise CaptureError(
+                f"{folder}: holds files that are not a result of `rhot track` ({', '.join(foreign[:3])}); give --out another folder"
+            )
+    except OSError as error:
+        raise CaptureError(f"{folder}: cannot be written: {error}") from None

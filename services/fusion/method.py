@@ -1,0 +1,60 @@
+"""What every method of fusion offers: take in one camera's observations, and tell where the landmarks are at an instant.
+
+FusionStep owns one of the three (kalman, triangulate, disparity) and knows no more of it than this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from rhot.transforms import Array
+from services.fusion.observations import View
+
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """All S landmarks at one instant, rig frame; rows whose `found` is false hold nothing."""
+
+    found: Bools  # (S,)
+    positions_m: Array  # (S, 3)
+    covariances_m2: Array  # (S, 3, 3)
+    cameras: Bools  # (S, C) which cameras saw it about then
+    measured: Bools  # (S,) two or more did; else it is predicted
+
+
+@dataclass
+class Counts:
+    """What became of observations and landmarks since the start."""
+
+    accepted: int = 0
+    gated: int = 0  # contradicts the track
+    late: int = 0  # older than all that is remembered
+    refused: int = 0  # rays that do not meet in front of the cameras
+    started: int = 0
+    dropped: int = 0
+
+
+class Method(Protocol):
+    """One way from observations to points. Times are seconds since an instant that FusionStep chose."""
+
+    counts: Counts
+    # Frames of the reference camera that a result waits for at least, beyond what the user asked.
+    frames_after: int
+
+    def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
+        """Take in a frame; times_s (n,) are the observations' own instants, in any order from frame to frame."""
+        ...
+
+    def estimate(self, time_s: float) -> Estimates:
+        """Where the landmarks are at an instant, as far as the observations so far tell; may be asked once for each, ascending."""
+        ...
+
+    def reset(self) -> None:
+        """Forget all observations: time starts anew."""
+        ...

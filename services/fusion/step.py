@@ -1,0 +1,116 @@
+"""Fusion as one pure step: MarkerFrames in, HandPoints out. Live, offline, replayed and tested alike.
+
+One output per hand for each frame of the reference camera, the fastest one that delivers; if it falls silent another carries on.
+Frames that come late, twice, out of order, from an unknown camera, in another size than the calibration's, or with a clock that has
+jumped are counted in `refusals` and otherwise have no effect; see timeline.py for when time is taken to have moved for all.
+Missing cameras or markers make landmarks `predicted`, then absent; a hand of which nothing is seen gives HandPoints without points.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+
+from rhot.camera import Camera
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError
+from rhot.hand import HANDS, HandModel, HandName
+from rhot.messages import HandPoint, HandPoints, MarkerFrame, PointSource
+from services.fusion.clocks import ClockTuner
+from services.fusion.kalman import KalmanMethod
+from services.fusion.method import Estimates, Method
+from services.fusion.observations import Observer, Refusal
+from services.fusion.pace import Pace
+from services.fusion.paired import PairedMethod
+from services.fusion.surface import to_axis
+from services.fusion.timeline import Timeline, Verdict
+
+# Positions and sigmas are told to a micrometre: a hundredth of the smallest sigma of a hand at arm's length.
+_DIGITS = 6
+
+
+class FusionStep:
+    """The state of fusion between frames; deterministic in its input."""
+
+    def __init__(self, config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]) -> None:
+        """cameras by name as rhot.calibration.load_cameras gives them; a model for every [hand.*] table of the rig.
+
+        Raises CalibrationError if there are fewer than two cameras or a hand's model is missing.
+        """
+        if len(cameras) < 2:
+            raise CalibrationError(
+                f"fusion needs two calibrated cameras or more, it has {sorted(cameras)}; add [[camera]] tables to rig.toml"
+            )
+        missing = [hand for hand in config.hand if hand not in hands]
+        if missing:
+            raise CalibrationError(f"no model of the {missing[0]} hand was given to fusion; it has {sorted(hands)}")
+        self.refusals: Counter[str] = Counter()
+        self._observer = Observer(config, cameras)
+        self._slots = self._observer.slots
+        self._fps = np.array([config.camera_named(name).fps for name in cameras])
+        self._radii_m = np.array([hands[slot.hand].paint[slot.landmark].radius_m for slot in self._slots])
+        # Where the mean viewing ray starts; (3,) m.
+        self.eye_rig = np.mean([camera.centre_rig for camera in cameras.values()], axis=0)
+        self._hands = [hand for hand in HANDS if hand in config.hand]
+        all_cameras = self._observer.cameras
+        kind = KalmanMethod if config.fusion.method == "kalman" else PairedMethod
+        self.method: Method = kind(len(self._slots), all_cameras, 1.0 / self._fps, config.fusion)
+        self.clocks = ClockTuner(all_cameras, len(self._slots), 1.0 / self._fps, enabled=config.fusion.tune_clocks)
+        self._wait = max(config.fusion.lag_frames, self.method.frames_after)
+        self._timeline = Timeline(len(all_cameras))
+        self._pace = Pace(self._fps, self._wait)
+        self._epoch_ns = self._told_ns = 0
+        self._seq = 0
+
+    def step(self, frame: MarkerFrame) -> list[HandPoints]:
+        """Take in one frame; the points that are due with it, one message per hand, or none."""
+        view = self._observer.view(frame)
+        if isinstance(view, Refusal):
+            self.refusals[view.value] += 1
+            return []
+        self.refusals["marker"] += view.ignored
+        verdict = self._timeline.judge(view.camera, view.instant_ns)
+        if verdict in (Verdict.TWICE, Verdict.ASTRAY):
+            self.refusals[verdict.value] += 1
+            return []
+        if verdict is Verdict.RESTART:
+            self._restart(view.instant_ns)
+        times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s
+        late_s, clock_sigma_s = self.clocks.observe(view, times_s)
+        self.method.observe(view, times_s - late_s, clock_sigma_s)
+        due_ns = self._pace.frame(view.camera, view.instant_ns - round(late_s * 1e9))
+        return [] if due_ns is None else self._tell(due_ns)
+
+    def flush(self) -> list[HandPoints]:
+        """The points still waiting for later frames, at the end of a recording."""
+        return [points for instant_ns in self._pace.rest() for points in self._tell(instant_ns)]
+
+    def _restart(self, instant_ns: int) -> None:
+        """Forget everything; seconds count from this instant, as float64 cannot hold nanoseconds since 1970."""
+        self._epoch_ns = instant_ns
+        self._pace = Pace(self._fps, self._wait)
+        self.method.reset()
+        self.clocks.reset()
+
+    def _tell(self, instant_ns: int) -> list[HandPoints]:
+        """One message per hand for an instant (master clock)."""
+        estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
+        positions, covariances = to_axis(estimates.positions_m, estimates.covariances_m2, self._radii_m, self.eye_rig)
+        sigmas = np.sqrt(np.maximum(np.einsum("nii->ni", covariances), 0.0))
+        usable = estimates.found & np.isfinite(positions).all(axis=1) & np.isfinite(sigmas).all(axis=1)
+        points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
+        for row in np.flatnonzero(usable).tolist():
+            slot = self._slots[row]
+            points[slot.hand].append(self._point(slot.landmark, row, positions[row].tolist(), sigmas[row].tolist(), estimates))
+        self._seq += 1
+        stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
+        return [HandPoints(hand=hand, seq=self._seq - 1, stamp_ns=stamp_ns, points=points[hand]) for hand in self._hands]
+
+    def _point(self, name: str, row: int, position: list[float], sigma: list[float], estimates: Estimates) -> HandPoint:
+        x, y, z = (round(value, _DIGITS) for value in position)
+        sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigma)
+        cameras = [camera.name for camera, seen in zip(self._observer.cameras, estimates.cameras[row].tolist(), strict=True) if seen]
+        source: PointSource = "measured" if estimates.measured[row] else "predicted"
+        return HandPoint(name=name, position_m=(x, y, z), sigma_m=(sx, sy, sz), cameras=cameras, source=source)

@@ -1,0 +1,42 @@
+"""Compiles (or loads from numba's cache) everything fusion calls, before the first frame is there.
+
+With a cache (NUMBA_CACHE_DIR, or __pycache__ beside the modules) this takes half a second, without one half a minute;
+a service that did it at its first frame would stand still for that long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rhot.camera import Camera
+from rhot.config import RigConfig
+from rhot.hand import HandModel, HandName
+from rhot.messages import Marker, MarkerFrame
+from services.fusion.step import FusionStep
+
+# Enough frames of each camera for a track to begin, to be filtered anew, smoothed, and for a lesson of the clocks.
+_FRAMES = 8
+
+
+def warm_up(config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]) -> int:
+    """Run a scratch FusionStep over a still point half a metre before the cameras; how many messages it made."""
+    step = FusionStep(config, cameras, hands)
+    told = 0
+    for seq in range(_FRAMES):
+        for n, camera in enumerate(cameras.values()):
+            x, y = np.nan_to_num(camera.project(camera.T_rig_from_camera[:3, :3] @ [0.0, 0.0, 0.5] + step.eye_rig)[0]).tolist()
+            markers = [Marker(color=c, x_px=x, y_px=y, area_px=1.0, sigma_px=0.1, quality=1.0) for c in config.colors]
+            frame = MarkerFrame(
+                camera=camera.name,
+                seq=seq,
+                stamp_ns=10**18 + round((seq + 0.3 * n) * 1e9 / 30.0),
+                row_time_ns=0.0,
+                clock_offset_ns=0,
+                clock_sigma_ns=0,
+                size_px=camera.size_px,
+                markers=markers[:256],
+            )
+            told += len(step.step(frame))
+    return told + len(step.flush())

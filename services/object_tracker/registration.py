@@ -1,0 +1,86 @@
+"""Where the lighthouses and the objects stand: calibration/objects.json turned into transforms.
+
+Pure. Without the file every object keeps its tracker's own pose in the lighthouse frame (Registration.registered is false);
+a file whose matrix is not a rigid transform is a CalibrationError, never repaired.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rhot.calibration import ObjectPlace, Objects, load_objects
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError
+from rhot.transforms import Array, rotation_from_quaternion, transform
+
+# A matrix typed with five digits passes, a scaled or mirrored one does not.
+_RIGID_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """One configured object: its name, its origin in its tracker's frame, and how late its tracker's stamps are."""
+
+    name: str
+    T_tracker_from_object: Array  # (4, 4)
+    time_offset_ns: int
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """All that turns a tracker's pose into an object's; placements are keyed by serial."""
+
+    registered: bool
+    T_rig_from_lighthouse: Array  # (4, 4), identity while registered is false
+    placements: dict[str, Placement]
+
+
+def register(config: RigConfig, objects: Objects | None) -> Registration:
+    """The registration of the objects that rig.toml names; objects is None where none was calibrated.
+
+    An object without an entry in objects.json is its tracker: no offset. Raises CalibrationError if objects.json holds a
+    matrix that is not a rigid transform or a quaternion without a direction.
+    """
+    places = objects.objects if objects else {}
+    placements = {o.serial: _placement(o.name, places.get(o.name, ObjectPlace())) for o in config.object}
+    if objects is None:
+        return Registration(registered=False, T_rig_from_lighthouse=np.eye(4), placements=placements)
+    return Registration(True, _rigid(np.array(objects.T_rig_from_lighthouse)), placements)
+
+
+def load_registration(config: RigConfig) -> Objects | None:
+    """calibration/objects.json of a rig, or None where nobody has calibrated objects yet."""
+    if not Path(config.calibration_dir / "objects.json").exists():
+        return None
+    return load_objects(config.calibration_dir)
+
+
+def is_rotation(R: Array, tolerance: float) -> bool:
+    """Whether (3, 3) is a right-handed rotation with every entry of R R^T within `tolerance` of the identity's."""
+    # Large entries are sorted out first, so that the products below cannot overflow.
+    if not np.all(np.abs(R) <= 1.0 + tolerance):
+        return False
+    return bool(np.abs(R @ R.T - np.eye(3)).max() <= tolerance and np.linalg.det(R) > 0.0)
+
+
+def _placement(name: str, place: ObjectPlace) -> Placement:
+    q = np.array(place.orientation_wxyz)
+    offset_m = np.array(place.offset_m)
+    # 1e-3: the length of a quaternion typed with four digits; a zero one has no direction at all.
+    if not np.all(np.isfinite(offset_m)) or not abs(float(np.hypot.reduce(q)) - 1.0) < 1e-3:
+        raise CalibrationError(
+            f"objects.json: {name!r} needs a finite offset_m and a unit quaternion wxyz; run `rhot calibrate objects` again"
+        )
+    return Placement(name, transform(rotation_from_quaternion(q), offset_m), place.time_offset_ns)
+
+
+def _rigid(T: Array) -> Array:
+    bottom = np.array([0.0, 0.0, 0.0, 1.0])
+    if not np.all(np.isfinite(T)) or not is_rotation(T[:3, :3], _RIGID_TOLERANCE) or np.abs(T[3] - bottom).max() > _RIGID_TOLERANCE:
+        raise CalibrationError(
+            "objects.json: T_rig_from_lighthouse is not a rigid transform (rotation and metres); run `rhot calibrate objects` again"
+        )
+    return T

@@ -1,0 +1,14 @@
+"""rhot-pi-tracker --config rig.toml --camera left"""
+
+from __future__ import annotations
+
+from rhot.lifecycle import command
+from services.pi_tracker.service import serve
+
+
+def main() -> None:
+    command("pi_tracker", serve, instance_option="camera")
+
+
+if __name__ == "__main__":
+    main()

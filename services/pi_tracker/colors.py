@@ -1,0 +1,161 @@
+"""HSV ranges, as people edit them, compiled to chroma lookup tables with luma bounds.
+
+At a fixed chroma (u, v) the colours of all lumas differ by grey only, so hue and the spread max - min of R, G, B are fixed, and
+the bounds on saturation = spread / value and on value turn into one interval of luma. One table of 65536 entries thus holds the
+exact HSV test of every colour: the class, and the lowest and highest luma. A Pi's YUV420 planes are classified without ever being
+converted.
+
+Where ranges overlap, a pixel belongs to the colour whose hue is nearer; where two colours share a chroma but not a luma (dark and
+light blue), the second goes to another layer. Pure; a colour that is missing in the file is a CalibrationError at start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rhot.calibration import ColorRange, Colors
+from rhot.errors import CalibrationError
+from services.pi_tracker.frame import Image
+
+Bytes = npt.NDArray[np.uint8]
+Array = npt.NDArray[np.float64]
+
+# BT.601 with Y in 16..235: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U', L = 1.164 (Y - 16).
+_LUMA_GAIN = 255.0 / 219.0
+_RED_V, _GREEN_U, _GREEN_V, _BLUE_U = 1.596027, -0.391762, -0.812968, 2.017232
+
+
+@dataclass(frozen=True, eq=False)
+class ColorTable:
+    """Compiled colours: class k + 1 is names[k]; layers are (65536,) uint32 of the bytes class, low luma, high luma, 0."""
+
+    names: tuple[str, ...]
+    layers: tuple[npt.NDArray[np.uint32], ...]
+
+    def classify(self, luma: Image, chroma: Image) -> Image:
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
+        index = chroma.view(np.uint16)[:, :, 0]
+        labels = _gated(self.layers[0], index, luma)
+        for layer in self.layers[1:]:
+            # Layers never claim the same cell: they share chromas, not lumas.
+            labels = np.maximum(labels, _gated(layer, index, luma))
+        return labels
+
+
+def _gated(layer: npt.NDArray[np.uint32], index: npt.NDArray[np.uint16], luma: Image) -> Image:
+    found = layer.take(index).view(np.uint8).reshape(*luma.shape, 4)
+    classes, low, high, _ = cv2.split(found)
+    return cv2.bitwise_and(classes, cv2.inRange(luma, low, high))
+
+
+def compile_colors(colors: Colors, wanted: Sequence[str], path: Path | str = "colors.json") -> ColorTable:
+    """The table of the wanted colours.
+
+    Raises CalibrationError naming the colour, the file and the colours there are. path is for that message only.
+    """
+    missing = [name for name in wanted if name not in colors.colors]
+    if missing:
+        raise CalibrationError(
+            f"{path}: colour {missing[0]!r} of rig.toml's markers is not in it; it has {', '.join(sorted(colors.colors)) or 'none'}. "
+            f"Add it with `rhot calibrate colors`, or correct rig.toml"
+        )
+    hue, spread, top = _chroma_geometry()
+    layers = [_Layer()]
+    for number, name in enumerate(wanted, start=1):
+        low, high = _luma_interval(colors.colors[name], hue, spread, top)
+        distance = _hue_distance(colors.colors[name], hue)
+        rest = low <= high
+        for layer in layers:
+            rest = layer.claim(number, rest, low, high, distance)
+        if rest.any():
+            layers.append(_Layer())
+            layers[-1].claim(number, rest, low, high, distance)
+    return ColorTable(tuple(wanted), tuple(layer.packed() for layer in layers))
+
+
+class _Layer:
+    """One table while it is being filled; all arrays (65536,)."""
+
+    def __init__(self) -> None:
+        self.owner = np.zeros(65536, np.uint8)
+        self.low = np.full(65536, 255, np.int64)
+        self.high = np.zeros(65536, np.int64)
+        self.distance = np.full(65536, np.inf)
+
+    def claim(self, number: int, mine: npt.NDArray[np.bool_], low: Array, high: Array, distance: Array) -> npt.NDArray[np.bool_]:
+        """Take what is free, or nearer in hue than its owner; returns what must go to another layer."""
+        apart = (low > self.high) | (high < self.low)
+        taken = self.owner != 0
+        win = mine & (~taken | (~apart & (distance < self.distance)))
+        self.owner[win] = number
+        self.low[win] = low[win].astype(np.int64)
+        self.high[win] = high[win].astype(np.int64)
+        self.distance[win] = distance[win]
+        return mine & taken & apart & ~win
+
+    def packed(self) -> npt.NDArray[np.uint32]:
+        table = np.zeros((65536, 4), np.uint8)
+        table[:, 0], table[:, 1], table[:, 2] = self.owner, self.low, self.high
+        return table.view(np.uint32).reshape(65536)
+
+
+def _chroma_geometry() -> tuple[Array, Array, Array]:
+    """OpenCV hue (0..180), max - min of R, G, B, and max - L of every chroma u + 256 v; each (65536,)."""
+    v, u = np.divmod(np.arange(65536), 256)
+    U, V = u - 128.0, v - 128.0
+    red, green, blue = _RED_V * V, _GREEN_U * U + _GREEN_V * V, _BLUE_U * U
+    top = np.maximum(np.maximum(red, green), blue)
+    spread = top - np.minimum(np.minimum(red, green), blue)
+    safe = np.maximum(spread, 1e-9)
+    sector = np.where(top == red, (green - blue) / safe, np.where(top == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe))
+    return np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0), spread, top
+
+
+def _luma_interval(span: ColorRange, hue: Array, spread: Array, top: Array) -> tuple[Array, Array]:
+    """Lowest and highest luma at which a chroma lies in the range (low > high: at none); each (65536,).
+
+    OpenCV rounds hue, saturation and value, hence the halves; bounds of 0 and 255 do not bound, as RGB saturates there.
+    """
+    (h0, s0, v0), (h1, s1, v1) = span.hsv_low, span.hsv_high
+    value_low = np.full_like(hue, v0 - 0.5) if v0 > 0 else np.full_like(hue, -np.inf)
+    value_high = np.full_like(hue, v1 + 0.5) if v1 < 255 else np.full_like(hue, np.inf)
+    if s0 > 0:
+        value_high = np.minimum(value_high, 255.0 * spread / (s0 - 0.5))
+    if s1 < 255:
+        value_low = np.maximum(value_low, 255.0 * spread / (s1 + 0.5))
+    low = np.ceil(np.maximum((value_low - top) / _LUMA_GAIN + 16.0, 0.0))
+    high = np.floor(np.minimum((value_high - top) / _LUMA_GAIN + 16.0, 255.0))
+    inside = _in_hue(hue, h0, h1)
+    # A range empty in itself (low above high) stays empty: clipping must not turn it into one of a single luma.
+    return np.where(inside, np.minimum(low, 256.0), 256.0), np.where(inside, np.maximum(high, -1.0), -1.0)
+
+
+def _in_hue(hue: Array, low: int, high: int) -> npt.NDArray[np.bool_]:
+    if low <= high:
+        # A hue just below 180 rounds to 180, which OpenCV writes as 0.
+        return ((hue >= low - 0.5) & (hue < high + 0.5)) | ((low == 0) & (hue >= 179.5))
+    return (hue >= low - 0.5) | (hue < high + 0.5)
+
+
+def _hue_distance(span: ColorRange, hue: Array) -> Array:
+    """How far a chroma lies from the middle of the range, in half widths of it; (65536,)."""
+    low, high = span.hsv_low[0], span.hsv_high[0]
+    width = (high - low) % 180
+    middle = low + width / 2.0
+    return np.abs((hue - middle + 90.0) % 180.0 - 90.0) / (width / 2.0 + 0.5)
+
+
+def hsv_mask(hsv: Image, span: ColorRange) -> Image:
+    """The seed's test on an HSV image (h, w, 3): 255 inside the range; low hue above high wraps through red."""
+    low, high = np.array(span.hsv_low, np.uint8), np.array(span.hsv_high, np.uint8)
+    if span.hsv_low[0] <= span.hsv_high[0]:
+        return cv2.inRange(hsv, low, high)
+    above = cv2.inRange(hsv, low, np.array([179, *span.hsv_high[1:]], np.uint8))
+    below = cv2.inRange(hsv, np.array([0, *span.hsv_low[1:]], np.uint8), high)
+    return cv2.bitwise_or(above, below)

@@ -1,0 +1,33 @@
+"""One image of one camera with its instant: what every source yields and the tracker's step takes.
+
+Pure data. A source that does not know its rolling shutter says row_time_ns = 0, and every row then counts as taken at stamp_ns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy.typing as npt
+
+# uint8; OpenCV's stubs do not say the type of what it returns.
+Image = npt.NDArray[Any]
+Layout = Literal["i420", "bgr"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One image.
+
+    stamp_ns is mid-exposure of row 0 on the camera's own clock, row_time_ns the time from one image row to the next.
+    image is (height * 3 / 2, width) for "i420" (planes Y, U, V without padding; BT.601, Y in 16..235) and
+    (height, width, 3) for "bgr"; size_px is (width, height).
+    """
+
+    camera: str
+    seq: int
+    stamp_ns: int
+    row_time_ns: float
+    size_px: tuple[int, int]
+    image: Image
+    layout: Layout

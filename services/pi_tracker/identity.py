@@ -1,0 +1,113 @@
+"""Which of several blobs of one colour is the marker: plausibility by size, shape, jump, company, and what stands in the room.
+
+Pure. A colour never seen takes the blob that fits the other markers best; one lost for long may reappear anywhere near them. A blob that is
+far from where the hand can be, or that has stood in the room all along, is refused: a marker is reported missing rather than guessed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from services.pi_tracker.company import support
+from services.pi_tracker.room import Room
+from services.pi_tracker.search import Blob
+
+# A hand at arm's length moves 2 m/s when it is fast: at 0.5 m and f = 527 px that is 2100 px/s.
+_FASTEST_PX_S = 2100.0
+# Paint patches seen from any side, blurred by fast motion, stay within this ratio of sides and fill this share of their box.
+_MAX_ASPECT, _MIN_FILL = 6.0, 0.3
+# A standing thing of the marker's colour is this much less likely to be the marker.
+_IN_ROOM = 0.15
+# Blobs less likely than this against a perfect one are not the marker.
+_LEAST = 0.25
+# A remembered area follows the marker with this share of the old one per frame.
+_AREA_KEEP = 0.8
+# What company counts against having none at all.
+_ALONE = 0.1
+
+
+@dataclass
+class Track:
+    """What is known of one colour's marker."""
+
+    x_px: float
+    y_px: float
+    area_px: float
+    stamp_ns: int
+    vx_px_s: float = 0.0
+    vy_px_s: float = 0.0
+
+    def predicted(self, stamp_ns: int) -> tuple[float, float]:
+        """Where it should be; velocity is trusted for a tenth of a second."""
+        ahead_s = min(max((stamp_ns - self.stamp_ns) * 1e-9, 0.0), 0.1)
+        return self.x_px + self.vx_px_s * ahead_s, self.y_px + self.vy_px_s * ahead_s
+
+    def follow(self, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> None:
+        """Take in the marker's new place."""
+        elapsed_s = (stamp_ns - self.stamp_ns) * 1e-9
+        # After a longer gap, or with stamps that do not advance, the old place tells nothing of the speed.
+        if 0.0 < elapsed_s < 0.1:
+            self.vx_px_s, self.vy_px_s = (x_px - self.x_px) / elapsed_s, (y_px - self.y_px) / elapsed_s
+        else:
+            self.vx_px_s = self.vy_px_s = 0.0
+        self.area_px = _AREA_KEEP * self.area_px + (1.0 - _AREA_KEEP) * area_px
+        self.x_px, self.y_px, self.stamp_ns = x_px, y_px, stamp_ns
+
+    def likeness(self, blob: Blob, stamp_ns: int, margin_px: float) -> float:
+        """How much a blob is like this marker by place and size, 0..1."""
+        x, y = self.predicted(stamp_ns)
+        dx, dy = blob.centre_px[0] - x, blob.centre_px[1] - y
+        gap_s = min(max((stamp_ns - self.stamp_ns) * 1e-9, 0.0), 1.0)
+        reach = margin_px + _FASTEST_PX_S * gap_s
+        size = min(blob.area_px, self.area_px) / max(blob.area_px, self.area_px, 1.0)
+        return float(size**0.5 / (1.0 + (dx * dx + dy * dy) / (reach * reach)))
+
+
+def shape_fits(blob: Blob, max_area_px: float) -> bool:
+    """Whether a blob may be a patch of paint at all."""
+    width, height = blob.rect[2] - blob.rect[0], blob.rect[3] - blob.rect[1]
+    return (
+        blob.area_px <= max_area_px and max(width, height) <= _MAX_ASPECT * min(width, height) and blob.cells >= _MIN_FILL * width * height
+    )
+
+
+class Identity:
+    """Tracks of `count` colours."""
+
+    def __init__(self, count: int, margin_px: float) -> None:
+        self._margin_px = margin_px
+        self._tracks: list[Track | None] = [None] * count
+        self._rooms = [Room() for _ in range(count)]
+
+    def choose(self, blobs: list[list[Blob]], stamp_ns: int) -> list[tuple[Blob, float] | None]:
+        """Each colour's marker with a certainty 0..1, which falls where a second blob is nearly as good; None where there is none."""
+        return [self._choose(color, blobs, stamp_ns) for color in range(len(blobs))]
+
+    def follow(self, color: int, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> None:
+        """Take in a marker that was measured."""
+        track = self._tracks[color]
+        if track is None:
+            self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns)
+        else:
+            track.follow(x_px, y_px, area_px, stamp_ns)
+
+    def _choose(self, color: int, blobs: list[list[Blob]], stamp_ns: int) -> tuple[Blob, float] | None:
+        own = blobs[color]
+        if not own:
+            return None
+        others = blobs[:color] + blobs[color + 1 :]
+        scored = sorted(((self._score(color, blob, others, stamp_ns), blob) for blob in own), key=lambda pair: -pair[0])
+        best, marker = scored[0]
+        for _, blob in scored[0 if best < _LEAST else 1 :]:
+            self._rooms[color].learn(blob, stamp_ns)
+        if best < _LEAST:
+            return None
+        second = scored[1][0] if len(scored) > 1 else 0.0
+        return marker, 1.0 - 0.5 * second / best
+
+    def _score(self, color: int, blob: Blob, others: list[list[Blob]], stamp_ns: int) -> float:
+        track = self._tracks[color]
+        score = 1.0 if track is None else track.likeness(blob, stamp_ns, self._margin_px)
+        if self._rooms[color].holds(blob):
+            score *= _IN_ROOM
+        return score * (_ALONE + (1.0 - _ALONE) * support(blob, others))

@@ -1,0 +1,85 @@
+"""Markers by chroma lookup table: search where they can be, tell which blob is which, measure it.
+
+Pure. A colour that is not seen is searched in the whole image from the next frame on; its place and size are remembered, so that a blob
+that cannot be it is not taken for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rhot.config import Tracker
+from rhot.messages import Marker
+from services.pi_tracker import roi
+from services.pi_tracker.centroid import Centroid, centroid
+from services.pi_tracker.colors import ColorTable
+from services.pi_tracker.frame import Frame
+from services.pi_tracker.identity import Identity, shape_fits
+from services.pi_tracker.planes import Picture, Rect, picture
+from services.pi_tracker.search import Blob, Searcher
+
+Lap = Callable[[str], None]
+
+
+class LutFinder:
+    """Markers of one camera, frame after frame."""
+
+    def __init__(self, table: ColorTable, settings: Tracker, lap: Lap) -> None:
+        self._names = table.names
+        self._settings = settings
+        self._searcher = Searcher(table, settings)
+        self._lap = lap
+        self._identity = Identity(len(table.names), settings.roi_margin_px)
+        self._boxes: dict[int, Rect] = {}
+
+    def find(self, frame: Frame) -> list[Marker]:
+        """Markers of one image, at most one per colour."""
+        image = picture(frame)
+        blobs = self._search(image)
+        self._lap("search")
+        self._boxes = {}
+        markers = []
+        for color, chosen in enumerate(self._identity.choose(blobs, frame.stamp_ns)):
+            if chosen is not None:
+                blob, certainty = chosen
+                found = centroid(image, blob)
+                self._boxes[color] = blob.rect
+                self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
+                markers.append(_marker(self._names[color], found, certainty))
+        self._lap("centroid")
+        return markers
+
+    def _search(self, image: Picture) -> list[list[Blob]]:
+        """Plausible blobs of each colour: near its last place, else in the whole image."""
+        everywhere = roi.whole(image.size)
+        margin = self._settings.roi_margin_px
+        rois = [roi.around(self._boxes[k], margin, image.size) if k in self._boxes else everywhere for k in range(len(self._names))]
+        found = self._blobs(image, rois)
+        left = [k for k, blobs in enumerate(found) if rois[k] != everywhere and (not blobs or roi.cut(blobs[0].rect, rois[k], image.size))]
+        if not left:
+            return found
+        # It has moved further than the margin: the same frame may still show it.
+        again = self._blobs(image, [everywhere])
+        return [again[k] if k in left else blobs for k, blobs in enumerate(found)]
+
+    def _blobs(self, image: Picture, rois: list[Rect]) -> list[list[Blob]]:
+        """Plausible blobs of each colour inside its rectangle, largest first; one rectangle stands for all."""
+        found: list[list[Blob]] = [[] for _ in self._names]
+        for rect in roi.joined(rois):
+            for blob in self._searcher.blobs(image, rect):
+                own = rois[blob.color] if len(rois) > 1 else rect
+                if roi.inside(*blob.centre_px, own) and shape_fits(blob, self._settings.max_area_px):
+                    found[blob.color].append(blob)
+        return found
+
+
+def _marker(name: str, found: Centroid, certainty: float) -> Marker:
+    return Marker(
+        color=name,
+        # A hundredth of the best sigma is as fine as the position deserves.
+        x_px=round(found.x_px, 3),
+        y_px=round(found.y_px, 3),
+        area_px=round(found.area_px, 1),
+        sigma_px=round(found.sigma_px, 4),
+        quality=round(found.quality * certainty, 3),
+    )

@@ -1,0 +1,107 @@
+"""Any frame as luma and chroma: the one form in which colours are looked up and blobs are measured.
+
+Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it; a BGR image is averaged 2x2 first, never sampled (one
+pixel's chroma costs .87 px of centroid, the average .41). Only the part asked for is converted. An odd last row or column is left out.
+Cells are 2x2 pixels: cell (i, j) covers pixels 2i..2i+1, 2j..2j+1, so its centre lies at pixel 2i + 0.5.
+
+An image that does not have the shape its frame claims raises SourceError.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from rhot.errors import SourceError
+from services.pi_tracker.frame import Frame, Image
+
+# (x0, y0, x1, y1) in cells, the end excluded.
+Rect = tuple[int, int, int, int]
+
+# BT.601, Y in 16..235, chroma about 128, from B, G, R in 0..255; the inverse of OpenCV's COLOR_YUV2BGR_I420.
+_Y_FROM_BGR = (0.097906, 0.504129, 0.256788)
+_U_FROM_BGR = (0.439216, -0.290993, -0.148223)
+_V_FROM_BGR = (-0.071427, -0.367788, 0.439216)
+_LUMA = np.array([[*_Y_FROM_BGR, 16.0]])
+_CHROMA = np.array([[*_U_FROM_BGR, 128.0], [*_V_FROM_BGR, 128.0]])
+_ZERO = np.array([16.0, 128.0, 128.0], np.float32)
+
+
+class Picture(Protocol):
+    """A frame as luma and chroma."""
+
+    size: tuple[int, int]  # cells (width, height)
+
+    def cells(self, rect: Rect) -> tuple[Image, Image]:
+        """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle."""
+
+    def patch(self, rect: Rect) -> Image:
+        """Every pixel of a rectangle of cells: Y - 16, U - 128, V - 128; (2h, 2w, 3) float32."""
+
+
+class _Planar:
+    """I420."""
+
+    def __init__(self, image: Image, width: int, height: int) -> None:
+        half_w, half_h = width // 2, height // 2
+        self.size = (half_w, half_h)
+        self._y = image[:height]
+        chroma = image[height:].reshape(2, half_h, half_w)
+        self._u, self._v = chroma[0], chroma[1]
+
+    def cells(self, rect: Rect) -> tuple[Image, Image]:
+        x0, y0, x1, y1 = rect
+        luma = cv2.resize(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+        return luma, cv2.merge((self._u[y0:y1, x0:x1], self._v[y0:y1, x0:x1]))
+
+    def patch(self, rect: Rect) -> Image:
+        x0, y0, x1, y1 = rect
+        return _full(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], cv2.merge((self._u[y0:y1, x0:x1], self._v[y0:y1, x0:x1])))
+
+
+class _Packed:
+    """BGR."""
+
+    def __init__(self, image: Image, width: int, height: int) -> None:
+        self.size = (width // 2, height // 2)
+        self._image = image
+
+    def cells(self, rect: Rect) -> tuple[Image, Image]:
+        x0, y0, x1, y1 = rect
+        bgr = cv2.resize(self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+        return cv2.transform(bgr, _LUMA), cv2.transform(bgr, _CHROMA)
+
+    def patch(self, rect: Rect) -> Image:
+        x0, y0, x1, y1 = rect
+        bgr = self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+        half = cv2.resize(bgr, (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+        return _full(cv2.transform(bgr, _LUMA), cv2.transform(half, _CHROMA))
+
+
+def _full(luma: Image, chroma: Image) -> Image:
+    """Y - 16, U - 128, V - 128 of every pixel, chroma between the cells' centres; (2h, 2w), (h, w, 2) -> (2h, 2w, 3) float32."""
+    height, width = luma.shape
+    out = np.empty((height, width, 3), np.float32)
+    out[:, :, 0] = luma
+    out[:, :, 1:] = cv2.resize(chroma, (width, height), interpolation=cv2.INTER_LINEAR)
+    out -= _ZERO
+    return out
+
+
+def picture(frame: Frame) -> Picture:
+    """The frame as luma and chroma; no pixel is touched yet."""
+    width, height = frame.size_px
+    image = frame.image
+    expected = (height * 3 // 2, width) if frame.layout == "i420" else (height, width, 3)
+    if image.shape != expected or image.dtype != np.uint8 or min(width, height) < 2:
+        raise SourceError(
+            f"camera {frame.camera!r}: frame {frame.seq} is an image of shape {image.shape} ({image.dtype}), "
+            f"expected {expected} of uint8 for {width}x{height} {frame.layout}"
+        )
+    if frame.layout == "bgr":
+        return _Packed(image, width, height)
+    if width % 2 or height % 2:
+        raise SourceError(f"camera {frame.camera!r}: I420 needs even sizes, got {width}x{height}")
+    return _Planar(np.ascontiguousarray(image), width, height)

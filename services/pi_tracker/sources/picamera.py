@@ -1,0 +1,150 @@
+"""A Raspberry Pi camera through picamera2: YUV420 frames, fixed exposure, gain and colour gains, a stamp on CLOCK_REALTIME.
+
+FrameWallClock is the instant at which row 0 starts to be read out, the end of its exposure; half the exposure before it is the middle.
+SensorTimestamp counts from boot and is never used. Without an exposure calibration the camera's auto modes stay on and the notes say so.
+A missing package or camera, a system too old for FrameWallClock, and a camera that stops delivering raise SourceError.
+Written from picamera2's sources and tested against a stand-in; not tried on hardware.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from rhot.calibration import Exposure
+from rhot.config import CameraTable
+from rhot.errors import SourceError
+from services.pi_tracker.frame import Frame, Image
+
+# Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2) 18.9 us.
+_LINE_US = {"ov5647": 33.7, "imx219": 18.9}
+# The slowest exposure of a 10 fps camera is 100 ms; one that is silent for this long is gone.
+_SILENCE_S = 2.0
+
+
+class PiCamera:
+    """Camera `number` of this Raspberry Pi."""
+
+    live = True
+
+    def __init__(self, table: CameraTable, number: int, exposure: Exposure | None) -> None:
+        self.notes: list[str] = []
+        self._table = table
+        self._number = number
+        self._exposure = exposure
+        self._camera: Any = None
+        self._stride = 0
+        self._size = table.size_px
+        self._row_time_ns = 0.0
+        self._seq = 0
+
+    def open(self) -> None:
+        module = _package()
+        there = module.Picamera2.global_camera_info()
+        if self._number >= len(there):
+            names = [f"{index}: {info.get('Model', '?')}" for index, info in enumerate(there)]
+            raise SourceError(
+                f"camera {self._table.name!r}: this machine has no camera {self._number}; it has {', '.join(names) or 'none'}. "
+                "Check the ribbon cable and `rpicam-hello --list-cameras`"
+            )
+        try:
+            self._camera = module.Picamera2(self._number)
+            self._configure()
+            self._camera.start()
+        except RuntimeError as error:
+            raise SourceError(f"camera {self._table.name!r}: cannot be started: {error}; does another program use it?") from None
+
+    def _configure(self) -> None:
+        mode = _best_mode(self._camera.sensor_modes, self._table)
+        config = self._camera.create_video_configuration(
+            main={"size": self._table.size_px, "format": "YUV420"},
+            # BT.601 with Y in 16..235 at every size: the colour tables' convention.
+            colour_space=importlib.import_module("libcamera").ColorSpace.Smpte170m(),
+            sensor={"output_size": mode["size"], "bit_depth": mode["bit_depth"]} if mode else {},
+            # No frame waits in a queue: each request is the next one to be exposed.
+            queue=False,
+            buffer_count=4,
+            controls=self._controls(),
+        )
+        self._camera.configure(config)
+        main = self._camera.camera_configuration()["main"]
+        self._stride, self._size = int(main["stride"]), (int(main["size"][0]), int(main["size"][1]))
+        if self._size != tuple(self._table.size_px):
+            self.notes.append(f"camera {self._table.name!r}: delivers {self._size[0]}x{self._size[1]} instead of {self._table.size_px}")
+        line_us = _LINE_US.get(str(self._camera.camera_properties.get("Model", "")), 0.0)
+        self._row_time_ns = line_us * 1000.0 * (mode["size"][1] / self._size[1] if mode else 1.0)
+        if not line_us:
+            self.notes.append(f"camera {self._table.name!r}: the sensor's readout time is unknown; rows count as taken at once")
+
+    def _controls(self) -> dict[str, Any]:
+        frame_us = round(1e6 / self._table.fps)
+        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)}
+        if self._exposure is None:
+            self.notes.append(
+                f"camera {self._table.name!r}: no exposure calibration, its auto modes stay on and colours may drift; "
+                f"run `rhot calibrate camera {self._table.name}`"
+            )
+            return controls
+        return controls | {
+            "AeEnable": False,
+            "AwbEnable": False,
+            "ExposureTime": round(self._exposure.exposure_us),
+            "AnalogueGain": self._exposure.gain,
+            "ColourGains": (self._exposure.red_gain, self._exposure.blue_gain),
+        }
+
+    def read(self) -> Frame:
+        try:
+            request = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
+        except TimeoutError:
+            raise SourceError(f"camera {self._table.name!r}: no image for {_SILENCE_S:g} s; is its cable loose?") from None
+        try:
+            metadata = request.get_metadata()
+            image = unpadded(request.make_buffer("main"), self._size, self._stride)
+        finally:
+            request.release()
+        frame = Frame(self._table.name, self._seq, self._stamp_ns(metadata), self._row_time_ns, self._size, image, "i420")
+        self._seq += 1
+        return frame
+
+    def _stamp_ns(self, metadata: dict[str, Any]) -> int:
+        wall_ns = metadata.get("FrameWallClock")
+        if wall_ns is None:
+            raise SourceError(f"camera {self._table.name!r}: libcamera gives no FrameWallClock; update with `sudo apt full-upgrade`")
+        return int(wall_ns) - round(float(metadata.get("ExposureTime", 0.0)) * 500.0)
+
+    def close(self) -> None:
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+
+def unpadded(buffer: Image, size_px: tuple[int, int], stride: int) -> Image:
+    """A YUV420 buffer, whose rows are padded to `stride` bytes (chroma: half of it), as packed I420 (height * 3 / 2, width)."""
+    width, height = size_px
+    needed = stride * height * 3 // 2
+    if buffer.size < needed:
+        raise SourceError(f"camera buffer of {buffer.size} bytes is too small for {width}x{height} YUV420 at stride {stride} ({needed})")
+    if stride == width:
+        return buffer[:needed].reshape(height * 3 // 2, width)
+    luma = buffer[: stride * height].reshape(height, stride)[:, :width]
+    chroma = buffer[stride * height : needed].reshape(height, stride // 2)[:, : width // 2]
+    return np.concatenate([luma.ravel(), chroma.ravel()]).reshape(height * 3 // 2, width)
+
+
+def _package() -> Any:
+    try:
+        return importlib.import_module("picamera2")
+    except ImportError as error:
+        raise SourceError(
+            f"picamera2 is not installed ({error}): run `sudo apt install python3-picamera2`, "
+            "and make the virtual environment with --system-site-packages"
+        ) from None
+
+
+def _best_mode(modes: list[dict[str, Any]], table: CameraTable) -> dict[str, Any] | None:
+    """The sensor mode that sees the most at the wanted rate, and of those the smallest that covers the image."""
+    usable = [mode for mode in modes if "crop_limits" in mode and mode["fps"] >= table.fps and mode["size"][1] >= table.size_px[1]]
+    return min(usable, key=lambda mode: (-mode["crop_limits"][2] * mode["crop_limits"][3], mode["size"][0]), default=None)

@@ -1,0 +1,100 @@
+"""A USB camera through V4L2, or any camera through a GStreamer pipeline, by OpenCV.
+
+Auto exposure and white balance are switched off and the calibrated values set; what the driver refuses is noted. The driver
+stamps frames with CLOCK_MONOTONIC when they arrive, which is brought to CLOCK_REALTIME less half the exposure; a driver without
+stamps gets the time of reading. Rolling shutter is unknown (row_time_ns 0). A camera that is missing, unplugged or silent is a
+SourceError. Not tried on hardware.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+
+from rhot import clock
+from rhot.calibration import Exposure
+from rhot.config import CameraTable
+from rhot.errors import SourceError
+from services.pi_tracker.frame import Frame
+
+# V4L2_EXPOSURE_MANUAL of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us.
+_MANUAL, _EXPOSURE_UNIT_US = 1, 100.0
+# A stamp further from now than this is not of this frame.
+_STAMP_SLACK_NS = 2_000_000_000
+
+
+class OpenCvCamera:
+    """device is a number, a path such as /dev/video0, or a GStreamer pipeline; api an OpenCV CAP_ constant."""
+
+    live = True
+
+    def __init__(
+        self,
+        table: CameraTable,
+        device: int | str,
+        exposure: Exposure | None,
+        api: int = cv2.CAP_V4L2,
+        capture: Callable[..., Any] = cv2.VideoCapture,
+    ) -> None:
+        self.notes: list[str] = []
+        self._table = table
+        self._device = device
+        self._exposure = exposure
+        self._api = api
+        self._make = capture
+        self._capture: Any = None
+        self._seq = 0
+
+    def open(self) -> None:
+        self._capture = self._make(self._device, self._api)
+        if not self._capture.isOpened():
+            hint = (
+                "see `v4l2-ctl --list-devices`"
+                if self._api == cv2.CAP_V4L2
+                else "OpenCV needs GStreamer support (Debian's python3-opencv has it)"
+            )
+            raise SourceError(
+                f"camera {self._table.name!r}: {self._device!r} cannot be opened; {hint} and check [[camera]] source in rig.toml"
+            )
+        if self._api != cv2.CAP_V4L2:
+            return
+        width, height = self._table.size_px
+        self._set("frame width", cv2.CAP_PROP_FRAME_WIDTH, width)
+        self._set("frame height", cv2.CAP_PROP_FRAME_HEIGHT, height)
+        self._set("frame rate", cv2.CAP_PROP_FPS, self._table.fps)
+        self._set("one buffer", cv2.CAP_PROP_BUFFERSIZE, 1)
+        if self._exposure is not None:
+            self._fix(self._exposure)
+
+    def _fix(self, exposure: Exposure) -> None:
+        self._set("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL)
+        self._set("exposure", cv2.CAP_PROP_EXPOSURE, exposure.exposure_us / _EXPOSURE_UNIT_US)
+        self._set("gain", cv2.CAP_PROP_GAIN, exposure.gain)
+        self._set("manual white balance", cv2.CAP_PROP_AUTO_WB, 0)
+        self._set("red gain", cv2.CAP_PROP_WHITE_BALANCE_RED_V, exposure.red_gain)
+        self._set("blue gain", cv2.CAP_PROP_WHITE_BALANCE_BLUE_U, exposure.blue_gain)
+
+    def _set(self, what: str, key: int, value: float) -> None:
+        if not self._capture.set(key, value):
+            self.notes.append(f"camera {self._table.name!r}: the driver refuses {what} = {value:g}")
+
+    def read(self) -> Frame:
+        ok, image = self._capture.read()
+        if not ok or image is None:
+            raise SourceError(f"camera {self._table.name!r}: {self._device!r} delivers no more images; is it unplugged?")
+        frame = Frame(self._table.name, self._seq, self._stamp_ns(), 0.0, (image.shape[1], image.shape[0]), image, "bgr")
+        self._seq += 1
+        return frame
+
+    def _stamp_ns(self) -> int:
+        now_ns = clock.now_ns()
+        half_exposure_ns = round(self._exposure.exposure_us * 500.0) if self._exposure is not None else 0
+        age_ns = time.monotonic_ns() - round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
+        return now_ns - half_exposure_ns - (age_ns if 0 <= age_ns < _STAMP_SLACK_NS else 0)
+
+    def close(self) -> None:
+        if self._capture is not None:
+            self._capture.release()

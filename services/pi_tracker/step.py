@@ -1,0 +1,85 @@
+"""One frame in, one MarkerFrame out: the whole of pi_tracker without its process.
+
+Pure: the same object runs live, in `rhot track`, in replay and in tests. A frame without any marker gives a MarkerFrame without
+markers; frames may skip and repeat. A colour without calibration is a CalibrationError at the start, not later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+
+from rhot.calibration import Colors
+from rhot.config import Tracker
+from rhot.messages import MarkerFrame
+from services.pi_tracker.colors import compile_colors
+from services.pi_tracker.frame import Frame
+from services.pi_tracker.lut import LutFinder
+from services.pi_tracker.seed import SeedFinder
+
+Clock = Callable[[], int]
+
+
+class TrackerStep:
+    """The tracker of one camera.
+
+    wanted are the colours to look for; all must be in colors, else CalibrationError (naming colors_path). size_px is the size in
+    rig.toml; a frame of another size is tracked as it is. clock, if given, is read at the stages' ends, for times_ms.
+    """
+
+    def __init__(
+        self,
+        camera_name: str,
+        colors: Colors,
+        settings: Tracker,
+        size_px: tuple[int, int],
+        wanted: Sequence[str],
+        clock: Clock | None = None,
+        colors_path: Path | str = "",
+    ) -> None:
+        # More OpenCV threads gain nothing on images this small, and cost the other cores.
+        cv2.setNumThreads(1)
+        self.camera_name = camera_name
+        self.size_px = size_px
+        self._settings = settings
+        self._wanted = tuple(wanted)
+        self._clock = clock
+        self._last_ns = 0
+        # Duration of each stage of the last step in ms; empty without a clock.
+        self.times_ms: dict[str, float] = {}
+        self.recolor(colors, colors_path or f"{camera_name}.colors.json")
+
+    def recolor(self, colors: Colors, path: Path | str) -> None:
+        """Take new colour ranges into force with the next frame; raises CalibrationError and keeps the old ones."""
+        table = compile_colors(colors, self._wanted, path)
+        self._finder: LutFinder | SeedFinder
+        if self._settings.method == "seed":
+            self._finder = SeedFinder(colors, self._settings, self._wanted)
+        else:
+            self._finder = LutFinder(table, self._settings, self._lap)
+
+    def step(self, frame: Frame, clock_offset_ns: int = 0, clock_sigma_ns: int = -1) -> MarkerFrame:
+        """Find the markers of one frame; the offset is the camera clock's, as rhot.clock estimates it."""
+        if self._clock is not None:
+            started_ns = self._last_ns = self._clock()
+        markers = self._finder.find(frame)
+        if self._clock is not None:
+            self.times_ms["step"] = (self._clock() - started_ns) * 1e-6
+        return MarkerFrame(
+            camera=self.camera_name,
+            seq=frame.seq,
+            stamp_ns=frame.stamp_ns,
+            row_time_ns=frame.row_time_ns,
+            clock_offset_ns=clock_offset_ns,
+            clock_sigma_ns=clock_sigma_ns,
+            size_px=frame.size_px,
+            markers=markers,
+        )
+
+    def _lap(self, stage: str) -> None:
+        if self._clock is not None:
+            now_ns = self._clock()
+            self.times_ms[stage] = (now_ns - self._last_ns) * 1e-6
+            self._last_ns = now_ns

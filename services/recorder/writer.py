@@ -1,0 +1,146 @@
+"""One recording being written: an MCAP file of raw payloads, with schemas, the rig's configuration and calibration.
+
+Payloads are kept as they came, also when they do not decode. Chunks are small, so that a killed recorder loses less than a second
+of a busy rig; `flush` hands whole chunks to the system. A full disk or an unwritable folder raises CaptureError. The file is
+locked while it is open, so that recovery leaves it alone.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from mcap.exceptions import UnsupportedCompressionError
+from mcap.writer import CompressionType, Writer
+
+from rhot.errors import CaptureError
+from rhot.topics import Topic
+from services.recorder.schemas import SCHEMA_ENCODING, json_schema, schema_name
+
+# How readers know one of ours.
+PROFILE = "rhot"
+# Measured (FACTS, "Edges"): loses at most 0.8 s at 200 messages/s, and still compresses to 2 MB/min.
+CHUNK_BYTES = 65_536
+# A rig has some dozen keys; MCAP has room for 65,535. Names come from the network.
+MAX_CHANNELS = 4096
+# Room left for the system and for finishing the file: its index is some 100 bytes a chunk, 1 MB for 20 hours.
+MIN_FREE_BYTES = 50_000_000
+
+
+class RecordingWriter:
+    """An open recording; use it as a context manager, which finishes the file.
+
+    messages, bytes and refused (messages on more keys than MAX_CHANNELS) count what came.
+    """
+
+    def __init__(self, path: Path, rig: str, version: str = "", attachments: Mapping[str, bytes] | None = None) -> None:
+        self.path = path
+        self.messages = 0
+        self.bytes = 0
+        self.refused = 0
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            check_space(path.parent)
+            self._file = path.open("xb")
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise _failed(path, error) from None
+        self._writer = _writer(self._file)
+        self._begin(rig, version, attachments or {})
+
+    def _begin(self, rig: str, version: str, attachments: Mapping[str, bytes]) -> None:
+        try:
+            self._writer.start(profile=PROFILE, library=f"rhot {version}".strip())
+            self._writer.add_metadata("rhot", {"rig": rig, "version": version})
+            for name, data in attachments.items():
+                self._writer.add_attachment(0, 0, name, "application/json", data)
+            self._file.flush()
+        except OSError as error:
+            _close(self._file)
+            raise _failed(self.path, error) from None
+
+    def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
+        """Keep one payload as it is; log_time_ns is when it arrived, on this machine's clock."""
+        channel = self._channels.get(key)
+        if channel is None and len(self._channels) >= MAX_CHANNELS:
+            self.refused += 1
+            return
+        try:
+            if channel is None:
+                channel = self._channel(topic, key)
+            self._writer.add_message(channel, log_time_ns, payload, log_time_ns, self.messages & 0xFFFFFFFF)
+        except OSError as error:
+            raise _failed(self.path, error) from None
+        self.messages += 1
+        self.bytes += len(payload)
+
+    def _channel(self, topic: Topic, key: str) -> int:
+        name = schema_name(topic)
+        if name and name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, json_schema(topic.message))  # type: ignore[arg-type]
+        encoding = "json" if name else topic.media_type
+        self._channels[key] = self._writer.register_channel(key, encoding, self._schemas.get(name, 0), {"encoding": topic.encoding})
+        return self._channels[key]
+
+    def flush(self) -> None:
+        """Hand whole chunks to the system; raises CaptureError when the disk is nearly full (the file can still be finished)."""
+        try:
+            self._file.flush()
+            check_space(self.path.parent)
+        except OSError as error:
+            raise _failed(self.path, error) from None
+
+    def close(self) -> None:
+        """Write the index and close; a second call does nothing."""
+        if self._file.closed:
+            return
+        try:
+            self._writer.finish()
+            self._file.flush()
+        except OSError as error:
+            raise _failed(self.path, error) from None
+        finally:
+            _close(self._file)
+
+    def __enter__(self) -> RecordingWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def check_space(folder: Path) -> None:
+    """Raises CaptureError while less than MIN_FREE_BYTES are free in a folder."""
+    free = shutil.disk_usage(folder).free
+    if free < MIN_FREE_BYTES:
+        raise CaptureError(
+            f"{folder}: only {free / 1e6:.0f} MB free, recordings need {MIN_FREE_BYTES / 1e6:.0f}; delete old ones or set [recorder] folder"
+        )
+
+
+def _writer(file: object) -> Writer:
+    """zstd, or lz4 where zstandard is not installed, or plain."""
+    for compression in (CompressionType.ZSTD, CompressionType.LZ4):
+        try:
+            return Writer(file, CHUNK_BYTES, compression)  # type: ignore[arg-type]
+        except UnsupportedCompressionError:
+            continue
+    return Writer(file, CHUNK_BYTES, CompressionType.NONE)  # type: ignore[arg-type]
+
+
+def _close(file: object) -> None:
+    try:
+        file.close()  # type: ignore[attr-defined]
+    except OSError:
+        # A full disk refuses the last bytes once more; the first refusal is the one that is told.
+        return
+
+
+def _failed(path: Path, error: OSError) -> CaptureError:
+    return CaptureError(
+        f"{path}: cannot be recorded: {error.strerror or error}; free the disk, or set [recorder] folder to one that can be written"
+    )

@@ -1,0 +1,96 @@
+"""The named scenes: who moves how, where, in which light. Pure data.
+
+A new scene is a row of SCENES. An unknown name is a ConfigError with the valid ones.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+from rhot.errors import ConfigError
+from rhot.hand import HandName
+
+Vec3 = tuple[float, float, float]
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Light:
+    """Directions point from the hand to the light, in the frame of the first camera; colours are linear RGB."""
+
+    key_from: Vec3 = (-0.45, -0.75, -0.55)
+    key: Rgb = (0.86, 0.83, 0.78)
+    fill_from: Vec3 = (0.8, -0.1, -0.5)
+    fill: Rgb = (0.16, 0.17, 0.19)
+    ambient: Rgb = (0.30, 0.30, 0.31)
+    # A coloured lamp from the side whose light the skin reflects: RHOT section 9.1.
+    rim_from: Vec3 = (0.9, 0.3, 0.2)
+    rim: Rgb = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SceneSpec:
+    """What makes a scene; lengths in metres, angles in degrees, in the frame of the first camera."""
+
+    motion: str
+    about: str
+    # The middle of the hand, in front of the middle of the rig.
+    distance_m: float = 0.5
+    shift_m: tuple[float, float] = (0.0, 0.0)
+    # The cameras see the palm from this far on the wrist's side, so that the painted tips stay in view as the fingers curl.
+    tilt_deg: float = 38.0
+    yaw_deg: float = 8.0
+    roll_deg: float = -6.0
+    # The hand's journey: amplitudes and frequency.
+    travel_m: Vec3 = (0.0, 0.0, 0.0)
+    travel_hz: float = 0.3
+    speed: float = 1.0
+    # Mid exposure of an indoor webcam; 1/125 s.
+    exposure_s: float = 0.008
+    # Standard deviation of each colour channel in grey levels at mid-grey.
+    noise: float = 4.5
+    # Standard deviation of lens blur and defocus at the hand, px.
+    blur_px: float = 0.6
+    light: Light = Light()
+    # Saturated things in the background and beside the hand.
+    clutter: bool = False
+    # Hands beside the configured ones, unpainted.
+    extra_hands: tuple[HandName, ...] = ()
+
+
+SCENES: dict[str, SceneSpec] = {
+    "fist": SceneSpec("fist", "the finger study's palmar grasp: 2 s closing, 2 s opening", tilt_deg=50.0),
+    "pinch": SceneSpec("pinch", "thumb and index finger meet and part"),
+    "wave": SceneSpec("wave", "the open hand waves", tilt_deg=20.0),
+    "piano": SceneSpec("piano", "the fingers strike one after the other", tilt_deg=32.0),
+    "grab": SceneSpec("grab", "the hand takes an object, carries it about and puts it back", tilt_deg=30.0),
+    "random": SceneSpec("random", "all joints wander through their ranges", tilt_deg=42.0),
+    "still": SceneSpec("still", "an open hand held still", tilt_deg=20.0),
+    "hard": SceneSpec(
+        "random",
+        "fast motion, blur, coloured clutter, coloured light on the skin, more noise",
+        tilt_deg=42.0,
+        travel_m=(0.09, 0.05, 0.06),
+        travel_hz=0.7,
+        speed=1.6,
+        exposure_s=0.012,
+        noise=6.0,
+        blur_px=0.8,
+        light=Light(rim=(0.50, 0.05, 0.42), key=(0.74, 0.71, 0.68)),
+        clutter=True,
+    ),
+    "two_hands": SceneSpec("piano", "both hands; one that is not configured is unpainted", tilt_deg=30.0, extra_hands=("left", "right")),
+}
+
+
+def scene_spec(name: str) -> SceneSpec:
+    """The scene of that name.
+
+    Raises ConfigError listing the valid names.
+    """
+    if name not in SCENES:
+        near = difflib.get_close_matches(name, SCENES, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise ConfigError(f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}. Set it in [simulator] of rig.toml or on the command line")
+    return SCENES[name]

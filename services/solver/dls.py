@@ -1,0 +1,180 @@
+"""Damped least squares for one digit, the product's own: scaled, residual-damped, with the step inside the joint limits.
+
+Levenberg-Marquardt on the painted point (and the coupling, or the last bone's orientation), where
+- lengths are divided by the digit's length, so that metres, pixels and people make no difference;
+- the damping is mu = 0.01 |e|^2 + 1e-15: quadratic convergence near the goal (Fan & Yuan 2005), caution far from it;
+- the step minimises its quadratic model *within the limits* (box_qp): clipping a free step afterwards stalls at limits;
+- the best iterate is kept, and a start that gets stuck is repeated from mid-range and from three more postures.
+The finger study's variant is in dls_paper.py. A target that is out of reach gives the nearest posture and says so; one that is
+not finite leaves the angles as they were, as NOT_CONVERGED.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from rhot.transforms import Array
+from services.solver.box_qp import Integers, box_qp
+from services.solver.constraints import clamp
+from services.solver.kinematics import (
+    Chain,
+    Chains,
+    chain_of,
+    distance_to,
+    jacobian,
+    length_of,
+    reach_of,
+    scaled,
+    tip_rotation,
+    to_canonical,
+)
+from services.solver.turns import rotation_vector
+
+# What is asked for: the painted point alone; with the last bone's axes; with last flexion = ratio * second flexion.
+POSITION, POSE, COUPLED = 0, 1, 2
+# How it ended.
+SOLVED, UNREACHABLE, NOT_CONVERGED = 0, 1, 2
+
+# The coupling's residual (rad) against the position's (digit lengths). 0.01 costs at most 0.01 mm at the tip of a finger
+# whose DIP is 20 deg off the ratio; 0.01 to 0.1 made no difference to the iterations.
+COUPLING_WEIGHT = 0.01
+# Iterations of one start; 5,000 random goals from random starts needed at most 14.
+START_ITERATIONS = 20
+# Residual, in digit lengths, at which a start ends: less than 1e-6 mm.
+STOP = 1e-8
+# rad; moves a tip by less than 1e-5 mm: with a coupling that cannot be met this is where it ends.
+SMALLEST_STEP = 1e-7
+# Share of each flexion's range in the postures that a stuck digit starts again from: mid-range first, then nearly open, nearly
+# closed, and hooked (knuckle straight, the rest curled). Abduction starts in the middle.
+_AGAIN = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, 0.15, 0.15, 0.15], [0.5, 0.85, 0.85, 0.85], [0.5, 0.1, 0.8, 0.8]])
+
+
+class Goal(NamedTuple):
+    """What one digit is asked for, in its canonical frame."""
+
+    kind: int  # POSITION, POSE or COUPLED
+    point: Array  # (3,) in the chain's unit of length
+    rotation: Array  # (3, 3) axes of the last bone, for POSE
+    # (2, 4) angles to stay near, and how strongly (0: not at all), in digit lengths per radian.
+    keep: Array
+
+
+def goal(kind: int, point: Array, rotation: Array | None = None) -> Goal:
+    """A goal that keeps nothing."""
+    return Goal(kind, np.asarray(point, dtype=np.float64), np.eye(3) if rotation is None else rotation, np.zeros((2, 4)))
+
+
+@njit(cache=True)
+def _residuals(chain: Chain, wanted: Goal, q: Array, p: Array, J: Array, e: Array) -> int:
+    """Fill e and turn J's rows into those of the goal; returns how many rows. J's first three rows are the position's."""
+    for i in range(3):
+        e[i] = wanted.point[i] - p[i]
+    rows = 3
+    if wanted.kind == POSE:
+        # A rotation vector: exact also beyond 90 deg, where the study's differential folds back.
+        e[3:6] = rotation_vector(wanted.rotation @ tip_rotation(q).T)
+        rows = 6
+    elif wanted.kind == COUPLED:
+        ratio, weight = chain.coupling[0], COUPLING_WEIGHT * chain.coupling[1]
+        J[3] = 0.0
+        J[3, 2], J[3, 3] = -weight * ratio, weight
+        e[3] = weight * (ratio * q[2] - q[3])
+        rows = 4
+    for j in range(4):
+        if wanted.keep[1, j] > 0.0:
+            J[rows] = 0.0
+            J[rows, j] = wanted.keep[1, j]
+            e[rows] = wanted.keep[1, j] * (wanted.keep[0, j] - q[j])
+            rows += 1
+    return rows
+
+
+@njit(cache=True)
+def _descend(chain: Chain, wanted: Goal, q: Array, most: int) -> tuple[int, float, float]:
+    """One start: improve q in place; returns iterations, cost, distance left. The digit's length is 1."""
+    p, J, e = np.empty(3), np.empty((10, 4)), np.empty(10)
+    H, g, low, high, step = np.empty((4, 4)), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    best, best_cost, best_distance, steps, largest = q.copy(), np.inf, np.inf, 0, 1.0
+    for iteration in range(most + 1):
+        jacobian(chain, q, p, J)
+        rows = _residuals(chain, wanted, q, p, J, e)
+        cost = 0.0
+        for r in range(rows):
+            cost += e[r] * e[r]
+        if cost < best_cost:
+            best[:], best_cost, best_distance, steps = q, cost, length_of(e), iteration
+        # The last step is taken and judged: breaking before that would leave up to 1e-7 rad on the table.
+        if math.sqrt(cost) < STOP or largest < SMALLEST_STEP:
+            break
+        mu = 0.01 * cost + 1e-15
+        for a in range(4):
+            g[a] = 0.0
+            for r in range(rows):
+                g[a] -= J[r, a] * e[r]
+            for b in range(a + 1):
+                total = mu if a == b else 0.0
+                for r in range(rows):
+                    total += J[r, a] * J[r, b]
+                H[a, b] = H[b, a] = total
+            low[a], high[a] = chain.limits[a, 0] - q[a], chain.limits[a, 1] - q[a]
+        if not box_qp(H, g, low, high, step):
+            break
+        largest = 0.0
+        for a in range(4):
+            q[a] = min(max(q[a] + step[a], chain.limits[a, 0]), chain.limits[a, 1])
+            largest = max(largest, abs(step[a]))
+    q[:] = best
+    return steps, best_cost, best_distance
+
+
+@njit(cache=True)
+def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> tuple[int, float, int]:
+    """Bring the painted point to the goal, starting from and ending in q (4,).
+
+    Returns (iterations, distance left, SOLVED | UNREACHABLE | NOT_CONVERGED), lengths in the chain's unit; SOLVED means within
+    tolerance. Angles are within limits whatever comes in.
+    """
+    clamp(q, chain.limits)
+    total, far = reach_of(chain), length_of(wanted.point)
+    if not (math.isfinite(far) and total > 1e-9):
+        return 0, far if math.isfinite(far) else 0.0, NOT_CONVERGED
+    # A point a kilometre away and one at ten digit lengths ask for the same posture, but only one is well scaled.
+    shrink = min(1.0, 10.0 * total / far) if far > 0.0 else 1.0
+    unit = scaled(chain, 1.0 / total)
+    aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
+    used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS))
+    trial = np.empty(4)
+    for attempt in range(4):
+        if distance * total <= tolerance or used >= most or far > total:
+            break
+        for j in range(4):
+            trial[j] = chain.limits[j, 0] + _AGAIN[attempt, j] * (chain.limits[j, 1] - chain.limits[j, 0])
+        steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS))
+        used += steps
+        if trial_cost < cost:
+            q[:], cost, distance = trial, trial_cost, left
+    left = distance_to(chain, q, wanted.point)
+    if left <= tolerance:
+        return used, left, SOLVED
+    return used, left, NOT_CONVERGED if used >= most and far <= total else UNREACHABLE
+
+
+@njit(cache=True)
+def solve_digits(
+    chains: Chains, points: Array, angles: Array, keep: Array, most: int, tolerance_m: float, seen: Integers, ends: Array
+) -> None:
+    """All digits with seen[row] != 0: points (5, 3) in the wrist frame, angles (5, 4) in and out, goal COUPLED.
+
+    keep (5,): how strongly each digit's angles stay near what they came with (see Goal). ends (5, 3) gets (iterations, metres left, state).
+    """
+    near, nowhere = np.empty((2, 4)), np.eye(3)
+    for row in range(5):
+        if seen[row] != 0:
+            near[0], near[1] = angles[row], keep[row]
+            point = to_canonical(chains.base_m[row], chains.base_rotation[row], chains.side, points[row])
+            wanted = Goal(COUPLED, point, nowhere, near)
+            ends[row, 0], ends[row, 1], ends[row, 2] = solve(chain_of(chains, row), wanted, angles[row], most, tolerance_m)

@@ -1,0 +1,87 @@
+"""A viser server for this machine's own browsers and nobody else's.
+
+viser listens on all interfaces by default, offers a button that opens a public tunnel, and lets any web page open in the same
+browser connect. Here it listens on the loopback, has no tunnel, not even for a client that asks for one, and refuses other pages.
+A port that is taken is replaced by the next free one. Other machines look through an SSH tunnel.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import re
+import threading
+from collections.abc import Callable, Iterator
+
+import viser
+import websockets.asyncio.server
+
+from rhot.errors import BusError
+
+_LOOPBACK = ("127.0.0.1", "localhost")
+# Where a browser's own page comes from, directly or through an SSH tunnel's port; None: programs, which send no origin.
+_ORIGINS = [re.compile(r"http://(127\.0\.0\.1|localhost)(:\d+)?"), None]
+
+
+class LoopbackServer(viser.ViserServer):
+    """viser without a way out."""
+
+    def request_share_url(self, verbose: bool = True) -> None:  # noqa: ARG002 - viser's signature
+        """No public tunnel, whoever asks."""
+        return
+
+
+@contextlib.contextmanager
+def open_server(host: str, port: int) -> Iterator[LoopbackServer]:
+    """A running server; port 0 or a taken one gives another (see get_port()). Stops with the block.
+
+    Raises BusError for any host but the loopback.
+    """
+    if host not in _LOOPBACK:
+        raise BusError(
+            f"the viewer listens on {_LOOPBACK[0]} only, not on {host!r}; look from elsewhere through `ssh -L {port}:127.0.0.1:{port}`"
+        )
+    # viser prints a banner and notes with rich; the services' standard output is for log lines.
+    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only():
+        server = LoopbackServer(host="127.0.0.1", port=port, label="rhot", verbose=False)
+    try:
+        server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large", brand_color=(0, 114, 178))
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+@contextlib.contextmanager
+def _own_pages_only() -> Iterator[None]:
+    """viser passes no `origins` to websockets' serve(); while its server starts, serve() has them anyway."""
+    serve = websockets.asyncio.server.serve
+    websockets.asyncio.server.serve = functools.partial(serve, origins=_ORIGINS)  # type: ignore[assignment, misc]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = serve  # type: ignore[misc]
+
+
+class Audience:
+    """Counts browsers; changed(count) is called from viser's thread."""
+
+    def __init__(self, server: viser.ViserServer, changed: Callable[[int], object]) -> None:
+        self._ids: set[int] = set()
+        self._lock = threading.Lock()
+        self._changed = changed
+        server.on_client_connect(self._came)
+        server.on_client_disconnect(self._went)
+
+    def _came(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._ids.add(client.client_id)
+            count = len(self._ids)
+        self._changed(count)
+
+    def _went(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._ids.discard(client.client_id)
+            count = len(self._ids)
+        self._changed(count)

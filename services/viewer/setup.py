@@ -1,0 +1,50 @@
+"""What the viewer reads before it starts: cameras and paints, with a note for whatever is missing.
+
+A rig that is not calibrated is shown without frusta, a broken calibration file likewise: the note says which and what to run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rhot.calibration import Colors, load_cameras, load_colors
+from rhot.camera import Camera
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError
+from rhot.hand import HandName
+from services.viewer.colors import Rgb, paint_rgb
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything of the rig that does not come over the bus."""
+
+    cameras: dict[str, Camera]
+    paints: dict[tuple[HandName, str], Rgb]
+    notes: list[str]
+
+
+def read_setup(config: RigConfig) -> Setup:
+    """Cameras and paints of a rig, never an error."""
+    cameras: dict[str, Camera] = {}
+    colors: list[Colors] = []
+    notes: list[str] = []
+    for table in config.camera:
+        try:
+            cameras |= load_cameras(config.calibration_dir, [table.name])
+        except CalibrationError as error:
+            notes.append(f"camera {table.name} is not drawn: {_short(error, config)}")
+        try:
+            colors.append(load_colors(config.calibration_dir, table.name))
+        except CalibrationError:
+            # Paints have names; pi_tracker tells of colours that are not calibrated.
+            continue
+    paints: dict[tuple[HandName, str], Rgb] = {
+        (hand, landmark): paint_rgb(color, colors) for hand, markers in config.hand.items() for landmark, color in markers.markers.items()
+    }
+    return Setup(cameras, paints, notes)
+
+
+def _short(error: CalibrationError, config: RigConfig) -> str:
+    """The error without the folder, which the panel has no room for."""
+    return str(error).replace(f"{config.calibration_dir}/", "")

@@ -1,0 +1,95 @@
+"""What the tests of fusion share: a pair of cameras, and how well a run did against the synthetic truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rhot.camera import Camera
+from rhot.config import Fusion
+from rhot.hand import BASIC_LANDMARKS
+from rhot.messages import HandPoints, MarkerFrame
+from rhot.transforms import Array
+from services.fusion.step import FusionStep
+from services.fusion.synthetic import START_NS, Path, Setup, frames, point_hands
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Errors of told points against truth, after `warm_s`."""
+
+    told: int
+    errors_m: Array  # (n, 3)
+    sigmas_m: Array  # (n, 3)
+    instants_s: Array  # (n,)
+    measured: Array  # (n,)
+
+    @property
+    def rms_mm(self) -> float:
+        return 1e3 * float(np.sqrt(np.mean(np.sum(self.errors_m**2, axis=1))))
+
+    @property
+    def depth_rms_mm(self) -> float:
+        return 1e3 * float(np.sqrt(np.mean(self.errors_m[:, 2] ** 2)))
+
+    @property
+    def nees(self) -> float:
+        """Squared error over variance, mean of all axes: 1 if sigma is honest."""
+        return float(np.mean((self.errors_m / self.sigmas_m) ** 2))
+
+
+def score(told: Iterable[HandPoints], path: Path, warm_s: float = 1.0) -> Score:
+    told = [message for message in told if (message.stamp_ns - START_NS) * 1e-9 >= warm_s]
+    rows = []
+    for message in told:
+        instant_s = (message.stamp_ns - START_NS) * 1e-9
+        truth = path(np.array([instant_s]))[0]
+        for point in message.points:
+            error = np.array(point.position_m) - truth[BASIC_LANDMARKS.index(point.name)]
+            rows.append([*error, *point.sigma_m, instant_s, float(point.source == "measured")])
+    table = np.array(rows).reshape(-1, 8)
+    return Score(len(told), table[:, :3], table[:, 3:6], table[:, 6], table[:, 7])
+
+
+def track(setup: Setup, given: Iterable[MarkerFrame], fusion: Fusion | None = None) -> tuple[FusionStep, list[HandPoints]]:
+    step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
+    told = [points for frame in given for points in step.step(frame)]
+    return step, told + step.flush()
+
+
+Run = Callable[..., tuple[FusionStep, Score]]
+
+
+@pytest.fixture(scope="session")
+def run() -> Run:
+    """Synthetic hand -> FusionStep -> score."""
+
+    def simulate(setup: Setup, path: Path, fusion: Fusion | None = None, seconds: float = 6.0) -> tuple[FusionStep, Score]:
+        step, told = track(setup, frames(setup, path, seconds), fusion)
+        return step, score(told, path)
+
+    return simulate
+
+
+@pytest.fixture(scope="session")
+def fuse() -> Callable[..., tuple[FusionStep, list[HandPoints]]]:
+    """Frames -> FusionStep -> everything it told."""
+    return track
+
+
+@pytest.fixture(scope="session")
+def judge() -> Callable[..., Score]:
+    """What was told -> score."""
+    return score
+
+
+@pytest.fixture
+def pair() -> tuple[Camera, Camera]:
+    """Two cameras that are neither parallel nor level nor of one focal length."""
+    left, right = Setup(toe_in_rad=0.05).rig().values()
+    tilted = right.T_rig_from_camera.copy()
+    tilted[:3, 3] += [0.0, 0.004, -0.01]
+    return left, Camera("right", right.size_px, right.matrix * np.array([[1.1], [1.1], [1.0]]), right.distortion, tilted)

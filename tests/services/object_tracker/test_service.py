@@ -1,0 +1,98 @@
+"""The running object tracker between a real router, a publisher of poses and a reader of objects."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot import topics
+from rhot.bus import Bus, open_bus
+from rhot.capture import write_lines
+from rhot.config import Objects, ObjectTable, RigConfig, RigTable
+from rhot.errors import SourceError
+from rhot.messages import OpenVrPose
+from rhot.service import Service
+from rhot.transforms import transform
+from services.object_tracker.service import serve
+
+MakePose = Callable[..., OpenVrPose]
+
+
+@contextlib.asynccontextmanager
+async def running(router: str, config: RigConfig) -> AsyncIterator[tuple[Service, Bus]]:
+    """The service in this process, and a bus of our own."""
+    async with (
+        open_bus("desk", [router]) as theirs,
+        open_bus("desk", [router]) as ours,
+        asyncio.timeout(15.0),
+        asyncio.TaskGroup() as tasks,
+    ):
+        service = Service("object_tracker", "main", config, theirs, tasks)
+        task = tasks.create_task(serve(service))
+        yield service, ours
+        task.cancel()
+
+
+def rig(folder: Path, source: str) -> RigConfig:
+    return RigConfig(
+        rig=RigTable(name="desk"), object=[ObjectTable(name="cup", serial="LHR-1")], objects=Objects(source=source), folder=str(folder)
+    )
+
+
+@contextlib.contextmanager
+def sending(send: Callable[[], None]) -> Iterator[None]:
+    """Send again and again: subscriptions need a moment to reach the router."""
+
+    async def repeat() -> None:
+        while True:
+            send()
+            await asyncio.sleep(0.02)
+
+    sender = asyncio.create_task(repeat())
+    try:
+        yield
+    finally:
+        sender.cancel()
+
+
+async def test_poses_in_objects_out_with_garbage_between(router: str, tmp_path: Path, make_pose: MakePose) -> None:
+    async with running(router, rig(tmp_path, "network")) as (service, bus):
+        known, unknown = (bus.publisher(topics.OPENVR, serial=serial) for serial in ("LHR-1", "LHR-2"))
+
+        def send() -> None:
+            for payload in (b"\xff\x00", b"[]", b"{}", b'{"v": null}', msgspec.json.encode(make_pose(serial="LHR-9"))):
+                bus.put_raw("rhot/desk/openvr/LHR-1/pose", payload)
+            unknown.put(make_pose(serial="LHR-2"))
+            known.put(make_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
+
+        objects = bus.every(topics.OBJECT, 8)
+        with sending(send):
+            # Poses overtake the garbage, which travels at a lower priority.
+            while sum(stats.rejected for stats in service.bus.streams) < 5 or service.values["unknown"] < 1:
+                result = await anext(objects)
+        assert (result.object, result.position_m, result.tracking, result.registered) == ("cup", (0.1, 0.2, 0.3), "ok", False)
+        assert service.state == "running"
+        # Not calibrated, and a device that rig.toml does not name: both are told, once.
+        assert service.errors == 2
+
+
+async def test_a_source_feeds_the_bus(router: str, tmp_path: Path, make_pose: MakePose) -> None:
+    write_lines(tmp_path / "o.jsonl", [make_pose(stamp_ns=10**18 + i * 5_000_000, seq=i) for i in range(400)])
+    async with running(router, rig(tmp_path, "replay:o.jsonl")) as (_, bus):
+        raw = bus.every(topics.OPENVR, 8)
+        result = await anext(bus.every(topics.OBJECT, 8))
+        assert result.stamp_ns == 10**18 + result.seq * 5_000_000
+        assert (await anext(raw)).device.serial == "LHR-1"
+
+
+async def test_a_source_that_fails_ends_the_service(router: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.RaisesGroup(SourceError):
+        async with running(router, rig(tmp_path, "libsurvive")):
+            await asyncio.Event().wait()

@@ -1,0 +1,112 @@
+"""Which files are written when."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rhot import topics
+from rhot.config import CameraTable, Objects, RigConfig, RigTable
+from rhot.config import Recorder as RecorderTable
+from rhot.messages import Session
+from services.recorder.reader import read, read_attachments
+from services.recorder.recorder import Recorder, attachments, recorded_topics, recording_path
+
+KEY = "rhot/desk/control/session"
+START_NS = 1_700_000_000_000_000_000
+
+
+def session(running: bool, start_ns: int = START_NS) -> bytes:
+    return msgspec.json.encode(Session(running=running, start_ns=start_ns))
+
+
+@pytest.fixture
+def recorder(tmp_path: Path) -> Recorder:
+    return Recorder(RigConfig(folder=str(tmp_path)), tmp_path / "r")
+
+
+def say(recorder: Recorder, *payloads: bytes) -> None:
+    for payload in payloads:
+        recorder.add(topics.SESSION, KEY, payload, 5)
+
+
+def point(recorder: Recorder) -> None:
+    recorder.add(topics.POINTS, "rhot/desk/hand/right/points", b"{}", 5)
+
+
+def test_names_are_utc_and_never_taken_twice(tmp_path: Path) -> None:
+    first = recording_path(tmp_path, "desk", START_NS)
+    assert first.name == "rhot-desk-20231114-221320.mcap"
+    first.touch()
+    assert recording_path(tmp_path, "desk", START_NS + 1).name == "rhot-desk-20231114-221320-2.mcap"
+    assert recording_path(tmp_path, "desk", 2**63 - 1).name == "rhot-desk-22620411-234716.mcap"
+
+
+def test_a_session_is_a_file_with_its_start_and_its_stop(recorder: Recorder, tmp_path: Path) -> None:
+    point(recorder)
+    say(recorder, session(True))
+    point(recorder)
+    say(recorder, session(True))  # told again, e.g. to a late comer
+    say(recorder, session(False))
+    point(recorder)
+    assert recorder.path is None
+    (file,) = (tmp_path / "r").glob("*.mcap")
+    assert [r.payload for r in read(file)] == [session(True), b"{}", session(True), session(False)]
+    assert recorder.messages == 4
+    assert "config.json" in read_attachments(file)
+
+
+def test_the_next_session_is_the_next_file(recorder: Recorder, tmp_path: Path) -> None:
+    say(recorder, session(True), session(True, START_NS + 60 * 10**9), session(False))
+    assert [p.name for p in sorted((tmp_path / "r").iterdir())] == ["rhot-desk-20231114-221320.mcap", "rhot-desk-20231114-221420.mcap"]
+
+
+def test_autostart_records_between_sessions_too(tmp_path: Path) -> None:
+    recorder = Recorder(RigConfig(recorder=RecorderTable(autostart=True)), tmp_path)
+    recorder.start(START_NS)
+    point(recorder)
+    say(recorder, session(False), session(True, START_NS + 10**9), session(False, START_NS + 10**9))
+    point(recorder)
+    recorder.stop()
+    assert [len(list(read(p))) for p in sorted(tmp_path.iterdir())] == [2, 3]
+
+
+def test_by_hand_sessions_change_nothing(tmp_path: Path) -> None:
+    recorder = Recorder(RigConfig(), tmp_path, follow_sessions=False)
+    recorder.start(START_NS, tmp_path / "x.mcap")
+    say(recorder, session(True), session(False), session(True, 7))
+    recorder.stop()
+    recorder.stop()
+    assert [p.name for p in tmp_path.iterdir()] == ["x.mcap"]
+    assert len(list(read(tmp_path / "x.mcap"))) == 3
+
+
+@pytest.mark.parametrize("garbage", [b"", b"\xff", b"[]", b'{"running": 1}', b'{"running": true, "start_ns": -1}', b"[" * 60_000])
+def test_garbage_starts_nothing(recorder: Recorder, garbage: bytes) -> None:
+    say(recorder, garbage)
+    assert recorder.path is None
+    say(recorder, session(True), garbage)
+    assert recorder.messages == 2
+    recorder.stop()
+
+
+def test_truth_is_recorded_only_where_something_is_simulated() -> None:
+    real = RigConfig(camera=[CameraTable(name="left")], objects=Objects(source="steamvr"))
+    assert topics.TRUTH not in recorded_topics(real)
+    assert {topics.MARKERS, topics.POSE, topics.SESSION, topics.HEALTH} < set(recorded_topics(real))
+    assert topics.TRUTH in recorded_topics(RigConfig(camera=[CameraTable(name="left", source="simulator")], objects=real.objects))
+    assert topics.PREVIEW not in recorded_topics(RigConfig())
+
+
+def test_attachments_are_the_configuration_and_the_calibration(tmp_path: Path) -> None:
+    config = RigConfig(rig=RigTable(name="lab", calibration="c"), folder=str(tmp_path))
+    assert set(attachments(config)) == {"config.json"}
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "rig.json").write_text("{}")
+    (tmp_path / "c" / "huge.json").write_text(" " * 1_000_001)
+    (tmp_path / "c" / "broken.json").symlink_to(tmp_path / "nowhere")
+    files = attachments(config)
+    assert set(files) == {"config.json", "calibration/rig.json"}
+    assert msgspec.json.decode(files["config.json"], type=RigConfig) == config
