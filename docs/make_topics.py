@@ -8,7 +8,7 @@ from rhot.topics import ROOT, TOPICS, Topic
 
 HEAD = f"""# Topics
 
-Generated from `rhot/topics.py` by `make docs`. Every key starts with `{ROOT}/<rig>/`; fields of a message are described in
+Generated from `rhot/topics.py` by `make docs`. Every key starts with `{ROOT}/<rig>/`, or as given; fields of a message are described in
 `rhot/messages.py`. Fields may be added, never renamed.
 
 | key | message | kind | expected rate | recorded | what it is |
@@ -20,7 +20,8 @@ def row(topic: Topic) -> str:
     """One line of the table."""
     message = f"{topic.message.__name__} (JSON)" if topic.message else topic.media_type or "-"
     recorded = "yes" if topic.recorded else ""
-    return f"| `{topic.template}` | {message} | {topic.kind.value} | {topic.rate.value} | {recorded} | {topic.about} |"
+    key = topic.template if topic.root == ROOT else f"{topic.root}/<rig>/{topic.template}"
+    return f"| `{key}` | {message} | {topic.kind.value} | {topic.rate.value} | {recorded} | {topic.about} |"
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """THE table of topics: key, message, expected rate, quality of service, recorded or not.
 
 No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and docs/topics.md derive from TOPICS.
-A key is `rhot/<rig>/` + the template with its fields filled in; a field left out becomes the wildcard `*`.
+A key is `<root>/<rig>/` + the template with its fields filled in, root being `rhot` for all but raw pictures; a field left out becomes the wildcard `*`.
 """
 
 from __future__ import annotations
@@ -62,6 +62,8 @@ class Topic(Generic[T]):
     media_type: str = "application/json"
     # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the largest (HandPose, 9 kB).
     max_bytes: int = 65_536
+    # First part of the key. Raw pictures have another, so that a subscription to rhot/** shows JSON and stays small.
+    root: str = ROOT
 
     @property
     def name(self) -> str:
@@ -89,12 +91,12 @@ class Topic(Generic[T]):
                     f"{field} name {value!r} cannot be part of a key; "
                     "use letters, digits, '_', '-' and '.', starting with a letter or digit"
                 )
-        return f"{ROOT}/{rig}/" + _FIELD.sub(lambda match: names.get(match[1], "*"), self.template)
+        return f"{self.root}/{rig}/" + _FIELD.sub(lambda match: names.get(match[1], "*"), self.template)
 
     def names(self, key: str) -> dict[str, str] | None:
         """The fields of a key of this topic, or None if the key is another's."""
         pattern = _FIELD.sub(r"(?P<\1>[^/]+)", self.template)
-        match = re.fullmatch(rf"{ROOT}/[^/]+/{pattern}", key)
+        match = re.fullmatch(rf"{self.root}/[^/]+/{pattern}", key)
         return match.groupdict() if match else None
 
 
@@ -131,7 +133,7 @@ FRAME: Topic[bytes] = Topic(
     40_000_000,
 )
 SIM_FRAME: Topic[bytes] = Topic(
-    "sim/{camera}/frame",
+    "camera/{camera}/image",
     None,
     Kind.STREAM,
     Rate.CAMERA,
@@ -140,6 +142,7 @@ SIM_FRAME: Topic[bytes] = Topic(
     "I420 images of a simulated camera; SimFrame in the attachment",
     "application/octet-stream",
     40_000_000,
+    "rhot-sim",
 )
 SESSION = Topic("control/session", m.Session, Kind.STATE, Rate.DEMAND, Priority.REAL_TIME, True, "the start broadcast")
 CLOCK = Topic("control/clock", m.ClockEcho, Kind.QUERY, Rate.DEMAND, Priority.REAL_TIME, False, "the master's clock")

@@ -6,7 +6,7 @@ Too few pictures, or a pair of cameras that no guess fits, is for the caller to 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -112,7 +112,7 @@ def relate(lenses: tuple[Array, Array], pairs: list[tuple[View, View]], turned: 
     view.pixels[turn] belong to view.points.
     """
     first = [board_pose(lenses[0], view)[0] for view, _ in pairs]
-    options = [[View(b.camera, b.board, b.points, b.pixels[turn]) if len(turned) > 1 else b for turn in turned] for _, b in pairs]
+    options = [[replace(b, pixels=b.pixels[turn]) if len(turned) > 1 else b for turn in turned] for _, b in pairs]
     second = [[board_pose(lenses[1], option)[0] for option in several] for several in options]
     best: Relation | None = None
     # Voters spread over all pairs: neighbours in a series look alike.

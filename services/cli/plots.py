@@ -44,6 +44,7 @@ def markers_figure(camera: str, size_px: tuple[int, int], tracks: Mapping[str, T
             axes.plot(track.times_s, track.values[:, column], color=ink, linewidth=0.8, marker=".", markersize=2.5)
         image.plot(track.values[:, 0], track.values[:, 1], color=ink, linewidth=0.6, marker=".", markersize=2.5, label=color)
     count.step(counts.times_s, counts.values[:, 0], color="black", linewidth=0.7, where="mid")
+    count.set_ylim(-0.2, max(float(np.max(counts.values)), 1.0) + 0.4)
     _label(x, "x / px", last=False)
     _label(y, "y / px", last=False)
     _label(count, "markers", last=True)
@@ -61,10 +62,10 @@ def markers_figure(camera: str, size_px: tuple[int, int], tracks: Mapping[str, T
 def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bool_]]]) -> Figure:
     """One hand: x, y, z of each landmark over time (predicted ones as circles), and the paths seen from the front and from above."""
     figure = _figure(f"3D points, {hand} hand, rig frame", (13.0, 8.0))
-    grid = figure.add_gridspec(6, 2, width_ratios=(3, 2))
-    lowest = figure.add_subplot(grid[4:, 0])
-    over_time = [*(figure.add_subplot(grid[row : row + 2, 0], sharex=lowest) for row in (0, 2)), lowest]
-    front, above = figure.add_subplot(grid[:3, 1]), figure.add_subplot(grid[3:, 1])
+    grid = figure.add_gridspec(1, 2, width_ratios=(3, 2))
+    left, right = (figure.add_subfigure(grid[0, column]) for column in range(2))
+    over_time = left.subplots(3, 1, sharex=True)
+    front, above = right.subplots(2, 1)
     for number, (name, (track, predicted)) in enumerate(tracks.items()):
         ink, mm = _INKS[number % len(_INKS)], 1e3 * track.values
         for row, axes in enumerate(over_time):

@@ -4,31 +4,38 @@ from __future__ import annotations
 
 import sys
 import time
+from typing import TextIO
 
 from services.cli.say import Teller
 
+# A reader cannot follow more than a few numbers a second; where every line stays, one each two seconds is enough.
+_TERMINAL_S, _LINES_S = 0.2, 2.0
+
 
 class Progress:
-    """Shows `what 120/600 (20 %), 85 frames/s`; shown is None for "only on a terminal"."""
+    """Shows `what 120/600 (20 %), 85 frames/s`.
 
-    # A reader cannot follow more than a few numbers a second.
-    _EVERY_S = 0.2
+    shown is None for "on a terminal only"; total, 0 if unknown, may be set when it becomes known.
+    """
 
-    def __init__(self, what: str, total: int, shown: bool | None, teller: Teller | None = None) -> None:
-        self._what, self.total, self._count = what, total, 0
-        self._teller = teller or Teller()
-        self._plain = bool(shown) and not sys.stderr.isatty()
-        self._shown = sys.stderr.isatty() if shown is None else shown
+    def __init__(self, what: str, total: int, shown: bool | None, out: TextIO | None = None) -> None:
+        out = out or sys.stderr
+        terminal = out.isatty()
+        self.total = total
+        self.every_s = _TERMINAL_S if terminal else _LINES_S
+        self._what, self._count = what, 0
+        self._teller = Teller(out=out)
+        self._tell = self._teller.status if terminal else self._teller.line
+        self._shown = terminal if shown is None else shown
         self._started = self._told = time.monotonic()
 
     def advance(self, count: int = 1) -> None:
         """So many more are done."""
         self._count += count
         now = time.monotonic()
-        # Where every line stays (--progress into a file), one each two seconds is enough.
-        if self._shown and now - self._told >= (10 if self._plain else 1) * self._EVERY_S:
+        if self._shown and now - self._told >= self.every_s:
             self._told = now
-            (self._teller.line if self._plain else self._teller.status)(self._text(now))
+            self._tell(self._text(now))
 
     def end(self) -> None:
         """Take the line away."""

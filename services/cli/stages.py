@@ -48,7 +48,7 @@ def marker_errors(
     counts: dict[str, int] = defaultdict(int)
     errors: dict[tuple[str, str], list[Array]] = defaultdict(list)
     for frame in frames:
-        if frame.camera not in cameras:
+        if frame.camera not in cameras or not stamps_ns[0] <= frame.stamp_ns - frame.clock_offset_ns <= stamps_ns[-1]:
             continue
         counts[frame.camera] += 1
         for marker in frame.markers:

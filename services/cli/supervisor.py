@@ -1,6 +1,6 @@
 """Child processes that are restarted when they end, and all ended together: what systemd does for an installed rig.
 
-Each child leads its own process group (Ctrl-C reaches only the supervisor, which ends them in order) and is killed by the
+Each child leads its own session (Ctrl-C reaches only the supervisor, which ends them in order) and is killed by the
 kernel should the supervisor die without a word. Their JSON log lines come out as one line of text each, warnings only unless
 asked for more.
 """
@@ -67,7 +67,7 @@ class Supervisor:
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
-            process_group=0,
+            start_new_session=True,
             preexec_fn=_die_with_parent,
             limit=_LINE_LIMIT,
         )

@@ -33,6 +33,8 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
     tallies = {name: _Tally() for name in names}
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
     with ResultWriter(out) as writer:
+        # First, as it takes no time and a broken line should not come up after an hour of video.
+        objects = _objects(job, writer)
         try:
             for frame in merged([one.frames() for one in job.inputs]):
                 output = pipeline.step(frame)
@@ -41,11 +43,10 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
                 _write(writer, output)
                 shown.advance()
             _write(writer, pipeline.flush())
-            notes = _objects(job, writer)
         finally:
             shown.end()
         broken = [warning for one in job.inputs for warning in one.warnings]
-        notes = [told for one in job.inputs for told in one.notes] + notes
+        notes = [*([note] if note else []), *(told for one in job.inputs for told in one.notes), *objects]
         summary = Summary(
             rig=job.config.rig.name,
             cameras={name: tally.summary() for name, tally in tallies.items()},
@@ -53,7 +54,7 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
             refusals=pipeline.refusals,
             complete=not broken,
             warnings=broken,
-            notes=[*([note] if note else []), *_doubts(pipeline, writer.counts), *notes],
+            notes=[*notes, *_doubts(pipeline, writer.counts)],
         )
         writer.finish(summary)
     return summary

@@ -19,8 +19,8 @@ from services.fusion.observations import View
 from services.fusion.ring import ACCEPTED, GATED, LATE, empty_ring, insert_all, query_all, start
 from services.fusion.triangulation import TriangulationStatus, extrinsics, triangulate
 
-# Jerk densities (m^2/s^5) of the models from a resting hand to a fast finger. With these four, squared error over variance stayed within .80
-# and 1.07 for synthetic hands at 0, .05, .2, .5 and 1 m/s and lags of 0 to 2 frames; with three (1, 50, 2000) within .79 and 1.7.
+# Jerk densities (m^2/s^5) of the models from a resting hand to a fast finger. With these four, squared error over variance stayed within
+# .80 and 1.07 for synthetic hands at 0, .05, .2, .5 and 1 m/s and lags of 0 to 2 frames; with three (1, 50, 2000) within .79 and 1.7.
 DENSITIES = np.array([1.0, 30.0, 300.0, 5000.0])
 # Innovations beyond this (2 degrees of freedom) are taken for another marker: chance exceeds 30 once in three million.
 GATE = 30.0
@@ -126,5 +126,5 @@ class KalmanMethod:
         found = query_all(self._ring, time_s, DENSITIES, means, covs)
         largest = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1) & (largest > 0.0) & (largest <= SHOW_SIGMA_M)
-        seen = time_s - self._seen_s <= SEEN_FRAMES * self._periods_s
-        return Estimates(found, means[:, :3], covs[:, :3, :3], seen, seen.sum(axis=1) >= 2)
+        seen, looked = (time_s - last_s <= SEEN_FRAMES * self._periods_s for last_s in (self._seen_s, self._look_s))
+        return Estimates(found, means[:, :3], covs[:, :3, :3], seen, seen.sum(axis=1) >= 2, looked.sum(axis=1) >= 2)

@@ -26,6 +26,7 @@ class Estimates:
     covariances_m2: Array  # (S, 3, 3)
     cameras: Bools  # (S, C) which cameras saw it about then
     measured: Bools  # (S,) two or more did; else it is predicted
+    wanted: Bools  # (S,) two or more looked at something of its colour then, believed or not
 
 
 @dataclass
@@ -38,6 +39,7 @@ class Counts:
     refused: int = 0  # rays that do not meet in front of the cameras
     started: int = 0
     dropped: int = 0
+    incoherent: int = 0  # points that do not belong to the hand they claim
 
 
 class Method(Protocol):

@@ -10,8 +10,8 @@ from collections import deque
 
 from rhot.transforms import Array
 
-# A reference silent for this many of its own frames hands over to whichever camera delivers next: one lost frame is enough.
-_SILENT_FRAMES = 1.5
+# A reference silent for this many of its own frames hands over to whichever camera delivers next: one lost frame is enough, jitter is not.
+_SILENT_FRAMES = 1.25
 
 
 class Pace:

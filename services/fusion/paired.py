@@ -85,7 +85,7 @@ class PairedMethod:
                 found[slot] = True
                 age_s = time_s - held.time_s
                 positions[slot], covariances[slot] = held.position_m, held.covariance_m2 + (SPEED_SIGMA * age_s) ** 2 * np.eye(3)
-        return Estimates(found, positions, covariances, seen, measured)
+        return Estimates(found, positions, covariances, seen, measured, seen.sum(axis=1) >= 2)
 
     def _ray(self, slot: int, camera: int, time_s: float) -> Ray | None:
         return self._tracks[slot][camera].at(time_s, self._settings.pairing, float(self._periods_s[camera]))

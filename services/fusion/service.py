@@ -97,7 +97,7 @@ class _Report:
         values["epipolar_px"] = step.clocks.epipolar_px
         values |= {f"late_{name}_ms": 1e3 * late_s for name, late_s in step.clocks.late_s.items()}
         values |= {f"height_{pair}_px": height_px for pair, height_px in step.clocks.heights_px.items()}
-        values |= {name: float(getattr(counts, name)) for name in ("gated", "late", "refused", "started", "dropped")}
+        values |= {name: float(getattr(counts, name)) for name in ("gated", "late", "refused", "started", "dropped", "incoherent")}
         values |= {f"frames_{reason}": float(count) for reason, count in step.refusals.items()}
         self._accepted = counts.accepted
         self._busy_s.clear()

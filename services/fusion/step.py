@@ -19,6 +19,7 @@ from rhot.errors import CalibrationError
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, MarkerFrame, PointSource
 from services.fusion.clocks import ClockTuner
+from services.fusion.coherence import coherent, reach_m
 from services.fusion.kalman import KalmanMethod
 from services.fusion.method import Estimates, Method
 from services.fusion.observations import Observer, Refusal
@@ -54,6 +55,8 @@ class FusionStep:
         # Where the mean viewing ray starts; (3,) m.
         self.eye_rig = np.mean([camera.centre_rig for camera in cameras.values()], axis=0)
         self._hands = [hand for hand in HANDS if hand in config.hand]
+        self._reach_m = {hand: reach_m(hands[hand]) for hand in self._hands}
+        self._rows = {hand: np.array([row for row, slot in enumerate(self._slots) if slot.hand == hand]) for hand in self._hands}
         all_cameras = self._observer.cameras
         kind = KalmanMethod if config.fusion.method == "kalman" else PairedMethod
         self.method: Method = kind(len(self._slots), all_cameras, 1.0 / self._fps, config.fusion)
@@ -100,17 +103,20 @@ class FusionStep:
         positions, covariances = to_axis(estimates.positions_m, estimates.covariances_m2, self._radii_m, self.eye_rig)
         sigmas = np.sqrt(np.maximum(np.einsum("nii->ni", covariances), 0.0))
         usable = estimates.found & np.isfinite(positions).all(axis=1) & np.isfinite(sigmas).all(axis=1)
-        points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
-        for row in np.flatnonzero(usable).tolist():
-            slot = self._slots[row]
-            points[slot.hand].append(self._point(slot.landmark, row, positions[row].tolist(), sigmas[row].tolist(), estimates))
         self._seq += 1
         stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
-        return [HandPoints(hand=hand, seq=self._seq - 1, stamp_ns=stamp_ns, points=points[hand]) for hand in self._hands]
+        told = []
+        for hand, rows in self._rows.items():
+            believed = coherent(positions[rows], covariances[rows], usable[rows], estimates.wanted[rows], self._reach_m[hand])
+            self.method.counts.incoherent += int(np.count_nonzero(usable[rows] & ~believed))
+            points = [self._point(row, positions[row].tolist(), sigmas[row].tolist(), estimates) for row in rows[believed].tolist()]
+            told.append(HandPoints(hand=hand, seq=self._seq - 1, stamp_ns=stamp_ns, points=points))
+        return told
 
-    def _point(self, name: str, row: int, position: list[float], sigma: list[float], estimates: Estimates) -> HandPoint:
+    def _point(self, row: int, position: list[float], sigma: list[float], estimates: Estimates) -> HandPoint:
         x, y, z = (round(value, _DIGITS) for value in position)
         sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigma)
         cameras = [camera.name for camera, seen in zip(self._observer.cameras, estimates.cameras[row].tolist(), strict=True) if seen]
         source: PointSource = "measured" if estimates.measured[row] else "predicted"
+        name = self._slots[row].landmark
         return HandPoint(name=name, position_m=(x, y, z), sigma_m=(sx, sy, sz), cameras=cameras, source=source)

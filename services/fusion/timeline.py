@@ -41,20 +41,21 @@ class Timeline:
         """The verdict on one frame; only accepted ones move time."""
         if instant_ns in self._known[camera]:
             return Verdict.TWICE
-        self._known[camera].append(instant_ns)
         if self.newest_ns is None:
-            return self._restart(instant_ns)
+            return self._restart(camera, instant_ns)
         if abs(instant_ns - self.newest_ns) <= WINDOW_NS:
             self.newest_ns = max(self.newest_ns, instant_ns)
+            self._known[camera].append(instant_ns)
             self._stray.clear()
             return Verdict.ACCEPT
         last_ns, run = self._stray.get(camera, (instant_ns, 0))
-        run = run + 1 if 0 <= instant_ns - last_ns <= WINDOW_NS else 1
+        run = run + 1 if 0 < instant_ns - last_ns <= WINDOW_NS else 1
         self._stray[camera] = (instant_ns, run)
         agreed = any(abs(other_ns - instant_ns) <= WINDOW_NS for c, (other_ns, _) in self._stray.items() if c != camera)
-        return self._restart(instant_ns) if agreed or run >= _INSIST else Verdict.ASTRAY
+        return self._restart(camera, instant_ns) if agreed or run >= _INSIST else Verdict.ASTRAY
 
-    def _restart(self, instant_ns: int) -> Verdict:
+    def _restart(self, camera: int, instant_ns: int) -> Verdict:
         self.newest_ns = instant_ns
+        self._known[camera].append(instant_ns)
         self._stray.clear()
         return Verdict.RESTART

@@ -7,6 +7,7 @@ from services.pi_tracker.service import serve
 
 
 def main() -> None:
+    """The command rhot-pi-tracker."""
     command("pi_tracker", serve, instance_option="camera")
 
 

@@ -11,10 +11,11 @@ from collections.abc import Callable
 from rhot.config import Tracker
 from rhot.messages import Marker
 from services.pi_tracker import roi
-from services.pi_tracker.centroid import Centroid, centroid
+from services.pi_tracker.centroid import Centroid, centroids
 from services.pi_tracker.colors import ColorTable
 from services.pi_tracker.frame import Frame
 from services.pi_tracker.identity import Identity, shape_fits
+from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture, Rect, picture
 from services.pi_tracker.search import Blob, Searcher
 
@@ -29,23 +30,23 @@ class LutFinder:
         self._settings = settings
         self._searcher = Searcher(table, settings)
         self._lap = lap
+        self._noise = Noise()
         self._identity = Identity(len(table.names), settings.roi_margin_px)
         self._boxes: dict[int, Rect] = {}
 
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image, at most one per colour."""
         image = picture(frame)
+        self._noise.look(image)
         blobs = self._search(image)
         self._lap("search")
-        self._boxes = {}
+        chosen = [(color, *pick) for color, pick in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if pick is not None]
+        self._lap("identity")
+        self._boxes = {color: blob.rect for color, blob, _ in chosen}
         markers = []
-        for color, chosen in enumerate(self._identity.choose(blobs, frame.stamp_ns)):
-            if chosen is not None:
-                blob, certainty = chosen
-                found = centroid(image, blob)
-                self._boxes[color] = blob.rect
-                self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
-                markers.append(_marker(self._names[color], found, certainty))
+        for (color, _, certainty), found in zip(chosen, centroids(image, [blob for _, blob, _ in chosen], self._noise), strict=True):
+            self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
+            markers.append(_marker(self._names[color], found, certainty))
         self._lap("centroid")
         return markers
 

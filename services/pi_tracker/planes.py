@@ -26,7 +26,6 @@ _U_FROM_BGR = (0.439216, -0.290993, -0.148223)
 _V_FROM_BGR = (-0.071427, -0.367788, 0.439216)
 _LUMA = np.array([[*_Y_FROM_BGR, 16.0]])
 _CHROMA = np.array([[*_U_FROM_BGR, 128.0], [*_V_FROM_BGR, 128.0]])
-_ZERO = np.array([16.0, 128.0, 128.0], np.float32)
 
 
 class Picture(Protocol):
@@ -37,8 +36,8 @@ class Picture(Protocol):
     def cells(self, rect: Rect) -> tuple[Image, Image]:
         """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle."""
 
-    def patch(self, rect: Rect) -> Image:
-        """Every pixel of a rectangle of cells: Y - 16, U - 128, V - 128; (2h, 2w, 3) float32."""
+    def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
+        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of every cell (h, w, 2)."""
 
 
 class _Planar:
@@ -56,9 +55,12 @@ class _Planar:
         luma = cv2.resize(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
         return luma, cv2.merge((self._u[y0:y1, x0:x1], self._v[y0:y1, x0:x1]))
 
-    def patch(self, rect: Rect) -> Image:
+    def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect
-        return _full(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], cv2.merge((self._u[y0:y1, x0:x1], self._v[y0:y1, x0:x1])))
+        w, h = x1 - x0, y1 - y0
+        luma[: 2 * h, : 2 * w] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+        chroma[:h, :w, 0] = self._u[y0:y1, x0:x1]
+        chroma[:h, :w, 1] = self._v[y0:y1, x0:x1]
 
 
 class _Packed:
@@ -73,21 +75,12 @@ class _Packed:
         bgr = cv2.resize(self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
         return cv2.transform(bgr, _LUMA), cv2.transform(bgr, _CHROMA)
 
-    def patch(self, rect: Rect) -> Image:
+    def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect
+        w, h = x1 - x0, y1 - y0
         bgr = self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
-        half = cv2.resize(bgr, (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-        return _full(cv2.transform(bgr, _LUMA), cv2.transform(half, _CHROMA))
-
-
-def _full(luma: Image, chroma: Image) -> Image:
-    """Y - 16, U - 128, V - 128 of every pixel, chroma between the cells' centres; (2h, 2w), (h, w, 2) -> (2h, 2w, 3) float32."""
-    height, width = luma.shape
-    out = np.empty((height, width, 3), np.float32)
-    out[:, :, 0] = luma
-    out[:, :, 1:] = cv2.resize(chroma, (width, height), interpolation=cv2.INTER_LINEAR)
-    out -= _ZERO
-    return out
+        luma[: 2 * h, : 2 * w] = cv2.transform(bgr, _LUMA)
+        chroma[:h, :w] = cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA)
 
 
 def picture(frame: Frame) -> Picture:

@@ -1,7 +1,7 @@
 """What of a marker's colour stands in the room: blobs that stay where they are while the marker is elsewhere.
 
-Pure. Nothing is known at the start; a thing that is put into the room is known after a few frames, one that is taken away is forgotten. A hand
-that lies still is not taken for furniture: only blobs that were not the marker are learnt.
+Pure. Nothing is known at the start; a thing that is put into the room is known after a few frames, one that is taken away is
+forgotten. A hand that lies still is not taken for furniture: only blobs that were not the marker are learnt.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from rhot.messages import Session
 from rhot.service import Service
 from services.pi_tracker import sources
 from services.pi_tracker.frame import Frame
-from services.pi_tracker.pictures import Pictures
-from services.pi_tracker.session import SessionGate
+from services.pi_tracker.sinks.pictures import Pictures
+from services.pi_tracker.sources.session import SessionGate
 from services.pi_tracker.step import TrackerStep
 
 # New colours are in force a second after they were saved.
@@ -56,12 +56,14 @@ class CameraTracker:
         config = service.config
         camera = config.camera_named(service.instance)
         self._colors_path = config.calibration_dir / f"{camera.name}.colors.json"
+        colors = load_colors(config.calibration_dir, camera.name)
         self._step = TrackerStep(
             camera.name,
-            load_colors(config.calibration_dir, camera.name),
+            colors,
             config.tracker,
             camera.size_px,
-            config.colors,
+            # Without a hand nobody says which colours matter: all of them do.
+            config.colors or sorted(colors.colors),
             time.perf_counter_ns,
             self._colors_path,
         )

@@ -40,25 +40,26 @@ def wall(seed: int, clutter: bool) -> Light32:
     """The wall's picture (_SIDE, _SIDE, 3), linear RGB, as lit."""
     rng = np.random.default_rng([seed, 19])
     size = (_SIDE, _SIDE)
-    picture = np.empty((*size, 3))
+    picture = np.empty((*size, 3), np.float32)
     picture[:] = _PLASTER
     # The table begins a hand's breadth below the middle.
     table = _SIDE // 2 + 120
-    grain = cv2.resize(rng.standard_normal((_SIDE // 3, 9)), size[::-1], interpolation=cv2.INTER_CUBIC)
-    picture[table:] = np.array(_WOOD) * (1.0 + 0.22 * grain[table:, :, None])
+    grain = cv2.resize(rng.standard_normal((_SIDE // 3, 9), np.float32), size[::-1], interpolation=cv2.INTER_CUBIC)
+    picture[table:] = np.array(_WOOD, np.float32) * (1.0 + 0.22 * grain[table:, :, None])
     for colour in (*_MUTED, *_MUTED):
         _thing(picture, rng, np.array(colour), rng.uniform(30, 150, 2))
     if clutter:
         for name in (*_SATURATED, *_SATURATED):
             _thing(picture, rng, np.array(PAINTS[name]) * rng.uniform(0.55, 0.95), rng.uniform(8, 34, 2))
     picture *= 1.0 + 0.10 * _clouds(rng, size)[..., None]
-    picture *= 1.0 + 0.05 * rng.standard_normal((*size, 1))
-    return np.clip(cv2.GaussianBlur(picture, (0, 0), 1.2), 0.004, 1.0).astype(np.float32)
+    picture *= 1.0 + 0.05 * rng.standard_normal((*size, 1), np.float32)
+    return np.clip(cv2.GaussianBlur(picture, (0, 0), 1.2), 0.004, 1.0)
 
 
-def _thing(picture: Array, rng: np.random.Generator, colour: Array, half: Array) -> None:
+def _thing(picture: Light32, rng: np.random.Generator, colour: Array, half: Array) -> None:
     """A box or disc somewhere on the wall, lit from one side, with a stripe of another tone."""
-    x, y = rng.uniform(0.12, 0.88, 2) * _SIDE
+    # The cameras see the middle half.
+    x, y = rng.uniform(0.22, 0.78, 2) * _SIDE
     mask = np.zeros(picture.shape[:2], np.uint8)
     angle = float(rng.uniform(-12, 12))
     if rng.random() < 0.35:
@@ -72,11 +73,11 @@ def _thing(picture: Array, rng: np.random.Generator, colour: Array, half: Array)
     picture[rows, columns] = colour * (0.85 - 0.3 * side[:, None]) * stripe[:, None]
 
 
-def _clouds(rng: np.random.Generator, size: tuple[int, int]) -> Array:
+def _clouds(rng: np.random.Generator, size: tuple[int, int]) -> Light32:
     """Smooth noise of several octaves, standard deviation about 1."""
-    total = np.zeros(size)
+    total = np.zeros(size, np.float32)
     for cells, weight in ((4, 0.6), (11, 0.5), (37, 0.45), (120, 0.4)):
-        total += weight * cv2.resize(rng.standard_normal((cells, cells)), size[::-1], interpolation=cv2.INTER_CUBIC)
+        total += weight * cv2.resize(rng.standard_normal((cells, cells), np.float32), size[::-1], interpolation=cv2.INTER_CUBIC)
     return total
 
 

@@ -19,10 +19,12 @@ from services.simulator.render import Renderer
 Samples = npt.NDArray[np.int64]  # (n, 3) OpenCV HSV
 # Bulk of the samples inside the hue range; a few pixels at shaded rims are not worth a wide range.
 _TAIL = 1.0
-# Half a grey level of slack on either side of what was seen.
-_HUE_SLACK = 2
-# Hue of pixels greyer or darker than this is noise of 4.5 grey levels, and skin and walls live there.
-_MIN_SATURATION, _MIN_VALUE = 60, 35
+# Hues a little outside what was seen: another place, another pose.
+_HUE_SLACK = 3
+# How much greyer and darker than what was seen a pixel may be: shade deepens more than it greys. Hue of pixels below the floor
+# is noise of 4.5 grey levels, and skin and walls live there.
+_SATURATION_SHARE, _VALUE_SHARE = 0.85, 0.65
+_MIN_SATURATION, _MIN_VALUE = 70, 35
 
 
 def samples(renderer: Renderer, frames: Iterable[int]) -> tuple[dict[int, Samples], Samples]:
@@ -48,7 +50,7 @@ def fit(painted: dict[str, Samples], other: Samples, date: str, tool: str) -> Co
     for name, seen in sorted(painted.items()):
         if len(seen) < 50:
             raise CalibrationError(
-                f"colour {name!r}: {len(seen)} pixels of it in the rendered scenes; paint a landmark that the cameras see"
+                f"colour {name!r}: {len(seen)} pixels of it in the rendered scenes; mark a landmark that the cameras see"
             )
         ranges[name] = _range(seen)
         rest = np.concatenate([other, *(rows for key, rows in painted.items() if key != name)])
@@ -68,8 +70,8 @@ def _range(seen: Samples) -> ColorRange:
     hue = (seen[:, 0] - centre + 90.0) % 180.0 - 90.0
     low, high = np.percentile(hue, [_TAIL, 100.0 - _TAIL])
     h_low, h_high = round(centre + low - _HUE_SLACK) % 180, round(centre + high + _HUE_SLACK) % 180
-    s_low = max(_MIN_SATURATION, int(np.percentile(seen[:, 1], _TAIL)) - 12)
-    v_low = max(_MIN_VALUE, int(np.percentile(seen[:, 2], _TAIL)) - 12)
+    s_low = max(_MIN_SATURATION, int(_SATURATION_SHARE * np.percentile(seen[:, 1], _TAIL)))
+    v_low = max(_MIN_VALUE, int(_VALUE_SHARE * np.percentile(seen[:, 2], _TAIL)))
     return ColorRange(hsv_low=(h_low, s_low, v_low), hsv_high=(h_high, 255, 255))
 
 

@@ -38,8 +38,8 @@ OPEN = np.array([[6, -6, 6, 0], [5, 8, 12, 0], [0, 6, 12, 0], [-3, 8, 14, 0], [-
 # The finger study's fist (figure 5) ends near the limits: MCP 80-90, PIP 95-110.
 FIST = np.array([[10, 6, 24, 0], [1, 82, 102, 0], [0, 84, 104, 0], [-1, 84, 102, 0], [-2, 82, 98, 0]], dtype=float)
 CURVED = np.array([[12, 0, 14, 0], [4, 22, 34, 0], [0, 22, 36, 0], [-3, 22, 34, 0], [-6, 22, 32, 0]], dtype=float)
-# Thumb and index finger meet pulp to pulp with the default hand (13 mm between their bone ends); found by least squares.
-PINCH = np.array([[24, 14, 34, 0], [3, 52, 46, 0], [0, 30, 30, 0], [-2, 24, 26, 0], [-5, 20, 24, 0]], dtype=float)
+# Thumb and index finger of the default hand touch, 15.6 mm between the middles of their last balls; found by least squares.
+PINCH = np.array([[17, 16, 37, 0], [3, 54, 48, 0], [0, 30, 30, 0], [-2, 24, 26, 0], [-5, 20, 24, 0]], dtype=float)
 # Around a handle of 40 mm.
 GRIP = np.array([[22, 0, 18, 0], [2, 52, 66, 0], [0, 54, 66, 0], [-2, 55, 66, 0], [-4, 55, 64, 0]], dtype=float)
 

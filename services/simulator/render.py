@@ -137,10 +137,13 @@ class Renderer:
         self._draw(time_s)
         return self._expose(0, 0.0)
 
-    def labels(self, time_s: float) -> npt.NDArray[np.int16]:
-        """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1 + Cast.marks[...] paint; (h, w)."""
+    def labels(self, time_s: float, only: npt.NDArray[np.bool_] | None = None) -> npt.NDArray[np.int16]:
+        """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1 + Cast.marks[...] paint; (h, w).
+
+        only (c,) says which capsules are there; default all.
+        """
         self._wipe()
-        self._trace(time_s)
+        self._trace(time_s, only)
         return self._film.label.copy()
 
     def _expose(self, frame: int, noise: float) -> Bytes:
@@ -179,7 +182,7 @@ class Renderer:
         self._chroma[:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2] = self._bare[1][:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2]
         self._drawn = None
 
-    def _trace(self, time_s: float) -> tuple[Array, float]:
+    def _trace(self, time_s: float, only: npt.NDArray[np.bool_] | None = None) -> tuple[Array, float]:
         """One ray a pixel; returns (u of row 0 and step a row), and the exposure in units of u."""
         height = self.camera.size_px[1]
         row_s, exposure_s = self.clock.row_time_ns * 1e-9, self.clock.exposure_s
@@ -191,6 +194,8 @@ class Renderer:
         motions(positions, rotations, self._R, self._p, self._lens, s.frame, s.offset, s.radius, w.ends, w.palms, w.tracks)
         points(positions, rotations, self._R, self._p, s.dab_frame, s.dab_offset, w.dabs)
         rows_of(w.tracks, height, w.spans)
+        if only is not None:
+            w.spans[~only] = (height, -1)
         timing = np.array([(time_s - middle_s) / half_s, row_s / half_s])
         trace(w, self._film, timing)
         self._drawn = self._box(0)

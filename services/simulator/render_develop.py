@@ -59,7 +59,7 @@ def noise_bank(height: int, width: int, seed: int) -> tuple[Array, Array]:
     luma = 0.257 * r + 0.504 * g + 0.098 * b
     chroma = np.stack([-0.148 * r - 0.291 * g + 0.439 * b, 0.439 * r - 0.368 * g - 0.071 * b])
     chroma = chroma.reshape(2, h // 2, 2, w // 2, 2).mean(axis=(2, 4))
-    return tuple(np.clip(np.round(NOISE_UNIT * plane), -127, 127).astype(np.int8) for plane in (luma, chroma))  # type: ignore[return-value]
+    return tuple(np.clip(np.round(NOISE_UNIT * plane), -127, 127).astype(np.int8) for plane in (luma, chroma))
 
 
 def _smooth(plane: Array, kernel: tuple[float, float, float]) -> Array:

@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from rhot.camera import Camera
 from rhot.transforms import Array
+
+Array32 = npt.NDArray[np.float32]
 
 # Fields of a placed capsule: 0 a, 3 b - a, 6 b (xyz each), 9 radii and products of these that `hit` needs; from LOOK on what `shade`
 # needs, written once by `dress`: palmar direction (xyz), surface, end surface, end length, dabbed, instant.
@@ -21,7 +24,7 @@ PLACED = LOOK + 8
 FAR = 1e9
 
 
-def rays_of(camera: Camera) -> Array:
+def rays_of(camera: Camera) -> Array32:
     """Unit direction of every pixel's ray in the camera frame; (h, 3, w) float32, so that rows are contiguous."""
     w, h = camera.size_px
     x, y = np.meshgrid(np.arange(w, dtype=np.float64), np.arange(h, dtype=np.float64))

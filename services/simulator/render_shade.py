@@ -13,7 +13,7 @@ from numba import njit
 
 from rhot.transforms import Array
 from services.simulator.paints import Surface
-from services.simulator.render_rays import LOOK
+from services.simulator.render_rays import LOOK, Array32
 from services.simulator.scenes import Light
 
 # Skin lets light in: the shadow's edge is soft by this much.
@@ -43,7 +43,7 @@ def surfaces_of(surfaces: list[Surface], gains: Array) -> Array:
     return np.array(rows)
 
 
-def texture(seed: int) -> Array:
+def texture(seed: int) -> Array32:
     """Blotches (TEXELS, TEXELS) float32 that tile, mean 0, within about -1..1."""
     rng = np.random.default_rng([seed, 13])
     spectrum = np.fft.rfft2(rng.standard_normal((TEXELS, TEXELS)))

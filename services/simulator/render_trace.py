@@ -10,11 +10,9 @@ from numba import njit
 
 from rhot.transforms import Array
 from services.simulator.render_paths import columns_of
-from services.simulator.render_rays import FAR, PLACED, dress, hit_row, place
+from services.simulator.render_rays import FAR, PLACED, Array32, dress, hit_row, place
 from services.simulator.render_shade import HIT_ALONG, HIT_RAY, HIT_RGB, HIT_SURFACE, HIT_T, HITS, identify, shade
-
-Array32 = npt.NDArray[np.float32]
-Ints = npt.NDArray[np.int64]
+from services.simulator.shapes import Ints
 
 
 class World(NamedTuple):

@@ -173,8 +173,8 @@ def _things(config: RigConfig, spec: SceneSpec, hands: dict[HandName, Hand], obj
             stage = hands[holder].stage
             T_rest = transform(stage.rotation, stage.wrist_m) @ T_wrist_from_held
         else:
-            # Beside and a little behind the hand, upright and turned a little.
-            place_m = (0.17 - 0.11 * number, 0.10, spec.distance_m + 0.12)
+            # Beside one hand or between two, a little behind, upright and turned a little.
+            place_m = ((0.17 if len(hands) < 2 else 0.05) - 0.11 * number, 0.10, spec.distance_m + 0.12)
             T_rest = first.T_rig_from_camera @ transform(rotation_x(np.pi) @ rotation_z(0.1), place_m)
         things.append(Thing(table.name, table.serial, T_rest, place, holder if number == 0 else None, T_wrist_from_held))
     return things

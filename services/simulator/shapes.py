@@ -9,9 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from rhot.hand import JOINT_INDEX, TIPS, HandModel
 from rhot.transforms import Array
+
+Ints = npt.NDArray[np.int64]
 
 # Frames of one hand: its 26 joints, and the forearm, which does not follow the wrist's motion.
 HAND_FRAMES = 27
@@ -131,15 +134,15 @@ def _add_forearm(shapes: Shapes, model: HandModel, first: int, skin: int) -> Non
 class ShapeArrays:
     """The same as arrays: c capsules, d dabs."""
 
-    frame: Array  # (c, 2) int
+    frame: Ints  # (c, 2)
     offset: Array  # (c, 2, 3)
     radius: Array  # (c, 2)
-    kind: Array  # (c, 3) int: surface, end surface or -1, dabbed
+    kind: Ints  # (c, 3): surface, end surface or -1, dabbed
     end_m: Array  # (c,)
-    dab_frame: Array  # (d,) int
+    dab_frame: Ints  # (d,)
     dab_offset: Array  # (d, 3)
     dab_radius: Array  # (d,)
-    dab_surface: Array  # (d,) int
+    dab_surface: Ints  # (d,)
 
 
 def arrays(shapes: Shapes) -> ShapeArrays:

@@ -48,6 +48,9 @@ START_ITERATIONS = 20
 STOP = 1e-8
 # rad; moves a tip by less than 1e-5 mm: with a coupling that cannot be met this is where it ends.
 SMALLEST_STEP = 1e-7
+# A step that came out worse is not taken back (going on from there leaves traps), but the next ones are damped this much more:
+# without it a target out of reach has the digit swing between its limits.
+_CAUTION = 10.0
 # Share of each flexion's range in the postures that a stuck digit starts again from: mid-range first, then nearly open, nearly
 # closed, and hooked (knuckle straight, the rest curled). Abduction starts in the middle.
 _AGAIN = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, 0.15, 0.15, 0.15], [0.5, 0.85, 0.85, 0.85], [0.5, 0.1, 0.8, 0.8]])
@@ -98,7 +101,7 @@ def _descend(chain: Chain, wanted: Goal, q: Array, most: int) -> tuple[int, floa
     """One start: improve q in place; returns iterations, cost, distance left. The digit's length is 1."""
     p, J, e = np.empty(3), np.empty((10, 4)), np.empty(10)
     H, g, low, high, step = np.empty((4, 4)), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    best, best_cost, best_distance, steps, largest = q.copy(), np.inf, np.inf, 0, 1.0
+    best, best_cost, best_distance, steps, largest, caution = q.copy(), np.inf, np.inf, 0, 1.0, 1.0
     for iteration in range(most + 1):
         jacobian(chain, q, p, J)
         rows = _residuals(chain, wanted, q, p, J, e)
@@ -107,10 +110,13 @@ def _descend(chain: Chain, wanted: Goal, q: Array, most: int) -> tuple[int, floa
             cost += e[r] * e[r]
         if cost < best_cost:
             best[:], best_cost, best_distance, steps = q, cost, length_of(e), iteration
+            caution = max(0.1 * caution, 1.0)
+        else:
+            caution *= _CAUTION
         # The last step is taken and judged: breaking before that would leave up to 1e-7 rad on the table.
         if math.sqrt(cost) < STOP or largest < SMALLEST_STEP:
             break
-        mu = 0.01 * cost + 1e-15
+        mu = caution * 0.01 * cost + 1e-15
         for a in range(4):
             g[a] = 0.0
             for r in range(rows):
@@ -142,14 +148,15 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
     total, far = reach_of(chain), length_of(wanted.point)
     if not (math.isfinite(far) and total > 1e-9):
         return 0, far if math.isfinite(far) else 0.0, NOT_CONVERGED
-    # A point a kilometre away and one at ten digit lengths ask for the same posture, but only one is well scaled.
-    shrink = min(1.0, 10.0 * total / far) if far > 0.0 else 1.0
+    # Out of reach, the digit points at it: that is asking for the point at its full length in that direction, which leaves no
+    # large residual for Gauss-Newton to swing about.
+    shrink = min(1.0, total / far) if far > 0.0 else 1.0
     unit = scaled(chain, 1.0 / total)
     aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
     used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS))
     trial = np.empty(4)
     for attempt in range(4):
-        if distance * total <= tolerance or used >= most or far > total:
+        if distance * total <= tolerance or used >= most:
             break
         for j in range(4):
             trial[j] = chain.limits[j, 0] + _AGAIN[attempt, j] * (chain.limits[j, 1] - chain.limits[j, 0])

@@ -26,6 +26,8 @@ _EYE_CAMERA = np.array([0.36, -0.36, -0.26])
 _FOV_RAD = float(np.deg2rad(34.0))
 # A desk is some 20 cm under the cameras.
 _GRID_CAMERA = np.array([0.0, 0.2, 0.5])
+# A world's desk is at z = 0.
+_IN_PLANE = np.array([1.0, 1.0, 0.0])
 # Joints at their full skin radius would hide the bones; with these shares of it, both are seen.
 _JOINT_SHARE, _BONE_SHARE = 0.72, 0.42
 _POINT_RADIUS_M, _PREDICTED_RADIUS_M = 0.008, 0.004
@@ -74,7 +76,7 @@ class Scene:
         T_rig_from_camera = np.eye(4) if world is None else np.array(world.T_rig_from_camera)
         self._scene.set_up_direction("-y" if world is None else "+z")
         # The studio lighting of the default washes the colours out, which say something here.
-        self._scene.configure_environment_map(environment_intensity=0.5)
+        self._scene.configure_environment_map(environment_intensity=0.35)
         self._scene.add_grid(
             "/grid",
             width=1.2,
@@ -84,7 +86,7 @@ class Scene:
             section_size=0.1,
             cell_color=(225, 225, 225),
             section_color=(190, 190, 190),
-            position=_GRID_CAMERA if world is None else (0.0, 0.0, 0.0),
+            position=apply(T_rig_from_camera, _GRID_CAMERA) * (1.0 if world is None else _IN_PLANE),
         )
         self._scene.add_frame("/rig", axes_length=0.04, axes_radius=0.0012)
         server.initial_camera.position = apply(T_rig_from_camera, _EYE_CAMERA)

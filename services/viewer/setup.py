@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rhot.calibration import Colors, load_cameras, load_colors
+from rhot.calibration import Colors, load_colors, load_rig_cameras
 from rhot.camera import Camera
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError
@@ -31,7 +31,7 @@ def read_setup(config: RigConfig) -> Setup:
     notes: list[str] = []
     for table in config.camera:
         try:
-            cameras |= load_cameras(config.calibration_dir, [table.name])
+            cameras |= load_rig_cameras(config, [table.name])
         except CalibrationError as error:
             notes.append(f"camera {table.name} is not drawn: {_short(error, config)}")
         try:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rhot.config import load_rig
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, ObjectTruth, Truth, WristPose
 from rhot.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
+from services.cli.defaults import sim_toml
+from services.cli.inputs import job_of
+from services.cli.track_run import run
+from services.simulator.capture import write_capture
+from services.simulator.scene import load_scene
 
 START_NS = 1_700_000_000_000_000_000
 
@@ -84,25 +91,33 @@ def made_up() -> MadeUpHand:
     return MadeUpHand(default_hand("right"))
 
 
-@pytest.fixture(scope="session")
-def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two seconds of the simulated rig's `fist`, seed 1. Do not write into it."""
-    from rhot.config import load_rig
-    from services.cli.defaults import sim_toml
-    from services.simulator.capture import write_capture
-    from services.simulator.scene import load_scene
-
-    folder = tmp_path_factory.mktemp("simulated") / "capture"
-    write_capture(load_scene(load_rig(sim_toml()), "fist", 1), 2.0, folder)
+def simulated(folder: Path, seconds: float) -> Path:
+    """`fist`, seed 1, of the simulated rig."""
+    write_capture(load_scene(load_rig(sim_toml()), "fist", 1), seconds, folder)
     return folder
 
 
 @pytest.fixture(scope="session")
-def result(capture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """That capture, tracked. Do not write into it."""
-    from services.cli.inputs import job_of
-    from services.cli.track_run import run
+def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two seconds of the simulated rig. Do not write into it."""
+    return simulated(tmp_path_factory.mktemp("simulated") / "capture", 2.0)
 
+
+@pytest.fixture(scope="session")
+def short_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a second of it, for tests that break something. Do not write into it."""
+    return simulated(tmp_path_factory.mktemp("simulated") / "short", 0.5)
+
+
+@pytest.fixture
+def copy(short_capture: Path, tmp_path: Path) -> Path:
+    """The short capture, to break."""
+    return Path(shutil.copytree(short_capture, tmp_path / "capture"))
+
+
+@pytest.fixture(scope="session")
+def result(capture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The capture, tracked. Do not write into it."""
     folder = tmp_path_factory.mktemp("tracked") / "result"
     run(job_of([str(capture)], None), folder)
     return folder

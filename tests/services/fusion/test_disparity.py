@@ -28,13 +28,13 @@ def test_eq_10_without_alignment_error_is_the_pinhole_law():
     assert depth_law(Disparity(), rectified_pair(left, right)) == (4543.3, -1.035)
 
 
-def test_seed_law_is_right_to_2_percent_where_it_was_fitted():
+def test_seed_law_is_right_to_4_percent_on_an_ideal_pair():
     left, right = Setup().rig().values()
     pair = rectified_pair(left, right)
     for distance in np.arange(0.3, 1.01, 0.05):
         p = np.array([0.0375, 0.0, distance])
         found = locate(pair, rays_of((left, right), p), np.full(2, 1e-4), depth_law(Disparity(), pair), 2.0)
-        assert found.position_m[2] == pytest.approx(distance, rel=0.03)
+        assert found.position_m[2] == pytest.approx(distance, rel=0.04)
 
 
 @pytest.mark.parametrize("swap", [False, True])

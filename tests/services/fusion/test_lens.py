@@ -23,8 +23,9 @@ def test_equals_the_camera_and_inverts_the_projection():
         np.testing.assert_allclose(model.pixels_from_rays(rays), pixels, atol=1e-6)
         np.testing.assert_allclose(rays, model.rays_from_pixels(pixels), atol=2e-5)
         # The scale is the ray's change per pixel, by finite differences in both directions.
-        right = lens.rays(model, pixels + [0.5, 0.0])[0] - lens.rays(model, pixels - [0.5, 0.0])[0]
-        down = lens.rays(model, pixels + [0.0, 0.5])[0] - lens.rays(model, pixels - [0.0, 0.5])[0]
+        half_x, half_y = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+        right = lens.rays(model, pixels + half_x)[0] - lens.rays(model, pixels - half_x)[0]
+        down = lens.rays(model, pixels + half_y)[0] - lens.rays(model, pixels - half_y)[0]
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
         np.testing.assert_allclose(scale, np.sqrt(area), rtol=1e-4)
 

@@ -1,0 +1,68 @@
+"""How right a rig is about boards it was not calibrated with: triangulate them, and compare with the rigid board. Pure.
+
+A board seen by one camera only cannot be triangulated and does not count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rhot.transforms import Array, inverse
+from services.calibrator.adjust import State, View, rms
+from services.calibrator.boards import Board
+from services.calibrator.model import FX, FY, rays
+from services.calibrator.triangulate import epipolar_px, rigid_fit, triangulate
+
+
+@dataclass(frozen=True)
+class BoardError:
+    """One triangulated board: RMS distance of its corners from the best rigid board in squares, the mean side of its squares against
+    the true one, RMS epipolar distance in px, and the mean distance of the board from the first camera that sees it in m."""
+
+    fit_squares: float
+    square_ratio: float
+    epipolar_px: float
+    distance_m: float
+
+
+def board_error(views: list[View], state: State, board: Board) -> BoardError | None:
+    """The error of one board position, whose views these are; None if no two cameras see the same six corners."""
+    ids = _common(views)
+    if len(views) < 2 or len(ids) < 6:
+        return None
+    cameras = [view.camera for view in views]
+    seen = np.stack([_rays_of(view, ids, state) for view in views])  # (c, n, 2)
+    good = np.all(np.isfinite(seen), axis=(0, 2))
+    if np.count_nonzero(good) < 6:
+        return None
+    ids, seen = ids[good], seen[:, good]
+    places = state.T_camera_from_rig[cameras]
+    focals = state.lenses[cameras][:, [FX, FY]].mean(axis=1)
+    points = triangulate(places, seen, focals)
+    fit = rigid_fit(board.points[ids], points)
+    pairs = board.neighbours(ids)
+    sides = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    epipolar = [
+        epipolar_px(places[k] @ inverse(places[0]), seen[0], seen[k], float(np.sqrt(focals[0] * focals[k]))) for k in range(1, len(views))
+    ]
+    distance = float(np.linalg.norm(points - inverse(places[0])[:3, 3], axis=1).mean())
+    return BoardError(
+        rms(fit.errors) / board.square_m,
+        float(sides.mean()) / board.square_m if len(sides) else float("nan"),
+        float(np.sqrt(np.mean(np.square(epipolar)))),
+        distance,
+    )
+
+
+def _common(views: list[View]) -> np.ndarray:
+    ids = views[0].ids
+    for view in views[1:]:
+        ids = np.intersect1d(ids, view.ids)
+    return ids
+
+
+def _rays_of(view: View, ids: np.ndarray, state: State) -> Array:
+    where = np.searchsorted(view.ids, ids)
+    return rays(state.lenses[view.camera], view.pixels[where])

@@ -1,0 +1,162 @@
+"""The live view as a person sees it: a real viewer process, a real browser, pixels."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import zenoh
+
+from rhot import topics
+from rhot.bus import client_config
+from rhot.config import RigConfig, load_rig
+from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, default_hand, forward, joint_radii_m
+from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, ObjectPose, WristPose
+from rhot.transforms import quaternion_from_rotation, rotation_x, rotation_z
+
+pytestmark = pytest.mark.browser
+DEADLINE_S = 30.0
+OBJECT_AT = (0.17, 0.05, 0.55)
+
+
+@pytest.fixture
+def rig(repository: Path) -> RigConfig:
+    return load_rig(repository / "config" / "sim.toml")
+
+
+@pytest.fixture
+def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
+    """A viewer process on a free port; its address."""
+    text = (repository / "config" / "sim.toml").read_text(encoding="utf-8")
+    (tmp_path / "rig.toml").write_text(f"{text}\n[viewer]\nport = 0\n" if "[viewer]" not in text else text, encoding="utf-8")
+    (tmp_path / "calibration").symlink_to(repository / "config" / "calibration")
+    command = [sys.executable, "-m", "services.viewer", "--config", str(tmp_path / "rig.toml"), "--connect", router]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, cwd=repository, env={**os.environ, "OMP_NUM_THREADS": "1"}
+    ) as process:
+        assert process.stdout is not None
+        line = next(line for line in process.stdout if "live view at" in line)
+        yield msgspec.json.decode(line)["text"].removeprefix("live view at ")
+        process.terminate()
+        process.stdout.read()
+    assert process.returncode == 0
+
+
+def hand_pose(seq: int) -> HandPose:
+    """An upright right hand half a metre away, palm to the cameras, bending its fingers."""
+    model = default_hand("right")
+    bend = 0.4 + 0.4 * np.sin(0.1 * seq)
+    angles = np.zeros((5, 4))
+    angles[1:] = [0.0, 0.7 * bend, bend, 0.66 * bend]
+    positions, rotations = forward(model, rotation_x(-np.pi / 2) @ rotation_z(np.pi), np.array([0.04, 0.08, 0.48]), angles)
+    joints = [
+        HandJoint(
+            name=name,
+            position_m=tuple(p.tolist()),
+            orientation_wxyz=tuple(quaternion_from_rotation(R).tolist()),
+            radius_m=float(radius),
+            source="measured" if name in BASIC_LANDMARKS else "solved",
+        )
+        for name, p, R, radius in zip(JOINTS, positions, rotations, joint_radii_m(model), strict=True)
+    ]
+    fingers = [
+        FingerPose(
+            name=digit,  # type: ignore[arg-type]
+            angles_rad=FingerAngles(abduction=float(a[0]), mcp=float(a[1]), pip=float(a[2]), dip=float(a[3])),
+            residual_m=0.0,
+            iterations=1,
+            status="solved",
+        )
+        for digit, a in zip(DIGITS, angles, strict=True)
+    ]
+    wrist = WristPose(position_m=joints[1].position_m, orientation_wxyz=joints[1].orientation_wxyz)
+    return HandPose(hand="right", seq=seq, stamp_ns=time.time_ns() - 30_000_000, method="dls", wrist=wrist, joints=joints, fingers=fingers)
+
+
+def cup_pose(seq: int) -> ObjectPose:
+    return ObjectPose(
+        object="cup",
+        serial="LHR-SIM00001",
+        seq=seq,
+        stamp_ns=time.time_ns(),
+        position_m=OBJECT_AT,
+        orientation_wxyz=(1.0, 0.0, 0.0, 0.0),
+        velocity_m_s=(0.0, 0.0, 0.0),
+        angular_velocity_rad_s=(0.0, 0.0, 0.0),
+        tracking="ok",
+        registered=True,
+    )
+
+
+@pytest.fixture
+def moving_hand(router: str, rig: RigConfig) -> Iterator[threading.Event]:
+    """Publishes a hand and a cup at 30 Hz until the event is set."""
+    stop = threading.Event()
+
+    def publish() -> None:
+        with zenoh.open(client_config([router])) as session:
+            for seq in itertools.count():
+                session.put(topics.POSE.key(rig.rig.name, hand="right"), msgspec.json.encode(hand_pose(seq)))
+                session.put(topics.OBJECT.key(rig.rig.name, object="cup"), msgspec.json.encode(cup_pose(seq)))
+                if stop.wait(1 / 30):
+                    return
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    yield stop
+    stop.set()
+    thread.join()
+
+
+def picture(page: Any) -> np.ndarray:
+    """The page as (h, w, 3), without the panel on its right and the notice on its left."""
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    pixels = np.array(image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    return pixels[:, int(0.27 * pixels.shape[1]) : int(0.65 * pixels.shape[1])]
+
+
+def blue_and_green(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Masks of what is bluish (solved joints and bones) and greenish (measured joints, and the cup)."""
+    red, green, blue = np.moveaxis(pixels, 2, 0)
+    return (blue - red > 30) & (blue - green > 15), (green - red > 25) & (green - blue > -5)
+
+
+def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(chromium: Any, viewer: str, moving_hand: threading.Event) -> None:
+    page = chromium.new_page(viewport={"width": 1200, "height": 750})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(viewer)
+    page.get_by_text("right hand: tracked").wait_for(timeout=DEADLINE_S * 1e3)
+    page.get_by_text("object cup: ok").wait_for(timeout=DEADLINE_S * 1e3)
+    deadline = time.monotonic() + DEADLINE_S
+    while (seen := blue_and_green(picture(page)))[0].sum() < 1500 and time.monotonic() < deadline:
+        page.wait_for_timeout(200)
+    blue, green = seen
+    assert blue.sum() >= 1500, "no hand is drawn"
+    assert green.sum() >= 200, "neither measured joints nor the cup are drawn"
+    rows, columns = np.nonzero(blue)
+    assert 0.25 < rows.mean() / blue.shape[0] < 0.65
+    assert 0.25 < columns.mean() / blue.shape[1] < 0.75
+    before = picture(page)
+    while np.abs(picture(page) - before).max() < 60 and time.monotonic() < deadline:
+        page.wait_for_timeout(100)
+    assert np.abs(picture(page) - before).max() >= 60, "nothing moves"
+    assert page.locator("table tr", has_text="index").inner_text().count("°") == 4
+    moving_hand.set()
+    page.get_by_text("waiting for hand poses of the right hand").wait_for(timeout=DEADLINE_S * 1e3)
+    while blue_and_green(picture(page))[0].sum() > 300 and time.monotonic() < deadline:
+        page.wait_for_timeout(200)
+    assert blue_and_green(picture(page))[0].sum() <= 300, "a hand is drawn that is not there"
+    assert errors == []
+    page.close()

@@ -1,0 +1,137 @@
+"""Helpers of the solver's tests: hands in motion, what a camera would measure of them, random angles within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand, forward, landmark_point
+from rhot.messages import HandPoint, HandPoints, HandPose
+from rhot.transforms import Array, rotation_from_quaternion, rotation_from_vector
+
+FRAME_NS = 33_333_333
+
+
+@dataclass(frozen=True)
+class Instant:
+    """One instant of a moving hand."""
+
+    rotation: Array
+    position_m: Array
+    angles_rad: Array
+
+
+@dataclass(frozen=True)
+class World:
+    """A hand model and what can be asked of it."""
+
+    model: HandModel
+
+    def motion(self, seed: int, frames: int, kind: str = "random") -> list[Instant]:
+        """Smooth motion: every joint on its own ("random") or a fist closing and opening ("fist"); fingers follow DIP = 2/3 PIP."""
+        rng = np.random.default_rng(seed)
+        low, high = self.model.limits_rad[..., 0], self.model.limits_rad[..., 1]
+        if kind == "random":
+            share = 0.5 + 0.45 * _waves(rng, frames, 20, 0.7).reshape(frames, 5, 4)
+        else:
+            closing = np.clip(0.5 + 0.6 * _waves(rng, frames, 1, 0.5)[:, :, None], 0.0, 1.0)
+            share = np.repeat(np.repeat(0.92 * closing, 5, axis=1), 4, axis=2)
+            share[:, :, 0] = 0.5
+        angles = low + share * (high - low)
+        angles[:, 1:, 3] = 2.0 / 3.0 * angles[:, 1:, 2]
+        start = rotation_from_quaternion(rng.normal(size=4))
+        turns, shifts = 0.8 * _waves(rng, frames, 3, 0.4), 0.1 * _waves(rng, frames, 3, 0.4)
+        return [
+            Instant(start @ rotation_from_vector(turn), np.array([0.0, 0.0, 0.5]) + shift, q)
+            for turn, shift, q in zip(turns, shifts, angles, strict=True)
+        ]
+
+    def points(self, instant: Instant, names: Sequence[str] = BASIC_LANDMARKS) -> dict[str, Array]:
+        """Where the landmarks of an instant are."""
+        joints = forward(self.model, instant.rotation, instant.position_m, instant.angles_rad)
+        return {name: landmark_point(self.model, name, *joints) for name in names}
+
+    def message(self, places: dict[str, Array], frame: int, sigma_m: float = 1e-3, predicted: Sequence[str] = ()) -> HandPoints:
+        """The HandPoints of some landmarks, frame by frame at 30 Hz."""
+        return HandPoints(
+            hand=self.model.hand,
+            seq=frame,
+            stamp_ns=10**18 + frame * FRAME_NS,
+            points=[
+                HandPoint(
+                    name=name,
+                    position_m=tuple(np.asarray(place).tolist()),
+                    sigma_m=(sigma_m,) * 3,
+                    cameras=["left", "right"],
+                    source="predicted" if name in predicted else "measured",
+                )
+                for name, place in places.items()
+            ],
+        )
+
+
+def _waves(rng: np.random.Generator, frames: int, count: int, hz: float) -> Array:
+    """Smooth curves within -1..1 at 30 frames a second; (frames, count)."""
+    t = np.arange(frames)[:, None, None] / 30.0
+    frequency, phase = rng.uniform(0.1, hz, (count, 3)), rng.uniform(0.0, 2.0 * np.pi, (count, 3))
+    weight = rng.uniform(0.5, 1.0, (count, 3))
+    return (weight * np.sin(2.0 * np.pi * frequency * t + phase)).sum(axis=2) / weight.sum(axis=1)
+
+
+def _angles_of(pose: HandPose) -> Array:
+    rows = []
+    for finger in pose.fingers:
+        a = finger.angles_rad
+        rows.append((a.abduction, a.cmc, a.mcp, a.dip) if finger.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip))
+    return np.array(rows)
+
+
+@pytest.fixture(scope="session")
+def world() -> Callable[[HandName], World]:
+    """World of a hand of the tables."""
+    return lambda hand: World(default_hand(hand))
+
+
+@pytest.fixture(scope="session")
+def angles_of() -> Callable[[HandPose], Array]:
+    """(5, 4) angles of a pose message, in the order of DIGITS and DIGIT_ANGLES."""
+    return _angles_of
+
+
+@pytest.fixture(scope="session")
+def grasp() -> Callable[[np.random.Generator, bool], Array]:
+    """A random 37-frame palmar grasp, as in the finger study: (37, 4); PIP leads, MCP follows; coupled: DIP = 2/3 PIP."""
+
+    def rise(t: Array, centre: float, width: float) -> Array:
+        curve = 1.0 / (1.0 + np.exp(-(t - centre) / width))
+        return (curve - curve[0]) / (curve[-1] - curve[0])
+
+    def make(rng: np.random.Generator, coupled: bool = False) -> Array:
+        t = np.linspace(0.0, 1.0, 37)
+        q = np.zeros((37, 4))
+        q[:, 0] = np.deg2rad(rng.uniform(-10.0, 10.0)) * (1.0 - t)
+        q[:, 1] = np.deg2rad(rng.uniform(50.0, 88.0)) * rise(t, rng.uniform(0.4, 0.7), rng.uniform(0.1, 0.2))
+        q[:, 2] = np.deg2rad(rng.uniform(70.0, 108.0)) * rise(t, rng.uniform(0.2, 0.5), rng.uniform(0.15, 0.3))
+        q[:, 3] = np.deg2rad(rng.uniform(40.0, 85.0)) * rise(t, rng.uniform(0.2, 0.6), rng.uniform(0.15, 0.3))
+        if coupled:
+            q[:, 3] = 2.0 / 3.0 * q[:, 2]
+        return q
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def within() -> Callable[[np.random.Generator, Array, bool], Array]:
+    """Random angles (4,) within limits (4, 2); coupled: DIP = 2/3 PIP, and PIP low enough for it."""
+
+    def make(rng: np.random.Generator, limits: Array, coupled: bool) -> Array:
+        q = rng.uniform(limits[:, 0], limits[:, 1])
+        if coupled:
+            q[2] = min(q[2], 1.5 * limits[3, 1])
+            q[3] = 2.0 / 3.0 * q[2]
+        return q
+
+    return make
