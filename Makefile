@@ -46,6 +46,7 @@ system:
 $(STAMP): pyproject.toml | system
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[dev]'
+	$(BIN)/rhot warm
 	@touch $@
 
 clean:

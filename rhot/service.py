@@ -19,6 +19,10 @@ from rhot.stats import StreamStats
 
 log = logging.getLogger("rhot.service")
 
+# The first two beats after the start hold parts of a second; what they would say of rates is not true.
+_SETTLE_S = 2.0
+# One slow second is scheduling, three are a fault worth a line in the journal.
+_SLOW_BEATS = 3
 _PAGE_MB = resource.getpagesize() / 1e6
 
 
@@ -45,11 +49,13 @@ class Service:
     last_error: str = ""
     _started_s: float = field(default_factory=time.monotonic)
     _logged_s: float = float("-inf")
-    _ok: dict[str, bool] = field(default_factory=dict)
+    _ready_s: float = float("inf")
+    _slow_beats: dict[str, int] = field(default_factory=dict)
 
     def ready(self) -> None:
         """Initialised: tell systemd, and everybody who watches liveliness."""
         self.state = "running"
+        self._ready_s = time.monotonic()
         self.bus.alive(self.name, self.instance)
         systemd.notify(f"READY=1\nSTATUS={self.state}")
         log.info("%s %s ready", self.name, self.instance)
@@ -95,7 +101,7 @@ class Service:
 
     def _expected_hz(self, stats: StreamStats) -> float:
         """What the topics table and rig.toml lead to expect; of a pattern, the sum over its streams."""
-        if self.state != "running":
+        if time.monotonic() - self._ready_s < _SETTLE_S:
             return 0.0
         rate = stats.topic.rate
         if "camera" in stats.topic.fields:
@@ -109,12 +115,14 @@ class Service:
         return self.config.rate_hz(rate) * streams
 
     def _log_changes(self, streams: list[StreamHealth]) -> None:
+        text = "%s %s: %.1f Hz of %.1f expected, %d dropped, %d rejected"
         for stream in streams:
-            if self._ok.get(stream.key, True) != stream.ok:
-                text = "%s %s: %.1f Hz of %.1f expected, %d dropped, %d rejected"
-                level = logging.INFO if stream.ok else logging.WARNING
+            slow_before = self._slow_beats.get(stream.key, 0)
+            slow = 0 if stream.ok else slow_before + 1
+            self._slow_beats[stream.key] = slow
+            if slow == _SLOW_BEATS or (slow == 0 and slow_before >= _SLOW_BEATS):
+                level = logging.WARNING if slow else logging.INFO
                 log.log(level, text, stream.direction, stream.key, stream.rate_hz, stream.expected_hz, stream.dropped, stream.rejected)
-            self._ok[stream.key] = stream.ok
 
 
 def _rss_mb() -> float:

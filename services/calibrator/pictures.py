@@ -28,10 +28,14 @@ Key = tuple[str, ...]
 
 @dataclass(frozen=True)
 class PictureSet:
-    """files[camera][key] is a picture; one key is one position of the board. left_out are files that were not understood."""
+    """files[camera][key] is a picture; one key is one position of the board. left_out are files that were not understood.
+
+    side_by_side: a file holds the pictures of all cameras, the first one on the left.
+    """
 
     files: dict[str, dict[str, Path]]
     left_out: tuple[Path, ...] = ()
+    side_by_side: bool = False
 
     @property
     def cameras(self) -> list[str]:
@@ -41,6 +45,14 @@ class PictureSet:
     def keys(self) -> list[str]:
         """Every board position some camera has a picture of, in order."""
         return sorted({key for pictures in self.files.values() for key in pictures}, key=_natural)
+
+    def read(self, camera: str, key: str) -> np.ndarray:
+        """One camera's picture as grey (h, w) uint8.
+
+        Raises CalibrationError if it cannot be read.
+        """
+        image = read_grey(self.files[camera][key])
+        return split_side_by_side(image, len(self.files))[self.cameras.index(camera)] if self.side_by_side else image
 
 
 def read_grey(path: Path) -> np.ndarray:
@@ -62,6 +74,17 @@ def one_camera(folder: Path, camera: str) -> PictureSet:
     files = _pictures(folder)
     own = [path for path in files if camera in (path.parent.name, *_parts(path.relative_to(folder)))] or files
     return PictureSet({camera: {str(path.relative_to(folder)): path for path in own}})
+
+
+def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
+    """All pictures of a folder, each holding the views of these cameras, from left to right.
+
+    Raises CalibrationError if there is none, or only one camera is named.
+    """
+    if len(cameras) < 2:
+        raise CalibrationError(f"pictures side by side need the names of two cameras or more, e.g. --cameras left,right; got {cameras}")
+    files = {str(path.relative_to(folder).with_suffix("")): path for path in _pictures(folder)}
+    return PictureSet({camera: files for camera in cameras}, side_by_side=True)
 
 
 def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:

@@ -22,8 +22,9 @@ from services.cli.simulate import simulate
 from services.cli.top import top
 from services.cli.track import track
 from services.cli.up import up
+from services.cli.warm import warm
 
-COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check)
+COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check, warm)
 
 
 def _version(wanted: bool) -> None:

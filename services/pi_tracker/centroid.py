@@ -42,10 +42,11 @@ _SLOPE = 2.0
 _MIN_CORE = 3
 # Luma below which a ratio of chroma to luma is noise.
 _DARKEST = 8.0
-# What noise does not explain: light that changes across the paint moves its centre by this share of its radius, the more the vaguer its edge
-# is, i.e. the wider than 1.3 px the band in which the share is between 0 and 1 (blur, coloured light, dark sides). Fitted to the simulator's
-# hands: errors over sigma .86-.99 in four scenes, with sharp and with blurred and coloured light, where a constant gave 1.4-5.0.
-_MISFIT, _MISFIT_PER_PX, _SHARP_PX = 0.012, 0.11, 1.3
+# What noise does not explain: light that changes across the paint moves its centre by this share of its radius, the more the vaguer
+# its edge is, i.e. the wider than 1.6 px the band in which the share of paint is neither 0 nor 1 (blur, coloured light, dark sides).
+# Fitted to the simulator's hands: error over sigma .9-1.1 in four scenes, sharp ones and one with blur and coloured light, where a
+# constant gave 1.5-5.9.
+_MISFIT, _MISFIT_PER_PX, _SHARP_PX = 0.016, 0.12, 1.6
 # Paint this far from its surroundings in chroma per luma is told from them without doubt; the paints of the simulator lie at .4 to .7.
 _CONTRAST = 0.25
 # Of a blob without any paint when looked at closely.

@@ -35,6 +35,7 @@ def _object(T_rig_from_object: Array) -> ObjectTruth:
 
 
 def vector(values: Array) -> tuple[float, float, float]:
+    """A vector (3,) as messages have it, rounded to micrometres (or the like)."""
     x, y, z = (round(float(v), 6) for v in values)
     return x, y, z
 

@@ -154,7 +154,7 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
     unit = scaled(chain, 1.0 / total)
     aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
     used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS))
-    trial = np.empty(4)
+    trial, again = np.empty(4), 0
     for attempt in range(4):
         if distance * total <= tolerance or used >= most:
             break
@@ -162,12 +162,14 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
             trial[j] = chain.limits[j, 0] + _AGAIN[attempt, j] * (chain.limits[j, 1] - chain.limits[j, 0])
         steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS))
         used += steps
+        again += 1
         if trial_cost < cost:
             q[:], cost, distance = trial, trial_cost, left
     left = distance_to(chain, q, wanted.point)
     if left <= tolerance:
         return used, left, SOLVED
-    return used, left, NOT_CONVERGED if used >= most and far <= total else UNREACHABLE
+    # Two starts that end away from the goal say that it is not to be had; one that was cut short says nothing.
+    return used, left, UNREACHABLE if again >= 2 or far > total else NOT_CONVERGED
 
 
 @njit(cache=True)

@@ -95,7 +95,7 @@ def rates(health: Sequence[Health]) -> str:
     rows = [_row(("stream", "Hz", "of", "ms", "lost"), head=True)]
     for beat in health:
         name = f"{beat.service}/{beat.instance}"
-        rows.append(_row((f"<b>{text(name)}</b>", "", "", "", f"{min(beat.cpu_percent, 9999.0):.0f}&nbsp;%")))
+        rows.append(f'<tr><td colspan="5"><b>{text(name)}</b> {min(beat.cpu_percent, 9999.0):.0f} % of a core</td></tr>')
         rows += [_stream(stream) for stream in beat.streams]
         if beat.last_error:
             rows.append(f'<tr><td colspan="5" style="color:#c0392b">{text(beat.last_error, 120)}</td></tr>')

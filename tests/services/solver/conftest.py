@@ -103,19 +103,24 @@ def angles_of() -> Callable[[HandPose], Array]:
 
 @pytest.fixture(scope="session")
 def grasp() -> Callable[[np.random.Generator, bool], Array]:
-    """A random 37-frame palmar grasp, as in the finger study: (37, 4); PIP leads, MCP follows; coupled: DIP = 2/3 PIP."""
+    """A random 37-frame palmar grasp, as in the finger study: (37, 4); PIP leads, MCP follows.
+
+    It starts as a hand does that is held open, bent by a few degrees, or straight; coupled: DIP = 2/3 PIP.
+    """
 
     def rise(t: Array, centre: float, width: float) -> Array:
         curve = 1.0 / (1.0 + np.exp(-(t - centre) / width))
         return (curve - curve[0]) / (curve[-1] - curve[0])
 
-    def make(rng: np.random.Generator, coupled: bool = False) -> Array:
+    def make(rng: np.random.Generator, coupled: bool = False, straight: bool = False) -> Array:
         t = np.linspace(0.0, 1.0, 37)
         q = np.zeros((37, 4))
         q[:, 0] = np.deg2rad(rng.uniform(-10.0, 10.0)) * (1.0 - t)
         q[:, 1] = np.deg2rad(rng.uniform(50.0, 88.0)) * rise(t, rng.uniform(0.4, 0.7), rng.uniform(0.1, 0.2))
         q[:, 2] = np.deg2rad(rng.uniform(70.0, 108.0)) * rise(t, rng.uniform(0.2, 0.5), rng.uniform(0.15, 0.3))
         q[:, 3] = np.deg2rad(rng.uniform(40.0, 85.0)) * rise(t, rng.uniform(0.2, 0.6), rng.uniform(0.15, 0.3))
+        if not straight:
+            q[:, 1:] += np.linspace(1.0, 0.0, 37)[:, None] * np.deg2rad(rng.uniform((4.0, 6.0, 3.0), (10.0, 14.0, 9.0)))
         if coupled:
             q[:, 3] = 2.0 / 3.0 * q[:, 2]
         return q

@@ -26,7 +26,8 @@ def test_the_optimum_of_random_problems(n: int) -> None:
         A, b, low, high, H = _problem(rng, n)
         g, x = -A.T @ b, np.empty(n)
         assert box_qp(H, g, low, high, x)
-        assert np.all(x >= low) and np.all(x <= high)
+        assert np.all(x >= low)
+        assert np.all(x <= high)
         slope = H @ x + g
         scale = 1e-7 * (1.0 + np.abs(g).max())
         assert np.all(np.abs(slope[(x > low) & (x < high)]) <= scale)

@@ -20,13 +20,14 @@ INDEX = k.chain_of(CHAINS, 1)
 FIRST = (0.0, np.pi / 2, 0.0, 0.0)
 
 
-def test_grasps_of_37_frames_from_the_studys_start(grasp: Callable) -> None:
+@pytest.mark.parametrize("straight", [False, True])
+def test_grasps_of_37_frames_from_the_studys_start(grasp: Callable, straight: bool) -> None:
     """Tip pose as the goal: first frame within 10 iterations, later ones 5, tip within 1e-6 mm, never the mirror elbow."""
     rng = np.random.default_rng(5)
     for _ in range(200):
         chain = INDEX._replace(lengths=INDEX.lengths * rng.uniform(0.8, 1.2))
         q = np.array(FIRST)
-        for frame, angles in enumerate(grasp(rng)):
+        for frame, angles in enumerate(grasp(rng, straight=straight)):
             point, axes = k.tip_reference(chain, angles)
             used, left, state = dls.solve(chain, dls.goal(dls.POSE, point, axes), q, 60, 1e-4)
             assert state == dls.SOLVED
@@ -37,9 +38,9 @@ def test_grasps_of_37_frames_from_the_studys_start(grasp: Callable) -> None:
 
 def test_grasps_from_position_and_coupling(grasp: Callable) -> None:
     rng = np.random.default_rng(6)
-    for _ in range(100):
+    for round_ in range(100):
         q = np.array(FIRST)
-        for frame, angles in enumerate(grasp(rng, True)):
+        for frame, angles in enumerate(grasp(rng, True, straight=round_ % 2 == 0)):
             used, left, _ = dls.solve(INDEX, dls.goal(dls.COUPLED, k.tip(INDEX, angles)), q, 60, 1e-4)
             # A straight finger is singular: its first bend takes one more.
             assert used <= (10 if frame == 0 else 6)
@@ -55,7 +56,8 @@ def test_reachable_targets_from_anywhere(row: int, kind: int, within: Callable) 
         point = k.tip(chain, within(rng, chain.limits, kind == dls.COUPLED))
         q = within(rng, chain.limits, False)
         _, left, state = dls.solve(chain, dls.goal(kind, point), q, 60, 1e-4)
-        assert np.all(q >= chain.limits[:, 0]) and np.all(q <= chain.limits[:, 1])
+        assert np.all(q >= chain.limits[:, 0])
+        assert np.all(q <= chain.limits[:, 1])
         solved += left <= 1e-4 and state == dls.SOLVED
     assert solved >= 499
 
@@ -133,8 +135,10 @@ def test_nothing_leaves_the_limits(point: list[float], start: list[float], bones
     chain = INDEX._replace(lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]]))
     q = np.array(start)
     used, left, state = dls.solve(chain, dls.goal(kind, np.array(point)), q, 60, 1e-4)
-    assert np.all(q >= chain.limits[:, 0]) and np.all(q <= chain.limits[:, 1])
-    assert used <= 60 and state in (dls.SOLVED, dls.UNREACHABLE, dls.NOT_CONVERGED)
+    assert np.all(q >= chain.limits[:, 0])
+    assert np.all(q <= chain.limits[:, 1])
+    assert used <= 60
+    assert state in (dls.SOLVED, dls.UNREACHABLE, dls.NOT_CONVERGED)
     assert not np.isnan(left)
 
 

@@ -17,7 +17,8 @@ angles = st.floats(-10.0, 10.0)
 @given(st.sampled_from(SHAPES), angles, angles)
 def test_always_inside_and_stays_there(shape: int, abduction: float, flexion: float) -> None:
     once = swing(shape, LIMITS, abduction, flexion)
-    assert np.all(np.array(once) >= LIMITS[:, 0]) and np.all(np.array(once) <= LIMITS[:, 1])
+    assert np.all(np.array(once) >= LIMITS[:, 0])
+    assert np.all(np.array(once) <= LIMITS[:, 1])
     np.testing.assert_allclose(swing(shape, LIMITS, *once), once, atol=1e-12)
 
 

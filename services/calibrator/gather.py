@@ -1,0 +1,75 @@
+"""From a folder of pictures to the boards found in them: what both calibrations begin with. Pure but for reading the files.
+
+Pictures without a whole board are listed with that reason; a folder without any board is refused by the calibration itself, or here
+if the board's size had to be found out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rhot.errors import CalibrationError
+from services.calibrator.boards import Board
+from services.calibrator.detect import Detection, detect
+from services.calibrator.guess import guess_corners
+from services.calibrator.pictures import PictureSet
+from services.calibrator.views import LeftOut
+
+Found = dict[str, dict[str, Detection]]
+Advance = Callable[[int], None]
+
+
+def find_boards(pictures: PictureSet, board: Board, advance: Advance = lambda _: None) -> tuple[Found, list[LeftOut]]:
+    """The board in every picture (camera -> key -> detection), and the pictures that do not show it as a whole."""
+    found: Found = {}
+    blind: list[LeftOut] = []
+    for camera, files in pictures.files.items():
+        found[camera] = {}
+        for key in files:
+            detection = detect(pictures.read(camera, key), board)
+            advance(1)
+            if detection is None:
+                blind.append(LeftOut(camera, key, "does not show the whole board"))
+            else:
+                found[camera][key] = detection
+    return found, blind
+
+
+def the_board(pictures: PictureSet, board: Board | None, square_m: float) -> Board:
+    """The board, counted in the pictures if it is not given, with the ChArUco pattern that these pictures show.
+
+    Raises CalibrationError if no picture shows a chessboard.
+    """
+    if board is not None:
+        return _pattern(pictures, board) if board.kind == "charuco" else board
+    size = guess_corners(_sample(pictures))
+    if size is None:
+        raise CalibrationError(
+            "no picture shows a chessboard as a whole, so its size cannot be found out; give it with --board COLSxROWS (inner corners), "
+            "or --kind charuco for a board with markers. It must be in focus, evenly lit, and completely in the picture with a white margin"
+        )
+    return Board(*size, square_m)
+
+
+def _pattern(pictures: PictureSet, board: Board) -> Board:
+    """ChArUco boards with an even number of rows of squares come in two patterns; the one that is found more often."""
+    if (board.rows + 1) % 2:
+        return board
+    both = (board, replace(board, legacy=not board.legacy))
+    sample = list(_sample(pictures))
+    seen = [sum(len(found.ids) for image in sample[:8] if (found := detect(image, option))) for option in both]
+    return both[int(np.argmax(seen))]
+
+
+def _sample(pictures: PictureSet) -> Iterator[np.ndarray]:
+    """Pictures of all cameras in turn, spread over the series."""
+    keys = pictures.keys()
+    # Neighbours in a series look alike: every fourth first, then those between.
+    for key in (key for offset in (0, 2, 1, 3) for key in keys[offset::4]):
+        for camera, files in pictures.files.items():
+            if key in files:
+                yield pictures.read(camera, key)

@@ -1,0 +1,95 @@
+"""What `rhot calibrate` prints: the figures that matter first, then picture by picture. Pure text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhot.transforms import Array, inverse
+from services.calibrator.boards import Board
+from services.calibrator.lens import LensResult
+from services.calibrator.model import FX, FY, K1
+from services.calibrator.rig_checks import HURTS_PERCENT
+from services.calibrator.stereo import RigResult
+from services.calibrator.views import LeftOut
+
+
+def lens_text(result: LensResult, board: Board) -> str:
+    """The report of `rhot calibrate lens`."""
+    seen = result.coverage
+    lines = [
+        f"camera {result.camera}, {result.size_px[0]}x{result.size_px[1]} px, {len(result.pictures)} pictures, board {board.name}",
+        f"  lens          {_lens(result.lens, result.sigma)}, distortion {result.model}",
+        f"  RMS           {result.rms_px:.3f} px",
+        f"  held out      {result.held_out_px:.3f} px, {result.held_out_squares:.4f} squares = "
+        f"{1e3 * board.square_m * result.held_out_squares:.3f} mm on the board",
+        f"  coverage      {100 * seen.share:.0f} % of the image, tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f} degrees",
+        *("    " + row for row in seen.drawing().splitlines()),
+        "  picture           RMS px   held out px   squares   pull on the others",
+    ]
+    for picture in result.pictures:
+        lines.append(
+            f"  {picture.key:<16} {picture.rms_px:>7.3f} {picture.held_out_px:>13.3f} {picture.held_out_squares:>9.4f} "
+            f"{picture.pull_percent:>10.1f} %{_hurts(picture.pull_percent)}"
+        )
+    return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
+
+
+def rig_text(result: RigResult) -> str:
+    """The report of `rhot calibrate stereo`."""
+    square_mm = 1e3 * result.board.square_m
+    held_out = [position for position in result.positions if position.held_out]
+    lines = [
+        f"rig of {', '.join(result.cameras)}, {len(result.positions)} positions of the board ({result.board.name}), "
+        f"{len(held_out)} of them seen by two cameras",
+        f"  stereo RMS           {result.rms_px:.3f} px",
+        f"  held-out board fit   {result.held_out_squares:.4f} squares = {square_mm * result.held_out_squares:.3f} mm",
+        f"  held-out square      {square_mm * result.square_ratio:.3f} mm of {square_mm:g} mm: {_percent(result.square_ratio)}, "
+        f"worst position {_percent(result.square_worst)}",
+        f"  held-out epipolar    {result.epipolar_px:.3f} px",
+    ]
+    for k, name in enumerate(result.cameras):
+        lines.append(f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px")
+        if k:
+            lines.append(f"    {_place(result.state.T_camera_from_rig[k], result.place_sigma[k])}")
+        lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")
+        lines += ["      " + row for row in result.coverage[k].drawing().splitlines()]
+    lines.append("  position          RMS px   held out: squares   square side   epipolar px   at mm   pull on the others")
+    for position in result.positions:
+        error = position.held_out
+        figures = (
+            f"{error.fit_squares:>19.4f} {_percent(error.square_ratio):>13} {error.epipolar_px:>13.3f} {1e3 * error.distance_m:>7.0f}"
+            if error
+            else f"{'seen by one camera only':>55}"
+        )
+        lines.append(f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.pull_percent)}")
+    return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
+
+
+def _lens(lens: Array, sigma: Array) -> str:
+    known = f" +- {max(sigma[FX], sigma[FY]):.1f}" if np.any(sigma) else ""
+    k = " ".join(f"{value:.3g}" for value in lens[K1:])
+    return f"f {lens[FX]:.1f}, {lens[FY]:.1f}{known} px, centre {lens[2]:.1f}, {lens[3]:.1f} px, ({k})"
+
+
+def _place(T_camera_from_rig: Array, sigma: Array) -> str:
+    p = 1e3 * inverse(T_camera_from_rig)[:3, 3]
+    angle = np.degrees(np.arccos(np.clip((np.trace(T_camera_from_rig[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+    return (
+        f"at {p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f} mm (+- {1e3 * sigma[3:].max():.1f}), {np.linalg.norm(p):.1f} mm from the first camera, "
+        f"turned {angle:.2f} degrees"
+    )
+
+
+def _percent(ratio: float) -> str:
+    return f"{100.0 * (ratio - 1.0):+.2f} %"
+
+
+def _hurts(pull_percent: float) -> str:
+    return "   <- hurts" if pull_percent > HURTS_PERCENT else ""
+
+
+def _notes(left_out: Sequence[LeftOut], warnings: Sequence[str]) -> list[str]:
+    lines = [f"  left out: {f'{item.camera} {item.key}'.strip()}: {item.reason}" for item in left_out]
+    return lines + [f"  warning: {warning}" for warning in warnings]

@@ -1,0 +1,22 @@
+"""`rhot calibrate ...`: everything a rig must know about itself, each command in the file of its name; here they are gathered."""
+
+from __future__ import annotations
+
+import typer
+
+from services.cli.calibrate_depth import depth
+from services.cli.calibrate_lens import lens
+from services.cli.calibrate_stereo import stereo
+from services.cli.calibrate_world import world
+
+COMMANDS = (lens, stereo, world, depth)
+
+calibrate = typer.Typer(
+    name="calibrate",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Measure lenses, the rig, the desk, ... and write calibration files.",
+)
+for _command in COMMANDS:
+    calibrate.command(name=_command.__name__)(_command)

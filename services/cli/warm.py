@@ -1,0 +1,39 @@
+"""`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast as all later ones.
+
+Part of `make install`. Kernels are cached beside their source, or in $NUMBA_CACHE_DIR; running it again costs a second.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rhot.calibration import load_cameras, load_hand
+from rhot.config import load_rig
+from services.cli.defaults import sim_toml
+
+
+def warm(
+    config: Annotated[Path | None, typer.Option(help="rig.toml; default: the simulated rig's")] = None,
+) -> None:
+    """Compile all kernels once, ahead of the first start."""
+    # Only here: `rhot --help` must not wait for numba.
+    from services.fusion.warm import warm_up as warm_fusion
+    from services.simulator.frames import FrameSource
+    from services.simulator.scene import load_scene
+    from services.solver.warm import warm_up as warm_solver
+
+    started_s = time.monotonic()
+    rig = load_rig(config or sim_toml())
+    hands = {name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()}
+    names = [camera.name for camera in rig.camera]
+    warm_solver(rig, hands)
+    warm_fusion(rig, load_cameras(rig.calibration_dir, names), hands)
+    if any(camera.source == "simulator" for camera in rig.camera):
+        scene = load_scene(rig)
+        for name in names:
+            FrameSource(scene, name).take(0)
+    typer.echo(f"kernels compiled in {time.monotonic() - started_s:.1f} s")
