@@ -112,7 +112,7 @@ class ObjectTable(Table, frozen=True, kw_only=True):
 
 
 class Objects(Table, frozen=True, kw_only=True):
-    # steamvr, libsurvive, replay:FILE or simulator.
+    # steamvr, libsurvive, replay:FILE, simulator, or network (poses arrive on the bus from elsewhere).
     source: str = "simulator"
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 90.0
 

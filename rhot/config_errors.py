@@ -25,7 +25,7 @@ def explain(error: str, root: type) -> str:
         text += f"; valid: {', '.join(map(str, _choices(_node_at(root, path), of_keys='`key`' in error)))}"
     if unknown is None:
         return f"`{path or 'file'}`: {text[:1].lower()}{text[1:]}"
-    valid = _keys_of(_node_at(root, path))
+    valid = _keys_of(_node_at(root, path), root)
     near = difflib.get_close_matches(unknown[1], valid, n=1)
     hint = f", did you mean `{near[0]}`?" if near else "."
     return f"{f'[{path}]' if path else 'top level'}: unknown key `{unknown[1]}`{hint} Valid keys: {', '.join(valid)}"
@@ -56,6 +56,7 @@ def _choices(node: Any, *, of_keys: bool) -> tuple[Any, ...]:
     return tuple(getattr(node, "values", ()))
 
 
-def _keys_of(node: Any) -> list[str]:
-    # `folder` is filled in by the reader, never written by people.
-    return [field.encode_name for field in getattr(node, "fields", ()) if field.encode_name != "folder"]
+def _keys_of(node: Any, root: type) -> list[str]:
+    names = [field.encode_name for field in getattr(node, "fields", ())]
+    # `folder` of the whole file is filled in by the reader, never written by people.
+    return [name for name in names if name != "folder" or node.cls is not root]

@@ -81,7 +81,8 @@ class Digit(msgspec.Struct, frozen=True, kw_only=True):
 class Paint(msgspec.Struct, frozen=True, kw_only=True):
     """A painted landmark: the point that stands for it, fixed to its joint's frame, and how the paint surrounds it.
 
-    What a camera sees is skin: the point lies radius_m behind the visible centre along the viewing ray.
+    What cameras see is skin, yet two of them locate the centre of paint all round a finger (radius_m > 0) on the bone axis, within
+    .3 radii: its outline is what counts. A dab on one side (radius_m = 0) lies where it is seen. See services/fusion/surface.py.
     """
 
     offset_m: Vec3

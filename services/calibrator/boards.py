@@ -18,7 +18,17 @@ from rhot.transforms import Array
 
 BoardKind = Literal["chessboard", "charuco"]
 
-DICTIONARIES = ("DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_250", "DICT_APRILTAG_36H11")
+# OpenCV's name and number of markers.
+DICTIONARIES = {
+    "DICT_4X4_50": 50,
+    "DICT_4X4_100": 100,
+    "DICT_4X4_250": 250,
+    "DICT_5X5_50": 50,
+    "DICT_5X5_100": 100,
+    "DICT_5X5_250": 250,
+    "DICT_6X6_250": 250,
+    "DICT_APRILTAG_36H11": 587,
+}
 # A board of more corners than this on one page has squares no camera resolves; OpenCV's detector needs three.
 _MIN_CORNERS, _MAX_CORNERS = 3, 40
 # Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in millimetres, or a slip.
@@ -56,6 +66,12 @@ class Board:
             raise CalibrationError(f"markers of {self.marker:g} squares cannot be used; give 0.3..0.9, e.g. --marker 0.7")
         if self.dictionary not in DICTIONARIES:
             raise CalibrationError(f"dictionary {self.dictionary!r} is not known; use one of {', '.join(DICTIONARIES)}")
+        markers = (self.cols + 1) * (self.rows + 1) // 2
+        if self.kind == "charuco" and markers > DICTIONARIES[self.dictionary]:
+            raise CalibrationError(
+                f"a ChArUco board of {self.cols}x{self.rows} inner corners has {markers} markers, {self.dictionary} only "
+                f"{DICTIONARIES[self.dictionary]}; use a larger dictionary: {', '.join(DICTIONARIES)}"
+            )
 
     @property
     def size(self) -> int:

@@ -32,7 +32,7 @@ CSV_HEADER = ("distance_cm", "disparity_px")
 class DepthLaw:
     """k (cm px^-z) and z of eq. (9); phi_rad of eq. (10) with z = -1; residuals in cm by distance, of both laws.
 
-    vergence_rad (positive: the cameras look towards each other) and zero_cm (the tape's zero lies so far in front of the optical
+    divergence_rad (positive: the cameras look away from each other) and zero_cm (the tape's zero lies so far in front of the optical
     centres) explain the same measurements by geometry, with explained_cm as residuals.
     """
 
@@ -43,7 +43,7 @@ class DepthLaw:
     disparities_px: tuple[float, ...]
     power_cm: tuple[float, ...]
     geometry_cm: tuple[float, ...]
-    vergence_rad: float
+    divergence_rad: float
     zero_cm: float
     explained_cm: tuple[float, ...]
 
@@ -103,7 +103,7 @@ def fit_depth(
         disparities_px=tuple(x.tolist()),
         power_cm=tuple((k * x**z - D).tolist()),
         geometry_cm=tuple((k_geometry / x - D).tolist()),
-        vergence_rad=float(offset_px / focal_px),
+        divergence_rad=float(offset_px / focal_px),
         zero_cm=float(zero_cm),
         explained_cm=tuple((focal_px * baseline_cm / np.maximum(x - offset_px, 1e-6) - zero_cm - D).tolist()),
     )
@@ -111,7 +111,9 @@ def fit_depth(
 
 def _check(D: Array, x: Array) -> None:
     if len(D) != len(x) or len(D) < _MIN_ROWS:
-        raise CalibrationError(f"{len(D)} distances are too few for a depth law; measure at least {_MIN_ROWS}, e.g. every 5 cm from 100 to 20 cm")
+        raise CalibrationError(
+            f"{len(D)} distances are too few for a depth law; measure at least {_MIN_ROWS}, e.g. every 5 cm from 100 to 20 cm"
+        )
     if not (np.all(np.isfinite(D)) and np.all(np.isfinite(x)) and D.min() > 0.0 and x.min() > 0.0):
         raise CalibrationError("every distance and disparity must be a positive number")
     if D.max() < _MIN_RANGE * D.min():
@@ -141,7 +143,7 @@ def bench(
     *,
     focal_px: float = SEED_FOCAL_PX,
     baseline_cm: float = SEED_BASELINE_CM,
-    vergence_rad: float = 0.0,
+    divergence_rad: float = 0.0,
     zero_cm: float = 0.0,
     noise_px: float = 0.0,
     tape_cm: float = 0.0,
@@ -149,13 +151,13 @@ def bench(
 ) -> tuple[Array, Array]:
     """The seed's bench: distances (n,) as read off the tape and the disparities (n,) px of a target on the rig's axis.
 
-    Two cameras without distortion at +- B/2, each turned inwards by half of vergence_rad; the tape's zero lies zero_cm in front of the
+    Two cameras without distortion at +- B/2, each turned outwards by half of divergence_rad; the tape's zero lies zero_cm in front of the
     optical centres; noise_px is the sigma of a disparity, tape_cm that of placing the target.
     """
     generator = np.random.default_rng(seed)
     read = np.asarray(distances_cm, dtype=np.float64)
     true = read + zero_cm + generator.normal(0.0, 1.0, len(read)) * tape_cm
-    angle = np.arctan(0.5 * baseline_cm / true) + 0.5 * vergence_rad
+    angle = np.arctan(0.5 * baseline_cm / true) + 0.5 * divergence_rad
     return read, 2.0 * focal_px * np.tan(angle) + generator.normal(0.0, 1.0, len(read)) * noise_px
 
 
@@ -170,7 +172,7 @@ def depth_text(law: DepthLaw) -> str:
         f"  {'RMS':>11} {'':>14} {_rms(law.power_cm):>11.2f} {_rms(law.geometry_cm):>11.2f} {_rms(law.explained_cm):>10.2f}",
         f"  D = k x^z, RHOT eq. (9): k = {law.k:.1f}, z = {law.z:.4f} (the seed's rig: {SEED_K}, {SEED_Z})",
         f"  D = k / x, RHOT eq. (10): phi = {math.degrees(law.phi_rad):.3f} degrees",
-        f"  geometry: cameras turned towards each other by {math.degrees(law.vergence_rad):.3f} degrees, "
+        f"  geometry: cameras turned away from each other by {math.degrees(law.divergence_rad):.3f} degrees, "
         f"the tape's zero {10.0 * law.zero_cm:.1f} mm in front of the optical centres",
         "Paste into rig.toml:",
         "[fusion.disparity]",

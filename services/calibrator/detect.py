@@ -39,10 +39,13 @@ class Detection:
     size_px: tuple[int, int]
 
 
-def detect(image: np.ndarray, board: Board) -> Detection | None:
-    """Find the board in a picture (h, w) or (h, w, 3) uint8; None if it is not there as a whole (ChArUco: in part)."""
+def detect(image: np.ndarray, board: Board, *, quick: bool = False) -> Detection | None:
+    """Find the board in a picture (h, w) or (h, w, 3) uint8; None if it is not there as a whole (ChArUco: in part).
+
+    quick tries one detector only, for live pictures, of which the next one may do.
+    """
     grey = as_grey(image)
-    found = _charuco(grey, board) if board.kind == "charuco" else _chessboard(grey, board)
+    found = _charuco(grey, board) if board.kind == "charuco" else _chessboard(grey, board, quick)
     if found is None:
         return None
     ids, corners = found
@@ -70,19 +73,21 @@ def reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
     return cv2.resize(grey, size, interpolation=cv2.INTER_AREA), grey.shape[1] / size[0]
 
 
-def _chessboard(grey: np.ndarray, board: Board) -> tuple[np.ndarray, Array] | None:
+def _chessboard(grey: np.ndarray, board: Board, quick: bool) -> tuple[np.ndarray, Array] | None:
     ids = np.arange(board.size)
-    for corners in _candidates(grey, board):
+    for corners in _candidates(grey, board, quick):
         if len(corners) == board.size and is_regular(board, ids, corners):
             return ids, normalised(grey, board.cols, board.rows, corners)
     return None
 
 
-def _candidates(grey: np.ndarray, board: Board) -> Iterator[Array]:
+def _candidates(grey: np.ndarray, board: Board, quick: bool) -> Iterator[Array]:
     """What each detector finds, cheapest first; the pictures without a board pay for all of them."""
     small, factor = reduced(grey)
     pattern = (board.cols, board.rows)
     yield from _sector_based(small, pattern, _SB_FLAGS[0], factor)
+    if quick:
+        return
     yield from _classic(small, pattern, factor)
     for flags in _SB_FLAGS[1:]:
         yield from _sector_based(small, pattern, flags, factor)

@@ -26,9 +26,7 @@ def lens_file(size_px: tuple[int, int], lens: Array, date: str, tool: str, input
         (0.0, 0.0, 1.0),
     )
     k1, k2, p1, p2, k3 = (round(float(value), 7) for value in lens[K1:])
-    return Lens(
-        date=date, tool=tool, inputs=inputs, residuals=residuals, size_px=size_px, matrix=rows, distortion=(k1, k2, p1, p2, k3)
-    )
+    return Lens(date=date, tool=tool, inputs=inputs, residuals=residuals, size_px=size_px, matrix=rows, distortion=(k1, k2, p1, p2, k3))
 
 
 def lens_of(result: LensResult, board: Board, date: str, source: str) -> Lens:
@@ -78,7 +76,9 @@ def rig_of(result: RigResult, date: str, source: str) -> RigGeometry:
         "positions": len(result.positions),
         "left_out": [f"{item.camera} {item.key}".strip() for item in result.left_out],
     }
-    cameras = {name: CameraPlace(T_rig_from_camera=rows(inverse(result.state.T_camera_from_rig[k]))) for k, name in enumerate(result.cameras)}
+    cameras = {
+        name: CameraPlace(T_rig_from_camera=rows(inverse(result.state.T_camera_from_rig[k]))) for k, name in enumerate(result.cameras)
+    }
     return RigGeometry(date=date, tool="rhot calibrate stereo", inputs=inputs, residuals=_finite(residuals), cameras=cameras)
 
 

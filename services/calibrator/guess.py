@@ -18,7 +18,26 @@ from services.calibrator.detect import as_grey, detect, reduced
 # The smallest grid to grow from. Growing from 5x4 counted 9x6 in 9 of 10 real pictures (OpenCV 5), from 3x3 in 5; 4x3 finds small boards.
 _SEEDS = ((5, 4), (4, 3))
 # Sizes that are sold, printed and shipped with tutorials, tried with the classic detector where growing fails.
-_COMMON = ((9, 6), (8, 6), (7, 6), (7, 5), (8, 5), (10, 7), (6, 5), (6, 4), (5, 4), (9, 7), (11, 8), (8, 7), (7, 4), (11, 7), (7, 7), (6, 6), (5, 3), (4, 3))
+_COMMON = (
+    (9, 6),
+    (8, 6),
+    (7, 6),
+    (7, 5),
+    (8, 5),
+    (10, 7),
+    (6, 5),
+    (6, 4),
+    (5, 4),
+    (9, 7),
+    (11, 8),
+    (8, 7),
+    (7, 4),
+    (11, 7),
+    (7, 7),
+    (6, 6),
+    (5, 3),
+    (4, 3),
+)
 # Pictures asked: enough for a vote, and 5 Mpx pictures cost a tenth of a second each.
 _VOTERS = 16
 # A size that a fifth of the pictures show beats a smaller one that more of them show in part.

@@ -172,4 +172,3 @@ def _on_board(lens: Array, view: View) -> float:
 
 def _mean_square(values: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
-

@@ -68,7 +68,9 @@ def check_lens(
         warnings.append(f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were the pictures sharp?")
     border = _border(size_px)
     if not np.all(np.isfinite(rays(lens, border))):
-        warnings.append("the distortion cannot be undone at the edge of the image: pixels there are not measured; add pictures that reach it")
+        warnings.append(
+            "the distortion cannot be undone at the edge of the image: pixels there are not measured; add pictures that reach it"
+        )
     return tuple(warnings)
 
 

@@ -76,6 +76,14 @@ def one_camera(folder: Path, camera: str) -> PictureSet:
     return PictureSet({camera: {str(path.relative_to(folder)): path for path in own}})
 
 
+def picture_of(folder: Path, camera: str) -> Path | None:
+    """The first picture in a folder that is named after the camera (`left.png`, `desk_left.jpg`); None without one.
+
+    Raises CalibrationError if the folder has no pictures at all.
+    """
+    return next((path for path in _pictures(folder) if path.stem == camera or camera in _parts(path.relative_to(folder))), None)
+
+
 def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
     """All pictures of a folder, each holding the views of these cameras, from left to right.
 

@@ -50,7 +50,9 @@ def rig_text(result: RigResult) -> str:
         f"  held-out epipolar    {result.epipolar_px:.3f} px",
     ]
     for k, name in enumerate(result.cameras):
-        lines.append(f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px")
+        lines.append(
+            f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px"
+        )
         if k:
             lines.append(f"    {_place(result.state.T_camera_from_rig[k], result.place_sigma[k])}")
         lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")
@@ -63,7 +65,9 @@ def rig_text(result: RigResult) -> str:
             if error
             else f"{'seen by one camera only':>55}"
         )
-        lines.append(f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.pull_percent)}")
+        lines.append(
+            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.pull_percent)}"
+        )
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 
 

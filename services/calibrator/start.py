@@ -68,7 +68,9 @@ def calibrate_lens(size_px: tuple[int, int], views: list[View], free: np.ndarray
     free (9,) says which lens numbers may move. Stages, because the distortion must not explain a focal length that is far off.
     """
     lens = lens_guess(size_px, views) if guess is None else guess
-    stages = [free] if guess is not None else [_only(free, (FX, FY)), _only(free, (FX, FY, K1)), _only(free, (FX, FY, CX, CY, K1, K2)), free]
+    stages = (
+        [free] if guess is not None else [_only(free, (FX, FY)), _only(free, (FX, FY, K1)), _only(free, (FX, FY, CX, CY, K1, K2)), free]
+    )
     result = None
     for stage in stages:
         result = with_poses(lens, views, stage)

@@ -107,9 +107,7 @@ def calibrate_rig(
     return replace(result, warnings=check_rig(result))
 
 
-def _start(
-    detections: dict[str, dict[str, Detection]], board: Board, lenses: dict[str, Array] | None
-) -> tuple[Rig, list[LeftOut]]:
+def _start(detections: dict[str, dict[str, Detection]], board: Board, lenses: dict[str, Array] | None) -> tuple[Rig, list[LeftOut]]:
     """Every lens by itself, then the cameras' places by pairs."""
     names = list(detections)
     sizes, left_out, good, found = [], [], [], []
@@ -174,7 +172,9 @@ def _settle(rig: Rig, free: Free) -> tuple[Rig, list[LeftOut]]:
         if not bad:
             break
         median = float(np.median(errors))
-        left_out += [LeftOut("", rig.keys[k], f"the cameras disagree by {errors[k]:.1f} px, else by {median:.2f}: did it move?") for k in bad]
+        left_out += [
+            LeftOut("", rig.keys[k], f"the cameras disagree by {errors[k]:.1f} px, else by {median:.2f}: did it move?") for k in bad
+        ]
         keep = [k for k in range(len(rig.keys)) if k not in bad]
         views, state = subset(rig.views, found.state, keep)
         rig = replace(rig, keys=[rig.keys[k] for k in keep], views=views, found=replace(found, state=state))
@@ -207,7 +207,9 @@ def _held_out_squares(rig: Rig, board: Board, model: LensModel) -> float:
 
 
 def _positions(rig: Rig, board: Board, free: Free) -> list[PositionError]:
-    squared = [sum(float(np.sum(e * e)) for v, e in zip(rig.views, rig.found.errors, strict=True) if v.board == k) for k in range(len(rig.keys))]
+    squared = [
+        sum(float(np.sum(e * e)) for v, e in zip(rig.views, rig.found.errors, strict=True) if v.board == k) for k in range(len(rig.keys))
+    ]
     result = []
     for k, (key, error_px) in enumerate(zip(rig.keys, position_rms(rig), strict=True)):
         rest, start = subset(rig.views, rig.found.state, others(len(rig.keys), np.array([k])))

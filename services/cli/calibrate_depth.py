@@ -20,7 +20,7 @@ def depth(
     table: Annotated[Path | None, typer.Argument(metavar="CSV", help="columns distance_cm,disparity_px")] = None,
     config: Annotated[Path | None, typer.Option("--config", help="rig.toml, for focal length and baseline; default: the seed's")] = None,
     simulate: Annotated[bool, typer.Option("--simulate", help="the seed's bench, simulated, instead of a CSV")] = False,
-    vergence_deg: Annotated[float, typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned towards each other")] = 0.0,
+    divergence_deg: Annotated[float, typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other")] = 0.0,
     zero_mm: Annotated[float, typer.Option(min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras")] = 0.0,
     noise_px: Annotated[float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")] = 0.1,
     tape_mm: Annotated[float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")] = 1.0,
@@ -31,9 +31,7 @@ def depth(
     from services.calibrator import depth as laws
 
     if (table is None) == (not simulate):
-        raise CalibrationError(
-            f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench"
-        )
+        raise CalibrationError(f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench")
     focal_px, baseline_cm, width_px = _geometry(config)
     if table is not None:
         distances, disparities = laws.read_bench(table)
@@ -41,7 +39,7 @@ def depth(
         distances, disparities = laws.bench(
             focal_px=focal_px,
             baseline_cm=baseline_cm,
-            vergence_rad=float(np.radians(vergence_deg)),
+            divergence_rad=float(np.radians(divergence_deg)),
             zero_cm=0.1 * zero_mm,
             noise_px=noise_px,
             tape_cm=0.1 * tape_mm,

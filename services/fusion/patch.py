@@ -1,9 +1,10 @@
 """Where a camera sees the centre of a painted finger tip, against the point of the bone that stands for it.
 
-The tip is a capsule (radius of the paint) that ends in a half ball, painted over extent_m from its end; the landmark is the middle of the
-painted stretch of the axis. Seen from afar, the centroid of what is visible lies off the landmark along the finger's direction in the
-picture, by an amount that depends only on the angle between finger and viewing ray: `centroid_shift`. What that does to a point located from
-several cameras follows by least squares: `located_shift`. Skin is taken as evenly bright; nothing else hides the paint.
+The tip is a capsule (radius of the paint) that ends in a half ball, painted over extent_m from its end; the landmark is the
+middle of the painted stretch of the axis. Seen from afar, the centroid of what is visible lies off the landmark along the
+finger's direction in the picture, by an amount that depends only on the angle between finger and viewing ray: `centroid_shift`.
+What that does to a point located from several cameras follows by least squares: `located_shift`. Skin is taken as evenly bright;
+nothing else hides the paint.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numba import njit
 
 from rhot.transforms import Array
 from services.fusion.measure import project
+from services.fusion.triangulation import invert_symmetric
 
 # Angles of the table, 0 to 180 deg: 3 deg apart, linear between them is right to 20 um for a 7 mm finger.
 _ANGLES = 61
@@ -28,7 +30,7 @@ def _centroid_shift(radius_m: float, extent_m: float, sine: float, cosine: float
     step = radius_m / _FINENESS
     half = 0.5 * extent_m + radius_m
     n_u, n_w = int(half / step) + 1, _FINENESS
-    centre_u, centre_z = (0.5 * extent_m - radius_m) * sine, (0.5 * extent_m - radius_m) * cosine
+    centre_u = (0.5 * extent_m - radius_m) * sine
     area, moment = 0.0, 0.0
     for i in range(-n_u, n_u + 1):
         u = i * step - centre_u
@@ -38,7 +40,7 @@ def _centroid_shift(radius_m: float, extent_m: float, sine: float, cosine: float
             inside = radius_m**2 - u * u - w * w
             if inside > 0.0:
                 z = -math.sqrt(inside)
-            # Cylinder: |q|^2 - (q.d)^2 = r^2 for q = (u, w, z), on the side away from the end.
+            # Cylinder about the finger's direction d: |q|^2 - (q.d)^2 = r^2 for q = (u, w, z), on the side away from the end.
             a, b = sine * sine, -u * sine * cosine
             c = u * u * (1.0 - sine * sine) + w * w - radius_m**2
             discriminant = b * b - a * c
@@ -81,7 +83,7 @@ def located_shift(table: Array, p_rig: Array, direction: Array, R: Array, t: Arr
 
     direction (3,) is the finger's, towards its end, of unit length.
     """
-    A, b, ray, H, across = np.zeros((3, 3)), np.zeros(3), np.empty(2), np.empty((2, 3)), np.empty(3)
+    A, inverse, b, ray, H, across = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.empty(2), np.empty((2, 3)), np.empty(3)
     for c in range(R.shape[0]):
         if not project(p_rig, R[c], t[c], ray, H):
             return False
@@ -103,18 +105,8 @@ def located_shift(table: Array, p_rig: Array, direction: Array, R: Array, t: Arr
                 b[i] += H[k, i] * seen
                 for j in range(3):
                     A[i, j] += H[k, i] * H[k, j]
-    return _solve(A, b, out)
-
-
-@njit(cache=True)
-def _solve(A: Array, b: Array, out: Array) -> bool:
-    """out = A^-1 b for a symmetric (3, 3), by cofactors; False if singular."""
-    c00, c01, c02 = A[1, 1] * A[2, 2] - A[1, 2] ** 2, A[0, 2] * A[1, 2] - A[0, 1] * A[2, 2], A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1]
-    c11, c12, c22 = A[0, 0] * A[2, 2] - A[0, 2] ** 2, A[0, 1] * A[0, 2] - A[0, 0] * A[1, 2], A[0, 0] * A[1, 1] - A[0, 1] ** 2
-    determinant = A[0, 0] * c00 + A[0, 1] * c01 + A[0, 2] * c02
-    if not determinant > 1e-12 * A[0, 0] * A[1, 1] * A[2, 2]:
+    if not invert_symmetric(A, inverse):
         return False
-    out[0] = (c00 * b[0] + c01 * b[1] + c02 * b[2]) / determinant
-    out[1] = (c01 * b[0] + c11 * b[1] + c12 * b[2]) / determinant
-    out[2] = (c02 * b[0] + c12 * b[1] + c22 * b[2]) / determinant
+    for i in range(3):
+        out[i] = inverse[i, 0] * b[0] + inverse[i, 1] * b[1] + inverse[i, 2] * b[2]
     return True

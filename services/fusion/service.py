@@ -36,6 +36,7 @@ async def serve(service: Service) -> None:
     publishers = {hand: service.bus.publisher(topics.POINTS, hand=hand) for hand in config.hand}
     frames = service.bus.every(topics.MARKERS, 64)
     _lead(service)
+    service.tasks.create_task(_listen_to_solver(service, step))
     report = _Report(service, step)
     service.ready()
     async for frame in frames:
@@ -43,6 +44,12 @@ async def serve(service: Service) -> None:
         for points in step.step(frame):
             publishers[points.hand].put(points)
         report.note(time.perf_counter() - began_s)
+
+
+async def _listen_to_solver(service: Service, step: FusionStep) -> None:
+    """Where the fingers point tells where in its paint a tip is."""
+    async for pose in service.bus.latest(topics.POSE):
+        step.note_pose(pose)
 
 
 def _lead(service: Service) -> None:

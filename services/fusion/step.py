@@ -17,7 +17,7 @@ from rhot.camera import Camera
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError
 from rhot.hand import HANDS, HandModel, HandName
-from rhot.messages import HandPoint, HandPoints, MarkerFrame, PointSource
+from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
 from services.fusion.clocks import ClockTuner
 from services.fusion.coherence import coherent, reach_m
 from services.fusion.kalman import KalmanMethod
@@ -25,7 +25,7 @@ from services.fusion.method import Estimates, Method
 from services.fusion.observations import Observer, Refusal
 from services.fusion.pace import Pace
 from services.fusion.paired import PairedMethod
-from services.fusion.surface import to_axis
+from services.fusion.surface import Surface
 from services.fusion.timeline import Timeline, Verdict
 
 # Positions and sigmas are told to a micrometre: a hundredth of the smallest sigma of a hand at arm's length.
@@ -51,9 +51,7 @@ class FusionStep:
         self._observer = Observer(config, cameras)
         self._slots = self._observer.slots
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
-        self._radii_m = np.array([hands[slot.hand].paint[slot.landmark].radius_m for slot in self._slots])
-        # Where the mean viewing ray starts; (3,) m.
-        self.eye_rig = np.mean([camera.centre_rig for camera in cameras.values()], axis=0)
+        self._surface = Surface(self._slots, hands, self._observer.cameras)
         self._hands = [hand for hand in HANDS if hand in config.hand]
         self._reach_m = {hand: reach_m(hands[hand]) for hand in self._hands}
         self._rows = {hand: np.array([row for row, slot in enumerate(self._slots) if slot.hand == hand]) for hand in self._hands}
@@ -86,6 +84,11 @@ class FusionStep:
         due_ns = self._pace.frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._tell(due_ns)
 
+    def note_pose(self, pose: HandPose) -> None:
+        """Learn from the solver which way the fingers point, which tells where in its paint a tip is; optional, and worth a millimetre."""
+        if pose.hand in self._rows:
+            self._surface.note(pose)
+
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
         return [points for instant_ns in self._pace.rest() for points in self._tell(instant_ns)]
@@ -96,11 +99,12 @@ class FusionStep:
         self._pace = Pace(self._fps, self._wait)
         self.method.reset()
         self.clocks.reset()
+        self._surface.forget()
 
     def _tell(self, instant_ns: int) -> list[HandPoints]:
         """One message per hand for an instant (master clock)."""
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
-        positions, covariances = to_axis(estimates.positions_m, estimates.covariances_m2, self._radii_m, self.eye_rig)
+        positions, covariances = self._surface.to_axis(estimates.positions_m, estimates.covariances_m2, estimates.cameras, instant_ns)
         sigmas = np.sqrt(np.maximum(np.einsum("nii->ni", covariances), 0.0))
         usable = estimates.found & np.isfinite(positions).all(axis=1) & np.isfinite(sigmas).all(axis=1)
         self._seq += 1

@@ -1,40 +1,89 @@
 """From the visible centre of paint to the point on the bone axis that stands for the landmark.
 
-Cameras see paint on skin, but what is triangulated is not a point of the skin. The centroid of a painted finger tip is set by its
-outline. Where the outline is the limb of the finger, it passes through the axis as seen from any camera, so two cameras put the
-centroid *on the axis*; only the edge where the paint ends lies on the skin itself. Ray-cast from two cameras 75 mm apart (capsule
-r 6.8 mm painted over 14 mm; 400 random directions, the finger not pointing away), the triangulated centroid against the middle of
-the painted axis:
+Cameras see paint on skin, but what they locate is not a point of the skin. The centroid of a painted finger tip is set by its
+outline: where that is the limb of the finger, it passes through the axis as seen from any camera, so two cameras put the centroid
+*on the axis*; only the edge where the paint ends lies on the skin itself. Ray-cast from two cameras 75 mm apart (capsule of
+radius 6.8 mm painted over 14 mm, 400 random directions, the finger not pointing away), the located centroid against the middle of
+the painted axis is
 
-    along the viewing ray   -.5 +- 2.0 mm (towards the cameras; the same within .1 mm at .35, .5 and .8 m, and with shading)
-    across it               1.5 mm RMS
-    finger along the baseline -2.4 mm, across it -.1 mm, pointing at the cameras +2.1 mm
+    along the viewing ray, away from the cameras   -.5 +- 2.0 mm (within .1 mm alike at .35, .5 and .8 m, and with shading)
+        finger along the baseline -2.4 mm, across it -.1 mm, pointing at the cameras +2.1 mm
+    across the ray                                 1.5 mm RMS
 
-A push by the whole radius would be 6.3 mm wrong. So a point is pushed MEAN_PUSH radii away from the cameras, and what the unknown
-direction of the finger leaves goes into the covariance. Dabs (radius 0) are flat and lie where they are seen.
+so there is nothing to push: a push by the radius would be 6.3 mm wrong. What depends on the finger's direction is taken off when
+a pose tells it (patch.py; on rendered scenes the RMS error fell from .49, 1.17, 1.75 to .23, .35, .91 mm along x, y, z); without
+one it stays, and the covariance says so. Dabs (radius 0) lie where they are seen, but for what their bulge and the light do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from rhot.transforms import Array
+from rhot.camera import Camera
+from rhot.hand import HandModel, HandName
+from rhot.messages import HandPose
+from rhot.transforms import Array, rotation_from_quaternion
+from services.fusion.method import Bools
+from services.fusion.observations import Slot
+from services.fusion.patch import located_shift, shift_table
+from services.fusion.triangulation import extrinsics
 
-# In radii of the paint, from the ray-casting above: .5 mm of 6.8 mm, and what is left along the ray and along each axis across it.
-MEAN_PUSH = 0.08
-SIGMA_ALONG = 0.29
-SIGMA_ACROSS = 0.16
+# What is left along the viewing ray and along each axis across it, in radii of the paint, from the figures above.
+SIGMA_UNKNOWN = (0.29, 0.16)
+SIGMA_KNOWN = (0.13, 0.08)
+# Of a dab, in every direction, as a share of its diameter: .9 mm of 16 mm on rendered wrists.
+SIGMA_DAB = 0.06
+# A finger turns by up to 10 rad/s: an older direction is worth no more than none.
+_POSE_AGE_NS = 150_000_000
 
 
-def to_axis(positions_m: Array, covariances_m2: Array, radii_m: Array, eye_rig: Array) -> tuple[Array, Array]:
-    """Points on the bone axis (n, 3) and their covariances (n, 3, 3) from triangulated paint centres, rig frame.
+class Surface:
+    """What is known of the paint of every landmark, and of the way the fingers point."""
 
-    radii_m (n,) are the paints' radii, eye_rig (3,) the middle of the cameras' optical centres: the mean viewing ray starts there.
-    """
-    away = positions_m - eye_rig
-    away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)  # (n, 3)
-    along = away[:, :, None] * away[:, None, :]  # (n, 3, 3)
-    across = np.eye(3) - along
-    radii = radii_m[:, None]
-    blur = radii[:, :, None] ** 2 * (SIGMA_ALONG**2 * along + SIGMA_ACROSS**2 * across)
-    return positions_m + MEAN_PUSH * radii * away, covariances_m2 + blur
+    def __init__(self, slots: tuple[Slot, ...], hands: Mapping[HandName, HandModel], cameras: tuple[Camera, ...]) -> None:
+        paints = [hands[slot.hand].paint[slot.landmark] for slot in slots]
+        self._slots = slots
+        self._radii_m = np.array([paint.radius_m for paint in paints])
+        self._dabs_m = np.array([paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints])
+        self._tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
+        self._R, self._t = extrinsics(cameras)
+        self._eye_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
+        self.forget()
+
+    def forget(self) -> None:
+        """Time starts anew: no direction is known."""
+        self._directions = np.zeros((len(self._slots), 3))
+        self._stamps_ns = [-_POSE_AGE_NS - 1] * len(self._slots)
+
+    def note(self, pose: HandPose) -> None:
+        """Remember which way the fingers of a solved hand point: -z of each joint."""
+        joints = {joint.name: joint for joint in pose.joints if joint.source != "predicted"}
+        for row, slot in enumerate(self._slots):
+            joint = joints.get(slot.landmark)
+            if slot.hand != pose.hand or joint is None or self._radii_m[row] == 0.0:
+                continue
+            quaternion = np.array(joint.orientation_wxyz)
+            if 0.4 < np.abs(quaternion).max() < 1.1:
+                self._directions[row] = -rotation_from_quaternion(quaternion)[:, 2]
+                self._stamps_ns[row] = pose.stamp_ns
+
+    def to_axis(self, positions_m: Array, covariances_m2: Array, seen_by: Bools, instant_ns: int) -> tuple[Array, Array]:
+        """Landmarks (S, 3) and covariances (S, 3, 3) from located paint centres; seen_by (S, C) tells which cameras located them."""
+        positions = positions_m.copy()
+        sigmas = np.tile(SIGMA_UNKNOWN, (len(positions), 1))
+        shift = np.zeros(3)
+        for row, stamp_ns in enumerate(self._stamps_ns):
+            if abs(instant_ns - stamp_ns) > _POSE_AGE_NS:
+                continue
+            by = seen_by[row] if np.count_nonzero(seen_by[row]) >= 2 else np.ones_like(seen_by[row])
+            if located_shift(self._tables[row], positions_m[row], self._directions[row], self._R[by], self._t[by], shift):
+                positions[row] -= shift
+                sigmas[row] = SIGMA_KNOWN
+        away = positions - self._eye_rig
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)  # (S, 3)
+        along = away[:, :, None] * away[:, None, :]  # (S, 3, 3)
+        variances = (sigmas * self._radii_m[:, None]) ** 2 + (SIGMA_DAB * self._dabs_m[:, None]) ** 2  # (S, 2)
+        blur = variances[:, 0, None, None] * along + variances[:, 1, None, None] * (np.eye(3) - along)
+        return positions, covariances_m2 + blur

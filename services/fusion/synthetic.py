@@ -73,7 +73,7 @@ class Setup:
 def point_hands() -> dict[HandName, HandModel]:
     """A right hand whose paint has no extent: what fusion tells is then the point itself."""
     model = default_hand("right")
-    paint = {name: msgspec.structs.replace(dab, radius_m=0.0) for name, dab in model.paint.items()}
+    paint = {name: msgspec.structs.replace(dab, radius_m=0.0, extent_m=0.0) for name, dab in model.paint.items()}
     return {"right": msgspec.structs.replace(model, paint=paint)}
 
 

@@ -77,7 +77,7 @@ def _solve(rays: Array, sigmas: Array, R: Array, t: Array, position: Array, cov:
                 b[i] += row[i] * value
                 for j in range(3):
                     A[i, j] += row[i] * row[j]
-    if n < 2 or not _invert(A, cov):
+    if n < 2 or not invert_symmetric(A, cov):
         return 1, np.inf
     for i in range(3):
         position[i] = cov[i, 0] * b[0] + cov[i, 1] * b[1] + cov[i, 2] * b[2]
@@ -94,7 +94,7 @@ def _solve(rays: Array, sigmas: Array, R: Array, t: Array, position: Array, cov:
                     b[i] += H[k, i] * left / sigmas[c]
                     for j in range(3):
                         A[i, j] += H[k, i] * H[k, j] / sigmas[c] ** 2
-        if not _invert(A, cov):
+        if not invert_symmetric(A, cov):
             return 1, np.inf
         for i in range(3):
             position[i] += cov[i, 0] * b[0] + cov[i, 1] * b[1] + cov[i, 2] * b[2]
@@ -102,7 +102,7 @@ def _solve(rays: Array, sigmas: Array, R: Array, t: Array, position: Array, cov:
 
 
 @njit(cache=True)
-def _invert(A: Array, out: Array) -> bool:
+def invert_symmetric(A: Array, out: Array) -> bool:
     """Inverse of a symmetric (3, 3) by cofactors; False if it is singular to working precision."""
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
     c01 = A[0, 2] * A[1, 2] - A[0, 1] * A[2, 2]

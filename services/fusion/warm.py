@@ -23,10 +23,12 @@ _FRAMES = 8
 def warm_up(config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]) -> int:
     """Run a scratch FusionStep over a still point half a metre before the cameras; how many messages it made."""
     step = FusionStep(config, cameras, hands)
+    first = next(iter(cameras.values()))
+    point = first.T_rig_from_camera @ [0.0, 0.0, 0.5, 1.0]
     told = 0
     for seq in range(_FRAMES):
         for n, camera in enumerate(cameras.values()):
-            x, y = np.nan_to_num(camera.project(camera.T_rig_from_camera[:3, :3] @ [0.0, 0.0, 0.5] + step.eye_rig)[0]).tolist()
+            x, y = np.nan_to_num(camera.project(point[:3])[0]).tolist()
             markers = [Marker(color=c, x_px=x, y_px=y, area_px=1.0, sigma_px=0.1, quality=1.0) for c in config.colors]
             frame = MarkerFrame(
                 camera=camera.name,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.pi_tracker.company import support
+from services.pi_tracker.company import Candidate, best_set
 from services.pi_tracker.room import Room
 from services.pi_tracker.search import Blob
 
@@ -24,6 +24,10 @@ _LEAST = 0.25
 _AREA_KEEP = 0.8
 # What company counts against having none at all.
 _ALONE = 0.1
+# A blob as like its own track as this, and the only one of its colour, is the marker without asking the others.
+_SURE = 0.6
+# However unlike its track, a blob in good company may be the marker after all: the track may have been wrong.
+_SECOND_THOUGHT = 0.3
 
 
 @dataclass
@@ -71,6 +75,15 @@ def shape_fits(blob: Blob, max_area_px: float) -> bool:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A marker's blob; certainty 0..1 falls where a second blob is nearly as good, support 0..1 where it is far from the other markers."""
+
+    blob: Blob
+    certainty: float
+    support: float
+
+
 class Identity:
     """Tracks of `count` colours."""
 
@@ -79,9 +92,17 @@ class Identity:
         self._tracks: list[Track | None] = [None] * count
         self._rooms = [Room() for _ in range(count)]
 
-    def choose(self, blobs: list[list[Blob]], stamp_ns: int) -> list[tuple[Blob, float] | None]:
-        """Each colour's marker with a certainty 0..1, which falls where a second blob is nearly as good; None where there is none."""
-        return [self._choose(color, blobs, stamp_ns) for color in range(len(blobs))]
+    def choose(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Choice | None]:
+        """Each colour's marker, None where there is none."""
+        candidates = [[Candidate(blob, self._prior(color, blob, stamp_ns)) for blob in own] for color, own in enumerate(blobs)]
+        if all(len(own) == 1 and own[0].prior >= _SURE and self._tracks[color] is not None for color, own in enumerate(candidates)):
+            return [Choice(own[0].blob, 1.0, 1.0) for own in candidates]
+        chosen = [None if member is None else self._choice(candidates[color], *member) for color, member in enumerate(best_set(candidates))]
+        for color, choice in enumerate(chosen):
+            for blob in blobs[color]:
+                if choice is None or blob is not choice.blob:
+                    self._rooms[color].learn(blob, stamp_ns)
+        return chosen
 
     def follow(self, color: int, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> None:
         """Take in a marker that was measured."""
@@ -91,23 +112,15 @@ class Identity:
         else:
             track.follow(x_px, y_px, area_px, stamp_ns)
 
-    def _choose(self, color: int, blobs: list[list[Blob]], stamp_ns: int) -> tuple[Blob, float] | None:
-        own = blobs[color]
-        if not own:
-            return None
-        others = blobs[:color] + blobs[color + 1 :]
-        scored = sorted(((self._score(color, blob, others, stamp_ns), blob) for blob in own), key=lambda pair: -pair[0])
-        best, marker = scored[0]
-        for _, blob in scored[0 if best < _LEAST else 1 :]:
-            self._rooms[color].learn(blob, stamp_ns)
-        if best < _LEAST:
-            return None
-        second = scored[1][0] if len(scored) > 1 else 0.0
-        return marker, 1.0 - 0.5 * second / best
-
-    def _score(self, color: int, blob: Blob, others: list[list[Blob]], stamp_ns: int) -> float:
+    def _prior(self, color: int, blob: Blob, stamp_ns: int) -> float:
         track = self._tracks[color]
-        score = 1.0 if track is None else track.likeness(blob, stamp_ns, self._margin_px)
-        if self._rooms[color].holds(blob):
-            score *= _IN_ROOM
-        return score * (_ALONE + (1.0 - _ALONE) * support(blob, others))
+        prior = 1.0 if track is None else max(track.likeness(blob, stamp_ns, self._margin_px), _SECOND_THOUGHT)
+        return prior * _IN_ROOM if self._rooms[color].holds(blob) else prior
+
+    @staticmethod
+    def _choice(own: list[Candidate], member: Candidate, support: float) -> Choice | None:
+        score = member.prior * (_ALONE + (1.0 - _ALONE) * support)
+        if score < _LEAST:
+            return None
+        second = max((candidate.prior for candidate in own if candidate is not member), default=0.0)
+        return Choice(member.blob, 1.0 - 0.5 * min(1.0, second / member.prior), support)

@@ -19,6 +19,8 @@ from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture, Rect, picture
 from services.pi_tracker.search import Blob, Searcher
 
+# A marker that fits the others worse than this may be a thing in the room.
+_LEAST_SUPPORT = 0.3
 Lap = Callable[[str], None]
 
 
@@ -40,13 +42,15 @@ class LutFinder:
         self._noise.look(image)
         blobs = self._search(image)
         self._lap("search")
-        chosen = [(color, *pick) for color, pick in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if pick is not None]
+        chosen = {color: choice for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if choice is not None}
         self._lap("identity")
-        self._boxes = {color: blob.rect for color, blob, _ in chosen}
+        # A marker that strayed from the others is looked for everywhere the next time.
+        self._boxes = {color: choice.blob.rect for color, choice in chosen.items() if choice.support >= _LEAST_SUPPORT}
         markers = []
-        for (color, _, certainty), found in zip(chosen, centroids(image, [blob for _, blob, _ in chosen], self._noise), strict=True):
+        measured = centroids(image, [choice.blob for choice in chosen.values()], self._noise)
+        for (color, choice), found in zip(chosen.items(), measured, strict=True):
             self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
-            markers.append(_marker(self._names[color], found, certainty))
+            markers.append(_marker(self._names[color], found, choice.certainty))
         self._lap("centroid")
         return markers
 

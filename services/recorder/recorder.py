@@ -7,10 +7,10 @@ message that does not decode starts and stops nothing.
 
 from __future__ import annotations
 
-import datetime
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from rhot import topics
 from rhot.config import RigConfig
@@ -30,7 +30,8 @@ def recorded_topics(config: RigConfig) -> list[Topic]:
 
 def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
     """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3, ... where that name is taken."""
-    stem = f"rhot-{rig}-{datetime.datetime.fromtimestamp(start_ns // 10**9, datetime.UTC):%Y%m%d-%H%M%S}"
+    day, _, clock = str(np.datetime64(start_ns // 10**9, "s")).replace("-", "").replace(":", "").partition("T")
+    stem = f"rhot-{rig}-{day}-{clock}"
     path, number = folder / f"{stem}.mcap", 1
     while path.exists():
         number += 1

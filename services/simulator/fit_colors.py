@@ -55,8 +55,8 @@ def fit(painted: dict[str, Samples], other: Samples, date: str, tool: str) -> Co
         ranges[name] = _range(seen)
         rest = np.concatenate([other, *(rows for key, rows in painted.items() if key != name)])
         residuals[name] = {
-            "inside": round(float(_inside(ranges[name], seen).mean()), 4),
-            "others_inside": round(float(_inside(ranges[name], rest).mean()), 6),
+            "inside": round(float(inside(ranges[name], seen).mean()), 4),
+            "others_inside": round(float(inside(ranges[name], rest).mean()), 6),
         }
     counts = {name: len(rows) for name, rows in sorted(painted.items())}
     return Colors(date=date, tool=tool, inputs={"samples": counts, "others": len(other)}, residuals=residuals, colors=ranges)
@@ -75,7 +75,8 @@ def _range(seen: Samples) -> ColorRange:
     return ColorRange(hsv_low=(h_low, s_low, v_low), hsv_high=(h_high, 255, 255))
 
 
-def _inside(bounds: ColorRange, hsv: Samples) -> npt.NDArray[np.bool_]:
+def inside(bounds: ColorRange, hsv: Samples) -> npt.NDArray[np.bool_]:
+    """Which samples (n, 3) a range takes; (n,)."""
     low, high = np.array(bounds.hsv_low), np.array(bounds.hsv_high)
     above, below = hsv[:, 0] >= low[0], hsv[:, 0] <= high[0]
     hue = above & below if low[0] <= high[0] else above | below

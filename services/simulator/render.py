@@ -137,6 +137,11 @@ class Renderer:
         self._draw(time_s)
         return self._expose(0, 0.0)
 
+    @property
+    def light(self) -> npt.NDArray[np.float32]:
+        """Linear light of the last picture before the lens blurs it; (h, w, 3). Overwritten by the next picture."""
+        return self._film.picture
+
     def labels(self, time_s: float, only: npt.NDArray[np.bool_] | None = None) -> npt.NDArray[np.int16]:
         """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1 + Cast.marks[...] paint; (h, w).
 

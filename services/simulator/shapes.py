@@ -127,7 +127,8 @@ def _add_forearm(shapes: Shapes, model: HandModel, first: int, skin: int) -> Non
     for x, end_x in ((0.0, 0.0), (-0.45, -0.7), (0.45, 0.7)):
         # The middle one carries the wrist dab: its surface is exactly wrist_radius_m from the joint.
         near = r if x == 0.0 else 0.92 * r
-        shapes.capsule((wrist, (x * r, 0.0, 0.0), near), (first + ARM, (end_x * r, 0.0, 12.0 * r), 1.45 * r), skin, dabbed=True)
+        a, b = (model.side * x * r, 0.0, 0.0), (model.side * end_x * r, 0.0, 12.0 * r)
+        shapes.capsule((wrist, a, near), (first + ARM, b, 1.45 * r), skin, dabbed=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,6 +48,8 @@ START_ITERATIONS = 20
 STOP = 1e-8
 # rad; moves a tip by less than 1e-5 mm: with a coupling that cannot be met this is where it ends.
 SMALLEST_STEP = 1e-7
+# rad; a digit bent by less is straight.
+_STRAIGHT = 0.03
 # A step that came out worse is not taken back (going on from there leaves traps), but the next ones are damped this much more:
 # without it a target out of reach has the digit swing between its limits.
 _CAUTION = 10.0
@@ -138,6 +140,23 @@ def _descend(chain: Chain, wanted: Goal, q: Array, most: int) -> tuple[int, floa
 
 
 @njit(cache=True)
+def _unlock(unit: Chain, distance: float, q: Array) -> None:
+    """Bend a straight digit (q in place) about as much as a target at that distance needs; the digit's length is 1.
+
+    The distance from root to tip does not change at first when a straight digit bends: its Jacobian says that bending is useless,
+    and a digit straight at its limits stays so. To second order 1 - d^2 = K * second flexion^2.
+    """
+    if abs(q[2]) + abs(q[3]) > _STRAIGHT or distance >= 1.0:
+        return
+    a, b, c, r = unit.lengths[0], unit.lengths[1], length_of(unit.tool), unit.coupling[0]
+    stiffness = a * b + r * r * b * c + (1.0 + r) ** 2 * a * c
+    bend = min(math.sqrt((1.0 - distance * distance) / max(stiffness, 1e-6)), 1.0)
+    if bend > abs(q[2]):
+        q[2], q[3] = bend, r * bend
+        clamp(q, unit.limits)
+
+
+@njit(cache=True)
 def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> tuple[int, float, int]:
     """Bring the painted point to the goal, starting from and ending in q (4,).
 
@@ -153,6 +172,7 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
     shrink = min(1.0, total / far) if far > 0.0 else 1.0
     unit = scaled(chain, 1.0 / total)
     aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
+    _unlock(unit, length_of(aim.point), q)
     used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS))
     trial, again = np.empty(4), 0
     for attempt in range(4):

@@ -11,7 +11,6 @@ import contextlib
 import functools
 import io
 import re
-import threading
 from collections.abc import Callable, Iterator
 
 import viser
@@ -69,19 +68,16 @@ class Audience:
 
     def __init__(self, server: viser.ViserServer, changed: Callable[[int], object]) -> None:
         self._ids: set[int] = set()
-        self._lock = threading.Lock()
         self._changed = changed
         server.on_client_connect(self._came)
         server.on_client_disconnect(self._went)
 
-    def _came(self, client: viser.ClientHandle) -> None:
-        with self._lock:
-            self._ids.add(client.client_id)
-            count = len(self._ids)
-        self._changed(count)
+    # Coroutines, so that viser runs them one after the other on its own loop instead of in a pool of threads.
 
-    def _went(self, client: viser.ClientHandle) -> None:
-        with self._lock:
-            self._ids.discard(client.client_id)
-            count = len(self._ids)
-        self._changed(count)
+    async def _came(self, client: viser.ClientHandle) -> None:
+        self._ids.add(client.client_id)
+        self._changed(len(self._ids))
+
+    async def _went(self, client: viser.ClientHandle) -> None:
+        self._ids.discard(client.client_id)
+        self._changed(len(self._ids))

@@ -33,6 +33,8 @@ async def serve(service: Service) -> None:
     config = service.config
     loop = asyncio.get_running_loop()
     setup = read_setup(config)
+    # viser's websocket library tells of every browser that comes and goes.
+    logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
         present = asyncio.Event()
         Audience(server, lambda count: loop.call_soon_threadsafe(present.set if count else present.clear))

@@ -22,7 +22,8 @@ FLAGS = (
 )
 
 
-@pytest.fixture(scope="session")
+# Not for the whole session: while playwright runs, no other test can have an event loop.
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """A playwright browser; skips without playwright or Chromium."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed; pip install playwright")

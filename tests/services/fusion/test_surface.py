@@ -1,10 +1,20 @@
-"""Where the centroid of a painted finger tip is: by ray-casting two cameras, against the constants of surface.py."""
+"""Where the centroid of a painted finger tip is: by ray-casting two cameras, against surface.py and patch.py."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
 
-from services.fusion.surface import MEAN_PUSH, SIGMA_ACROSS, SIGMA_ALONG, to_axis
+import numpy as np
+import pytest
+
+from rhot.hand import JOINTS, default_hand
+from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from rhot.transforms import quaternion_from_rotation, rotation_from_vector
+from services.fusion.observations import Slot
+from services.fusion.patch import centroid_shift, located_shift, shift_table
+from services.fusion.surface import SIGMA_UNKNOWN, Surface
+from services.fusion.synthetic import Setup
+from services.fusion.triangulation import extrinsics
 
 RADIUS_M, PAINT_M, BASELINE_M, DISTANCE_M = 0.0068, 0.014, 0.075, 0.5
 EYES = np.array([[0.0, 0.0, 0.0], [BASELINE_M, 0.0, 0.0]])
@@ -32,42 +42,118 @@ def visible_centroid(eye, tip, direction):
     return rays[painted].mean(axis=0) if painted.sum() > 20 else None
 
 
-def errors() -> np.ndarray:
-    """Triangulated centroid minus the middle of the painted axis, along the mean viewing ray and across it; (n, 2)."""
-    random, rows = np.random.default_rng(0), []
-    while len(rows) < 150:
+def random_fingers(n: int, *, hidden: float = 0.9) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Random landmarks and finger directions, with where two cameras locate the visible centroid."""
+    random = np.random.default_rng(0)
+    found = 0
+    while found < n:
         direction = random.normal(size=3)
         direction /= np.linalg.norm(direction)
-        if direction[2] > 0.9:  # the finger hides its own tip
+        if direction[2] > hidden:  # the finger hides its own tip
             continue
         point = np.array([random.uniform(-0.06, 0.14), random.uniform(-0.1, 0.1), DISTANCE_M])
         seen = [visible_centroid(eye, point + 0.5 * PAINT_M * direction, direction) for eye in EYES]
         if seen[0] is None or seen[1] is None:
             continue
+        found += 1
         z = BASELINE_M / (seen[0][0] - seen[1][0])
-        error = np.array([seen[0][0] * z, 0.5 * (seen[0][1] + seen[1][1]) * z, z]) - point
-        away = point - EYES.mean(axis=0)
-        away /= np.linalg.norm(away)
-        rows.append((error @ away, np.linalg.norm(error - (error @ away) * away)))
-    return np.array(rows)
+        yield point, direction, np.array([seen[0][0] * z, 0.5 * (seen[0][1] + seen[1][1]) * z, z])
+
+
+def split(error, point):
+    """An error along the mean viewing ray, and its length across it."""
+    away = point - EYES.mean(axis=0)
+    away /= np.linalg.norm(away)
+    return error @ away, np.linalg.norm(error - (error @ away) * away)
 
 
 def test_the_constants_are_what_ray_casting_gives():
-    along, across = errors().T
-    assert abs(along.mean() + MEAN_PUSH * RADIUS_M) < 0.5e-3
-    assert abs(along.std() / RADIUS_M - SIGMA_ALONG) < 0.06
-    assert abs(np.sqrt(np.mean(across**2) / 2.0) / RADIUS_M - SIGMA_ACROSS) < 0.03
-    # A push by the whole radius, as if the centroid lay on the skin, would be far off.
-    assert abs(along.mean() + RADIUS_M) > 5e-3
+    along, across = np.array([split(located - point, point) for point, _, located in random_fingers(150)]).T
+    # Nowhere near a radius (6.8 mm) towards the cameras, as if the centroid lay on the skin.
+    assert abs(along.mean()) < 1e-3
+    assert along.std() / RADIUS_M == pytest.approx(SIGMA_UNKNOWN[0], abs=0.06)
+    assert np.sqrt(np.mean(across**2) / 2.0) / RADIUS_M == pytest.approx(SIGMA_UNKNOWN[1], abs=0.03)
 
 
-def test_points_move_away_from_the_cameras_and_flat_dabs_stay():
-    positions, covs = np.array([[0.1, 0.2, 0.5], [0.1, 0.2, 0.5]]), np.tile(1e-6 * np.eye(3), (2, 1, 1))
-    eye = np.array([0.0375, 0.0, 0.0])
-    moved, blurred = to_axis(positions, covs, np.array([0.0068, 0.0]), eye)
-    away = (positions[0] - eye) / np.linalg.norm(positions[0] - eye)
-    np.testing.assert_allclose(moved[0], positions[0] + MEAN_PUSH * 0.0068 * away)
-    np.testing.assert_array_equal(moved[1], positions[1])
-    np.testing.assert_array_equal(blurred[1], covs[1])
-    assert np.sqrt(away @ blurred[0] @ away) > np.sqrt(1e-6)
-    assert np.isfinite(to_axis(np.array([eye]), covs[:1], np.array([0.01]), eye)[0]).all()
+def test_shift_is_along_the_finger_and_vanishes_end_on():
+    table = shift_table(RADIUS_M, PAINT_M)
+    assert centroid_shift(table, -1.0) == pytest.approx(0.0, abs=1e-5)
+    # Seen from the side, the round end has less paint than the straight stretch behind it.
+    assert -1e-3 < centroid_shift(table, 0.0) < -0.3e-3
+    assert -2e-3 < centroid_shift(table, -0.6) < -1e-3
+    assert not shift_table(0.0, 0.01).any()
+
+
+def test_known_direction_explains_where_the_centroid_is_located():
+    cameras = tuple(Setup(distortion=(0.0,) * 5).rig().values())
+    R, t = extrinsics(cameras)
+    table, shift, left = shift_table(RADIUS_M, PAINT_M), np.zeros(3), []
+    for point, direction, located in random_fingers(150, hidden=0.7):
+        assert located_shift(table, located, direction, R, t, shift)
+        left.append(split(located - shift - point, point))
+    along, across = np.array(left).T
+    # What is left is the coarse grid of the ray-casting here (.25 mm a ray) and that parallel rays stand for a near camera's.
+    assert np.sqrt(np.mean(along**2)) < 0.7e-3
+    assert np.sqrt(np.mean(across**2)) < 0.2e-3
+
+
+SLOTS = (Slot("right", "wrist"), Slot("right", "index_tip"))
+
+
+@pytest.fixture
+def surface() -> Surface:
+    return Surface(SLOTS, {"right": default_hand("right")}, tuple(Setup().rig().values()))
+
+
+def pose(stamp_ns: int, wxyz, source="solved") -> HandPose:
+    joints = [HandJoint(name=name, position_m=(0.0, 0.0, 0.5), orientation_wxyz=wxyz, radius_m=0.01, source=source) for name in JOINTS]
+    angles = FingerAngles(abduction=0.0, mcp=0.0, pip=0.0, dip=0.0)
+    names = ("thumb", "index", "middle", "ring", "little")
+    fingers = [FingerPose(name=name, angles_rad=angles, residual_m=0.0, iterations=1, status="solved") for name in names]
+    wrist = WristPose(position_m=(0.0, 0.0, 0.5), orientation_wxyz=wxyz)
+    return HandPose(hand="right", seq=0, stamp_ns=stamp_ns, method="test", wrist=wrist, joints=joints, fingers=fingers)
+
+
+POSITIONS = np.array([[0.0, 0.1, 0.5], [0.03, -0.05, 0.5]])
+COVARIANCES = np.tile(1e-8 * np.eye(3), (2, 1, 1))
+BOTH = np.ones((2, 2), dtype=bool)
+# The finger points at the cameras, tilted by half a radian.
+TOWARDS = tuple(quaternion_from_rotation(rotation_from_vector([0.5, 0.0, 0.0])).tolist())
+
+
+def test_without_a_pose_points_stay_and_sigma_says_so(surface):
+    positions, covariances = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)
+    np.testing.assert_array_equal(positions, POSITIONS)
+    depth_mm = 1e3 * np.sqrt(covariances[:, 2, 2])
+    assert depth_mm[1] == pytest.approx(0.29 * 6.8, rel=0.05)
+    assert depth_mm[0] == pytest.approx(0.06 * 16.0, rel=0.05)
+
+
+def test_a_pose_corrects_tips_while_it_is_fresh(surface):
+    surface.note(pose(10**18, TOWARDS))
+    positions, covariances = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 33_000_000)
+    np.testing.assert_array_equal(positions[0], POSITIONS[0])
+    assert -3e-3 < positions[1, 2] - POSITIONS[1, 2] < -1e-3
+    assert np.sqrt(covariances[1, 2, 2]) < 1e-3
+    late, _ = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 400_000_000)
+    np.testing.assert_array_equal(late, POSITIONS)
+    surface.forget()
+    np.testing.assert_array_equal(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0], POSITIONS)
+
+
+@pytest.mark.parametrize("wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)])
+def test_absurd_or_predicted_poses_are_not_believed(surface, wxyz):
+    surface.note(pose(10**18, wxyz))
+    surface.note(pose(10**18, TOWARDS, source="predicted"))
+    np.testing.assert_array_equal(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0], POSITIONS)
+
+
+def test_any_number_of_cameras_agrees_on_the_shift():
+    table, direction = shift_table(RADIUS_M, PAINT_M), np.array([0.3, -0.6, -0.74])
+    shifts = []
+    for cameras in (2, 4):
+        R, t = extrinsics(tuple(Setup(cameras=cameras).rig().values()))
+        shift = np.zeros(3)
+        assert located_shift(table, POSITIONS[1], direction / np.linalg.norm(direction), R, t, shift)
+        shifts.append(shift)
+    np.testing.assert_allclose(shifts[0], shifts[1], atol=0.3e-3)

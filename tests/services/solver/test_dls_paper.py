@@ -16,13 +16,13 @@ INDEX = k.chain_of(k.hand_chains(default_hand()), 1)
 
 
 def _follow(grasp: np.ndarray, reading: paper.Reading) -> tuple[list[paper.Frame], float]:
-    q, frames, worst = np.array(paper.FIRST), [], 0.0
+    q, frames, last = np.array(paper.FIRST), [], 0.0
     for angles in grasp:
         frame = paper.solve(INDEX, *k.tip_reference(INDEX, angles), q, reading)
         q = frame.angles_rad
         frames.append(frame)
-        worst = max(worst, float(np.abs(q - angles).max()))
-    return frames, worst
+        last = float(np.abs(q - angles).max())
+    return frames, last
 
 
 @pytest.mark.parametrize("form", ["normal", "svd"])
