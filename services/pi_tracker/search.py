@@ -46,6 +46,7 @@ class Searcher:
 
     def __init__(self, table: ColorTable, settings: Tracker) -> None:
         self._table = table
+        self.names = table.names
         # Settings are in pixels of the full image, masks in cells of two; 3 cells is the smallest kernel.
         self._gaussian = max(3, settings.gaussian_px // 2 | 1) if settings.gaussian_px > 1 else 0
         # A round of 3x3 px takes away 2 px of width, which is one cell: a 2x2 element.
@@ -85,7 +86,7 @@ class Searcher:
 
     def _of_contour(self, labels: Image, inside: Image, origin: tuple[int, int]) -> list[Blob]:
         """The blobs inside one contour: one as a rule, several where markers touch."""
-        counts = np.bincount((labels * inside).ravel(), minlength=len(self._table.names) + 1).tolist()
+        counts = np.bincount((labels * inside).ravel(), minlength=len(self.names) + 1).tolist()
         classes = [k for k, count in enumerate(counts) if k and count >= self._min_cells]
         if len(classes) == 1:
             # Holes of noise inside the blob count as its own.

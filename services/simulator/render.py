@@ -16,7 +16,7 @@ from rhot.transforms import Array
 from services.simulator import render_develop as dark_room
 from services.simulator.backdrop import backdrop, vignette, wall
 from services.simulator.paints import CUP, SKIN, TRACKER, Surface, paint
-from services.simulator.render_edges import outlines, retrace
+from services.simulator.render_edges import outlines, patterns, retrace
 from services.simulator.render_paths import motions, points, rows_of
 from services.simulator.render_rays import FAR, lens_of, rays_of
 from services.simulator.render_shade import lights_of, surfaces_of, texture
@@ -92,6 +92,7 @@ class Renderer:
             flags=np.zeros((height, width), np.uint8),
             ranges=np.zeros((height, 2), np.int64),
             picture=sharp.copy(),
+            pattern=patterns(),
         )
         self._world = self._make_world(lights_of(scene.spec.light, T[:3, :3] @ first.T_rig_from_camera[:3, :3]), gains)
         self._curve, self._weights = dark_room.tone_curve(), dark_room.blur_weights(scene.spec.blur_px)

@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
+from rhot.transforms import Array
 from services.simulator.render_paths import columns_of
 from services.simulator.render_rays import FAR, PLACED, dress, hit, place
 from services.simulator.render_shade import HIT_ALONG, HIT_RAY, HIT_RGB, HIT_T, HITS, identify, shade
@@ -21,8 +22,30 @@ _STEP_M = 4e-3
 _STILL_PX = 0.3
 # Samples a pixel at the outline of something still, and at most; a step of 1.5 px between instants vanishes in the lens blur.
 _SAMPLES, _MAX_SAMPLES, _STEP_PX = 4, 12, 1.5
+# Random arrangements tried for each number of samples.
+_TRIES = 300
 # Longest way that is followed, px: flags are bytes, and a third of the picture is a hand thrown, not moved.
 _MAX_WAY_PX = 200.0
+
+
+def patterns() -> Array:
+    """Where n samples of a pixel lie: (n, k) -> x and y from its middle in px, rank in time 0..n-1; (_MAX_SAMPLES + 1, _MAX_SAMPLES, 3).
+
+    Latin squares: each row, column and instant of an n-fold pixel once, so the mean lies exactly in the middle (an uneven pattern
+    would shift every outline); of many arrangements the one whose samples keep furthest apart.
+    """
+    rng = np.random.default_rng(1)
+    table = np.zeros((_MAX_SAMPLES + 1, _MAX_SAMPLES, 3))
+    for n in range(_SAMPLES, _MAX_SAMPLES + 1):
+        tries = np.stack([np.tile(np.arange(n), (_TRIES, 1)), *(rng.permuted(np.tile(np.arange(n), (_TRIES, 1)), axis=1) for _ in "yt")], 2)
+        apart = np.abs(tries[:, :, None] - tries[:, None, :])  # (tries, n, n, 3)
+        apart = np.minimum(apart, n - apart)
+        in_space, in_all = np.sum(apart[..., :2] ** 2, axis=3), np.sum(apart**2, axis=3)
+        score = np.min((in_space + 0.5 * in_all) + 1e6 * np.eye(n), axis=(1, 2))
+        best = tries[int(np.argmax(score))]
+        table[n, :n, :2] = (best[:, :2] + 0.5) / n - 0.5
+        table[n, :n, 2] = best[:, 2]
+    return table
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -130,14 +153,14 @@ def retrace(world, film, timing, shutter, longest, box):  # type: ignore[no-unty
         touched = _placed(world, row, u, shutter, instants, width, g, active, columns)
         for k in range(instants):
             dabs_at(world.dabs, u + ((k + 0.5) / instants - 0.5) * shutter, dabs[k])
-        p, n = _cast(film.rays, film.flags[row], row, box, instants, touched, active, columns, flat, hits, where, pixels)
+        p, n = _cast(film.rays, film.pattern, film.flags[row], row, box, instants, touched, active, columns, flat, hits, where, pixels)
         identify(n, hits, where, flat, dabs, world.dab_r2, world.dab_surface)
         shade(n, hits, where, flat, world.looks, world.lights, world.blotches)
         _average(p, pixels, hits, film.vignette[row], film.backdrop[row], film.picture[row])
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _cast(rays, flags, row, box, instants, touched, active, columns, g, hits, where, pixels):  # type: ignore[no-untyped-def]
+def _cast(rays, pattern, flags, row, box, instants, touched, active, columns, g, hits, where, pixels):  # type: ignore[no-untyped-def]
     """The rays of a row's flagged pixels: what they hit, and pixels (p, 3): column, rays cast, rays that hit. Returns p and hits."""
     height, width, count = rays.shape[0], rays.shape[2], g.shape[0] // instants
     yn = min(row + 1, height - 1)
@@ -148,8 +171,7 @@ def _cast(rays, flags, row, box, instants, touched, active, columns, g, hits, wh
         samples = _samples(flags[x] - 1) if instants > 1 else _SAMPLES
         xn, before = min(x + 1, width - 1), n
         for k in range(samples):
-            # The R2 sequence: every prefix covers the pixel evenly (M. Roberts, 2018).
-            ox, oy = (0.5 + 0.7548776662 * k) % 1.0 - 0.5, (0.5 + 0.5698402910 * k) % 1.0 - 0.5
+            ox, oy = pattern[samples, k, 0], pattern[samples, k, 1]
             scale = 0.0
             for i in range(3):
                 # How the ray changes from pixel to pixel; the last column and row look back.
@@ -161,7 +183,7 @@ def _cast(rays, flags, row, box, instants, touched, active, columns, g, hits, wh
             dx, dy, dz = hits[HIT_RAY, n] * scale, hits[HIT_RAY + 1, n] * scale, hits[HIT_RAY + 2, n] * scale
             hits[HIT_RAY, n], hits[HIT_RAY + 1, n], hits[HIT_RAY + 2, n] = dx, dy, dz
             # Neighbouring pixels take other instants: blur instead of ghosts.
-            instant = (k * instants // samples + x * 5 + row * 3) % instants
+            instant = int(pattern[samples, k, 2] * instants / samples + x * 5 + row * 3) % instants
             nearest = FAR
             for i in range(touched):
                 if x < columns[i, 0] or x > columns[i, 1]:

@@ -45,6 +45,7 @@ class Film(NamedTuple):
     flags: npt.NDArray[np.uint8]  # (h, w)
     ranges: Ints  # (h, 2)
     picture: Array32  # (h, w, 3)
+    pattern: Array  # (n, k, 3), services/simulator/render_edges.py
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,0 +1,76 @@
+"""Blobs: which colour, where, how many."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from rhot.config import Tracker
+from services.pi_tracker.colors import compile_colors
+from services.pi_tracker.planes import picture
+from services.pi_tracker.roi import whole
+from services.pi_tracker.search import Searcher
+
+
+def blobs_of(searcher, frame):
+    image = picture(frame)
+    return searcher.blobs(image, whole(image.size))
+
+
+def test_six_tips_are_six_blobs(studio, tip, searcher):
+    tips = [tip(name, 30.0 + 40 * i, 40.0) for i, name in enumerate(studio.paints)]
+    frame, truth = studio.frame(tips, size_px=(280, 90))
+    found = blobs_of(searcher, frame)
+    names = list(studio.paints)
+    assert sorted(blob.color for blob in found) == list(range(6))
+    for blob in found:
+        assert blob.centre_px == pytest.approx(truth[names[blob.color]], abs=2.0)
+        assert blob.mask.sum() == blob.cells
+        assert blob.mask.shape == (blob.rect[3] - blob.rect[1], blob.rect[2] - blob.rect[0])
+
+
+def test_touching_colours_are_told_apart(studio, tip, searcher):
+    frame, truth = studio.frame([tip("green", 28.0, 32.0, turn_rad=1.57), tip("blue", 37.5, 32.0, turn_rad=1.57)])
+    found = {blob.color: blob for blob in blobs_of(searcher, frame)}
+    assert set(found) == {0, 1}
+    assert found[0].centre_px == pytest.approx(truth["green"], abs=1.5)
+    assert found[1].centre_px == pytest.approx(truth["blue"], abs=1.5)
+
+
+def test_a_rectangle_limits_the_search(studio, tip, searcher):
+    frame, _ = studio.frame([tip("green", 20.0, 20.0), tip("blue", 50.0, 50.0)])
+    assert [blob.color for blob in searcher.blobs(picture(frame), (16, 16, 32, 32))] == [1]
+
+
+def test_an_empty_picture_has_no_blobs(studio, searcher):
+    frame, _ = studio.frame([])
+    assert blobs_of(searcher, frame) == []
+
+
+@pytest.mark.parametrize(("min_area", "seen"), [(12.0, True), (600.0, False)])
+def test_specks_below_the_least_area_are_left_out(studio, tip, colors, min_area, seen):
+    searcher = Searcher(compile_colors(colors, ["green"]), Tracker(min_area_px=min_area))
+    frame, _ = studio.frame([tip("green", 30.0, 30.0)])
+    assert bool(blobs_of(searcher, frame)) is seen
+
+
+@pytest.mark.parametrize("settings", [Tracker(gaussian_px=0, erode=0, dilate=0), Tracker(gaussian_px=7, erode=1, dilate=2), Tracker()])
+def test_mask_filters_do_not_move_a_blob(studio, tip, colors, settings):
+    searcher = Searcher(compile_colors(colors, ["green"]), settings)
+    frame, truth = studio.frame([tip("green", 31.0, 33.0, width_px=16.0, length_px=16.0)], sigma=1.0)
+    blob = blobs_of(searcher, frame)[0]
+    rows, columns = np.nonzero(blob.mask)
+    centre = 2 * (blob.rect[0] + columns.mean()) + 0.5, 2 * (blob.rect[1] + rows.mean()) + 0.5
+    assert centre == pytest.approx(truth["green"], abs=0.7)
+
+
+def test_a_room_full_of_colour_costs_no_more_than_a_frame(studio, searcher):
+    rng = np.random.default_rng(3)
+    confetti = rng.integers(0, 256, (120, 160, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+    frame = studio.of(confetti)
+    blobs_of(searcher, frame)
+    started = time.perf_counter()
+    blobs_of(searcher, frame)
+    assert time.perf_counter() - started < 0.03
