@@ -25,6 +25,8 @@ bench: $(STAMP)
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 browser: $(STAMP)
+	@command -v chromium >/dev/null || { echo "Chromium is missing: sudo apt install chromium"; exit 1; }
+	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[browser]'
 	$(BIN)/pytest -q tests/browser $(ARGS)
 
 docs: $(STAMP)

@@ -1,6 +1,6 @@
 """How exact fusion is, how honest, and what it costs: `python benchmarks/accuracy.py [--rendered] [--json FILE]`.
 
-From synthetic observations (services/fusion/synthetic.py): geometry, timing and noise of 0.06 px, so that errors are fusion's own. --rendered
+From synthetic observations (services/fusion/synthetic.py): geometry, timing, 0.06 px of noise, so that errors are fusion's own. --rendered
 adds hands as the simulator's cameras see them, through the tracker, against the landmarks of its truth: that includes what paint, skin,
 light and the detector do (a minute or two). Errors are RMS, in mm; nees is squared error over predicted variance, 1 if sigma is honest.
 """

@@ -19,6 +19,8 @@ from services.pi_tracker.planes import Picture, Rect
 # Contours looked at in one rectangle, largest first. Six markers, their reflections and a dozen distractors stay far below;
 # a wall of noise must not cost more than a frame (1.5 us each).
 _MAX_CONTOURS = 64
+# What is left of a marker among others after a cell of its width is taken away, at least; of a seam next to nothing is.
+_SEAM_CELLS, _SEAM_SHARE = 3, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,9 @@ class Searcher:
         return [blob for k in classes for blob in self._of_class((labels == k).view(np.uint8) & inside, k, origin)]
 
     def _of_class(self, mask: Image, k: int, origin: tuple[int, int]) -> list[Blob]:
+        # Where two paints meet, a seam a cell or two wide has the mixed colour, which may be a third paint's: green beside blue is cyan.
+        if cv2.countNonZero(cv2.erode(mask, self._element, anchor=(0, 0))) < max(_SEAM_CELLS, _SEAM_SHARE * cv2.countNonZero(mask)):
+            return []
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         found: list[Blob] = []
         for x, y, w, h in map(cv2.boundingRect, contours):

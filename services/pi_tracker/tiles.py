@@ -26,6 +26,7 @@ class Tiles:
     """n tiles of h x w cells, stacked to images of n h x w cells; luma is float32 of pixels, (2 n h, 2 w), less 16."""
 
     count: int
+    size: tuple[int, int]  # of the image, in cells
     origins: list[tuple[int, int]]  # top left cell of each tile in the image
     mask: Image  # (n h, w) 0/1: the blobs
     inside: Image  # (n h, w) 0/1: the image
@@ -61,7 +62,9 @@ def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
     pixels = luma.reshape(n * 2 * h, 2 * w).astype(np.float32) - np.float32(16.0)
     u, v = cv2.split(chroma.reshape(n * h, w, 2).astype(np.float32) - np.float32(128.0))
     y = cv2.resize(pixels, (w, n * h), interpolation=cv2.INTER_AREA)
-    return Tiles(n, [(rect[0], rect[1]) for rect in rects], mask.reshape(n * h, w), inside.reshape(n * h, w), pixels, (y, u, v))
+    return Tiles(
+        n, picture.size, [(rect[0], rect[1]) for rect in rects], mask.reshape(n * h, w), inside.reshape(n * h, w), pixels, (y, u, v)
+    )
 
 
 def _grown(rect: Rect, size: tuple[int, int]) -> Rect:

@@ -25,7 +25,7 @@ PAINTS = {
     "lime": (40, 200, 150),
 }
 SKIN, WALL = (120, 150, 200), (150, 152, 149)
-_FINE = 8
+_FINE = 6
 
 
 @dataclass(frozen=True)

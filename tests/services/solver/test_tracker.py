@@ -60,7 +60,8 @@ def test_markers_come_and_go(world: Callable, tracker: HandTracker) -> None:
         look = tracker.look(frame * FRAME_NS, _seen({name: p for name, p in found.items() if name not in hidden}, rng))
         assert look is not None
         tips.append(angle_between(look.rotation, instant.rotation))
-        assert np.linalg.norm(look.position_m - instant.position_m) < 0.05
+        # The wrist itself is out of sight for 0.4 s at a time.
+        assert np.linalg.norm(look.position_m - instant.position_m) < 0.08
     assert np.mean(tips) < np.deg2rad(9.0)
     assert max(tips) < np.deg2rad(50.0)
 
