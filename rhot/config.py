@@ -67,8 +67,10 @@ class Tracker(Table, frozen=True, kw_only=True):
 class OneEuro(Table, frozen=True, kw_only=True):
     """Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012."""
 
-    mincutoff_hz: Positive = 3.0
-    beta: NonNegative = 30.0
+    # Of all pairs that halve the jitter of a resting hand (1 mm at 30 Hz), these follow a hand at 0.15-0.5 m/s best: benchmarks/filters.py.
+    mincutoff_hz: Positive = 1.2
+    # Hz per m/s.
+    beta: NonNegative = 170.0
     dcutoff_hz: Positive = 1.0
 
 

@@ -1,7 +1,6 @@
 """Finding a board in a picture. Pure: a picture goes in, numbered sub-pixel corners come out, or None where there is no whole board.
 
-Which detector finds the corners does not matter for accuracy, since refine.py places them: on the real pairs cornerSubPix gave a
-held-out board fit of .0149 squares, the corners of findChessboardCornersSB themselves .0205. So detectors are tried until one
+Which detector finds the corners does not matter for accuracy, since refine.py places them. So detectors are tried until one
 finds the board: the sector-based one stands blur and noise, the classic one steep views (each misses pictures the other one finds).
 A chessboard must be seen whole; of a ChArUco board any part will do.
 """

@@ -11,7 +11,7 @@ import asyncio
 import time
 
 from rhot import clock, topics
-from rhot.calibration import load_cameras, load_hand
+from rhot.calibration import load_hand, load_rig_cameras
 from rhot.messages import ClockEcho
 from rhot.service import Service
 from services.fusion.session import SessionState
@@ -29,7 +29,7 @@ _REFUSAL_TEXTS = {
 async def serve(service: Service) -> None:
     """Turns the cameras' markers into 3D landmarks, and leads the rig: start broadcast and clock."""
     config = service.config
-    cameras = load_cameras(config.calibration_dir, [camera.name for camera in config.camera])
+    cameras = load_rig_cameras(config)
     hands = {hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()}
     step = FusionStep(config, cameras, hands)
     await asyncio.to_thread(warm_up, config, cameras, hands)

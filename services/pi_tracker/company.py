@@ -13,7 +13,7 @@ from services.pi_tracker.search import Blob
 
 # Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm wide: markers lie within
 # 14 patch widths, mostly within 10.
-_REACH_WIDTHS = 10.0
+_REACH_WIDTHS = 14.0
 # Tips seen end on or half hidden and a dab on the wrist seen in full differ in area up to this.
 _SIZE_RATIO = 4.0
 

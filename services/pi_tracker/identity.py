@@ -27,7 +27,12 @@ _ALONE = 0.1
 # A blob as like its own track as this, and the only one of its colour, is the marker without asking the others.
 _SURE = 0.6
 # However unlike its track, a blob in good company may be the marker after all: the track may have been wrong.
-_SECOND_THOUGHT = 0.3
+_SECOND_THOUGHT = 0.4
+# A track that moves less than this a frame stands still, and after so many frames may be no marker.
+_STILL_PX, _STANDING = 1.0, 4
+# A small blob at the rim of a larger one of another colour is, as a rule, that one's edge in coloured light: so much less likely a marker,
+# when it is at most this share of the other's size.
+_HALO, _HALO_SHARE = 0.3, 0.6
 
 
 @dataclass
@@ -40,6 +45,8 @@ class Track:
     stamp_ns: int
     vx_px_s: float = 0.0
     vy_px_s: float = 0.0
+    # Frames in a row in which it has not moved.
+    still: int = 0
 
     def predicted(self, stamp_ns: int) -> tuple[float, float]:
         """Where it should be; velocity is trusted for a tenth of a second."""
@@ -49,6 +56,7 @@ class Track:
     def follow(self, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> None:
         """Take in the marker's new place."""
         elapsed_s = (stamp_ns - self.stamp_ns) * 1e-9
+        self.still = self.still + 1 if abs(x_px - self.x_px) + abs(y_px - self.y_px) < _STILL_PX else 0
         # After a longer gap, or with stamps that do not advance, the old place tells nothing of the speed.
         if 0.0 < elapsed_s < 0.1:
             self.vx_px_s, self.vy_px_s = (x_px - self.x_px) / elapsed_s, (y_px - self.y_px) / elapsed_s
@@ -84,6 +92,13 @@ class Choice:
     support: float
 
 
+def is_halo(blob: Blob, other: Blob) -> bool:
+    """Whether a blob touches a larger one of another colour."""
+    a, b = blob.rect, other.rect
+    touching = a[0] <= b[2] + 1 and b[0] <= a[2] + 1 and a[1] <= b[3] + 1 and b[1] <= a[3] + 1
+    return touching and blob.cells <= _HALO_SHARE * other.cells
+
+
 class Identity:
     """Tracks of `count` colours."""
 
@@ -94,7 +109,7 @@ class Identity:
 
     def choose(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Choice | None]:
         """Each colour's marker, None where there is none."""
-        candidates = [[Candidate(blob, self._prior(color, blob, stamp_ns)) for blob in own] for color, own in enumerate(blobs)]
+        candidates = [self._candidates(color, blobs, stamp_ns) for color in range(len(blobs))]
         if all(len(own) == 1 and own[0].prior >= _SURE and self._tracks[color] is not None for color, own in enumerate(candidates)):
             return [Choice(own[0].blob, 1.0, 1.0) for own in candidates]
         chosen = [None if member is None else self._choice(candidates[color], *member) for color, member in enumerate(best_set(candidates))]
@@ -112,9 +127,24 @@ class Identity:
         else:
             track.follow(x_px, y_px, area_px, stamp_ns)
 
-    def _prior(self, color: int, blob: Blob, stamp_ns: int) -> float:
+    def _candidates(self, color: int, blobs: list[list[Blob]], stamp_ns: int) -> list[Candidate]:
+        own = blobs[color]
+        priors = [self._prior(color, blob, blobs, stamp_ns) for blob in own]
         track = self._tracks[color]
-        prior = 1.0 if track is None else max(track.likeness(blob, stamp_ns, self._margin_px), _SECOND_THOUGHT)
+        if len(own) > 1 and track is not None and track.still >= _STANDING:
+            # What has not moved for a while may be a thing in the room; among others it has no advantage.
+            priors = [min(prior, _SECOND_THOUGHT) for prior in priors]
+        return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
+
+    def _prior(self, color: int, blob: Blob, blobs: list[list[Blob]], stamp_ns: int) -> float:
+        track = self._tracks[color]
+        likeness = 0.0 if track is None else track.likeness(blob, stamp_ns, self._margin_px)
+        if likeness >= _SURE:
+            prior = likeness
+        else:
+            prior = 1.0 if track is None else max(likeness, _SECOND_THOUGHT)
+            if any(is_halo(blob, other) for number, others in enumerate(blobs) if number != color for other in others):
+                prior *= _HALO
         return prior * _IN_ROOM if self._rooms[color].holds(blob) else prior
 
     @staticmethod

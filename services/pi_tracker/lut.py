@@ -19,6 +19,8 @@ from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture, Rect, picture
 from services.pi_tracker.search import Blob, Searcher
 
+# Every so many frames the whole image is searched although nothing is lost, so that a mistake does not last.
+_REVIEW = 15
 # A marker that fits the others worse than this may be a thing in the room.
 _LEAST_SUPPORT = 0.3
 Lap = Callable[[str], None]
@@ -33,6 +35,7 @@ class LutFinder:
         self._searcher = Searcher(table, settings)
         self._lap = lap
         self._noise = Noise()
+        self._searches = 0
         self._identity = Identity(len(table.names), settings.roi_margin_px)
         self._boxes: dict[int, Rect] = {}
 
@@ -57,6 +60,9 @@ class LutFinder:
     def _search(self, image: Picture) -> list[list[Blob]]:
         """Plausible blobs of each colour: near its last place, else in the whole image."""
         everywhere = roi.whole(image.size)
+        self._searches += 1
+        if self._searches % _REVIEW == 0:
+            return self._blobs(image, [everywhere])
         margin = self._settings.roi_margin_px
         rois = [roi.around(self._boxes[k], margin, image.size) if k in self._boxes else everywhere for k in range(len(self._names))]
         found = self._blobs(image, rois)
@@ -68,12 +74,11 @@ class LutFinder:
         return [again[k] if k in left else blobs for k, blobs in enumerate(found)]
 
     def _blobs(self, image: Picture, rois: list[Rect]) -> list[list[Blob]]:
-        """Plausible blobs of each colour inside its rectangle, largest first; one rectangle stands for all."""
+        """Plausible blobs of each colour in the rectangles, largest first."""
         found: list[list[Blob]] = [[] for _ in self._names]
         for rect in roi.joined(rois):
             for blob in self._searcher.blobs(image, rect):
-                own = rois[blob.color] if len(rois) > 1 else rect
-                if roi.inside(*blob.centre_px, own) and shape_fits(blob, self._settings.max_area_px):
+                if shape_fits(blob, self._settings.max_area_px):
                     found[blob.color].append(blob)
         return found
 

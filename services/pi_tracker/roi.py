@@ -41,11 +41,6 @@ def joined(rects: Iterable[Rect]) -> list[Rect]:
     return done
 
 
-def inside(x_px: float, y_px: float, rect: Rect) -> bool:
-    """Whether a pixel lies in a rectangle of cells."""
-    return 2 * rect[0] - 0.5 <= x_px < 2 * rect[2] - 0.5 and 2 * rect[1] - 0.5 <= y_px < 2 * rect[3] - 0.5
-
-
 def cut(blob: Rect, rect: Rect, size: tuple[int, int]) -> bool:
     """Whether a blob reaches the border of its rectangle where that is not the image's: there may be more of it outside."""
     return (

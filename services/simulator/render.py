@@ -16,7 +16,7 @@ from rhot.transforms import Array
 from services.simulator import render_develop as dark_room
 from services.simulator.backdrop import backdrop, vignette, wall
 from services.simulator.paints import CUP, SKIN, TRACKER, Surface, paint
-from services.simulator.render_edges import outlines, patterns, retrace
+from services.simulator.render_edges import outlines, patterns, retrace, widen
 from services.simulator.render_paths import motions, points, rows_of
 from services.simulator.render_rays import FAR, lens_of, rays_of
 from services.simulator.render_shade import lights_of, surfaces_of, texture
@@ -121,7 +121,8 @@ class Renderer:
         width, height = self.camera.size_px
         film = self._film
         self._scratch, self._soft = np.empty_like(film.backdrop), np.empty_like(film.backdrop)
-        everything = np.array([0, height - 1, 0, width - 1])
+        everything = np.tile([0, width - 1], (height, 1))
+        self._reach = everything.copy()
         self._luma, self._chroma = np.empty((height, width), np.float32), np.empty((2, height // 2, width // 2), np.float32)
         dark_room.blur(everything, self._weights, film.backdrop, self._scratch, self._soft)
         dark_room.develop(everything, self._curve, self._soft, self._luma, self._chroma)
@@ -165,14 +166,13 @@ class Renderer:
         self._wipe()
         timing, shutter = self._trace(time_s)
         longest = outlines(self._world, self._film, shutter)
-        # What moves may reach beyond where it was in the middle of the exposure.
-        box = self._box(int(longest) + 4)
-        if box is None:
-            return
-        self._drawn = box
-        retrace(self._world, self._film, timing, shutter, longest, box)
-        dark_room.blur(box, self._weights, self._film.picture, self._scratch, self._soft)
-        dark_room.develop(box, self._curve, self._soft, self._luma, self._chroma)
+        # What moves reaches beyond where it was in the middle of the exposure, and the lens spreads it further.
+        widen(self._film.ranges, int(0.5 * longest) + 5, self._reach)
+        np.minimum(self._reach[:, 1], self.camera.size_px[0] - 1, out=self._reach[:, 1])
+        self._drawn = self._bounds(self._reach)
+        retrace(self._world, self._film, timing, shutter, longest, self._reach)
+        dark_room.blur(self._reach, self._weights, self._film.picture, self._scratch, self._soft)
+        dark_room.develop(self._reach, self._curve, self._soft, self._luma, self._chroma)
 
     def _wipe(self) -> None:
         """Bring the background back where the last picture covered it."""
@@ -204,16 +204,13 @@ class Renderer:
             w.spans[~only] = (height, -1)
         timing = np.array([(time_s - middle_s) / half_s, row_s / half_s])
         trace(w, self._film, timing)
-        self._drawn = self._box(0)
+        self._drawn = self._bounds(self._film.ranges)
         return timing, exposure_s / half_s
 
-    def _box(self, margin: int) -> Array | None:
-        """Where anything was or will be drawn: first and last row, first and last column, on even boundaries."""
-        width, height = self.camera.size_px
-        ranges = self._film.ranges
+    def _bounds(self, ranges: npt.NDArray[np.int64]) -> Array | None:
+        """First and last row and column of all ranges (h, 2), on even boundaries; None if they are empty."""
         rows = np.flatnonzero(ranges[:, 1] >= ranges[:, 0])
         if not len(rows):
             return None
-        y0, y1 = max(0, int(rows[0]) - margin), min(height - 1, int(rows[-1]) + margin)
-        x0, x1 = max(0, int(ranges[rows, 0].min()) - margin), min(width - 1, int(ranges[rows, 1].max()) + margin)
-        return np.array([y0 // 2 * 2, y1 // 2 * 2 + 1, x0 // 2 * 2, x1 // 2 * 2 + 1])
+        first, last = int(ranges[rows, 0].min()), int(ranges[rows, 1].max())
+        return np.array([rows[0] // 2 * 2, rows[-1] // 2 * 2 + 1, first // 2 * 2, last // 2 * 2 + 1])

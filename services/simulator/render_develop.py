@@ -70,25 +70,41 @@ def _smooth(plane: Array, kernel: tuple[float, float, float]) -> Array:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def blur(box, weights, picture, scratch, out):  # type: ignore[no-untyped-def]
-    """Separable blur of the picture (h, w, 3) inside the box (inclusive; kept 3 px inside the picture by clamping) into out."""
-    height, width = picture.shape[0], picture.shape[1]
-    for y in range(max(0, box[0] - 3), min(height, box[1] + 4)):
-        for x in range(box[2], box[3] + 1):
-            if x < 3 or x >= width - 3:
-                for i in range(3):
-                    scratch[y, x, i] = picture[y, x, i]
-                continue
-            for i in range(3):
-                scratch[y, x, i] = (
-                    weights[3] * picture[y, x, i]
-                    + weights[2] * (picture[y, x - 1, i] + picture[y, x + 1, i])
-                    + weights[1] * (picture[y, x - 2, i] + picture[y, x + 2, i])
-                    + weights[0] * (picture[y, x - 3, i] + picture[y, x + 3, i])
-                )
-    for y in range(box[0], box[1] + 1):
+def _blur_row(reach, weights, picture, scratch):  # type: ignore[no-untyped-def]
+    """One row (w, 3), along the row; the three pixels at either end of the picture stay sharp."""
+    width = picture.shape[0]
+    first, last = max(reach[0], 3), min(reach[1], width - 4)
+    for x in range(reach[0], min(3, reach[1] + 1)):
+        for i in range(3):
+            scratch[x, i] = picture[x, i]
+    for x in range(max(width - 3, reach[0]), reach[1] + 1):
+        for i in range(3):
+            scratch[x, i] = picture[x, i]
+    for x in range(first, last + 1):
+        for i in range(3):
+            scratch[x, i] = (
+                weights[3] * picture[x, i]
+                + weights[2] * (picture[x - 1, i] + picture[x + 1, i])
+                + weights[1] * (picture[x - 2, i] + picture[x + 2, i])
+                + weights[0] * (picture[x - 3, i] + picture[x + 3, i])
+            )
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def blur(reach, weights, picture, scratch, out):  # type: ignore[no-untyped-def]
+    """Separable blur of the picture (h, w, 3) into out, between the columns reach (h, 2) of each row, as `develop`."""
+    height = picture.shape[0]
+    wide = np.empty(2, np.int64)
+    for y in range(height):
+        # What this row's neighbours need of it.
+        wide[0], wide[1] = picture.shape[1], -1
+        for v in range(max(0, y - 3), min(height, y + 4)):
+            if reach[v, 1] >= reach[v, 0]:
+                wide[0], wide[1] = min(wide[0], reach[v, 0]), max(wide[1], reach[v, 1])
+        _blur_row(wide, weights, picture[y], scratch[y])
+    for y in range(height):
         inside = y >= 3 and y < height - 3
-        for x in range(box[2], box[3] + 1):
+        for x in range(reach[y, 0], reach[y, 1] + 1):
             for i in range(3):
                 if inside:
                     out[y, x, i] = (
@@ -107,10 +123,13 @@ def _tone(curve, light):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def develop(box, curve, picture, luma, chroma):  # type: ignore[no-untyped-def]
-    """Light (h, w, 3) inside the box (even first, odd last row and column) to Y (h, w), U and V (2, h / 2, w / 2), float32 unrounded."""
-    for v in range(box[0] // 2, (box[1] + 1) // 2):
-        for w in range(box[2] // 2, (box[3] + 1) // 2):
+def develop(reach, curve, picture, luma, chroma):  # type: ignore[no-untyped-def]
+    """Light (h, w, 3) to Y (h, w), U and V (2, h / 2, w / 2), float32 unrounded, between the columns reach (h, 2) of each row.
+
+    The two rows of a pair reach equally far, from an even to an odd column; an empty row ends before it begins.
+    """
+    for v in range(luma.shape[0] // 2):
+        for w in range(reach[2 * v, 0] // 2, (reach[2 * v, 1] + 1) // 2):
             red, green, blue = np.float32(0.0), np.float32(0.0), np.float32(0.0)
             for dy in range(2):
                 for dx in range(2):

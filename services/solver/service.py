@@ -45,10 +45,6 @@ async def _follow(service: Service, step: SolverStep, hand: HandName, points: Su
     """One hand, for ever."""
     mean_ms = 0.0
     async for message in points:
-        # A message that came on this hand's key but speaks of the other one is somebody's mistake.
-        if message.hand != hand:
-            service.error(f"points of the {message.hand} hand on the key of the {hand} one; they are ignored")
-            continue
         began_s = time.perf_counter()
         pose = step.step(message)
         mean_ms += _SMOOTH * ((time.perf_counter() - began_s) * 1e3 - mean_ms)

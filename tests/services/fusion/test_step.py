@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from enum import Enum
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from rhot.config import Fusion
 from rhot.errors import CalibrationError
 from rhot.messages import Marker, MarkerFrame
+from rhot.transforms import apply, rotation_from_vector, transform
 from services.fusion.step import FusionStep
 from services.fusion.synthetic import START_NS, Path, Setup, frames, point_hands
 
@@ -71,6 +73,21 @@ def test_one_message_per_reference_frame_with_rising_stamps(fuse):
     assert [message.seq for message in told] == list(range(len(told)))
     assert len(told) == pytest.approx(150, abs=3)
     assert step.flush() == []
+
+
+@pytest.mark.parametrize("method", ["kalman", "triangulate", "disparity"])
+def test_the_frame_of_the_rig_does_not_matter(method):
+    """Test: the same frames with [rig.world] turning the rig frame z up. Expected: the same points, turned."""
+    T = transform(rotation_from_vector([1.2, -0.4, 0.7]), [0.3, -0.2, 1.1])
+    cameras = SETUP.rig()
+    turned = {name: dataclasses.replace(camera, T_rig_from_camera=T @ camera.T_rig_from_camera) for name, camera in cameras.items()}
+    config = SETUP.config(Fusion(method=method))
+    plain, other = (FusionStep(config, each, point_hands()) for each in (cameras, turned))
+    for frame in frames(SETUP, MOVING, 1.0):
+        for a, b in zip(plain.step(frame), other.step(frame), strict=True):
+            assert [p.name for p in a.points] == [p.name for p in b.points]
+            for here, there in zip(a.points, b.points, strict=True):
+                np.testing.assert_allclose(apply(T, here.position_m), there.position_m, atol=3e-6)
 
 
 def test_same_input_same_bytes(fuse):

@@ -41,11 +41,15 @@ class Tip:
     light: float = 0.3
 
 
-def _draw(fine: np.ndarray, tip: Tip, shading: float) -> np.ndarray:
-    """Draw a tip on a picture _FINE times enlarged; returns its mask."""
-    height, width = fine.shape[:2]
-    rows, columns = np.mgrid[:height, :width].astype(np.float32)
-    x, y = (columns + 0.5) / _FINE - 0.5 - tip.x_px, (rows + 0.5) / _FINE - 0.5 - tip.y_px
+def _draw(image: np.ndarray, tip: Tip, shading: float) -> tuple[float, float]:
+    """Draw a tip on a picture, sharp but anti-aliased; returns the centre of its paint."""
+    reach = int(3.2 * tip.length_px + tip.width_px)
+    x0, y0 = max(int(tip.x_px) - reach, 0), max(int(tip.y_px) - reach, 0)
+    window = image[y0 : int(tip.y_px) + reach, x0 : int(tip.x_px) + reach]
+    height, width = window.shape[:2]
+    fine = window.repeat(_FINE, 0).repeat(_FINE, 1)
+    rows, columns = np.mgrid[: height * _FINE, : width * _FINE].astype(np.float32)
+    x, y = (columns + 0.5) / _FINE - 0.5 + x0 - tip.x_px, (rows + 0.5) / _FINE - 0.5 + y0 - tip.y_px
     c, s = np.cos(tip.turn_rad), np.sin(tip.turn_rad)
     along, across = x * c + y * s, -x * s + y * c
     radius, start = tip.width_px / 2, -tip.length_px / 2 + tip.width_px / 2
@@ -56,7 +60,8 @@ def _draw(fine: np.ndarray, tip: Tip, shading: float) -> np.ndarray:
     light = np.clip(1 - shading + shading * facing, 0.15, 1.0)[..., None]
     fine[finger] = (np.array(SKIN) * light)[finger]
     fine[paint] = (np.array(PAINTS[tip.color]) * light)[paint]
-    return paint
+    window[:] = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    return float(x[paint].mean() + tip.x_px), float(y[paint].mean() + tip.y_px)
 
 
 class Studio:
@@ -67,14 +72,10 @@ class Studio:
     @staticmethod
     def clean(tips, size_px=(64, 64), shading=0.5, blur_px=0.8, wall=WALL):
         """The picture without noise, float BGR (h, w, 3), and the centre of the paint of each colour."""
-        fine = np.empty((size_px[1] * _FINE, size_px[0] * _FINE, 3), np.float32)
-        fine[:] = wall
-        truth = {}
-        for tip in tips:
-            rows, columns = np.nonzero(_draw(fine, tip, shading))
-            truth[tip.color] = ((columns.mean() + 0.5) / _FINE - 0.5, (rows.mean() + 0.5) / _FINE - 0.5)
-        fine = cv2.GaussianBlur(fine, (0, 0), blur_px * _FINE)
-        return cv2.resize(fine, size_px, interpolation=cv2.INTER_AREA), truth
+        image = np.empty((size_px[1], size_px[0], 3), np.float32)
+        image[:] = wall
+        truth = {tip.color: _draw(image, tip, shading) for tip in tips}
+        return cv2.GaussianBlur(image, (0, 0), blur_px), truth
 
     @staticmethod
     def bgr(clean, sigma, seed):

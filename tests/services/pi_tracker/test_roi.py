@@ -51,8 +51,3 @@ def test_a_cut_blob_is_one_that_may_go_on_outside():
     assert not roi.cut((20, 0, 30, 9), rect, SIZE)  # the image ends there, too
     assert not roi.cut((20, 5, 30, 9), rect, SIZE)
     assert not roi.cut((300, 5, 320, 9), roi.whole(SIZE), SIZE)
-
-
-def test_inside_is_in_pixels():
-    assert roi.inside(20.0, 40.0, (10, 20, 11, 21))
-    assert not roi.inside(22.0, 40.0, (10, 20, 11, 21))

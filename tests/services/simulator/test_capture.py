@@ -84,7 +84,7 @@ def test_the_same_again_is_the_same_bytes(fist, folder, tmp_path):
     write_capture(fist, SECONDS, tmp_path / "again")
     names = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     assert names == sorted(str(p.relative_to(tmp_path / "again")) for p in (tmp_path / "again").rglob("*") if p.is_file())
-    same, different, odd = filecmp.cmpfiles(folder, tmp_path / "again", names, shallow=False)
+    _, different, odd = filecmp.cmpfiles(folder, tmp_path / "again", names, shallow=False)
     assert (different, odd) == ([], [])
 
 

@@ -46,16 +46,17 @@ def test_recordings_keep_a_small_residual():
 
 def test_some_frames_get_lost_and_always_the_same():
     clock, other = pair()
-    lost = [k for k in range(20_000) if clock.dropped(k)]
-    assert 0.01 <= len(lost) / 20_000 <= 0.02
-    assert lost == [k for k in range(20_000) if clock.dropped(k)]
-    assert lost != [k for k in range(20_000) if other.dropped(k)]
+    lost = [k for k in range(6_000) if clock.dropped(k)]
+    assert 0.01 <= len(lost) / 6_000 <= 0.02
+    assert lost == [k for k in range(6_000) if clock.dropped(k)]
+    assert lost != [k for k in range(6_000) if other.dropped(k)]
 
 
 def test_stamps_jitter_by_microseconds():
-    errors = [pair()[0].stamp_error_ns(k) for k in range(2000)]
+    clock = pair()[0]
+    errors = [clock.stamp_error_ns(k) for k in range(1000)]
     assert np.std(errors) == pytest.approx(20e3, rel=0.1)
-    assert errors == [pair()[0].stamp_error_ns(k) for k in range(2000)]
+    assert errors == [clock.stamp_error_ns(k) for k in range(1000)]
 
 
 def test_first_frame_is_the_next_one():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot.hand import HandModel, default_hand
@@ -27,6 +27,7 @@ def narrow_hand() -> HandModel:
 
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("model", [default_hand("right"), narrow_hand()], ids=["average", "stiff"])
+@settings(max_examples=40, deadline=None)
 @given(t_s=st.floats(-1e4, 1e5), seed=st.integers(0, 3))
 def test_no_limit_is_ever_passed(name, model, t_s, seed):
     angles = MOTIONS[name](model, seed)(t_s).angles_rad

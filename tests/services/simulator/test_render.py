@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -64,6 +65,7 @@ def test_motion_blur_is_the_mean_over_the_exposure(fast):
     # Where the hand rushes by: x = A sin(wt) at t = 0.5 s.
     t_s = 0.5
     instants = t_s + exposure_s * ((np.arange(24) + 0.5) / 24 - 0.5)
+
     def light(renderer: Renderer, at_s: float) -> np.ndarray:
         renderer.clean(at_s)
         return renderer.light.astype(np.float64)
@@ -73,7 +75,10 @@ def test_motion_blur_is_the_mean_over_the_exposure(fast):
     smeared = np.abs(mean - sharp).max(axis=2) > 0.03
     assert smeared.sum() > 1500
     error, blur = (np.sqrt(np.mean((picture - mean)[smeared] ** 2)) for picture in (ours, sharp))
-    assert error < 0.2 * blur
+    # Eight samples a pixel scatter; their neighbourhood does not.
+    assert error < 0.4 * blur
+    local = cv2.blur(ours - mean, (5, 5))[smeared]
+    assert np.sqrt(np.mean(local**2)) < 0.12 * blur
     # And no light is lost or won.
     assert abs((ours - mean)[smeared].mean()) < 0.02 * blur
 

@@ -76,7 +76,7 @@ def test_rows_are_rays_side_by_side():
 def test_projection_is_the_cameras(fist):
     rng = np.random.default_rng(4)
     for camera in fist.cameras.values():
-        points = rng.uniform(-0.25, 0.25, (50, 3)) + (0.0, 0.0, 0.6)
+        points = rng.uniform((-0.25, -0.25, 0.35), (0.25, 0.25, 0.85), (50, 3))
         ours = np.array([project(lens_of(camera), *p) for p in points])
         np.testing.assert_allclose(ours, camera.project_camera(points), atol=1e-9)
 

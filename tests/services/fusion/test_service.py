@@ -1,0 +1,109 @@
+"""The service on a real loopback router: the master's duties, and markers in, points out."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+import msgspec
+import pytest
+
+from rhot import clock, topics
+from rhot.bus import open_bus
+from rhot.calibration import CameraPlace, Lens, RigGeometry, save
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError
+from rhot.messages import Session
+from rhot.service import Service
+from services.fusion.service import serve
+from services.fusion.synthetic import START_NS, Path, Setup, frames
+
+RIG = "bench"
+DEADLINE_S = 20.0
+
+
+@pytest.fixture
+def config(tmp_path) -> RigConfig:
+    """The synthetic rig with its calibration on disk."""
+    setup = Setup()
+    for camera in setup.rig().values():
+        lens = Lens(size_px=camera.size_px, matrix=rows(camera.matrix), distortion=tuple(camera.distortion.tolist()))
+        save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
+    places = {camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera)) for camera in setup.rig().values()}
+    save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
+    return msgspec.structs.replace(setup.config(), folder=str(tmp_path))
+
+
+@contextlib.asynccontextmanager
+async def running(config, bus):
+    """The service in its own TaskGroup, as rhot.lifecycle runs it, cancelled at the end."""
+    services: asyncio.Queue[Service] = asyncio.Queue()
+
+    async def live() -> None:
+        async with asyncio.TaskGroup() as tasks:
+            service = Service("fusion", "main", config, bus, tasks)
+            services.put_nowait(service)
+            await serve(service)
+
+    task = asyncio.create_task(live())
+    yield await services.get()
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+def rows(matrix):
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+async def test_without_calibration_it_says_what_makes_it(router, tmp_path):
+    config = msgspec.structs.replace(Setup().config(), folder=str(tmp_path))
+    async with open_bus(RIG, [router]) as bus, asyncio.TaskGroup() as tasks:
+        with pytest.raises(CalibrationError, match="rhot calibrate"):
+            await serve(Service("fusion", "main", config, bus, tasks))
+
+
+async def test_leads_the_rig_and_turns_markers_into_points(router, config):
+    async with asyncio.timeout(DEADLINE_S), open_bus(RIG, [router]) as bus, open_bus(RIG, [router]) as client:
+        heard, points = client.every(topics.SESSION, 8), client.every(topics.POINTS, 64)
+        async with running(config, bus) as service:
+            assert (await anext(aiter(heard))).running
+            answers = await client.get(topics.SESSION)
+            assert answers[0].running
+            exchange = await client.echo(clock.now_ns)
+            assert exchange is not None
+            assert exchange[0] <= exchange[1] <= exchange[2]
+            await feed(client, points)
+            await stop(client)
+            assert service.state == "running"
+            await one_unknown_camera(client, service)
+
+
+async def feed(client, points):
+    """Two seconds of frames; points arrive and are where the hand is."""
+    publishers = {name: client.publisher(topics.MARKERS, camera=name) for name in Setup().names}
+    path, setup = Path(), Setup(clock_error_s=0.0, loss=0.0)
+    for frame in frames(setup, path, 1.0):
+        publishers[frame.camera].put(frame)
+    async for message in points:
+        if len(message.points) == 6 and message.stamp_ns > START_NS + 8 * 10**8:
+            assert message.hand == "right"
+            assert 0.4 < message.points[0].position_m[2] < 1.0
+            return
+
+
+async def stop(client):
+    """Whoever broadcasts a stop, the master tells it to those who ask."""
+    client.publisher(topics.SESSION).put(Session(running=False, start_ns=clock.now_ns()))
+    while (await client.get(topics.SESSION))[0].running:
+        await asyncio.sleep(0)
+
+
+async def one_unknown_camera(client, service):
+    """A camera that is not in the rig is mentioned once, and nothing ends."""
+    stranger = client.publisher(topics.MARKERS, camera="door")
+    frame = msgspec.structs.replace(frames(Setup(), Path(), 0.1)[0], camera="door")
+    while not service.errors:
+        stranger.put(frame)
+        await asyncio.sleep(0.01)
+    assert "does not name" in service.last_error

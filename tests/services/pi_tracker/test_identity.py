@@ -1,0 +1,158 @@
+"""Which blob is the marker."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.pi_tracker.company import Candidate, best_set, support
+from services.pi_tracker.identity import Identity, Track, shape_fits
+from services.pi_tracker.room import Room
+from services.pi_tracker.search import Blob
+
+FRAME_NS = 33_333_333
+START_NS = 1_700_000_000_000_000_000
+
+
+def blob(color, x_px, y_px, side_px=14):
+    """A square blob about a pixel."""
+    cells = max(side_px // 2, 1)
+    x0, y0 = round(x_px / 2 - cells / 2), round(y_px / 2 - cells / 2)
+    return Blob(color, (x0, y0, x0 + cells, y0 + cells), np.ones((cells, cells), np.uint8), cells * cells)
+
+
+def hand(x_px, y_px, side_px=14):
+    """One blob per colour: five tips in an arc and a wrist."""
+    places = [(-60, -20), (-30, -60), (0, -70), (30, -60), (55, -40), (0, 60)]
+    return [blob(color, x_px + dx, y_px + dy, side_px) for color, (dx, dy) in enumerate(places)]
+
+
+def chosen(identity, blobs, seq):
+    """Choose, and follow what was chosen."""
+    stamp_ns = START_NS + seq * FRAME_NS
+    choices = identity.choose(blobs, stamp_ns)
+    for color, choice in enumerate(choices):
+        if choice is not None:
+            identity.follow(color, *choice.blob.centre_px, choice.blob.area_px, stamp_ns)
+    return [None if choice is None else choice.blob for choice in choices]
+
+
+def test_a_hand_is_preferred_to_larger_things_in_the_room():
+    tips = hand(400, 250)
+    things = [blob(0, 60, 60, 40), blob(1, 600, 60, 36), blob(2, 60, 420, 34), blob(5, 80, 240, 44)]
+    blobs = [[one for one in things + tips if one.color == color] for color in range(6)]
+    assert chosen(Identity(6, 40), blobs, 0) == tips
+
+
+def test_a_hand_is_told_from_things_that_keep_company_too():
+    tips = hand(430, 250)
+    things = [blob(color, 80 + 15 * color, 100 + 60 * (color % 3), 36) for color in range(4)]
+    blobs = [[one for one in things + tips if one.color == color] for color in range(6)]
+    assert chosen(Identity(6, 40), blobs, 0) == tips
+
+
+def test_a_marker_that_hides_is_not_replaced_by_a_thing_that_stands_there():
+    identity = Identity(6, 40)
+    thing = blob(1, 420, 330, 16)
+    for seq in range(12):
+        tips = hand(300 + 4 * seq, 250)
+        chosen(identity, [[tip] if color != 1 else [tip, thing] for color, tip in enumerate(tips)], seq)
+    for seq in range(12, 60):
+        tips = hand(300 + 4 * seq, 250)
+        found = chosen(identity, [[tip] if color != 1 else [thing] for color, tip in enumerate(tips)], seq)
+        assert found[1] is None
+    tips = hand(300 + 4 * 60, 250)
+    assert chosen(identity, [[tip] if color != 1 else [thing, tip] for color, tip in enumerate(tips)], 60) == tips
+
+
+def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
+    identity = Identity(6, 40)
+    for seq in range(5):
+        chosen(identity, [[tip] for tip in hand(300, 250)], seq)
+    for seq in range(5, 40):
+        chosen(identity, [[] for _ in range(6)], seq)
+    tips = hand(150, 150)
+    assert chosen(identity, [[tip] for tip in tips], 40) == tips
+
+
+def test_a_wrong_start_is_mended():
+    identity = Identity(6, 40)
+    thing = blob(5, 80, 240, 40)
+    tips = hand(400, 250)
+    chosen(identity, [[], [], [], [], [], [thing]], 0)
+    found = chosen(identity, [[tip] if color != 5 else [thing, tip] for color, tip in enumerate(tips)], 1)
+    assert found == tips
+
+
+def test_a_single_colour_takes_the_blob_like_its_last():
+    identity = Identity(1, 40)
+    first = blob(0, 100, 100, 20)
+    assert chosen(identity, [[first]], 0) == [first]
+    near, far = blob(0, 112, 100, 18), blob(0, 400, 300, 40)
+    assert chosen(identity, [[far, near]], 1) == [near]
+
+
+def test_two_alike_are_ambiguous():
+    identity = Identity(1, 40)
+    chosen(identity, [[blob(0, 100, 100)]], 0)
+    (alone,) = identity.choose([[blob(0, 100, 100)]], START_NS + FRAME_NS)
+    (doubtful,) = identity.choose([[blob(0, 90, 100), blob(0, 110, 100)]], START_NS + FRAME_NS)
+    assert doubtful.certainty < 0.6 < alone.certainty
+
+
+@pytest.mark.parametrize("stamps", [[0, 0, 0], [5, 3, 1], [0, 2**62, 3]])
+def test_stamps_that_stand_still_or_run_backwards_are_survived(stamps):
+    track = Track(10.0, 10.0, 100.0, 0)
+    for stamp_ns in stamps:
+        likeness = track.likeness(blob(0, 12, 10, 10), stamp_ns, 40)
+        assert 0.0 <= likeness <= 1.0
+        track.follow(12.0, 10.0, 100.0, stamp_ns)
+        assert np.isfinite([track.vx_px_s, track.vy_px_s]).all()
+
+
+def test_shapes_that_no_patch_of_paint_has():
+    assert shape_fits(blob(0, 50, 50), 20_000.0)
+    assert not shape_fits(blob(0, 50, 50, 200), 20_000.0)
+    stripe = Blob(0, (0, 0, 40, 2), np.ones((2, 40), np.uint8), 80)
+    cross = Blob(0, (0, 0, 40, 40), np.eye(40, dtype=np.uint8), 40)
+    assert not shape_fits(stripe, 20_000.0)
+    assert not shape_fits(cross, 20_000.0)
+
+
+def test_company_is_near_and_of_one_size():
+    others = hand(300, 250)[:5]
+    assert support(blob(5, 300, 310), others) > 0.6
+    assert support(blob(5, 620, 20), others) < 0.15
+    assert support(blob(5, 300, 310, 100), others) < 0.2
+    assert support(blob(5, 300, 310), []) == 1.0
+
+
+def test_the_best_set_of_nothing_is_nothing():
+    assert best_set([]) == []
+    assert best_set([[], []]) == [None, None]
+    only = Candidate(blob(1, 50, 50), 0.5)
+    assert best_set([[], [only]]) == [None, (only, 1.0)]
+
+
+def test_the_room_learns_what_stands_and_forgets_what_is_gone():
+    room = Room()
+    thing = blob(0, 100, 100, 30)
+    for seq in range(3):
+        room.learn(thing, START_NS + seq * FRAME_NS)
+        assert not room.holds(thing)
+    room.learn(blob(0, 101, 100, 30), START_NS + 3 * FRAME_NS)
+    assert room.holds(thing)
+    assert room.holds(blob(0, 98, 98, 16))  # half of it hidden
+    assert not room.holds(blob(0, 130, 100, 30))
+    room.learn(blob(0, 400, 100, 30), START_NS + 120_000_000_000)
+    assert not room.holds(thing)
+
+
+def test_the_room_does_not_grow_for_ever():
+    room = Room()
+    for seq in range(500):
+        room.learn(blob(0, 10 * (seq % 60), 3 * (seq % 100), 10), START_NS + seq)
+    standing = blob(0, 333, 222, 30)
+    for seq in range(4):
+        room.learn(standing, START_NS + 500 + seq)
+    assert room.holds(standing)
