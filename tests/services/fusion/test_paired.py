@@ -49,8 +49,9 @@ def test_what_is_no_longer_seen_is_held_with_growing_sigma_then_dropped():
 def test_one_euro_calms_a_resting_hand():
     scatter = {}
     for name in ("none", "one_euro"):
-        method, instant_s = seen(Fusion(method="triangulate", filter=name), Path(speed_m_s=0.0), seconds=0.0)
         cameras = EXACT.rig()
+        settings = Fusion(method="triangulate", filter=name)
+        method = PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), settings)
         observer, depths = Observer(EXACT.config(), cameras), []
         for frame in frames(EXACT, Path(speed_m_s=0.0), 4.0):
             view = observer.view(frame)
