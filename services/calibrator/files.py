@@ -65,6 +65,7 @@ def rig_of(result: RigResult, date: str, source: str) -> RigGeometry:
         "stereo_rms_px": result.rms_px,
         "held_out_squares": result.held_out_squares,
         "held_out_mm": 1e3 * result.board.square_m * result.held_out_squares,
+        "held_out_px": result.held_out_px,
         "square_mm": 1e3 * result.board.square_m * result.square_ratio,
         "square_error_percent": 100.0 * (result.square_ratio - 1.0),
         "square_worst_percent": 100.0 * (result.square_worst - 1.0),

@@ -5,12 +5,12 @@ A board seen by one camera only cannot be triangulated and does not count.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rhot.transforms import Array, inverse
-from services.calibrator.adjust import State, View, rms
+from rhot.transforms import Array, inverse, transform
+from services.calibrator.adjust import Free, State, View, adjust, rms
 from services.calibrator.boards import Board
 from services.calibrator.model import FX, FY, rays
 from services.calibrator.triangulate import epipolar_px, rigid_fit, triangulate
@@ -18,11 +18,12 @@ from services.calibrator.triangulate import epipolar_px, rigid_fit, triangulate
 
 @dataclass(frozen=True)
 class BoardError:
-    """One triangulated board: RMS distance of its corners from the best rigid board in squares, the mean side of its squares against
-    the true one, RMS epipolar distance in px, and the mean distance of the board from the first camera that sees it in m."""
+    """One triangulated board: RMS distance of its corners from the best rigid board in squares, the side of its squares against the
+    true one, RMS px of the best rigid board in the pictures, RMS epipolar distance in px, mean distance from the first camera in m."""
 
     fit_squares: float
     square_ratio: float
+    reprojection_px: float
     epipolar_px: float
     distance_m: float
 
@@ -42,18 +43,24 @@ def board_error(views: list[View], state: State, board: Board) -> BoardError | N
     focals = state.lenses[cameras][:, [FX, FY]].mean(axis=1)
     points = triangulate(places, seen, focals)
     fit = rigid_fit(board.points[ids], points)
-    pairs = board.neighbours(ids)
-    sides = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     epipolar = [
         epipolar_px(places[k] @ inverse(places[0]), seen[0], seen[k], float(np.sqrt(focals[0] * focals[k]))) for k in range(1, len(views))
     ]
     distance = float(np.linalg.norm(points - inverse(places[0])[:3, 3], axis=1).mean())
     return BoardError(
         rms(fit.errors) / board.square_m,
-        float(sides.mean()) / board.square_m if len(sides) else float("nan"),
+        fit.scale,
+        _reprojection(views, state, transform(fit.R_measured_from_board, fit.t)),
         float(np.sqrt(np.mean(np.square(epipolar)))),
         distance,
     )
+
+
+def _reprojection(views: list[View], state: State, T_rig_from_board: Array) -> float:
+    """RMS px of the board in all its pictures, where it fits them best."""
+    mine = [replace(view, board=0) for view in views]
+    held = Free(np.zeros_like(state.lenses, dtype=bool), np.zeros(len(state.lenses), dtype=bool))
+    return adjust(mine, replace(state, T_rig_from_board=T_rig_from_board[None]), held).rms_px
 
 
 def _common(views: list[View]) -> np.ndarray:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rhot.errors import CalibrationError
 from rhot.transforms import Array
 from services.calibrator.adjust import Adjusted, Free, State, View, adjust, rms
 from services.calibrator.boards import Board
@@ -75,7 +74,7 @@ def calibrate_camera(camera: str, detections: dict[str, Detection], board: Board
     """
     size_px, kept, left_out = same_size(camera, detections)
     fit, contrary = fit_lens(camera, size_px, kept, board)
-    model, model_errors = choose(lambda model: _held_out_rms(size_px, fit, model))
+    model, _ = choose(lambda model: _held_out_rms(fit, model))
     fit = Fit(fit.keys, fit.views, _refit(fit, model))
     pictures = _picture_errors(fit, model, board)
     seen = coverage(size_px, [view.pixels for view in fit.views], list(fit.found.state.T_rig_from_board))
@@ -107,7 +106,7 @@ def fit_lens(camera: str, size_px: tuple[int, int], detections: dict[str, Detect
     left_out: list[LeftOut] = []
     for _ in range(_ROUNDS):
         errors = [rms(error) for error in found.errors]
-        bad = contradicting(errors)
+        bad = contradicting(errors, size_px[0])
         if not bad:
             break
         left_out += [LeftOut(camera, keys[k], f"its corners are {errors[k]:.1f} px off, the others' {np.median(errors):.2f}") for k in bad]
@@ -124,7 +123,7 @@ def _refit(fit: Fit, model: LensModel) -> Adjusted:
     return adjust(fit.views, replace(fit.found.state, lenses=lens[None]), Free(model.free[None], np.array([False])))
 
 
-def _held_out_rms(size_px: tuple[int, int], fit: Fit, model: LensModel) -> float:
+def _held_out_rms(fit: Fit, model: LensModel) -> float:
     """RMS px over all pictures, each with the lens from the parts it is not in."""
     state = _refit(fit, model).state
     squares = []

@@ -6,13 +6,14 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from rhot.transforms import Array
-from services.calibrator.coverage import Coverage
+from services.calibrator.adjust import Adjusted
+from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.model import CX, CY, FX, FY, rays
 from services.calibrator.views import LeftOut
 
 # Zhang (2000) needs three views in theory; with less than five the held-out error means nothing.
 MIN_VIEWS = 5
-# A picture is left out if its corners are this many times as far off as the median picture's, and further than _OFF_PX.
+# A picture is left out if its corners are this many times as far off as the median picture's, and further than _OFF_PX at 640 px width.
 _OFF_TIMES, _OFF_PX = 4.0, 0.6
 # More pictures than this share are never left out: then the median is not to be trusted either.
 _OFF_SHARE = 0.34
@@ -41,11 +42,17 @@ def check_views(camera: str, count: int, left_out: list[LeftOut] | None = None) 
     raise CalibrationError(f"{reason}. {_HOW_TO}")
 
 
-def contradicting(errors: list[float]) -> list[int]:
-    """Positions of errors far above the median; none if there are too many of them."""
-    median = float(np.median(errors))
-    bad = [k for k, error in enumerate(errors) if error > max(_OFF_TIMES * median, _OFF_PX)]
+def contradicting(errors: list[float], width_px: int) -> list[int]:
+    """Positions of errors (px) far above the median; none if there are too many of them."""
+    limit = max(_OFF_TIMES * float(np.median(errors)), _OFF_PX * width_px / 640.0)
+    bad = [k for k, error in enumerate(errors) if not error <= limit]
     return bad if len(bad) <= _OFF_SHARE * len(errors) else []
+
+
+def check_fit(camera: str, size_px: tuple[int, int], fit: Adjusted, corners: list[Array]) -> None:
+    """Raise CalibrationError, with the reason, if a lens fitted to these corners (n, 2) by view must not be used."""
+    seen = coverage(size_px, corners, list(fit.state.T_rig_from_board))
+    check_lens(camera, size_px, fit.state.lenses[0], fit.lens_sigma[0], 0.0, seen)
 
 
 def check_lens(

@@ -13,15 +13,15 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from rhot.transforms import Array
-from services.calibrator.adjust import View
+from services.calibrator.adjust import Free, State, View, adjust, rms
 from services.calibrator.boards import Board
 from services.calibrator.ordering import mirrored, turns
 from services.calibrator.start import Relation, board_pose, relate
 
 # Two poses fix the relation, further ones test it; with fewer than this a wrong one goes unnoticed.
 MIN_SHARED = 4
-# Median error of the best guess, px at 640 px width: guesses from single pictures are .2-.4 px off on the real pairs, wrong ones 20 and more.
-_FITS_PX = 4.0
+# Median error of a pair of cameras, px at 640 px width: .2 on the real pairs; wrong pairings give 10 and more.
+_FITS_PX = 3.0
 # Pairing errors looked for: a picture more or less on one side.
 _SHIFTS = (1, -1, 2, -2)
 
@@ -40,7 +40,7 @@ def place_cameras(
     while len(places) < len(names):
         anchor, camera = _next(names, places, views)
         pairs = _pairs(renumbered, views, anchor, camera)
-        relation = relate((lenses[anchor], lenses[camera]), pairs, _turns(board))
+        relation = _related((lenses[anchor], lenses[camera]), pairs, _turns(board))
         limit = _FITS_PX * max(sizes[camera][0] / 640.0, 1.0)
         if not relation.median_px <= limit:
             raise CalibrationError(_why(names, sizes, (anchor, camera), lenses, pairs, board, relation, limit))
@@ -49,6 +49,23 @@ def place_cameras(
         # Boards the anchor did not see are numbered against any other camera that is placed.
         renumbered += _renumbered(views, camera, turned, renumbered, places, lenses, board)
     return np.stack([places[k] for k in range(len(names))]), renumbered
+
+
+def _related(lenses: tuple[Array, Array], pairs: list[tuple[View, View]], turned: list[np.ndarray]) -> Relation:
+    """The best guess, adjusted to all pairs: single views of small or distant boards guess several pixels off."""
+    guess = relate(lenses, pairs, turned)
+    if not np.isfinite(guess.median_px):
+        return guess
+    views = []
+    for number, ((first, second), turn) in enumerate(zip(pairs, guess.turns, strict=True)):
+        pixels = second.pixels[turned[turn]] if len(turned) > 1 else second.pixels
+        views += [replace(first, camera=0, board=number), replace(second, camera=1, board=number, pixels=pixels)]
+    poses = np.stack([board_pose(lenses[0], first)[0] for first, _ in pairs])
+    start = State(np.stack(lenses), np.stack([np.eye(4), guess.T_second_from_first]), poses)
+    found = adjust(views, start, Free(np.zeros((2, 9), dtype=bool), np.array([False, True])))
+    errors = tuple(rms(np.concatenate(found.errors[2 * k : 2 * k + 2])) for k in range(len(pairs)))
+    better = Relation(found.state.T_camera_from_rig[1], guess.turns, errors)
+    return better if better.median_px <= guess.median_px else guess
 
 
 def _next(names: list[str], places: dict[int, Array], views: list[View]) -> tuple[int, int]:
@@ -116,11 +133,11 @@ def _why(
     both = (lenses[anchor], lenses[camera])
     if board.kind == "chessboard":
         seen = [(a, _mirrored(b, sizes[camera], board)) for a, b in pairs]
-        if relate(both, seen, _turns(board)).median_px <= limit:
+        if _related(both, seen, _turns(board)).median_px <= limit:
             return f"{who}: one of them delivers mirrored pictures; switch off its horizontal or vertical flip (one of hflip, vflip alone)"
     for shift in _SHIFTS:
         moved = _shifted(pairs, shift)
-        if len(moved) >= MIN_SHARED and relate(both, moved, _turns(board)).median_px <= limit:
+        if len(moved) >= MIN_SHARED and _related(both, moved, _turns(board)).median_px <= limit:
             way = f"{abs(shift)} {'later' if shift > 0 else 'earlier'}"
             return f"{who}: the pictures are paired wrongly; those of {names[camera]!r} fit the others' {way} in number. Rename them"
     fitting = sum(error <= limit for error in relation.errors_px)

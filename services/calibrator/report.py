@@ -44,7 +44,7 @@ def rig_text(result: RigResult) -> str:
         f"rig of {', '.join(result.cameras)}, {len(result.positions)} positions of the board ({result.board.name}), "
         f"{len(held_out)} of them seen by two cameras",
         f"  stereo RMS           {result.rms_px:.3f} px",
-        f"  held-out board fit   {result.held_out_squares:.4f} squares = {square_mm * result.held_out_squares:.3f} mm",
+        f"  held-out board fit   {result.held_out_squares:.4f} squares = {square_mm * result.held_out_squares:.3f} mm; {result.held_out_px:.3f} px",
         f"  held-out square      {square_mm * result.square_ratio:.3f} mm of {square_mm:g} mm: {_percent(result.square_ratio)}, "
         f"worst position {_percent(result.square_worst)}",
         f"  held-out epipolar    {result.epipolar_px:.3f} px",

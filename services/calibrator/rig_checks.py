@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 # Boards that two cameras both see. Each gives six equations more than its pose has; below four nothing can be left out.
 _MIN_HELD_OUT = 4
-# Held-out board fit in squares: the real pairs reach .014. Above .1 triangulated points are off by millimetres on the board itself.
-_SQUARES_REFUSED, _SQUARES_WARNED = 0.1, 0.04
+# Held-out error in the pictures, px at 640 px width: the real pairs reach .2. At 2 px a board is bent, or moved, or a camera did.
+_PX_REFUSED, _PX_WARNED = 2.0, 0.6
+# Held-out board fit in squares: the real pairs reach .011. It contains the depth noise, which far, small boards and short baselines raise.
+_SQUARES_WARNED = 0.06
 # Side of the triangulated squares. Depth is off by the same share.
 _SIDE_REFUSED, _SIDE_WARNED = 0.02, 0.005
 # One sigma of a camera's place, as a share of its distance from the first camera.
@@ -49,10 +51,15 @@ def check_rig(result: RigResult) -> tuple[str, ...]:
         if not result.lenses_given:
             said = check_lens(name, result.sizes[k], result.state.lenses[k], result.lens_sigma[k], 0.0, result.coverage[k])
             warnings += [f"{name}: {warning}" for warning in said]
-    if result.held_out_squares > _SQUARES_WARNED:
+    if result.held_out_px > _PX_WARNED * _scale(result):
         warnings.append(
-            f"held-out boards are off by {result.held_out_squares:.3f} squares (.02 is good); is the board flat, did it stand still, "
-            "are the pictures sharp?"
+            f"held-out boards are {result.held_out_px:.2f} px off (.2 is good at 640 px width); is the board flat, did it stand still, are "
+            "the pictures sharp?"
+        )
+    elif result.held_out_squares > _SQUARES_WARNED:
+        warnings.append(
+            f"held-out boards are triangulated {result.held_out_squares:.3f} squares off (.02 is good): their distance is uncertain; "
+            "show the board nearer, use larger squares, or set the cameras farther apart"
         )
     if abs(result.square_ratio - 1.0) > _SIDE_WARNED:
         warnings.append(f"triangulated squares are {100 * (result.square_ratio - 1.0):+.2f} % off; take more pictures")
@@ -68,10 +75,11 @@ def _refuse(result: RigResult) -> None:
         raise CalibrationError(
             f"only {len(held_out)} positions of the board are seen by two cameras together, at least {_MIN_HELD_OUT} are needed (12 to 20 are good)"
         )
-    if not result.held_out_squares <= _SQUARES_REFUSED:
+    if not result.held_out_px <= _PX_REFUSED * _scale(result):
         raise CalibrationError(
-            f"boards left out of the calibration are triangulated {result.held_out_squares:.2f} squares off (.02 is good, {_SQUARES_REFUSED:g} "
-            "the limit). Did the board stand still while the cameras took their pictures, is it flat, was no camera touched in between?"
+            f"boards left out of the calibration are {result.held_out_px:.1f} px off in the pictures (.2 is good, "
+            f"{_PX_REFUSED * _scale(result):g} the limit). Did the board stand still while the cameras took their pictures, is it flat, was no "
+            "camera touched in between?"
         )
     if not abs(result.square_ratio - 1.0) <= _SIDE_REFUSED:
         raise CalibrationError(
@@ -86,6 +94,11 @@ def _refuse(result: RigResult) -> None:
                 f"the place of camera {name!r} is uncertain by {1e3 * sigma:.1f} mm of {1e3 * baseline:.0f} mm; take more pictures that both "
                 "cameras see, near and tilted in all directions"
             )
+
+
+def _scale(result: RigResult) -> float:
+    """Pixels of the widest picture in pixels at 640 px width."""
+    return max(width for width, _ in result.sizes) / 640.0
 
 
 def _sides(result: RigResult) -> tuple[str, ...]:

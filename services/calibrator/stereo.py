@@ -19,7 +19,7 @@ from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
 from services.calibrator.heldout import BoardError, board_error
 from services.calibrator.lens import fit_lens
-from services.calibrator.lens_checks import contradicting
+from services.calibrator.lens_checks import check_fit, contradicting
 from services.calibrator.lens_models import USUAL, LensModel, choose, folds
 from services.calibrator.rig_checks import check_rig, check_shared
 from services.calibrator.relate import place_cameras
@@ -47,8 +47,9 @@ class PositionError:
 class RigResult:
     """The calibrated rig: cameras, sizes (w, h), lenses (c, 9) and T_camera_from_rig (c, 4, 4) with sigmas, and its errors.
 
-    rms_px is over all corners of all cameras. held_out_squares is the RMS over all corners of all held-out boards; square_ratio the
-    mean triangulated side of their squares over the true one, square_worst the position farthest from 1.
+    rms_px is over all corners of all cameras. held_out_squares is the RMS over all corners of all held-out boards, triangulated;
+    held_out_px their RMS in the pictures; square_ratio the mean side of their squares over the true one, square_worst the position
+    farthest from 1.
     """
 
     board: Board
@@ -62,6 +63,7 @@ class RigResult:
     rms_px: float
     camera_rms_px: tuple[float, ...]
     held_out_squares: float
+    held_out_px: float
     square_ratio: float
     square_worst: float
     epipolar_px: float
@@ -119,6 +121,7 @@ def _start(detections: dict[str, dict[str, Detection]], board: Board, lenses: di
             left_out += contrary
             kept = {key: kept[key] for key in fit.keys}
             found.append(fit.found.state.lenses[0])
+            check_fit(name, size_px, fit.found, [view.pixels for view in fit.views])
         else:
             found.append(lenses[name])
         sizes.append(size_px)
@@ -168,7 +171,7 @@ def _settle(rig: Rig, free: Free) -> tuple[Rig, list[LeftOut]]:
         found = adjust(rig.views, rig.found.state, free)
         rig = replace(rig, found=found)
         errors = position_rms(rig)
-        bad = contradicting(errors)
+        bad = contradicting(errors, max(width for width, _ in rig.sizes))
         if not bad:
             break
         median = float(np.median(errors))
@@ -244,11 +247,17 @@ def _result(
         model="as given" if lenses_given else model.name,
         rms_px=rig.found.rms_px,
         camera_rms_px=tuple(camera_rms),
-        held_out_squares=float(np.sqrt(np.mean([error.fit_squares**2 for error in held_out]))) if held_out else float("inf"),
+        held_out_squares=_root_mean([error.fit_squares for error in held_out]),
+        held_out_px=_root_mean([error.reprojection_px for error in held_out]),
         square_ratio=float(ratios.mean()) if len(ratios) else float("nan"),
         square_worst=float(ratios[np.argmax(np.abs(ratios - 1.0))]) if len(ratios) else float("nan"),
-        epipolar_px=float(np.sqrt(np.mean([error.epipolar_px**2 for error in held_out]))) if held_out else float("inf"),
+        epipolar_px=_root_mean([error.epipolar_px for error in held_out]),
         coverage=tuple(seen),
         positions=tuple(positions),
         left_out=left_out,
     )
+
+
+def _root_mean(values: list[float]) -> float:
+    """RMS of values; inf of none."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values else float("inf")

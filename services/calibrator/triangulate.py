@@ -36,11 +36,15 @@ def triangulate(T_camera_from_rig: Array, rays: Array, focals_px: Array) -> Arra
 
 @dataclass(frozen=True, eq=False)
 class RigidFit:
-    """errors (n, 3): measured minus fitted points, in the board's frame and units."""
+    """errors (n, 3): measured minus fitted points, in the board's frame and units.
+
+    scale is how much larger the measured points are than the board; the fit itself does not scale.
+    """
 
     R_measured_from_board: Array  # (3, 3)
     t: Array  # (3,)
     errors: Array
+    scale: float
 
 
 def rigid_fit(board: Array, measured: Array) -> RigidFit:
@@ -52,7 +56,9 @@ def rigid_fit(board: Array, measured: Array) -> RigidFit:
     U, _, Vt = np.linalg.svd(a.T @ b)
     sign = np.sign(np.linalg.det(U @ Vt))
     R = (U @ np.diag([1.0, 1.0, sign]) @ Vt).T
-    return RigidFit(R, measured.mean(axis=0) - R @ board.mean(axis=0), (b - a @ R.T) @ R)
+    # By regression on the board, which is exact: the mean length of noisy sides is always too long.
+    scale = float(np.sum(b * (a @ R.T)) / np.sum(a * a))
+    return RigidFit(R, measured.mean(axis=0) - R @ board.mean(axis=0), (b - a @ R.T) @ R, scale)
 
 
 def epipolar_px(T_second_from_first: Array, rays_first: Array, rays_second: Array, focal_px: float) -> Array:

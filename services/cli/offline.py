@@ -74,9 +74,12 @@ class Pipeline:
         return Output([], points, self._solve(points))
 
     def _solve(self, points: list[HandPoints]) -> list[HandPose]:
-        if self._solver is None:
+        if self._solver is None or self._fusion is None:
             return []
-        return [pose for one in points if (pose := self._solver.step(one)) is not None]
+        poses = [pose for one in points if (pose := self._solver.step(one)) is not None]
+        for pose in poses:
+            self._fusion.note_pose(pose)
+        return poses
 
 
 def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | None, str]:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from rhot.calibration import load_cameras, load_hand
+from rhot.calibration import load_hand, load_rig_cameras
 from rhot.config import load_rig
 from services.cli.defaults import sim_toml
 
@@ -31,7 +31,7 @@ def warm(
     hands = {name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()}
     names = [camera.name for camera in rig.camera]
     warm_solver(rig, hands)
-    warm_fusion(rig, load_cameras(rig.calibration_dir, names), hands)
+    warm_fusion(rig, load_rig_cameras(rig), hands)
     if any(camera.source == "simulator" for camera in rig.camera):
         scene = load_scene(rig)
         for name in names:

@@ -16,7 +16,6 @@ from rhot import topics
 from rhot.calibration import load_colors
 from rhot.clock import OffsetEstimator, follow_master
 from rhot.errors import CalibrationError
-from rhot.messages import Session
 from rhot.service import Service
 from services.pi_tracker import sources
 from services.pi_tracker.frame import Frame
@@ -33,18 +32,20 @@ async def serve(service: Service) -> None:
     tracker = CameraTracker(service)
     gate = SessionGate(service.bus)
     companions = [service.tasks.create_task(task) for task in (gate.follow(), tracker.follow_colors())]
-    service.ready()
-    service.state = "waiting"
-    table = service.config.camera_named(service.instance)
-    session = await gate.started() if sources.is_file(table) else Session(running=False, start_ns=0)
-    source = sources.open_source(table, service.config, service.bus, session.start_ns)
-    companions.append(service.tasks.create_task(follow_master(service.bus, tracker.offset, source.now_ns)))
-    async with contextlib.aclosing(source.frames()) as frames:
-        async for frame in frames:
-            service.state = "running" if gate.running else "waiting"
-            tracker.take(frame, source, running=gate.running)
-    for task in companions:
-        task.cancel()
+    try:
+        service.ready()
+        service.state = "waiting"
+        table = service.config.camera_named(service.instance)
+        start_ns = (await gate.started()).start_ns if sources.is_file(table) else 0
+        source = sources.open_source(table, service.config, service.bus, start_ns)
+        companions.append(service.tasks.create_task(follow_master(service.bus, tracker.offset, source.now_ns)))
+        async with contextlib.aclosing(source.frames()) as frames:
+            async for frame in frames:
+                service.state = "running" if gate.running else "waiting"
+                tracker.take(frame, source, running=gate.running)
+    finally:
+        for task in companions:
+            task.cancel()
 
 
 class CameraTracker:

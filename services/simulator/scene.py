@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rhot.calibration import ObjectPlace, Objects, load_cameras, load_hand, load_objects
+from rhot.calibration import ObjectPlace, Objects, load_hand, load_objects, load_rig_cameras
 from rhot.camera import Camera
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError, ConfigError
@@ -112,7 +112,7 @@ def build_scene(config: RigConfig, spec: SceneSpec, name: str, seed: int, speed:
 
 def rig_cameras(config: RigConfig) -> dict[str, Camera]:
     """Every camera of rig.toml in the rig frame, with [rig.world] applied; the picture size must be the calibrated one."""
-    cameras = load_cameras(config.calibration_dir, [c.name for c in config.camera])
+    cameras = load_rig_cameras(config)
     for table in config.camera:
         size = cameras[table.name].size_px
         if size != table.size_px:
@@ -122,10 +122,7 @@ def rig_cameras(config: RigConfig) -> dict[str, Camera]:
             )
         if table.size_px[0] % 2 or table.size_px[1] % 2:
             raise ConfigError(f"camera {table.name!r}: size_px = {list(table.size_px)}; YUV420 pictures need even sizes")
-    if config.rig.world is None:
-        return cameras
-    world = np.array(config.rig.world.T_rig_from_camera)
-    return {n: Camera(n, c.size_px, c.matrix, c.distortion, world @ c.T_rig_from_camera) for n, c in cameras.items()}
+    return cameras
 
 
 def _hands(config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras: list[Camera]) -> dict[HandName, Hand]:

@@ -6,6 +6,7 @@ import sys
 import time
 import types
 from concurrent.futures import Future
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -62,8 +63,8 @@ class FakeJob:
 class FakePicamera2:
     """picamera2.Picamera2 as far as it is used, with its checks."""
 
-    made: list[FakePicamera2] = []
-    cameras = [{"Model": "ov5647", "Num": 0}]
+    made: ClassVar[list[FakePicamera2]] = []
+    cameras: ClassVar = [{"Model": "ov5647", "Num": 0}]
     padding = 0
 
     @staticmethod
@@ -231,7 +232,7 @@ def test_a_pi_camera_in_use_is_named(picamera2, monkeypatch):
         raise RuntimeError("Failed to acquire camera: Device or resource busy")
 
     monkeypatch.setattr(picamera2, "start", busy)
-    with pytest.raises(SourceError, match="cannot be started: .*busy; does another program use it"):
+    with pytest.raises(SourceError, match=r"cannot be started: .*busy; does another program use it"):
         PiCamera(table(), 0, EXPOSURE).open()
 
 

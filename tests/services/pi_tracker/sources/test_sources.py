@@ -116,7 +116,8 @@ async def test_the_latest_frame_of_a_camera_wins():
             await asyncio.sleep(0.005)
         last = [one.seq async for one in stream]
     assert last[-1] == 19
-    assert source.dropped + 1 + len(last) == 20 + (first.seq > 0) * 0
+    assert source.dropped + 1 + len(last) == 20
+    assert first.seq < 19
 
 
 async def test_a_file_can_be_played_at_its_own_pace():
@@ -129,11 +130,10 @@ async def test_a_file_can_be_played_at_its_own_pace():
 @pytest.mark.parametrize("frames", [0, 3])
 async def test_what_a_reader_raises_comes_out_of_the_stream(frames):
     reader = Scripted((frame(n) for n in range(frames)), live=False, error=SourceError("unplugged"))
-    seen = []
+    stream = Threaded(reader).frames()
+    assert [(await anext(stream)).seq for _ in range(frames)] == list(range(frames))
     with pytest.raises(SourceError, match="unplugged"):
-        async for one in Threaded(reader).frames():
-            seen.append(one.seq)
-    assert seen == list(range(frames))
+        await anext(stream)
 
 
 async def test_leaving_the_stream_closes_the_reader():
@@ -164,12 +164,12 @@ async def test_simulated_frames_come_over_the_bus_and_nonsense_is_counted(router
                 (b"garbage", attachment()),
                 (image.tobytes(), attachment(size_px=(800, 400))),
                 (image.tobytes(), attachment(size_px=(-8, -4))),
-                (image.tobytes(), attachment(size_px=(16, 2))),
+                (image.tobytes(), attachment(size_px=(3, 16))),
                 (image.tobytes(), attachment(camera="right")),
                 (image.tobytes(), attachment(row_time_ns=1e300)),
                 (image.tobytes(), None),
             ]
-            for number, (payload, told) in enumerate(bad[:3] + bad[4:], start=1):
+            for number, (payload, told) in enumerate(bad, start=1):
                 publisher.put_bytes(payload, told)
                 while source.rejected < number:
                     await asyncio.sleep(0.005)

@@ -1,0 +1,200 @@
+"""The process: waits for the start, tracks what comes, shows pictures to who asks."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+
+from rhot import topics
+from rhot.bus import Bus, open_bus
+from rhot.calibration import save
+from rhot.config import CameraTable, HandTable, RigConfig, RigTable
+from rhot.errors import CalibrationError, CaptureError, ConfigError
+from rhot.messages import Session, SimFrame
+from rhot.service import Service
+from services.pi_tracker.service import serve
+
+DEADLINE_S = 15.0
+SIZE = (160, 120)
+
+
+@pytest.fixture
+def config(tmp_path, colors):
+    """A rig of one simulated camera that looks for green and blue."""
+    save(tmp_path / "calibration" / "left.colors.json", colors)
+    return RigConfig(
+        rig=RigTable(name="test"),
+        camera=[CameraTable(name="left", source="simulator", size_px=SIZE)],
+        hand={"right": HandTable(markers={"index_tip": "green", "thumb_tip": "blue"})},
+        folder=str(tmp_path),
+    )
+
+
+@contextlib.asynccontextmanager
+async def running(config, router, camera="left"):
+    """The service in this loop; yields it."""
+    async with open_bus("test", [router]) as bus, asyncio.TaskGroup() as tasks:
+        service = Service("pi_tracker", camera, config, bus, tasks)
+        task = tasks.create_task(serve(service))
+        yield service
+        task.cancel()
+
+
+class Rig:
+    """The rest of the rig, as the tracker sees it: a camera, a master."""
+
+    def __init__(self, bus: Bus, frame):
+        self._bus = bus
+        self._frame = frame
+        self._camera = bus.publisher(topics.SIM_FRAME, camera="left")
+        self._sessions = bus.publisher(topics.SESSION)
+        self._seq = 0
+
+    async def camera_wanted(self):
+        while not self._camera.wanted:
+            await asyncio.sleep(0.01)
+
+    async def say(self, *, running):
+        while not self._sessions.wanted:
+            await asyncio.sleep(0.01)
+        self._sessions.put(Session(running=running, start_ns=1))
+
+    def shoot(self):
+        """Send one frame; its number."""
+        self._seq += 1
+        told = SimFrame(camera="left", seq=self._seq, stamp_ns=10**18 + self._seq, row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
+        self._camera.put_bytes(self._frame.image.tobytes(), told)
+        return self._seq
+
+    async def until_seen(self, markers):
+        """Shoot until a MarkerFrame comes back."""
+        task = asyncio.ensure_future(anext(markers))
+        while not task.done():
+            self.shoot()
+            await asyncio.wait([task], timeout=0.05)
+        return task.result()
+
+
+@pytest.fixture
+async def rig(router, studio, tip):
+    """A rig that shows a green and a blue tip."""
+    frame, _ = studio.frame([tip("green", 50.0, 60.0), tip("blue", 80.0, 50.0)], size_px=SIZE)
+    async with open_bus("test", [router]) as bus:
+        yield Rig(bus, frame)
+
+
+async def test_it_waits_for_the_start_and_pauses_at_the_stop(config, router, rig):
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as other, running(config, router) as service:
+        markers = other.every(topics.MARKERS, 64)
+        await rig.camera_wanted()
+        for _ in range(5):
+            rig.shoot()
+            await asyncio.sleep(0.01)
+        assert service.state == "waiting"
+        await rig.say(running=True)
+        first = await rig.until_seen(markers)
+        assert first.seq > 5
+        assert {marker.color for marker in first.markers} == {"green", "blue"}
+        assert service.state == "running"
+        await rig.say(running=False)
+        while service.state == "running":
+            rig.shoot()
+            await asyncio.sleep(0.02)
+        assert service.values["markers"] == 2.0
+        assert {"search_ms", "centroid_ms", "step_ms", "skipped_frames"} <= set(service.values)
+
+
+async def test_after_a_restart_it_asks_and_carries_on(config, router, rig):
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master:
+        master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+        for _ in range(2):
+            async with running(config, router):
+                markers = master.every(topics.MARKERS, 64)
+                await rig.camera_wanted()
+                assert (await rig.until_seen(markers)).camera == "left"
+                markers.undeclare()
+
+
+async def test_frames_without_markers_are_published_too(config, router, rig, studio):
+    rig._frame = studio.frame([], size_px=SIZE)[0]
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master, running(config, router):
+        master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+        markers = master.every(topics.MARKERS, 64)
+        await rig.camera_wanted()
+        assert (await rig.until_seen(markers)).markers == []
+
+
+async def test_pictures_for_who_asks(config, router, rig):
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as other, running(config, router):
+        await rig.camera_wanted()
+        assert await other.get(topics.FRAME, 0.3, camera="left") == []
+        previews = other.raw(topics.PREVIEW, 4, camera="left")
+        task = asyncio.ensure_future(anext(previews))
+        while not task.done():
+            rig.shoot()
+            await asyncio.wait([task], timeout=0.05)
+        preview = cv2.imdecode(np.frombuffer(task.result().payload, np.uint8), cv2.IMREAD_COLOR)
+        assert preview.shape == (SIZE[1], SIZE[0], 3)
+        (lossless,) = await other.get(topics.FRAME, 2.0, camera="left")
+        picture = cv2.imdecode(np.frombuffer(lossless, np.uint8), cv2.IMREAD_COLOR)
+        assert np.array_equal(picture, cv2.cvtColor(rig._frame.image, cv2.COLOR_YUV2BGR_I420))
+
+
+async def test_new_colours_need_no_restart(config, router, rig, colors, tmp_path):
+    path = tmp_path / "calibration" / "left.colors.json"
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master, running(config, router) as service:
+        master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+        markers = master.latest(topics.MARKERS)
+        await rig.camera_wanted()
+        await rig.until_seen(markers)
+        path.write_text("{broken")
+        while not service.errors:
+            await asyncio.sleep(0.05)
+        assert "left.colors.json" in service.last_error
+        assert len((await rig.until_seen(markers)).markers) == 2
+        ranges = {**colors.colors, "green": colors.colors["magenta"]}
+        save(path, type(colors)(colors=ranges))
+        while len((await rig.until_seen(markers)).markers) != 1:
+            pass
+
+
+async def test_a_recording_begins_with_the_session_and_ends_the_service(config, router, studio, tip, tmp_path):
+    (tmp_path / "shots").mkdir()
+    for seq in range(3):
+        clean, _ = studio.clean([tip("green", 50.0, 60.0)], size_px=SIZE)
+        cv2.imwrite(str(tmp_path / "shots" / f"{seq}.png"), studio.bgr(clean, 3.0, seq))
+    config = msgspec.structs.replace(config, camera=[CameraTable(name="left", source="folder:shots", size_px=SIZE)])
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master:
+        markers = master.every(topics.MARKERS, 64)
+        master.answer(topics.SESSION, lambda: Session(running=True, start_ns=7_000_000_000))
+        async with open_bus("test", [router]) as bus, asyncio.TaskGroup() as tasks:
+            await serve(Service("pi_tracker", "left", config, bus, tasks))
+        found = [await anext(markers) for _ in range(3)]
+    assert [one.stamp_ns for one in found] == [7_000_000_000 + round(n * 1e9 / 30.0) for n in range(3)]
+    assert all([marker.color for marker in one.markers] == ["green"] for one in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"camera": [CameraTable(name="left", source="folder:nowhere")]}, CaptureError, "no such folder of images"),
+        ({"camera": [CameraTable(name="left", source="kinect")]}, ConfigError, "unknown source 'kinect'"),
+        ({"camera": [CameraTable(name="other")]}, ConfigError, "has no camera 'left'; it has"),
+        ({"hand": {"right": HandTable(markers={"index_tip": "mauve"})}}, CalibrationError, "colour 'mauve'"),
+        ({"folder": "/nowhere"}, CalibrationError, "rhot calibrate colors left"),
+    ],
+)
+async def test_what_is_wrong_ends_it_with_a_reason(config, router, change, error, message):
+    spoilt = msgspec.structs.replace(config, **change)
+    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master:
+        master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+        with pytest.raises(BaseExceptionGroup) as caught:
+            async with open_bus("test", [router]) as bus, asyncio.TaskGroup() as tasks:
+                await serve(Service("pi_tracker", "left", spoilt, bus, tasks))
+        assert caught.value.subgroup(error) is not None
+        assert message in str(caught.value.subgroup(error).exceptions[0])
