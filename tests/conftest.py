@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, AbstractContextManager
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from rhot.bus import router_config
+from rhot.bus import Bus, open_bus, router_config
+from rhot.config import RigConfig
+from rhot.lifecycle import Serve
+from rhot.service import Service
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -44,3 +50,48 @@ def router(endpoint: str) -> Iterator[str]:
     session = zenoh.open(router_config([endpoint]))
     yield endpoint
     session.close()
+
+
+Running = Callable[..., AbstractAsyncContextManager[tuple[Service, Bus]]]
+
+
+@pytest.fixture
+def running(router: str) -> Running:
+    """`async with running(name, serve, config) as (service, bus)`: a service in this process on a real router, and a bus of one's own."""
+
+    @contextlib.asynccontextmanager
+    async def run(
+        name: str, serve: Serve, config: RigConfig, *, instance: str = "main", deadline_s: float = 60.0
+    ) -> AsyncIterator[tuple[Service, Bus]]:
+        async with (
+            open_bus("desk", [router]) as theirs,
+            open_bus("desk", [router]) as ours,
+            asyncio.timeout(deadline_s),
+            asyncio.TaskGroup() as tasks,
+        ):
+            service = Service(name, instance, config, theirs, tasks)
+            task = tasks.create_task(serve(service))
+            yield service, ours
+            task.cancel()
+
+    return run
+
+
+@pytest.fixture
+def sending() -> Callable[[Callable[[], None]], AbstractContextManager[None]]:
+    """`with sending(send):` calls send again and again: subscriptions need a moment to reach the router."""
+
+    @contextlib.contextmanager
+    def repeat(send: Callable[[], None]) -> Iterator[None]:
+        async def forever() -> None:
+            while True:
+                send()
+                await asyncio.sleep(0.02)
+
+        task = asyncio.create_task(forever())
+        try:
+            yield
+        finally:
+            task.cancel()
+
+    return repeat

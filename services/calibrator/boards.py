@@ -52,7 +52,7 @@ class Board:
     legacy: bool = False
 
     def __post_init__(self) -> None:
-        if not (_MIN_CORNERS <= min(self.cols, self.rows) and max(self.cols, self.rows) <= _MAX_CORNERS):
+        if min(self.cols, self.rows) < _MIN_CORNERS or max(self.cols, self.rows) > _MAX_CORNERS:
             raise CalibrationError(
                 f"a board of {self.cols}x{self.rows} inner corners cannot be used; both numbers must be {_MIN_CORNERS}..{_MAX_CORNERS}. "
                 "Inner corners are the points where black squares touch: one less than the squares each way"

@@ -118,11 +118,13 @@ def _check(D: Array, x: Array) -> None:
         raise CalibrationError("every distance and disparity must be a positive number")
     if D.max() < _MIN_RANGE * D.min():
         raise CalibrationError(
-            f"distances from {D.min():g} to {D.max():g} cm are too close together for a depth law; the farthest must be {_MIN_RANGE:g} times the nearest"
+            f"distances from {D.min():g} to {D.max():g} cm are too close together for a depth law; "
+            f"the farthest must be {_MIN_RANGE:g} times the nearest"
         )
     if np.corrcoef(np.log(D), np.log(x))[0, 1] > -0.9:
         raise CalibrationError(
-            "the disparities do not fall as the distances grow; is a column of the CSV swapped, or the left picture taken for the right one?"
+            "the disparities do not fall as the distances grow; are columns of the CSV swapped, "
+            "or the left picture taken for the right one?"
         )
 
 
@@ -163,6 +165,7 @@ def bench(
 
 def depth_text(law: DepthLaw) -> str:
     """What `rhot calibrate depth` prints: the numbers for rig.toml, and the residuals of each law at each distance."""
+    zero = f"the tape's zero {10.0 * law.zero_cm:.1f} mm in front of the optical centres"
     lines = [
         "  distance cm   disparity px   D = k x^z   D = k / x   geometry   (errors in cm)",
         *(
@@ -172,8 +175,7 @@ def depth_text(law: DepthLaw) -> str:
         f"  {'RMS':>11} {'':>14} {_rms(law.power_cm):>11.2f} {_rms(law.geometry_cm):>11.2f} {_rms(law.explained_cm):>10.2f}",
         f"  D = k x^z, RHOT eq. (9): k = {law.k:.1f}, z = {law.z:.4f} (the seed's rig: {SEED_K}, {SEED_Z})",
         f"  D = k / x, RHOT eq. (10): phi = {math.degrees(law.phi_rad):.3f} degrees",
-        f"  geometry: cameras turned away from each other by {math.degrees(law.divergence_rad):.3f} degrees, "
-        f"the tape's zero {10.0 * law.zero_cm:.1f} mm in front of the optical centres",
+        f"  geometry: cameras turned away from each other by {math.degrees(law.divergence_rad):.3f} degrees, {zero}",
         "Paste into rig.toml:",
         "[fusion.disparity]",
         f"k = {law.k:.1f}",

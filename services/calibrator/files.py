@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from rhot.calibration import CameraPlace, Lens, Matrix4, RigGeometry, Row3
+from rhot.errors import CalibrationError
 from rhot.transforms import Array, inverse
 from services.calibrator.boards import Board
+from services.calibrator.detect import Detection
 from services.calibrator.lens import LensResult
-from services.calibrator.model import CX, CY, FX, FY, K1
+from services.calibrator.model import CX, CY, FX, FY, K1, lens_vector
 from services.calibrator.stereo import RigResult
 
 
@@ -57,6 +59,21 @@ def lenses_of(result: RigResult, date: str, source: str) -> dict[str, Lens]:
         inputs = {**_inputs(result.board, source), "model": result.model, "positions": len(result.positions)}
         files[name] = lens_file(result.sizes[k], result.state.lenses[k], date, "rhot calibrate stereo", inputs, _finite(residuals))
     return files
+
+
+def given_lenses(files: dict[str, Lens], found: dict[str, dict[str, Detection]]) -> dict[str, Array]:
+    """The lens vectors (9,) of lens files, for the pictures in which boards were found.
+
+    Raises CalibrationError if a lens is of another picture size.
+    """
+    for camera, lens in files.items():
+        sizes = {shown.size_px for shown in found.get(camera, {}).values()} - {lens.size_px}
+        if sizes:
+            raise CalibrationError(
+                f"camera {camera!r}: its lens was calibrated at {lens.size_px[0]}x{lens.size_px[1]}, these pictures are {sorted(sizes)}; "
+                "take pictures of that size, or leave out --keep-lenses"
+            )
+    return {camera: lens_vector(np.array(lens.matrix), np.array(lens.distortion)) for camera, lens in files.items()}
 
 
 def rig_of(result: RigResult, date: str, source: str) -> RigGeometry:

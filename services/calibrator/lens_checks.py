@@ -11,18 +11,20 @@ from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.model import CX, CY, FX, FY, rays
 from services.calibrator.views import LeftOut
 
-# Zhang (2000) needs three views in theory; with less than five the held-out error means nothing.
-MIN_VIEWS = 5
+# Zhang (2000) needs three views in theory; with three, none can be held out.
+MIN_VIEWS = 4
 # A picture is left out if its corners are this many times as far off as the median picture's, and further than _OFF_PX at 640 px width.
 _OFF_TIMES, _OFF_PX = 4.0, 0.6
 # More pictures than this share are never left out: then the median is not to be trusted either.
 _OFF_SHARE = 0.34
-# One sigma of the focal length. 1 % of it is 1 % of every distance; the real pairs reach .08 %.
-_FOCAL_REFUSED, _FOCAL_WARNED = 0.01, 0.003
+# One sigma of the focal length: 1 % of it is 1 % of every distance. The real pairs reach .08 %, a board never tilted 5 % and more.
+_FOCAL_REFUSED, _FOCAL_WARNED = 0.02, 0.004
+# Focal lengths in picture widths of lenses that this model describes: fields of view of 130 to 3 degrees.
+_FOCALS = (0.23, 20.0)
 # Boards this parallel leave focal length and distance inseparable. The real pairs span 60 degrees.
-_PARALLEL_DEG = 12.0
-# Share of the image cells with corners. The real pairs fill .7; below a third the distortion is a guess over most of the image.
-_COVERED_REFUSED, _COVERED_WARNED = 0.33, 0.6
+_PARALLEL_DEG = 10.0
+# Share of the image cells with corners. The real pairs fill .7; below a fifth all views are in one place.
+_COVERED_REFUSED, _COVERED_WARNED = 0.2, 0.6
 # Held-out error on the board in squares. The real pairs reach .005; a wrong count of corners or a bent board gives more than .1.
 _SQUARES_REFUSED, _SQUARES_WARNED = 0.1, 0.03
 
@@ -91,6 +93,12 @@ def _refuse_fit(camera: str, held_out_squares: float) -> None:
 
 
 def _refuse_geometry(camera: str, size_px: tuple[int, int], lens: Array, focal: float, seen: Coverage) -> None:
+    inside = 0 <= lens[CX] < size_px[0] and 0 <= lens[CY] < size_px[1]
+    if not (inside and all(_FOCALS[0] <= lens[name] / size_px[0] <= _FOCALS[1] for name in (FX, FY))):
+        raise CalibrationError(
+            f"camera {camera!r}: the pictures do not determine the lens: the best fit has its centre at {lens[CX]:.0f}, {lens[CY]:.0f} px and "
+            f"a focal length of {lens[FX]:.0f} px, which no camera has. {_HOW_TO}"
+        )
     span = f"its normals are at most {seen.normals_deg:.0f} degrees apart, its tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f}"
     if seen.normals_deg < _PARALLEL_DEG:
         raise CalibrationError(
@@ -105,10 +113,6 @@ def _refuse_geometry(camera: str, size_px: tuple[int, int], lens: Array, focal: 
         raise CalibrationError(
             f"camera {camera!r}: corners cover {100 * seen.share:.0f} % of the image (at least {100 * _COVERED_REFUSED:.0f} % are needed; "
             f"missing: {seen.missing or 'all over'}). {_HOW_TO}"
-        )
-    if not (0 <= lens[CX] < size_px[0] and 0 <= lens[CY] < size_px[1] and lens[FX] > 0.0 and lens[FY] > 0.0):
-        raise CalibrationError(
-            f"camera {camera!r}: the lens found is impossible (centre {lens[CX]:.0f}, {lens[CY]:.0f} px, focal {lens[FX]:.0f} px). {_HOW_TO}"
         )
 
 

@@ -73,6 +73,8 @@ def rays(lens: Array, pixels: Array) -> Array:
         determinant = a * d - b * c
         safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
         step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
+        if not np.nanmax(np.abs(miss), initial=0.0) > 1e-13:
+            break
         # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
         length = np.linalg.norm(step, axis=1, keepdims=True)
         xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))

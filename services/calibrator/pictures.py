@@ -20,7 +20,9 @@ from rhot.errors import CalibrationError
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 _TOKEN = re.compile(r"[A-Za-z]+|\d+")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
-_EXAMPLES = "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera"
+_EXAMPLES = (
+    "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera (both views in one picture: --side-by-side)"
+)
 # More cameras than this are never one rig here: the varying part is then the number of the picture.
 _MAX_CAMERAS = 16
 Key = tuple[str, ...]
@@ -92,7 +94,7 @@ def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
     if len(cameras) < 2:
         raise CalibrationError(f"pictures side by side need the names of two cameras or more, e.g. --cameras left,right; got {cameras}")
     files = {str(path.relative_to(folder).with_suffix("")): path for path in _pictures(folder)}
-    return PictureSet({camera: files for camera in cameras}, side_by_side=True)
+    return PictureSet(dict.fromkeys(cameras, files), side_by_side=True)
 
 
 def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
@@ -105,7 +107,7 @@ def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
     for path in files:
         parts = _parts(path.relative_to(folder))
         groups[_shape(parts)].append((path, parts))
-    best: PictureSet | None = None
+    best: _Reading | None = None
     for group in groups.values():
         found = _split(group, cameras)
         if found and (best is None or _worth(found) > _worth(best)):
@@ -149,9 +151,9 @@ def _shape(parts: list[str]) -> Key:
     return (str(len(parts)), *("9" if part.isdigit() else "a" for part in parts))
 
 
-def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> PictureSet | None:
+def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> _Reading | None:
     """One part of the names as the camera: the one with which the most positions are seen by all cameras."""
-    best: PictureSet | None = None
+    best: _Reading | None = None
     for place in range(len(group[0][1])):
         values = Counter(parts[place] for _, parts in group)
         if cameras and not set(cameras) <= set(values):
@@ -165,11 +167,11 @@ def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> Pi
     return best
 
 
-def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str] | None) -> PictureSet | None:
+def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str] | None) -> _Reading | None:
     files: dict[str, dict[str, Path]] = defaultdict(dict)
     for path, parts in group:
         # A camera's name may be repeated, as in left/left01.png, and its partner's number may have other leading zeros.
-        rest = [part for part in parts[:place] + parts[place + 1 :] if part != parts[place]]
+        rest = [part for part in parts[:place] + parts[place + 1 :] if part != parts[place] or part.isdigit()]
         key = "-".join(str(int(part)) if part.isdigit() else part for part in rest) or "0"
         if key in files[parts[place]]:
             return None
@@ -178,7 +180,7 @@ def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str
     if len(named) < 2 or not all(_NAME.match(name) for name in named):
         return None
     order = cameras or sorted(named, key=lambda name: (_side(name), _natural(name)))
-    return PictureSet({name: named[name] for name in order})
+    return _Reading({name: named[name] for name in order}, all(value.isdigit() for value in files))
 
 
 def _camera_name(group: list[tuple[Path, list[str]]], place: int, value: str) -> str:
@@ -189,11 +191,18 @@ def _camera_name(group: list[tuple[Path, list[str]]], place: int, value: str) ->
     return value
 
 
-def _worth(found: PictureSet) -> tuple[int, int, int]:
+@dataclass(frozen=True)
+class _Reading:
+    """One way to read the names: the cameras' pictures, and whether only a number tells the cameras apart."""
+
+    files: dict[str, dict[str, Path]]
+    numbered: bool
+
+
+def _worth(found: _Reading) -> tuple[int, int, int]:
     """How much speaks for a reading of the names: positions all cameras share, named rather than numbered, few cameras."""
     shared = set.intersection(*(set(pictures) for pictures in found.files.values()))
-    lettered = sum(1 for name in found.files if not name.isdigit())
-    return len(shared) * len(found.files), lettered, -len(found.files)
+    return len(shared) * len(found.files), 0 if found.numbered else 1, -len(found.files)
 
 
 def _side(name: str) -> int:

@@ -1,10 +1,10 @@
 """Sub-pixel corners: a saddle surface fitted around every corner, and the test whether corners form a board. Pure.
 
-Where two black squares touch, a slightly blurred picture is a saddle: z = a x^2 + b x y + c y^2 + d x + e y + f fitted to the grey values by
-least squares has its stationary point in the corner (Lucchese & Mitra, "Using saddle points for subpixel feature detection", 2002; Placht
-et al., "ROCHADE", 2014). All pixels in the window count, where cornerSubPix uses gradients only; on the real pairs at 640x480 (320x240) the
-held-out board fit is .0108 (.0109) squares against .0149 (.0161) of cornerSubPix, and a rendered board blurred by 2.5 px is found to .05 px
-instead of .41. A corner without a saddle stays where the detector put it.
+Where two black squares touch, a slightly blurred picture is a saddle: z = a x^2 + b x y + c y^2 + d x + e y + f, fitted to the grey values
+by least squares, has its stationary point in the corner (Lucchese & Mitra, "Using saddle points for subpixel feature detection", 2002;
+Placht et al., "ROCHADE", 2014). All pixels in the window count, where cornerSubPix uses gradients only: on the real pairs at 640x480
+(320x240) the held-out board fit is .0108 (.0109) squares against .0149 (.0161) of cornerSubPix, and a rendered board blurred by 2.5 px
+is found to .05 px instead of .41. A corner without a saddle stays where the detector put it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ _MARKER_SHARE = 0.9
 _WINDOW_PX = (2, 30)
 # Blur before the fit, in distances to the nearest corner: rendered boards with noise of 12 grey levels .10 px without, .09 with.
 _BLUR, _BLUR_PX = 0.03, (0.5, 3.0)
+# A saddle rises and falls by this many grey levels at the window's rim, at least: below, it is noise.
+_CONTRAST = 4.0
 # Newton's steps converge at once when the start is within half the window; twelve reach it from anywhere in it.
 _STEPS = 12
 # A corner may wander this share of a square from where neighbours expect it: real lenses and perspective stay below .15.
@@ -73,7 +75,7 @@ def _saddle(blurred: np.ndarray, start: Array, radius: int, inside: np.ndarray, 
         a, b, c, d, e, _ = to_surface @ patch[inside]
         determinant = 4.0 * a * c - b * b
         # Not a saddle but a bowl, a ridge or a plane: no corner here.
-        if not determinant < 0.0:
+        if not determinant < -((_CONTRAST / radius**2) ** 2):
             return start
         step = np.array([b * e - 2.0 * c * d, b * d - 2.0 * a * e]) / determinant
         length = float(np.hypot(*step))

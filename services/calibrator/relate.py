@@ -143,8 +143,8 @@ def _why(
     fitting = sum(error <= limit for error in relation.errors_px)
     return (
         f"{who}: no position of the second to the first explains the {len(pairs)} common pictures (the best fits {fitting}; the median is "
-        f"{relation.median_px:.0f} px off). Either pictures with the same number do not show the same instant - hold the board still, or fix "
-        "it, while all cameras take their picture - or a camera, its focus or its resolution was changed in between"
+        f"{relation.median_px:.0f} px off). Either pictures with the same number do not show the same instant - hold the board still "
+        "while all cameras take their picture - or a camera, its focus or its resolution was changed in between"
     )
 
 

@@ -17,22 +17,21 @@ from services.calibrator.views import LeftOut
 
 def lens_text(result: LensResult, board: Board) -> str:
     """The report of `rhot calibrate lens`."""
-    seen = result.coverage
+    seen, held_out_mm = result.coverage, 1e3 * board.square_m * result.held_out_squares
     lines = [
         f"camera {result.camera}, {result.size_px[0]}x{result.size_px[1]} px, {len(result.pictures)} pictures, board {board.name}",
         f"  lens          {_lens(result.lens, result.sigma)}, distortion {result.model}",
         f"  RMS           {result.rms_px:.3f} px",
-        f"  held out      {result.held_out_px:.3f} px, {result.held_out_squares:.4f} squares = "
-        f"{1e3 * board.square_m * result.held_out_squares:.3f} mm on the board",
+        f"  held out      {result.held_out_px:.3f} px, {result.held_out_squares:.4f} squares = {held_out_mm:.3f} mm on the board",
         f"  coverage      {100 * seen.share:.0f} % of the image, tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f} degrees",
         *("    " + row for row in seen.drawing().splitlines()),
         "  picture           RMS px   held out px   squares   pull on the others",
     ]
-    for picture in result.pictures:
-        lines.append(
-            f"  {picture.key:<16} {picture.rms_px:>7.3f} {picture.held_out_px:>13.3f} {picture.held_out_squares:>9.4f} "
-            f"{picture.pull_percent:>10.1f} %{_hurts(picture.pull_percent)}"
-        )
+    lines += [
+        f"  {each.key:<16} {each.rms_px:>7.3f} {each.held_out_px:>13.3f} {each.held_out_squares:>9.4f} "
+        f"{each.pull_percent:>10.1f} %{_hurts(each.pull_percent)}"
+        for each in result.pictures
+    ]
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 
 
@@ -40,19 +39,18 @@ def rig_text(result: RigResult) -> str:
     """The report of `rhot calibrate stereo`."""
     square_mm = 1e3 * result.board.square_m
     held_out = [position for position in result.positions if position.held_out]
+    fit_mm = square_mm * result.held_out_squares
+    side = f"{square_mm * result.square_ratio:.3f} mm"
     lines = [
-        f"rig of {', '.join(result.cameras)}, {len(result.positions)} positions of the board ({result.board.name}), "
-        f"{len(held_out)} of them seen by two cameras",
+        f"rig of {', '.join(result.cameras)}, {len(result.positions)} positions ({len(held_out)} seen by two cameras), {result.board.name}",
         f"  stereo RMS           {result.rms_px:.3f} px",
-        f"  held-out board fit   {result.held_out_squares:.4f} squares = {square_mm * result.held_out_squares:.3f} mm; {result.held_out_px:.3f} px",
-        f"  held-out square      {square_mm * result.square_ratio:.3f} mm of {square_mm:g} mm: {_percent(result.square_ratio)}, "
-        f"worst position {_percent(result.square_worst)}",
+        f"  held-out board fit   {result.held_out_squares:.4f} squares = {fit_mm:.3f} mm, {result.held_out_px:.3f} px",
+        f"  held-out square      {side} of {square_mm:g} mm: {_percent(result.square_ratio)}, worst {_percent(result.square_worst)}",
         f"  held-out epipolar    {result.epipolar_px:.3f} px",
     ]
     for k, name in enumerate(result.cameras):
-        lines.append(
-            f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px"
-        )
+        known = f"distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px"
+        lines.append(f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, {known}")
         if k:
             lines.append(f"    {_place(result.state.T_camera_from_rig[k], result.place_sigma[k])}")
         lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Boards that two cameras both see. Each gives six equations more than its pose has; below four nothing can be left out.
 _MIN_HELD_OUT = 4
+# Below this, held-out errors are themselves uncertain by a third.
+_GOOD = 8
 # Held-out error in the pictures, px at 640 px width: the real pairs reach .2. At 2 px a board is bent, or moved, or a camera did.
 _PX_REFUSED, _PX_WARNED = 2.0, 0.6
 # Held-out board fit in squares: the real pairs reach .011. It contains the depth noise, which far, small boards and short baselines raise.
@@ -35,8 +37,8 @@ def check_shared(detections: dict[str, dict[str, Detection]]) -> None:
     blind = [camera for camera, found in detections.items() if not found]
     if blind:
         raise CalibrationError(
-            f"no picture of {', '.join(map(repr, blind))} shows the board as a whole. Is --board its number of inner corners (one less than "
-            "the squares each way), is it in focus, evenly lit and completely in the picture with a white margin?"
+            f"no picture of {', '.join(map(repr, blind))} shows the board as a whole. Is --board its number of inner corners (one less "
+            "than the squares each way), is it in focus, evenly lit and completely in the picture with a white margin?"
         )
 
 
@@ -47,6 +49,8 @@ def check_rig(result: RigResult) -> tuple[str, ...]:
     """
     _refuse(result)
     warnings = []
+    if len(result.positions) < _GOOD:
+        warnings.append(f"{len(result.positions)} positions of the board are few; 12 to 20 make the errors above trustworthy")
     for k, name in enumerate(result.cameras):
         if not result.lenses_given:
             said = check_lens(name, result.sizes[k], result.state.lenses[k], result.lens_sigma[k], 0.0, result.coverage[k])
@@ -73,26 +77,27 @@ def _refuse(result: RigResult) -> None:
     held_out = [position for position in result.positions if position.held_out]
     if len(held_out) < _MIN_HELD_OUT:
         raise CalibrationError(
-            f"only {len(held_out)} positions of the board are seen by two cameras together, at least {_MIN_HELD_OUT} are needed (12 to 20 are good)"
+            f"only {len(held_out)} positions of the board are seen by two cameras together, at least {_MIN_HELD_OUT} are "
+            "needed (12 to 20 are good)"
         )
     if not result.held_out_px <= _PX_REFUSED * _scale(result):
         raise CalibrationError(
             f"boards left out of the calibration are {result.held_out_px:.1f} px off in the pictures (.2 is good, "
-            f"{_PX_REFUSED * _scale(result):g} the limit). Did the board stand still while the cameras took their pictures, is it flat, was no "
-            "camera touched in between?"
+            f"{_PX_REFUSED * _scale(result):g} the limit). Did the board stand still while the cameras took their pictures, "
+            "is it flat, was no camera touched in between?"
         )
     if not abs(result.square_ratio - 1.0) <= _SIDE_REFUSED:
         raise CalibrationError(
-            f"triangulated squares of boards left out are {100 * (result.square_ratio - 1.0):+.1f} % off; distances would be too. Take more "
-            "pictures, nearer and tilted in all directions"
+            f"triangulated squares of boards left out are {100 * (result.square_ratio - 1.0):+.1f} % off; distances would be too. "
+            "Take more pictures, nearer and tilted in all directions"
         )
     for k, name in enumerate(result.cameras[1:], start=1):
         baseline = float(np.linalg.norm(result.state.T_camera_from_rig[k][:3, 3]))
         sigma = float(result.place_sigma[k, 3:5].max())
         if not sigma <= _PLACE_REFUSED * baseline:
             raise CalibrationError(
-                f"the place of camera {name!r} is uncertain by {1e3 * sigma:.1f} mm of {1e3 * baseline:.0f} mm; take more pictures that both "
-                "cameras see, near and tilted in all directions"
+                f"the place of camera {name!r} is uncertain by {1e3 * sigma:.1f} mm of {1e3 * baseline:.0f} mm; take more "
+                "pictures that both cameras see, near and tilted in all directions"
             )
 
 

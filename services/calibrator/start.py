@@ -55,7 +55,7 @@ def board_pose(lens: Array, view: View) -> tuple[Array, float]:
         return np.eye(4), float("inf")
     best, least = np.eye(4), float("inf")
     for vector, shift in zip(vectors[:count], shifts[:count], strict=True):
-        T = transform(cv2.Rodrigues(vector)[0], scale * np.asarray(shift).reshape(3))
+        T = transform(cv2.Rodrigues(vector)[0].astype(np.float64), scale * np.asarray(shift).reshape(3))
         error = rms(view.pixels - project(lens, view.points @ T[:3, :3].T + T[:3, 3]))
         if error < least:
             best, least = T, error

@@ -21,8 +21,8 @@ from services.calibrator.heldout import BoardError, board_error
 from services.calibrator.lens import fit_lens
 from services.calibrator.lens_checks import check_fit, contradicting
 from services.calibrator.lens_models import USUAL, LensModel, choose, folds
-from services.calibrator.rig_checks import check_rig, check_shared
 from services.calibrator.relate import place_cameras
+from services.calibrator.rig_checks import check_rig, check_shared
 from services.calibrator.start import board_pose
 from services.calibrator.views import LeftOut, others, same_size, subset, view_of
 

@@ -30,7 +30,7 @@ _FITS_PX = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Desk:
-    """T_desk_from_rig (4, 4), where rig is the frame of rig.json, the cameras that saw the board, and the RMS error of its corners in px."""
+    """T_desk_from_rig (4, 4), where rig is the frame of rig.json; the cameras that saw the board; RMS error of its corners in px."""
 
     T_desk_from_rig: Array
     cameras: tuple[str, ...]

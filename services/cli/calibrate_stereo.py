@@ -15,7 +15,6 @@ from services.cli import calibrate_options as options
 from services.cli.calibrate_options import Kind
 
 if TYPE_CHECKING:
-    from rhot.transforms import Array
     from services.calibrator.pictures import PictureSet
     from services.calibrator.stereo import RigResult
 
@@ -39,6 +38,7 @@ def stereo(
     as_json: options.JsonOption = False,
 ) -> None:
     """Find where the cameras stand to each other, and their lenses, from pictures of a board that all of them see."""
+    from services.calibrator.files import given_lenses
     from services.calibrator.stereo import calibrate_rig
 
     rig = options.rig_if_named(config, needed=live)
@@ -50,9 +50,9 @@ def stereo(
 
         known = collect(rig, names or [], folder, known, square or options.SQUARE_M, count, connect)
     pictures = _pictures(folder, names, side_by_side)
-    lenses = _lenses(target, pictures.cameras) if keep_lenses else None
+    kept = {camera: load_lens(target, camera) for camera in pictures.cameras} if keep_lenses else None
     known, found, blind = options.detect_all(pictures, known, square or options.SQUARE_M, progress)
-    result = calibrate_rig(found, known, lenses)
+    result = calibrate_rig(found, known, given_lenses(kept, found) if kept else None)
     result = replace(result, left_out=(*blind, *result.left_out))
     _write(result, target, folder, as_json)
     if note := options.square_note(square):
@@ -71,15 +71,6 @@ def _pictures(folder: Path, names: list[str] | None, side_by_side: bool) -> Pict
     if side_by_side:
         return pictures.side_by_side(folder, names or ["left", "right"])
     return pictures.find_pictures(folder, names)
-
-
-def _lenses(folder: Path, cameras: list[str]) -> dict[str, Array]:
-    import numpy as np
-
-    from services.calibrator.model import lens_vector
-
-    given = {camera: load_lens(folder, camera) for camera in cameras}
-    return {camera: lens_vector(np.array(file.matrix), np.array(file.distortion)) for camera, file in given.items()}
 
 
 def _write(result: RigResult, target: Path, folder: Path, as_json: bool) -> None:

@@ -28,7 +28,7 @@ from services.pi_tracker.frame import Image
 from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture
 from services.pi_tracker.search import Blob
-from services.pi_tracker.tiles import Tiles, stacked
+from services.pi_tracker.tiles import Tiles, doubled, flat, moments, stacked
 
 _SQUARE = np.ones((3, 3), np.uint8)
 _WIDE = np.ones((5, 5), np.uint8)
@@ -84,85 +84,90 @@ def _size(blob: Blob) -> int:
 
 
 def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-    reach = cv2.dilate(tiles.mask, _SQUARE)
-    paint = _Paint.of(tiles, reach)
-    share = cv2.resize(paint.offset, None, fx=2, fy=2) - tiles.luma * cv2.resize(paint.slope, None, fx=2, fy=2)
+    reach = _dilated(tiles.mask, _SQUARE)
+    paint = _paint(tiles, reach)
+    share = doubled(paint.offset) - tiles.luma * doubled(paint.slope)
     weight = np.clip(_SLOPE * share + (0.5 - 0.5 * _SLOPE), 0.0, 1.0)
-    weight *= cv2.resize(reach, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-    area, x, y = _moments(weight.reshape(tiles.count, -1, weight.shape[1]))
+    weight *= doubled(reach, cv2.INTER_NEAREST)
+    sums = moments(weight, 1)  # (n, 2, 2)
+    area = sums[:, 0, 0]
+    x, y = sums[:, 0, 1] / np.maximum(area, 1.0), sums[:, 1, 0] / np.maximum(area, 1.0)
     # Where clipping holds the weight, noise does not move it.
-    moving = ((weight > 0.0) & (weight < 1.0)).astype(np.float32)
-    cells = tiles.stack(cv2.resize(moving, paint.slope.shape[::-1], interpolation=cv2.INTER_AREA))
-    sigma = _sigma(cells * tiles.stack(paint.variance(noise)), area, x, y)
-    unsure = _misfit(4.0 * cells.sum((1, 2)), area)
-    found = np.stack([area, x, y, np.hypot(sigma, unsure), _contrast(tiles, paint)], axis=1).tolist()
+    moving = np.logical_and(weight > 0.0, weight < 1.0).astype(np.float32)
+    n, h, w = reach.shape
+    moving = cv2.resize(flat(moving), (w, n * h), interpolation=cv2.INTER_AREA).reshape(n, h, w)
+    sigma = np.hypot(_sigma(moving * paint.variance(noise), area, x, y), _misfit(4.0 * moments(moving, 0)[:, 0, 0], area))
+    found = np.stack([area, x, y, sigma, paint.contrast], axis=1).tolist()
     return [_centroid(tiles, k, blob, *values) for k, (blob, values) in enumerate(zip(blobs, found, strict=True))]
 
 
 @dataclass(frozen=True, eq=False)
 class _Paint:
-    """The share of paint of a pixel as offset - slope * Y, per cell; (n h, w) each."""
+    """The share of paint of a pixel as offset - slope * Y, per cell, (n, h, w)."""
 
     offset: Image
     slope: Image
     # The share's derivative by the cell's chroma, squared.
     by_chroma2: Image
-    # 1 / |p - s|
-    inverse_contrast: Image
+    # How far the paint's chroma per luma lies from what is around the blob, on average; (n,).
+    contrast: Image
 
     def variance(self, noise: Noise) -> Image:
-        """Of the share, for the mean of a cell's four pixels; (n h, w)."""
+        """Of the share, for the mean of a cell's four pixels; (n, h, w)."""
         return (self.slope * noise.luma) ** 2 + self.by_chroma2 * noise.chroma**2
 
-    @staticmethod
-    def of(tiles: Tiles, reach: Image) -> _Paint:
-        ring = (cv2.dilate(reach, _WIDE) - reach) & tiles.inside
-        core = _cores(tiles)
-        y, u, v = tiles.cells
-        y_b, u_b, v_b = (_carried(tiles, plane, ring, _BACKGROUND_CELLS) for plane in (y, u, v))
-        y_p = np.maximum(_carried(tiles, y, core, _PAINT_CELLS), _DARKEST)
-        y_b = np.maximum(y_b, _DARKEST)
-        total = np.maximum(tiles.sums(y, core), _DARKEST)
-        s_u, s_v = u_b / y_b, v_b / y_b
-        d_u = tiles.spread(tiles.sums(u, core) / total) - s_u
-        d_v = tiles.spread(tiles.sums(v, core) / total) - s_v
-        norm = np.maximum(d_u * d_u + d_v * d_v, 1e-6)
-        g_u, g_v = d_u / norm, d_v / norm
-        scale = 1.0 / (y_p * y_p + y_b * y_b)
-        p, q = (y_p + y_b) * scale, y_b * scale
-        return _Paint((u * g_u + v * g_v) * p + y_b * q, (s_u * g_u + s_v * g_v) * p + q, p * p / norm, 1.0 / np.sqrt(norm))
+
+def _paint(tiles: Tiles, reach: Image) -> _Paint:
+    ring = (_dilated(reach, _WIDE) - reach) & tiles.inside
+    behind, around = _carried(tiles.cells, ring, _BACKGROUND_CELLS)
+    pure, paint = _carried(tiles.cells, _cores(tiles.mask), _PAINT_CELLS)
+    y_b, y_p = np.maximum(behind[..., 0], _DARKEST), np.maximum(pure[..., 0], _DARKEST)
+    s_u, s_v = behind[..., 1] / y_b, behind[..., 2] / y_b
+    p_u, p_v = (paint[:, 1:3] / np.maximum(paint[:, :1], _DARKEST)).T[:, :, None, None]
+    d_u, d_v = p_u - s_u, p_v - s_v
+    norm = np.maximum(d_u * d_u + d_v * d_v, 1e-6)
+    scale = 1.0 / (y_p * y_p + y_b * y_b)
+    p, q = (y_p + y_b) * scale, y_b * scale
+    p_norm = p / norm
+    g_u, g_v = d_u * p_norm, d_v * p_norm
+    far = paint[:, 1:3] / np.maximum(paint[:, :1], _DARKEST) - around[:, 1:3] / np.maximum(around[:, :1], _DARKEST)
+    offset = tiles.cells[..., 1] * g_u + tiles.cells[..., 2] * g_v + y_b * q
+    return _Paint(offset, s_u * g_u + s_v * g_v + q, p * p_norm, np.hypot(far[:, 0], far[:, 1]))
 
 
-def _cores(tiles: Tiles) -> Image:
-    core = cv2.erode(tiles.mask, _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    few = tiles.spread((tiles.stack(core).sum((1, 2)) < _MIN_CORE).astype(np.uint8))
-    return np.where(few, tiles.mask, core)
+def _cores(mask: Image) -> Image:
+    """The masks without their edges, where anything is left of them."""
+    core = cv2.erode(flat(mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0).reshape(mask.shape)
+    few = core.sum((1, 2)) < _MIN_CORE
+    if few.any():
+        core[few] = mask[few]
+    return core
 
 
-def _carried(tiles: Tiles, plane: Image, known: Image, size: int) -> Image:
-    """A plane where it is known, averaged over size x size cells, and its mean where that does not reach; (n h, w)."""
-    weights = known.astype(np.float32)
-    count = cv2.boxFilter(weights, -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    total = cv2.boxFilter(plane * weights, -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    mean = tiles.spread(tiles.sums(plane, known) / np.maximum(tiles.stack(weights).sum((1, 2)), 1.0))
-    return np.where(count > 0.5, total / np.maximum(count, 0.5), mean)
+def _dilated(masks: Image, element: Image) -> Image:
+    return cv2.dilate(flat(masks), element).reshape(masks.shape)
 
 
-def _moments(weight: Image) -> tuple[Image, Image, Image]:
-    """Area and centre of each tile's weights, in pixels of the tile; (n, h, w) -> three of (n,)."""
-    columns, rows = weight.sum(1), weight.sum(2)
-    area = rows.sum(1)
-    safe = np.maximum(area, 1e-6)
-    return area, columns @ np.arange(weight.shape[2]) / safe, rows @ np.arange(weight.shape[1]) / safe
+def _carried(cells: Image, known: Image, size: int) -> tuple[Image, Image]:
+    """Cells where they are known, averaged over size x size, and their mean where that does not reach: (n, h, w, 4), and the means (n, 4)."""
+    n, h, w, _ = cells.shape
+    kept = cells * known[..., None]
+    total = np.ones((1, h * w), np.float32) @ kept.reshape(n, h * w, 4)  # (n, 1, 4)
+    mean = total[:, 0] / np.maximum(total[:, 0, 3:], 1.0)
+    window = cv2.boxFilter(flat(kept), -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT).reshape(n, h, w, 4)
+    # The mean counts as a hundredth of a cell: nothing beside known ones, everything where there are none.
+    window += 0.01 * mean[:, None, None]
+    return window / np.maximum(window[..., 3:], 1e-6), mean
 
 
 def _sigma(variance: Image, area: Image, x: Image, y: Image) -> Image:
     """Standard deviation of each coordinate from the noise, px; variance (n, h, w) of cells that can move, the others (n,)."""
-    columns, rows = variance.sum(1), variance.sum(2)
-    across = 2.0 * np.arange(variance.shape[2]) + 0.5 - x[:, None]
-    along = 2.0 * np.arange(variance.shape[1]) + 0.5 - y[:, None]
-    # A cell is four pixels that move together: the sum over pixels has a variance of 4^2 times the cell's.
-    total = 16.0 * _SLOPE**2 * ((columns * across**2).sum(1) + (rows * along**2).sum(1)) / 2.0
+    sums = moments(variance, 2)  # (n, 3, 3)
+    # Cells' own coordinates, of which one is two pixels wide.
+    x, y = (x - 0.5) / 2.0, (y - 0.5) / 2.0
+    spread = sums[:, 0, 2] + sums[:, 2, 0] - 2.0 * (x * sums[:, 0, 1] + y * sums[:, 1, 0]) + (x * x + y * y) * sums[:, 0, 0]
+    # Four pixels that move together: 4^2 times the cell's variance; pixels for cells: 2^2; the mean of two coordinates: 1 / 2.
+    total = 32.0 * _SLOPE**2 * np.maximum(spread, 0.0)
     return np.sqrt(total) / np.maximum(area, 1.0)
 
 
@@ -174,15 +179,9 @@ def _misfit(moving_px: Image, area: Image) -> Image:
     return radius * (_MISFIT + _MISFIT_PER_PX * np.maximum(band_px - _SHARP_PX, 0.0))
 
 
-def _contrast(tiles: Tiles, paint: _Paint) -> Image:
-    """How far the paint's chroma per luma lies from what is around the blob, mean over the blob; (n,)."""
-    inverse = tiles.sums(paint.inverse_contrast, tiles.mask) / np.maximum(tiles.stack(tiles.mask).sum((1, 2)), 1)
-    return 1.0 / np.maximum(inverse, 1e-3)
-
-
 def _centroid(tiles: Tiles, k: int, blob: Blob, area: float, x: float, y: float, sigma: float, contrast: float) -> Centroid:
     if area < 1.0:
-        return Centroid(*blob.centre_px, blob.area_px, _LOST_SIGMA_PX, 0.0)
+        return Centroid(blob.x_px, blob.y_px, blob.area_px, _LOST_SIGMA_PX, 0.0)
     left, top, right, bottom = blob.rect
     # A disc fills pi / 4 of its box.
     quality = min(1.0, blob.cells / (0.7 * (right - left) * (bottom - top))) * min(1.0, contrast / _CONTRAST)

@@ -24,12 +24,19 @@ _TAIL = 0.02
 # Hues beyond those quantiles: another pose, a little less light. Simulated paints turn by 2 to 3 between poses; half of the distance
 # to a neighbour if that is less.
 _HUE_MARGIN, _LEAST_HUE_MARGIN = 5.0, 2.0
-# What is nearly grey turns by this much from picture to picture: foreign hues that near count as alike.
-_HUE_NOISE = 6.0
-# Saturation falls in motion blur, value in shade, so far below the quantiles...
-_SATURATION_SHARE, _VALUE_SHARE = 0.62, 0.5
+# Noise and compression move chroma by this many grey levels, and hue has 180 / 2 pi steps a radian.
+_CHROMA_NOISE, _HUE_RADIAN = 2.0, 28.65
+# Highlights and rims are pale: a tenth of a patch may stay outside on that side, as a blob's outline is filled.
+_PALE = 0.10
+# Saturation falls in motion blur, value in shade: that share of the quantiles is still taken, and, where something foreign comes near,
+# at least that one is given up.
+_SATURATION_SHARE, _VALUE_SHARE = (0.65, 0.92), (0.5, 0.75)
 # ... but never lower: below a value of 25 hue is noise; below a saturation of 25, white balance.
 _LEAST_SATURATION, _LEAST_VALUE = 25.0, 25.0
+# Steps in which those bounds are raised, and how much more than the least that is foreign may stay inside.
+_STEPS, _SPARE = 10, 1.5
+# A bound that leaves more than this share of what is foreign inside does not help.
+_USELESS = 0.3
 # A foreign cell or two per picture is noise, and the tracker's filters take it away.
 _STRAY_CELLS = 2.0
 # Rim of a patch, in cells, that is neither paint nor background: blur, and the light that paint throws on skin.
@@ -157,21 +164,15 @@ def _band(own: Samples, hues: tuple[float, float, float], near: Sequence[tuple[f
     _, saturation, value = own.paint.hsv()
     hue, foreign_saturation, foreign_value = foreign.hsv()
     off = hue_from(hue, centre)
+    # The less chroma the more its noise turns the hue.
+    turn = np.minimum(_CHROMA_NOISE / np.maximum(foreign.chroma, 1.0), 1.0) * _HUE_RADIAN
+    alike = (off >= low - turn) & (off <= high + turn)
     stray = _STRAY_CELLS * own.frames
-    alike = (off >= low - _HUE_NOISE) & (off <= high + _HUE_NOISE)
-    value_low = max(_LEAST_VALUE, _VALUE_SHARE * float(np.quantile(value, _TAIL)))
-    alike &= foreign_value >= value_low
-    least, most = (float(np.quantile(saturation, share)) for share in (_TAIL, 1.0 - _TAIL))
-    saturation_low = _lower(
-        least, _SATURATION_SHARE * least, foreign_saturation[alike & (foreign_saturation < np.median(saturation))], stray
-    )
-    saturation_low = max(saturation_low, _LEAST_SATURATION)
-    alike &= foreign_saturation >= saturation_low
-    saturation_high = _upper(most, foreign_saturation[alike & (foreign_saturation > np.median(saturation))], stray)
-    alike &= foreign_saturation <= saturation_high
+    palest, richest = (float(np.quantile(saturation, share)) for share in (_PALE, 1.0 - _TAIL))
     darkest = float(np.quantile(value, _TAIL))
-    value_low = max(_lower(darkest, value_low, foreign_value[alike & (foreign_value < np.median(value))], stray), _LEAST_VALUE)
-    return Band(centre, low, high, (saturation_low, saturation_high), (value_low, 255.0))
+    saturation_low, value_low = _floors(palest, darkest, foreign_saturation[alike], foreign_value[alike], stray)
+    alike &= (foreign_saturation >= saturation_low) & (foreign_value >= value_low)
+    return Band(centre, low, high, (saturation_low, _ceiling(richest, foreign_saturation[alike], stray)), (value_low, 255.0))
 
 
 def _margin(hues: tuple[float, float, float], near: Sequence[tuple[float, float, float]], side: int) -> float:
@@ -188,17 +189,28 @@ def _margin(hues: tuple[float, float, float], near: Sequence[tuple[float, float,
     return max(margin, min(_LEAST_HUE_MARGIN, margin + 1.0))
 
 
-def _lower(seen: float, wanted: float, foreign: Array, stray: float) -> float:
-    """A lower bound: as low as wanted, but half way to the foreign values below what was seen."""
-    if foreign.size <= stray:
-        return wanted
-    nearest = float(np.sort(foreign)[-int(stray) - 1])
-    return min(seen, max(wanted, (nearest + seen) / 2.0))
+def _floors(palest: float, darkest: float, saturation: Array, value: Array, stray: float) -> tuple[float, float]:
+    """Lower bounds of saturation and value: as low as blur and shade go, raised together no more than what is foreign makes necessary.
+
+    saturation and value are of the foreign cells of like hue, (n,).
+    """
+    saturations = np.maximum(np.linspace(*_SATURATION_SHARE, _STEPS) * palest, _LEAST_SATURATION)
+    values = np.maximum(np.linspace(*_VALUE_SHARE, _STEPS) * darkest, _LEAST_VALUE)
+    inside = np.array([[np.count_nonzero((saturation >= s) & (value >= v)) for v in values] for s in saturations])
+    least = float(inside[-1, -1])
+    if inside[0, 0] <= stray or least > max(stray, _USELESS * inside[0, 0]):
+        # Nothing to keep out; or it cannot be kept out, and only paint would be lost.
+        return float(saturations[0]), float(values[0])
+    good = inside <= max(stray, _SPARE * least)
+    effort = np.add.outer(np.arange(_STEPS), np.arange(_STEPS)).astype(np.float64)
+    i, j = np.unravel_index(int(np.argmin(np.where(good, effort, np.inf))), good.shape)
+    # A step more, as the next picture's noise is another.
+    return float(saturations[min(i + 1, _STEPS - 1)] if i else saturations[0]), float(values[j])
 
 
-def _upper(seen: float, foreign: Array, stray: float) -> float:
-    """An upper bound: none, unless foreign values lie above what was seen: then half way to them."""
-    if foreign.size <= stray:
+def _ceiling(richest: float, saturation: Array, stray: float) -> float:
+    """An upper bound of saturation: none, unless most of what is foreign (n,) is more saturated than the paint and clear of it."""
+    above = saturation[saturation > richest]
+    if above.size <= stray or above.size < (1.0 - _USELESS) * saturation.size:
         return 255.0
-    nearest = float(np.sort(foreign)[int(stray)])
-    return 255.0 if nearest <= seen else (nearest + seen) / 2.0
+    return (float(np.sort(above)[int(stray)]) + richest) / 2.0

@@ -69,8 +69,7 @@ def _support(member: Candidate, members: Sequence[Candidate | None]) -> float:
 def _fit(a: Blob, b: Blob) -> float:
     area_a, area_b = a.area_px, b.area_px
     smaller, larger = (area_a, area_b) if area_a < area_b else (area_b, area_a)
-    (ax, ay), (bx, by) = a.centre_px, b.centre_px
-    apart2 = (ax - bx) ** 2 + (ay - by) ** 2
+    apart2 = (a.x_px - b.x_px) ** 2 + (a.y_px - b.y_px) ** 2
     # Of two sizes the smaller one is less often wrong: things in the room and blur make blobs large.
     near = 1.0 / (1.0 + (apart2 / (_REACH_WIDTHS**2 * smaller)) ** 2)
     return near * min(1.0, _SIZE_RATIO * smaller / larger)

@@ -68,7 +68,7 @@ class Track:
     def likeness(self, blob: Blob, stamp_ns: int, margin_px: float) -> float:
         """How much a blob is like this marker by place and size, 0..1."""
         x, y = self.predicted(stamp_ns)
-        dx, dy = blob.centre_px[0] - x, blob.centre_px[1] - y
+        dx, dy = blob.x_px - x, blob.y_px - y
         gap_s = min(max((stamp_ns - self.stamp_ns) * 1e-9, 0.0), 1.0)
         reach = margin_px + _FASTEST_PX_S * gap_s
         size = min(blob.area_px, self.area_px) / max(blob.area_px, self.area_px, 1.0)

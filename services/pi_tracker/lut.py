@@ -58,28 +58,25 @@ class LutFinder:
         return markers
 
     def _search(self, image: Picture) -> list[list[Blob]]:
-        """Plausible blobs of each colour: near its last place, else in the whole image."""
+        """Plausible blobs of each colour: near the last places, else in the whole image."""
         everywhere = roi.whole(image.size)
         self._searches += 1
-        if self._searches % _REVIEW == 0:
-            return self._blobs(image, [everywhere])
+        if not self._boxes or len(self._boxes) < len(self._names) or self._searches % _REVIEW == 0:
+            return self._blobs(image, everywhere)
         margin = self._settings.roi_margin_px
-        rois = [roi.around(self._boxes[k], margin, image.size) if k in self._boxes else everywhere for k in range(len(self._names))]
-        found = self._blobs(image, rois)
-        left = [k for k, blobs in enumerate(found) if rois[k] != everywhere and (not blobs or roi.cut(blobs[0].rect, rois[k], image.size))]
-        if not left:
-            return found
-        # It has moved further than the margin: the same frame may still show it.
-        again = self._blobs(image, [everywhere])
-        return [again[k] if k in left else blobs for k, blobs in enumerate(found)]
+        region = roi.around(roi.hull(list(self._boxes.values())), margin, image.size)
+        found = self._blobs(image, region)
+        if any(all(roi.cut(blob.rect, region, image.size) for blob in own) for own in found):
+            # A marker has moved further than the margin: the same frame may still show it.
+            return self._blobs(image, everywhere)
+        return found
 
-    def _blobs(self, image: Picture, rois: list[Rect]) -> list[list[Blob]]:
-        """Plausible blobs of each colour in the rectangles, largest first."""
+    def _blobs(self, image: Picture, region: Rect) -> list[list[Blob]]:
+        """Plausible blobs of each colour in a rectangle."""
         found: list[list[Blob]] = [[] for _ in self._names]
-        for rect in roi.joined(rois):
-            for blob in self._searcher.blobs(image, rect):
-                if shape_fits(blob, self._settings.max_area_px):
-                    found[blob.color].append(blob)
+        for blob in self._searcher.blobs(image, region):
+            if shape_fits(blob, self._settings.max_area_px):
+                found[blob.color].append(blob)
         return found
 
 

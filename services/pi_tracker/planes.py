@@ -53,7 +53,8 @@ class _Planar:
     def cells(self, rect: Rect) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
         luma = cv2.resize(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-        return luma, cv2.merge((self._u[y0:y1, x0:x1], self._v[y0:y1, x0:x1]))
+        # Merging copies of the parts is three times faster than merging the parts.
+        return luma, cv2.merge((np.ascontiguousarray(self._u[y0:y1, x0:x1]), np.ascontiguousarray(self._v[y0:y1, x0:x1])))
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect

@@ -27,8 +27,9 @@ _TURN, _PALER, _DEEPER = 0.30, 0.40, 2.2
 _NOISE = 2.5
 # Half side of the window a click grows in, as share of the picture's width: markers are far smaller, a calibration ball may be 1/6 wide.
 _WINDOW = 1.0 / 8.0
-# Bins of chroma, in grey levels, when colours inside a box are held against those around it.
-_BIN = 4
+# Bins of colour, when those inside a box are held against those around it: directions of chroma (5 degrees), and half octaves of its
+# share of luma, from that of a wall that is not quite grey.
+_TURNS, _DEPTHS, _WEAKEST = 72, 12, 0.03
 # A colour that is so many times as frequent in the box as around it belongs to what is boxed.
 _OWN = 3.0
 
@@ -141,35 +142,39 @@ def _box_seed(cells: Cells, rect: tuple[int, int, int, int]) -> tuple[Array | No
     ring = np.zeros(cells.shape, bool)
     ring[max(y0 - h, 0) : min(y1 + h, height), max(x0 - w, 0) : min(x1 + w, width)] = True
     ring[y0:y1, x0:x1] = False
-    box = cells[y0:y1, x0:x1]
+    box, outside = cells[y0:y1, x0:x1], cells[ring]
     rows, columns = np.mgrid[:h, :w]
-    middle = np.exp(-2.0 * (((columns + 0.5) / w - 0.5) ** 2 + ((rows + 0.5) / h - 0.5) ** 2) / 0.25)
+    middle = np.exp(-4.0 * (((columns + 0.5) / w - 0.5) ** 2 + ((rows + 0.5) / h - 0.5) ** 2) / 0.25)
     weight = np.where(box.chroma >= MIN_CHROMA, middle, 0.0)
-    inside, around = _histogram(box, weight / max(float(middle.sum()), 1e-9)), _histogram(cells[ring], None)
+    inside = _histogram(box, weight / max(float(middle.sum()), 1e-9))
+    around = _histogram(outside, (outside.chroma >= MIN_CHROMA) / max(float(outside.y.size), 1.0))
     own = np.where(inside > _OWN * around, inside, 0.0)
     peak = np.unravel_index(int(np.argmax(own)), own.shape)
     if own[peak] <= 0.0:
         return None, np.zeros((h, w), bool)
-    u, v = _bins(box)
-    starts = (np.abs(u - peak[0]) <= 1) & (np.abs(v - peak[1]) <= 1) & (weight > 0.0)
+    turn, depth = _bins(box)
+    apart = np.abs(turn - peak[0])
+    starts = (np.minimum(apart, _TURNS - apart) <= 1) & (np.abs(depth - peak[1]) <= 1) & (weight > 0.0)
     if np.count_nonzero(starts) < MIN_CELLS:
         return None, starts
     return np.median(box[starts].tint, axis=0), starts
 
 
 def _bins(cells: Cells) -> tuple[Array, Array]:
-    u, v = (np.clip((plane + 128.0) // _BIN, 0, 256 // _BIN - 1).astype(np.int64) for plane in (cells.u, cells.v))
-    return u, v
+    """Bins of chroma over luma, which shade does not change: direction and, in half octaves, strength."""
+    tint = cells.tint
+    turn = np.floor(np.arctan2(tint[..., 1], tint[..., 0]) * (_TURNS / (2.0 * np.pi))).astype(np.int64) % _TURNS
+    strength = np.hypot(tint[..., 0], tint[..., 1])
+    depth = np.clip(np.floor(2.0 * np.log2(np.maximum(strength, 1e-6) / _WEAKEST)), 0, _DEPTHS - 1).astype(np.int64)
+    return turn, depth
 
 
-def _histogram(cells: Cells, weight: Array | None) -> Array:
-    """Shares of chroma bins, smoothed over neighbours; (64, 64)."""
-    size = 256 // _BIN
-    u, v = _bins(cells)
-    flat = np.bincount((u * size + v).ravel(), None if weight is None else weight.ravel(), size * size).astype(np.float64)
-    if weight is None:
-        flat /= max(float(u.size), 1.0)
-    return cv2.blur(flat.reshape(size, size), (3, 3), borderType=cv2.BORDER_CONSTANT)
+def _histogram(cells: Cells, weight: Array) -> Array:
+    """Sums of weights in bins, smoothed over neighbours; (_TURNS, _DEPTHS)."""
+    turn, depth = _bins(cells)
+    flat = np.bincount((turn * _DEPTHS + depth).ravel(), weight.ravel(), _TURNS * _DEPTHS).reshape(_TURNS, _DEPTHS)
+    wrapped = np.concatenate([flat[-1:], flat, flat[:1]])
+    return cv2.blur(wrapped, (3, 3), borderType=cv2.BORDER_CONSTANT)[1:-1]
 
 
 def _grow(window: Cells, tint: Array, starts: Mask) -> Mask:

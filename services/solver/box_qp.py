@@ -7,6 +7,7 @@ exact, and one Cholesky where no bound matters. 4 unknowns for a digit, 26 for t
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,21 @@ from numba import njit
 from rhot.transforms import Array
 
 Integers = npt.NDArray[np.int64]
+
+
+class Scratch(NamedTuple):
+    """Room to work in for n unknowns; allocating it anew at each of many small problems would cost as much as solving them."""
+
+    L: Array  # (n, n)
+    step: Array  # (n,)
+    held: Integers  # (n,)
+    free: Integers  # (n,)
+
+
+@njit(cache=True)
+def scratch(n: int) -> Scratch:
+    """Room for n unknowns."""
+    return Scratch(np.empty((n, n)), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64))
 
 
 @njit(cache=True)
@@ -79,16 +95,12 @@ def _release(H: Array, g: Array, x: Array, held: Integers) -> int:
 
 
 @njit(cache=True)
-def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array) -> bool:
+def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Scratch) -> bool:
     """Solve into x (n,); H (n, n) symmetric positive definite, bounds may be infinite. False if H is not definite.
 
     x is feasible in any case, and never worse than the feasible point nearest to zero.
     """
-    n = g.size
-    held = np.empty(n, np.int64)
-    free = np.empty(n, np.int64)
-    L = np.empty((n, n))
-    step = np.empty(n)
+    n, held, free, L, step = g.size, room.held, room.free, room.L, room.step
     _start(g, low, high, x, held)
     # Each round holds or releases one unknown; 4n rounds were never used up by 1e6 random problems of 4 and 26 unknowns.
     for _ in range(4 * n + 4):
@@ -102,9 +114,9 @@ def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array) -> bool:
         length, block = 1.0, -1
         for a in range(count):
             i = free[a]
-            room = high[i] - x[i] if step[a] > 0.0 else low[i] - x[i]
-            if abs(step[a]) * length > abs(room):
-                length, block = abs(room) / abs(step[a]), a
+            left = high[i] - x[i] if step[a] > 0.0 else x[i] - low[i]
+            if abs(step[a]) * length > left:
+                length, block = left / abs(step[a]), a
         for a in range(count):
             x[free[a]] += length * step[a]
         if block >= 0:

@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from rhot.transforms import Array
-from services.solver.box_qp import Integers, box_qp
+from services.solver.box_qp import Integers, Scratch, box_qp, scratch
 from services.solver.constraints import clamp
 from services.solver.kinematics import (
     Chain,
@@ -32,7 +32,7 @@ from services.solver.kinematics import (
     tip_rotation,
     to_canonical,
 )
-from services.solver.turns import rotation_vector
+from services.solver.turns import turn_between
 
 # What is asked for: the painted point alone; with the last bone's axes; with last flexion = ratio * second flexion.
 POSITION, POSE, COUPLED = 0, 1, 2
@@ -73,67 +73,105 @@ def goal(kind: int, point: Array, rotation: Array | None = None) -> Goal:
     return Goal(kind, np.asarray(point, dtype=np.float64), np.eye(3) if rotation is None else rotation, np.zeros((2, 4)))
 
 
+class Desk(NamedTuple):
+    """Room to work in: allocating it at every start would cost as much as an iteration."""
+
+    p: Array  # (3,) the painted point
+    J: Array  # (6, 4)
+    turn: Array  # (3,) the rotation that is left
+    H: Array  # (4, 4)
+    g: Array  # (4,)
+    low: Array  # (4,)
+    high: Array  # (4,)
+    step: Array  # (4,)
+    best: Array  # (4,)
+    qp: Scratch
+
+
 @njit(cache=True)
-def _residuals(chain: Chain, wanted: Goal, q: Array, p: Array, J: Array, e: Array) -> int:
-    """Fill e and turn J's rows into those of the goal; returns how many rows. J's first three rows are the position's."""
-    for i in range(3):
-        e[i] = wanted.point[i] - p[i]
-    rows = 3
+def _desk() -> Desk:
+    return Desk(
+        np.empty(3),
+        np.empty((6, 4)),
+        np.empty(3),
+        np.empty((4, 4)),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        scratch(4),
+    )
+
+
+@njit(cache=True)
+def _equations(chain: Chain, wanted: Goal, q: Array, desk: Desk) -> tuple[float, float]:
+    """Fill H and g with the goal's normal equations (without damping); returns cost and distance left."""
+    p, J, H, g = desk.p, desk.J, desk.H, desk.g
+    jacobian(chain, q, p, J)
+    x, y, z = wanted.point[0] - p[0], wanted.point[1] - p[1], wanted.point[2] - p[2]
+    square = x * x + y * y + z * z
+    cost = square
+    for a in range(4):
+        g[a] = -(J[0, a] * x + J[1, a] * y + J[2, a] * z)
+        for b in range(a + 1):
+            H[a, b] = J[0, a] * J[0, b] + J[1, a] * J[1, b] + J[2, a] * J[2, b]
     if wanted.kind == POSE:
         # A rotation vector: exact also beyond 90 deg, where the study's differential folds back.
-        e[3:6] = rotation_vector(wanted.rotation @ tip_rotation(q).T)
-        rows = 6
+        turn = desk.turn
+        turn_between(tip_rotation(q), wanted.rotation, turn)
+        cost += turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
+        # Axes: that of abduction is y, the three of flexion are one and square to it.
+        g[0] -= turn[1]
+        H[0, 0] += 1.0
+        for a in range(1, 4):
+            g[a] -= J[3, a] * turn[0] + J[5, a] * turn[2]
+            for b in range(1, a + 1):
+                H[a, b] += 1.0
     elif wanted.kind == COUPLED:
-        ratio, weight = chain.coupling[0], COUPLING_WEIGHT * chain.coupling[1]
-        J[3] = 0.0
-        J[3, 2], J[3, 3] = -weight * ratio, weight
-        e[3] = weight * (ratio * q[2] - q[3])
-        rows = 4
-    for j in range(4):
-        if wanted.keep[1, j] > 0.0:
-            J[rows] = 0.0
-            J[rows, j] = wanted.keep[1, j]
-            e[rows] = wanted.keep[1, j] * (wanted.keep[0, j] - q[j])
-            rows += 1
-    return rows
+        ratio, weight = chain.coupling[0], (COUPLING_WEIGHT * chain.coupling[1]) ** 2
+        off = ratio * q[2] - q[3]
+        cost += weight * off * off
+        g[2] += weight * ratio * off
+        g[3] -= weight * off
+        H[2, 2] += weight * ratio * ratio
+        H[3, 3] += weight
+        H[3, 2] -= weight * ratio
+    for a in range(4):
+        weight = wanted.keep[1, a] ** 2
+        off = wanted.keep[0, a] - q[a]
+        cost += weight * off * off
+        g[a] -= weight * off
+        H[a, a] += weight
+        for b in range(a):
+            H[b, a] = H[a, b]
+    return cost, math.sqrt(square)
 
 
 @njit(cache=True)
-def _descend(chain: Chain, wanted: Goal, q: Array, most: int) -> tuple[int, float, float]:
+def _descend(chain: Chain, wanted: Goal, q: Array, most: int, desk: Desk) -> tuple[int, float, float]:
     """One start: improve q in place; returns iterations, cost, distance left. The digit's length is 1."""
-    p, J, e = np.empty(3), np.empty((10, 4)), np.empty(10)
-    H, g, low, high, step = np.empty((4, 4)), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    best, best_cost, best_distance, steps, largest, caution = q.copy(), np.inf, np.inf, 0, 1.0, 1.0
+    limits, H, low, high, step, best = chain.limits, desk.H, desk.low, desk.high, desk.step, desk.best
+    best_cost, best_distance, steps, largest, caution = np.inf, np.inf, 0, 1.0, 1.0
+    best[:] = q
     for iteration in range(most + 1):
-        jacobian(chain, q, p, J)
-        rows = _residuals(chain, wanted, q, p, J, e)
-        cost = 0.0
-        for r in range(rows):
-            cost += e[r] * e[r]
+        cost, distance = _equations(chain, wanted, q, desk)
         if cost < best_cost:
-            best[:], best_cost, best_distance, steps = q, cost, length_of(e), iteration
+            best[:], best_cost, best_distance, steps = q, cost, distance, iteration
             caution = max(0.1 * caution, 1.0)
         else:
             caution *= _CAUTION
         # The last step is taken and judged: breaking before that would leave up to 1e-7 rad on the table.
-        if math.sqrt(cost) < STOP or largest < SMALLEST_STEP:
+        if cost < STOP * STOP or largest < SMALLEST_STEP:
             break
-        mu = caution * 0.01 * cost + 1e-15
         for a in range(4):
-            g[a] = 0.0
-            for r in range(rows):
-                g[a] -= J[r, a] * e[r]
-            for b in range(a + 1):
-                total = mu if a == b else 0.0
-                for r in range(rows):
-                    total += J[r, a] * J[r, b]
-                H[a, b] = H[b, a] = total
-            low[a], high[a] = chain.limits[a, 0] - q[a], chain.limits[a, 1] - q[a]
-        if not box_qp(H, g, low, high, step):
+            H[a, a] += caution * 0.01 * cost + 1e-15
+            low[a], high[a] = limits[a, 0] - q[a], limits[a, 1] - q[a]
+        if not box_qp(H, desk.g, low, high, step, desk.qp):
             break
         largest = 0.0
         for a in range(4):
-            q[a] = min(max(q[a] + step[a], chain.limits[a, 0]), chain.limits[a, 1])
+            q[a] = min(max(q[a] + step[a], limits[a, 0]), limits[a, 1])
             largest = max(largest, abs(step[a]))
     q[:] = best
     return steps, best_cost, best_distance
@@ -173,14 +211,15 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
     unit = scaled(chain, 1.0 / total)
     aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
     _unlock(unit, length_of(aim.point), q)
-    used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS))
+    desk = _desk()
+    used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS), desk)
     trial, again = np.empty(4), 0
     for attempt in range(4):
         if distance * total <= tolerance or used >= most:
             break
         for j in range(4):
             trial[j] = chain.limits[j, 0] + _AGAIN[attempt, j] * (chain.limits[j, 1] - chain.limits[j, 0])
-        steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS))
+        steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS), desk)
         used += steps
         again += 1
         if trial_cost < cost:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -12,31 +11,14 @@ import numpy as np
 import pytest
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
 from rhot.capture import write_lines
 from rhot.config import Objects, ObjectTable, RigConfig, RigTable
 from rhot.errors import SourceError
 from rhot.messages import OpenVrPose
-from rhot.service import Service
 from rhot.transforms import transform
 from services.object_tracker.service import serve
 
 MakePose = Callable[..., OpenVrPose]
-
-
-@contextlib.asynccontextmanager
-async def running(router: str, config: RigConfig) -> AsyncIterator[tuple[Service, Bus]]:
-    """The service in this process, and a bus of our own."""
-    async with (
-        open_bus("desk", [router]) as theirs,
-        open_bus("desk", [router]) as ours,
-        asyncio.timeout(15.0),
-        asyncio.TaskGroup() as tasks,
-    ):
-        service = Service("object_tracker", "main", config, theirs, tasks)
-        task = tasks.create_task(serve(service))
-        yield service, ours
-        task.cancel()
 
 
 def rig(folder: Path, source: str) -> RigConfig:
@@ -45,24 +27,8 @@ def rig(folder: Path, source: str) -> RigConfig:
     )
 
 
-@contextlib.contextmanager
-def sending(send: Callable[[], None]) -> Iterator[None]:
-    """Send again and again: subscriptions need a moment to reach the router."""
-
-    async def repeat() -> None:
-        while True:
-            send()
-            await asyncio.sleep(0.02)
-
-    sender = asyncio.create_task(repeat())
-    try:
-        yield
-    finally:
-        sender.cancel()
-
-
-async def test_poses_in_objects_out_with_garbage_between(router: str, tmp_path: Path, make_pose: MakePose) -> None:
-    async with running(router, rig(tmp_path, "network")) as (service, bus):
+async def test_poses_in_objects_out_with_garbage_between(running: Callable, tmp_path: Path, make_pose: MakePose, sending: Callable) -> None:
+    async with running("object_tracker", serve, rig(tmp_path, "network")) as (service, bus):
         known, unknown = (bus.publisher(topics.OPENVR, serial=serial) for serial in ("LHR-1", "LHR-2"))
 
         def send() -> None:
@@ -82,17 +48,17 @@ async def test_poses_in_objects_out_with_garbage_between(router: str, tmp_path: 
         assert service.errors == 2
 
 
-async def test_a_source_feeds_the_bus(router: str, tmp_path: Path, make_pose: MakePose) -> None:
+async def test_a_source_feeds_the_bus(running: Callable, tmp_path: Path, make_pose: MakePose) -> None:
     write_lines(tmp_path / "o.jsonl", [make_pose(stamp_ns=10**18 + i * 5_000_000, seq=i) for i in range(400)])
-    async with running(router, rig(tmp_path, "replay:o.jsonl")) as (_, bus):
+    async with running("object_tracker", serve, rig(tmp_path, "replay:o.jsonl")) as (_, bus):
         raw = bus.every(topics.OPENVR, 8)
         result = await anext(bus.every(topics.OBJECT, 8))
         assert result.stamp_ns == 10**18 + result.seq * 5_000_000
         assert (await anext(raw)).device.serial == "LHR-1"
 
 
-async def test_a_source_that_fails_ends_the_service(router: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_source_that_fails_ends_the_service(running: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.RaisesGroup(SourceError):
-        async with running(router, rig(tmp_path, "libsurvive")):
+        async with running("object_tracker", serve, rig(tmp_path, "libsurvive")):
             await asyncio.Event().wait()

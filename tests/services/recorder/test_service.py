@@ -15,28 +15,12 @@ from rhot.config import Recorder as RecorderTable
 from rhot.config import RigConfig
 from rhot.errors import CaptureError
 from rhot.messages import Session
-from rhot.service import Service
 from services.recorder.reader import Record, read
 from services.recorder.service import serve
 from services.recorder.sources.replay import check_names, replay
 from services.recorder.writer import RecordingWriter
 
 Write = Callable[..., Path]
-
-
-@contextlib.asynccontextmanager
-async def running(router: str, config: RigConfig) -> AsyncIterator[tuple[Service, Bus]]:
-    """The service in this process, and a bus of our own."""
-    async with (
-        open_bus("desk", [router]) as theirs,
-        open_bus("desk", [router]) as ours,
-        asyncio.timeout(15.0),
-        asyncio.TaskGroup() as tasks,
-    ):
-        service = Service("recorder", "main", config, theirs, tasks)
-        task = tasks.create_task(serve(service))
-        yield service, ours
-        task.cancel()
 
 
 async def until(condition: Callable[[], object], act: Callable[[], None] = lambda: None) -> None:
@@ -46,10 +30,10 @@ async def until(condition: Callable[[], object], act: Callable[[], None] = lambd
         await asyncio.sleep(0.02)
 
 
-async def test_everything_marked_is_recorded_garbage_too(router: str, tmp_path: Path) -> None:
+async def test_everything_marked_is_recorded_garbage_too(running: Callable, tmp_path: Path) -> None:
     config = RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True))
     keys = {"rhot/desk/camera/left/markers": b"\xff\x00", "rhot/desk/hand/right/pose": b"[1]", "rhot/desk/camera/left/preview": b"jpeg"}
-    async with running(router, config) as (service, bus):
+    async with running("recorder", serve, config) as (service, bus):
 
         def publish() -> None:
             for key, payload in keys.items():
@@ -63,33 +47,33 @@ async def test_everything_marked_is_recorded_garbage_too(router: str, tmp_path: 
     assert abs(records[-1].log_time_ns - records[0].log_time_ns) < 20 * 10**9
 
 
-async def test_sessions_by_broadcast_and_after_a_restart(router: str, tmp_path: Path) -> None:
+async def test_sessions_by_broadcast_and_after_a_restart(running: Callable, tmp_path: Path) -> None:
     config = RigConfig(folder=str(tmp_path))
     folder = tmp_path / "recordings"
-    async with running(router, config) as (service, bus):
+    async with running("recorder", serve, config) as (service, bus):
         publisher = bus.publisher(topics.SESSION)
         await until(lambda: list(folder.glob("*.mcap")), lambda: publisher.put(Session(running=True, start_ns=10**18)))
         await until(lambda: service.values.get("recording") == 1.0)
         bus.answer(topics.SESSION, lambda: Session(running=True, start_ns=10**18))
-        async with running(router, config):
+        async with running("recorder", serve, config):
             await until(lambda: len(list(folder.glob("*.mcap"))) == 2)
     assert [p.name for p in sorted(folder.iterdir())] == ["rhot-desk-20010909-014640-2.mcap", "rhot-desk-20010909-014640.mcap"]
 
 
-async def test_cut_files_are_restored_at_the_start(router: str, tmp_path: Path, write: Write) -> None:
+async def test_cut_files_are_restored_at_the_start(running: Callable, tmp_path: Path, write: Write) -> None:
     path = write(tmp_path / "recordings" / "rhot-desk-1.mcap")
     path.write_bytes(path.read_bytes()[:-5])
     (tmp_path / "recordings" / "rhot-desk-2.mcap").write_bytes(b"")
-    async with running(router, RigConfig(folder=str(tmp_path))) as (service, _):
+    async with running("recorder", serve, RigConfig(folder=str(tmp_path))) as (service, _):
         await until(lambda: service.state == "running")
         assert service.errors == 2
     assert len(list(read(tmp_path / "recordings" / "rhot-desk-1.recovered.mcap"))) == 1000
 
 
-async def test_a_folder_that_cannot_be_written_ends_the_service(router: str, tmp_path: Path) -> None:
+async def test_a_folder_that_cannot_be_written_ends_the_service(running: Callable, tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("")
     with pytest.RaisesGroup(CaptureError):
-        async with running(router, RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True))):
+        async with running("recorder", serve, RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True))):
             await asyncio.Event().wait()
 
 

@@ -3,35 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
 from rhot.config import RigConfig
 from rhot.messages import HandPoints, HandPose, Health, ObjectPose
-from rhot.service import Service
 from services.viewer.service import serve
 
 Make = Callable[..., Any]
 JPEG = b"\xff\xd8\xff\xe0picture"
-
-
-@contextlib.asynccontextmanager
-async def running(router: str, config: RigConfig) -> AsyncIterator[tuple[Service, Bus]]:
-    """The service in this process, and a bus of our own."""
-    async with (
-        open_bus("desk", [router]) as theirs,
-        open_bus("desk", [router]) as ours,
-        asyncio.timeout(20.0),
-        asyncio.TaskGroup() as tasks,
-    ):
-        service = Service("viewer", "main", config, theirs, tasks)
-        task = tasks.create_task(serve(service))
-        await until(lambda: service.state == "running")
-        yield service, ours
-        task.cancel()
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -40,26 +21,18 @@ async def until(condition: Callable[[], object]) -> None:
         await asyncio.sleep(0.01)
 
 
-@contextlib.contextmanager
-def sending(send: Callable[[], None]) -> Iterator[None]:
-    """Send again and again in the background."""
-
-    async def repeat() -> None:
-        while True:
-            send()
-            await asyncio.sleep(0.02)
-
-    task = asyncio.create_task(repeat())
-    try:
-        yield
-    finally:
-        task.cancel()
-
-
 async def test_what_is_published_is_drawn_and_told(
-    router: str, config: RigConfig, browse: Make, make_pose: Make, make_points: Make, make_object: Make, make_health: Make
+    running: Callable,
+    config: RigConfig,
+    browse: Make,
+    make_pose: Make,
+    make_points: Make,
+    make_object: Make,
+    make_health: Make,
+    sending: Callable,
 ) -> None:
-    async with running(router, config) as (service, bus):
+    async with running("viewer", serve, config) as (service, bus):
+        await until(lambda: service.state == "running")
         pose, points = bus.publisher(topics.POSE, hand="right"), bus.publisher(topics.POINTS, hand="right")
         thing, health = bus.publisher(topics.OBJECT, object="cup"), bus.publisher(topics.HEALTH, service="fusion", instance="main")
 
@@ -93,16 +66,18 @@ async def test_what_is_published_is_drawn_and_told(
         await asyncio.to_thread(browser.wait_for, "GuiUpdateMessage", updates=lambda u: "waiting for hand poses" in u.get("content", ""))
 
 
-async def test_uncalibrated_cameras_are_left_out_with_a_note(router: str, config: RigConfig, browse: Make) -> None:
-    async with running(router, config) as (service, _):
+async def test_uncalibrated_cameras_are_left_out_with_a_note(running: Callable, config: RigConfig, browse: Make) -> None:
+    async with running("viewer", serve, config) as (service, _):
+        await until(lambda: service.state == "running")
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
         status = await asyncio.to_thread(browser.wait_for, "GuiHtmlMessage")
         assert "camera left is not drawn: rig.json: no such file" in status["props"]["content"]
         assert "waiting for hand poses" in status["props"]["content"]
 
 
-async def test_nothing_is_done_while_nobody_looks(router: str, config: RigConfig, browse: Make, make_pose: Make) -> None:
-    async with running(router, config) as (service, bus):
+async def test_nothing_is_done_while_nobody_looks(running: Callable, config: RigConfig, browse: Make, make_pose: Make) -> None:
+    async with running("viewer", serve, config) as (service, bus):
+        await until(lambda: service.state == "running")
         publisher = bus.publisher(topics.POSE, hand="right")
         assert service.bus.streams == []
         assert not publisher.wanted
@@ -115,8 +90,11 @@ async def test_nothing_is_done_while_nobody_looks(router: str, config: RigConfig
             assert service.bus.streams == []
 
 
-async def test_pictures_are_asked_for_only_while_the_switch_is_on(router: str, config: RigConfig, browse: Make) -> None:
-    async with running(router, config) as (service, bus):
+async def test_pictures_are_asked_for_only_while_the_switch_is_on(
+    running: Callable, config: RigConfig, browse: Make, sending: Callable
+) -> None:
+    async with running("viewer", serve, config) as (service, bus):
+        await until(lambda: service.state == "running")
         publisher = bus.publisher(topics.PREVIEW, camera="left")
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
         switch = await asyncio.to_thread(browser.wait_for, "GuiCheckboxMessage", props=lambda p: p["label"] == "camera pictures")
