@@ -105,7 +105,7 @@ async def _connect(connect: Sequence[str]) -> zenoh.Session:
             return await asyncio.to_thread(zenoh.open, config)
         except zenoh.ZError as error:
             if not said:
-                log.warning("no router at %s yet, waiting for it: %s", ", ".join(connect), str(error)[:200])
+                log.warning("no router at %s yet, waiting for it: %s", ", ".join(connect), str(error).split(" at /")[0])
                 said = True
             await asyncio.sleep(_RETRY_S)
 
@@ -159,11 +159,11 @@ class Bus:
             self.streams.append(stats)
         return stats
 
-    async def get(self, topic: Topic[T], timeout_s: float = 1.0, **names: str) -> list[T]:
+    async def get(self, topic: Topic[T], timeout_s: float = 1.0, request: msgspec.Struct | None = None, **names: str) -> list[T]:
         """Answers to a query, decoded; those that do not decode are left out. Empty after timeout_s without any."""
         decoder = msgspec.json.Decoder(topic.message) if topic.message else None
         answers: list[T] = []
-        for payload, _ in await self._query(topic, timeout_s, names, clock.now_ns):
+        for payload, _ in await self._query(topic, timeout_s, names, clock.now_ns, request):
             if decoder is None:
                 answers.append(payload)  # type: ignore[arg-type]
                 continue
@@ -184,9 +184,10 @@ class Bus:
         return None
 
     async def _query(
-        self, topic: Topic[Any], timeout_s: float, names: dict[str, str], now_ns: Callable[[], int]
+        self, topic: Topic[Any], timeout_s: float, names: dict[str, str], now_ns: Callable[[], int], request: msgspec.Struct | None = None
     ) -> list[tuple[bytes, int]]:
         replies: list[tuple[bytes, int]] = []
+        asked = None if request is None else msgspec.json.encode(request)
         done: asyncio.Future[None] = self._loop.create_future()
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -202,7 +203,7 @@ class Bus:
             with contextlib.suppress(RuntimeError):  # the loop is gone, and nobody waits
                 self._loop.call_soon_threadsafe(finish)
 
-        self._session.get(topic.key(self.rig, **names), zenoh.handlers.Callback(on_reply, on_end), timeout=timeout_s)
+        self._session.get(topic.key(self.rig, **names), zenoh.handlers.Callback(on_reply, on_end), payload=asked, timeout=timeout_s)
         # Zenoh ends every query at its timeout; a second more covers a link that dies meanwhile.
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(done, timeout_s + 1.0)
@@ -231,6 +232,22 @@ class Bus:
                 except Exception as error:  # the asker waits: it must hear of any failure
                     log.exception("query %s failed", key)
                     query.reply_err(str(error))
+
+        self._open.append(self._session.declare_queryable(key, on_query))
+
+    def answer_requests(self, topic: Topic[Any], handler: Callable[[bytes], Awaitable[Answer]], **names: str) -> None:
+        """As answer(), with a coroutine function that takes the request's payload; a request larger than max_bytes gets no answer."""
+        key = topic.key(self.rig, **names)
+
+        async def answer_later(query: zenoh.Query) -> None:
+            with query:
+                payload = b"" if query.payload is None else query.payload.to_bytes()
+                await self._reply(query, key, topic, lambda: handler(payload))
+
+        def on_query(query: zenoh.Query) -> None:
+            if query.payload is None or len(query.payload) <= topic.max_bytes:
+                with contextlib.suppress(RuntimeError):
+                    self._loop.call_soon_threadsafe(self._spawn, answer_later(query))
 
         self._open.append(self._session.declare_queryable(key, on_query))
 

@@ -10,32 +10,44 @@ import os
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 import numpy as np
 
 from rhot.camera import Camera
+from rhot.camera_messages import Calibration, ColorRange, Colors, Exposure
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError
 from rhot.hand import HandModel, HandName, default_hand
+
+__all__ = [
+    "Calibration",
+    "CameraPlace",
+    "ColorRange",
+    "Colors",
+    "Exposure",
+    "Lens",
+    "ObjectPlace",
+    "Objects",
+    "RigGeometry",
+    "load",
+    "load_cameras",
+    "load_colors",
+    "load_exposure",
+    "load_geometry",
+    "load_hand",
+    "load_lens",
+    "load_objects",
+    "load_rig_cameras",
+    "save",
+]
 
 S = TypeVar("S", bound=msgspec.Struct)
 Row3 = tuple[float, float, float]
 Row4 = tuple[float, float, float, float]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]
-Hue = Annotated[int, msgspec.Meta(ge=0, le=179)]
-Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
 Size = Annotated[int, msgspec.Meta(ge=1, le=65536)]
-
-
-class Calibration(msgspec.Struct, frozen=True, kw_only=True):
-    """What every calibration file says of its making."""
-
-    date: str = ""
-    tool: str = ""
-    inputs: dict[str, Any] = {}
-    residuals: dict[str, Any] = {}
 
 
 class Lens(Calibration, frozen=True, kw_only=True):
@@ -44,28 +56,6 @@ class Lens(Calibration, frozen=True, kw_only=True):
     size_px: tuple[Size, Size]
     matrix: tuple[Row3, Row3, Row3]
     distortion: tuple[float, float, float, float, float]
-
-
-class ColorRange(msgspec.Struct, frozen=True, kw_only=True):
-    """OpenCV HSV bounds, both inclusive; a low hue above the high one wraps through red."""
-
-    hsv_low: tuple[Hue, Byte, Byte]
-    hsv_high: tuple[Hue, Byte, Byte]
-
-
-class Colors(Calibration, frozen=True, kw_only=True):
-    """<camera>.colors.json"""
-
-    colors: dict[str, ColorRange]
-
-
-class Exposure(Calibration, frozen=True, kw_only=True):
-    """<camera>.exposure.json"""
-
-    exposure_us: Annotated[float, msgspec.Meta(gt=0.0)]
-    gain: Annotated[float, msgspec.Meta(ge=0.0)]
-    red_gain: Annotated[float, msgspec.Meta(ge=0.0)]
-    blue_gain: Annotated[float, msgspec.Meta(ge=0.0)]
 
 
 class CameraPlace(msgspec.Struct, frozen=True, kw_only=True):
@@ -92,7 +82,7 @@ class Objects(Calibration, frozen=True, kw_only=True):
     """objects.json"""
 
     T_rig_from_lighthouse: Matrix4
-    objects: dict[str, ObjectPlace] = {}
+    objects: dict[str, ObjectPlace] = msgspec.field(default_factory=dict)
 
 
 def load(path: Path, kind: type[S], command: str) -> S:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
+import rhot.camera_messages as c
 import rhot.messages as m
 from rhot.errors import BusError
 
@@ -145,6 +146,19 @@ SIM_FRAME: Topic[bytes] = Topic(
     40_000_000,
     "rhot-sim",
 )
+COLORS = Topic("camera/{camera}/colors", c.Colors, Kind.STATE, Rate.DEMAND, Priority.DATA, False, "colour ranges; a put changes them")
+EXPOSURE = Topic(
+    "camera/{camera}/exposure",
+    c.ExposureControl,
+    Kind.STATE,
+    Rate.DEMAND,
+    Priority.DATA,
+    False,
+    "exposure in force; a put changes it, or runs the automatics once",
+)
+FIT = Topic(
+    "camera/{camera}/fit", c.FitResult, Kind.QUERY, Rate.DEMAND, Priority.BACKGROUND, False, "ranges fitted to the patches of a FitRequest"
+)
 SESSION = Topic("control/session", m.Session, Kind.STATE, Rate.DEMAND, Priority.REAL_TIME, True, "the start broadcast")
 CLOCK = Topic("control/clock", m.ClockEcho, Kind.QUERY, Rate.DEMAND, Priority.REAL_TIME, False, "the master's clock")
 HEALTH = Topic("service/{service}/{instance}/health", m.Health, Kind.STREAM, Rate.BEAT, Priority.DATA, True, "state of each service")
@@ -162,6 +176,9 @@ TOPICS: tuple[Topic, ...] = (
     PREVIEW,
     FRAME,
     SIM_FRAME,
+    COLORS,
+    EXPOSURE,
+    FIT,
     SESSION,
     CLOCK,
     HEALTH,

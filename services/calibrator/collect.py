@@ -13,8 +13,8 @@ from enum import Enum
 import numpy as np
 
 from rhot.transforms import Array
-from services.calibrator.adjust import View
 from services.calibrator.boards import Board
+from services.calibrator.bundle import View
 from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
 from services.calibrator.start import board_pose, centred

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.transforms import Array, inverse, transform
-from services.calibrator.adjust import Free, State, View, adjust, rms
+from services.calibrator.adjust import Free, adjust
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View, rms
 from services.calibrator.model import FX, FY, rays
 from services.calibrator.triangulate import epipolar_px, rigid_fit, triangulate
 

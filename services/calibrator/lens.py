@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.transforms import Array
-from services.calibrator.adjust import Adjusted, Free, State, View, adjust, rms
+from services.calibrator.adjust import Adjusted, Free, adjust
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View, rms
 from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
-from services.calibrator.lens_checks import check_lens, check_views, contradicting
+from services.calibrator.lens_checks import check_fit, check_lens, check_views, contradicting
 from services.calibrator.lens_models import USUAL, LensModel, choose, folds
 from services.calibrator.model import rays
 from services.calibrator.start import calibrate_lens, with_poses
@@ -74,6 +75,7 @@ def calibrate_camera(camera: str, detections: dict[str, Detection], board: Board
     """
     size_px, kept, left_out = same_size(camera, detections)
     fit, contrary = fit_lens(camera, size_px, kept, board)
+    check_fit(camera, size_px, fit.found, [view.pixels for view in fit.views])
     model, _ = choose(lambda model: _held_out_rms(fit, model))
     fit = Fit(fit.keys, fit.views, _refit(fit, model))
     pictures = _picture_errors(fit, model, board)

@@ -19,6 +19,8 @@ _OFF_TIMES, _OFF_PX = 4.0, 0.6
 _OFF_SHARE = 0.34
 # One sigma of the focal length: 1 % of it is 1 % of every distance. The real pairs reach .08 %, a board never tilted 5 % and more.
 _FOCAL_REFUSED, _FOCAL_WARNED = 0.02, 0.004
+# RMS of the fit, px at 640 px width. The real pairs reach .17; blurred and moving boards stay below 1.
+_RMS_REFUSED = 3.0
 # Focal lengths in picture widths of lenses that this model describes: fields of view of 130 to 3 degrees.
 _FOCALS = (0.23, 20.0)
 # Boards this parallel leave focal length and distance inseparable. The real pairs span 60 degrees.
@@ -53,6 +55,11 @@ def contradicting(errors: list[float], width_px: int) -> list[int]:
 
 def check_fit(camera: str, size_px: tuple[int, int], fit: Adjusted, corners: list[Array]) -> None:
     """Raise CalibrationError, with the reason, if a lens fitted to these corners (n, 2) by view must not be used."""
+    if not fit.rms_px <= _RMS_REFUSED * size_px[0] / 640.0:
+        raise CalibrationError(
+            f"camera {camera!r}: no lens explains the pictures; their corners are {fit.rms_px:.1f} px off (.2 is good). Is "
+            "--board its number of inner corners, is the board flat, are all pictures of the same camera, lens and focus?"
+        )
     seen = coverage(size_px, corners, list(fit.state.T_rig_from_board))
     check_lens(camera, size_px, fit.state.lenses[0], fit.lens_sigma[0], 0.0, seen)
 
@@ -96,8 +103,8 @@ def _refuse_geometry(camera: str, size_px: tuple[int, int], lens: Array, focal: 
     inside = 0 <= lens[CX] < size_px[0] and 0 <= lens[CY] < size_px[1]
     if not (inside and all(_FOCALS[0] <= lens[name] / size_px[0] <= _FOCALS[1] for name in (FX, FY))):
         raise CalibrationError(
-            f"camera {camera!r}: the pictures do not determine the lens: the best fit has its centre at {lens[CX]:.0f}, {lens[CY]:.0f} px and "
-            f"a focal length of {lens[FX]:.0f} px, which no camera has. {_HOW_TO}"
+            f"camera {camera!r}: the pictures do not determine the lens: the best fit has its centre at {lens[CX]:.0f}, {lens[CY]:.0f} px "
+            f"and a focal length of {lens[FX]:.0f} px, which no camera has. Was the board never tilted? {_HOW_TO}"
         )
     span = f"its normals are at most {seen.normals_deg:.0f} degrees apart, its tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f}"
     if seen.normals_deg < _PARALLEL_DEG:

@@ -13,8 +13,9 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from rhot.transforms import Array
-from services.calibrator.adjust import Free, State, View, adjust, rms
+from services.calibrator.adjust import Free, adjust
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View, rms
 from services.calibrator.ordering import mirrored, turns
 from services.calibrator.start import Relation, board_pose, relate
 

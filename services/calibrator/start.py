@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from rhot.transforms import Array, inverse, transform
-from services.calibrator.adjust import Adjusted, Free, State, View, adjust, rms
+from services.calibrator.adjust import Adjusted, Free, adjust
+from services.calibrator.bundle import State, View, rms
 from services.calibrator.model import CX, CY, FX, FY, K1, K2, project, rays
 
 # Focal lengths tried, in picture widths: fields of view of 127 to 14 degrees, 20 % apart.

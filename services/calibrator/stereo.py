@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.transforms import Array
-from services.calibrator.adjust import Adjusted, Free, State, View, adjust, pixel_errors, rms
+from services.calibrator.adjust import Adjusted, Free, adjust
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View, pixel_errors, rms
 from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
 from services.calibrator.heldout import BoardError, board_error

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from services.calibrator.adjust import State, View
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View
 from services.calibrator.detect import Detection
 
 

@@ -13,8 +13,9 @@ import numpy as np
 from rhot.camera import Camera
 from rhot.errors import CalibrationError
 from rhot.transforms import Array, inverse, transform
-from services.calibrator.adjust import Free, State, View, adjust
+from services.calibrator.adjust import Free, adjust
 from services.calibrator.boards import Board
+from services.calibrator.bundle import State, View
 from services.calibrator.detect import Detection
 from services.calibrator.files import rows
 from services.calibrator.model import lens_vector

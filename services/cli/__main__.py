@@ -10,9 +10,11 @@ import typer
 from rhot.errors import RhotError, leaves
 from rhot.lifecycle import EXIT_USER
 from rhot.service import rhot_version
+from services.cli.calibrate import calibrate
 from services.cli.check import check
 from services.cli.demo import demo
 from services.cli.plot import plot
+from services.cli.print_board import board
 from services.cli.record import record
 from services.cli.replay import replay
 from services.cli.router import router
@@ -24,7 +26,7 @@ from services.cli.track import track
 from services.cli.up import up
 from services.cli.warm import warm
 
-COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check, warm)
+COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check, board, warm)
 
 
 def _version(wanted: bool) -> None:
@@ -40,6 +42,7 @@ def application() -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,
         help="Real-time hand and object tracking from low-cost parts.",
     )
 
@@ -49,6 +52,7 @@ def application() -> typer.Typer:
 
     for function in COMMANDS:
         app.command(name=function.__name__)(function)
+    app.add_typer(calibrate)
     return app
 
 

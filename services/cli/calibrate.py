@@ -16,6 +16,7 @@ calibrate = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     help="Measure lenses, the rig, the desk, ... and write calibration files.",
 )
 for _command in COMMANDS:

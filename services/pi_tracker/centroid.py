@@ -18,8 +18,10 @@ their sigma and quality say so.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -28,7 +30,7 @@ from services.pi_tracker.frame import Image
 from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture
 from services.pi_tracker.search import Blob
-from services.pi_tracker.tiles import Tiles, doubled, flat, moments, stacked
+from services.pi_tracker.tiles import Tiles, doubled, flat, halved, moments, stacked
 
 _SQUARE = np.ones((3, 3), np.uint8)
 _WIDE = np.ones((5, 5), np.uint8)
@@ -58,8 +60,7 @@ _CUT_SIGMA, _CUT_QUALITY = 0.15, 0.4
 _STACK_CELLS = 26
 
 
-@dataclass(frozen=True)
-class Centroid:
+class Centroid(NamedTuple):
     """Position of a blob in px, covered area in px^2, one standard deviation of each coordinate in px, quality 0..1."""
 
     x_px: float
@@ -87,23 +88,22 @@ def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid
     reach = _dilated(tiles.mask, _SQUARE)
     paint = _paint(tiles, reach)
     share = doubled(paint.offset) - tiles.luma * doubled(paint.slope)
-    weight = np.clip(_SLOPE * share + (0.5 - 0.5 * _SLOPE), 0.0, 1.0)
+    weight = _SLOPE * share + (0.5 - 0.5 * _SLOPE)
+    np.minimum(weight, 1.0, out=weight)
+    np.maximum(weight, 0.0, out=weight)
     weight *= doubled(reach, cv2.INTER_NEAREST)
-    sums = moments(weight, 1)  # (n, 2, 2)
-    area = sums[:, 0, 0]
-    x, y = sums[:, 0, 1] / np.maximum(area, 1.0), sums[:, 1, 0] / np.maximum(area, 1.0)
     # Where clipping holds the weight, noise does not move it.
-    moving = np.logical_and(weight > 0.0, weight < 1.0).astype(np.float32)
-    n, h, w = reach.shape
-    moving = cv2.resize(flat(moving), (w, n * h), interpolation=cv2.INTER_AREA).reshape(n, h, w)
-    sigma = np.hypot(_sigma(moving * paint.variance(noise), area, x, y), _misfit(4.0 * moments(moving, 0)[:, 0, 0], area))
-    found = np.stack([area, x, y, sigma, paint.contrast], axis=1).tolist()
-    return [_centroid(tiles, k, blob, *values) for k, (blob, values) in enumerate(zip(blobs, found, strict=True))]
+    moving = halved(np.logical_and(weight > 0.0, weight < 1.0).astype(np.float32))
+    sums = moments(weight, 1).swapaxes(0, 1).tolist()
+    spreads = moments(moving * paint.variance(noise), 2).swapaxes(0, 1).tolist()
+    moved = (4.0 * moments(moving, 0).ravel()).tolist()
+    contrast = paint.contrast.tolist()
+    return [_centroid(tiles, k, blob, sums[k], spreads[k], moved[k], contrast[k]) for k, blob in enumerate(blobs)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Paint:
-    """The share of paint of a pixel as offset - slope * Y, per cell, (n, h, w)."""
+    """The share of paint of a pixel as offset - slope * Y, per cell, (h, n, w)."""
 
     offset: Image
     slope: Image
@@ -113,34 +113,32 @@ class _Paint:
     contrast: Image
 
     def variance(self, noise: Noise) -> Image:
-        """Of the share, for the mean of a cell's four pixels; (n, h, w)."""
+        """Of the share, for the mean of a cell's four pixels; (h, n, w)."""
         return (self.slope * noise.luma) ** 2 + self.by_chroma2 * noise.chroma**2
 
 
 def _paint(tiles: Tiles, reach: Image) -> _Paint:
     ring = (_dilated(reach, _WIDE) - reach) & tiles.inside
-    behind, around = _carried(tiles.cells, ring, _BACKGROUND_CELLS)
-    pure, paint = _carried(tiles.cells, _cores(tiles.mask), _PAINT_CELLS)
-    y_b, y_p = np.maximum(behind[..., 0], _DARKEST), np.maximum(pure[..., 0], _DARKEST)
-    s_u, s_v = behind[..., 1] / y_b, behind[..., 2] / y_b
-    p_u, p_v = (paint[:, 1:3] / np.maximum(paint[:, :1], _DARKEST)).T[:, :, None, None]
-    d_u, d_v = p_u - s_u, p_v - s_v
+    (y_b, u_b, v_b), around = _carried(tiles.cells, ring, _BACKGROUND_CELLS)
+    (y_p, *_), paint = _carried(tiles.cells, _cores(tiles.mask), _PAINT_CELLS)
+    y_b, y_p = np.maximum(y_b, _DARKEST), np.maximum(y_p, _DARKEST)
+    s_u, s_v = u_b / y_b, v_b / y_b
+    p_uv, s_uv = paint[1:3] / np.maximum(paint[0], _DARKEST), around[1:3] / np.maximum(around[0], _DARKEST)  # (2, n)
+    d_u, d_v = p_uv[0, :, None] - s_u, p_uv[1, :, None] - s_v
     norm = np.maximum(d_u * d_u + d_v * d_v, 1e-6)
     scale = 1.0 / (y_p * y_p + y_b * y_b)
-    p, q = (y_p + y_b) * scale, y_b * scale
-    p_norm = p / norm
+    p_norm, q = (y_p + y_b) * scale / norm, y_b * scale
     g_u, g_v = d_u * p_norm, d_v * p_norm
-    far = paint[:, 1:3] / np.maximum(paint[:, :1], _DARKEST) - around[:, 1:3] / np.maximum(around[:, :1], _DARKEST)
-    offset = tiles.cells[..., 1] * g_u + tiles.cells[..., 2] * g_v + y_b * q
-    return _Paint(offset, s_u * g_u + s_v * g_v + q, p * p_norm, np.hypot(far[:, 0], far[:, 1]))
+    offset = tiles.cells[:, 1] * g_u + tiles.cells[:, 2] * g_v + y_b * q
+    return _Paint(offset, s_u * g_u + s_v * g_v + q, p_norm * p_norm * norm, np.hypot(*(p_uv - s_uv)))
 
 
 def _cores(mask: Image) -> Image:
     """The masks without their edges, where anything is left of them."""
     core = cv2.erode(flat(mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0).reshape(mask.shape)
-    few = core.sum((1, 2)) < _MIN_CORE
+    few = core.sum((0, 2)) < _MIN_CORE
     if few.any():
-        core[few] = mask[few]
+        core[:, few] = mask[:, few]
     return core
 
 
@@ -149,39 +147,29 @@ def _dilated(masks: Image, element: Image) -> Image:
 
 
 def _carried(cells: Image, known: Image, size: int) -> tuple[Image, Image]:
-    """Cells where they are known, averaged over size x size, and their mean where that does not reach: (n, h, w, 4), and the means (n, 4)."""
-    n, h, w, _ = cells.shape
-    kept = cells * known[..., None]
-    total = np.ones((1, h * w), np.float32) @ kept.reshape(n, h * w, 4)  # (n, 1, 4)
-    mean = total[:, 0] / np.maximum(total[:, 0, 3:], 1.0)
-    window = cv2.boxFilter(flat(kept), -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT).reshape(n, h, w, 4)
+    """Y, U, V where they are known, averaged over size x size cells, and their mean where that does not reach.
+
+    cells (h, 4, n, w), known (h, n, w) -> (3, h, n, w), and the means (3, n).
+    """
+    h, _, n, w = cells.shape
+    kept = cells * known[:, None]
+    total = moments(kept.reshape(h, 4 * n, w), 0).reshape(4, n)
+    mean = total[:3] / np.maximum(total[3], 1.0)
+    window = cv2.boxFilter(flat(kept), -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT).reshape(kept.shape)
     # The mean counts as a hundredth of a cell: nothing beside known ones, everything where there are none.
-    window += 0.01 * mean[:, None, None]
-    return window / np.maximum(window[..., 3:], 1e-6), mean
+    window[:, :3] += 0.01 * mean[:, :, None]
+    return (window[:, :3] / (window[:, 3:] + 0.01)).swapaxes(0, 1), mean
 
 
-def _sigma(variance: Image, area: Image, x: Image, y: Image) -> Image:
-    """Standard deviation of each coordinate from the noise, px; variance (n, h, w) of cells that can move, the others (n,)."""
-    sums = moments(variance, 2)  # (n, 3, 3)
-    # Cells' own coordinates, of which one is two pixels wide.
-    x, y = (x - 0.5) / 2.0, (y - 0.5) / 2.0
-    spread = sums[:, 0, 2] + sums[:, 2, 0] - 2.0 * (x * sums[:, 0, 1] + y * sums[:, 1, 0]) + (x * x + y * y) * sums[:, 0, 0]
-    # Four pixels that move together: 4^2 times the cell's variance; pixels for cells: 2^2; the mean of two coordinates: 1 / 2.
-    total = 32.0 * _SLOPE**2 * np.maximum(spread, 0.0)
-    return np.sqrt(total) / np.maximum(area, 1.0)
-
-
-def _misfit(moving_px: Image, area: Image) -> Image:
-    """Standard deviation of each coordinate from light and blur, px; (n,)."""
-    radius = np.sqrt(area / np.pi)
-    # The band of a disc has an area of 2 pi r times its width.
-    band_px = moving_px / np.maximum(2.0 * np.pi * radius, 1.0)
-    return radius * (_MISFIT + _MISFIT_PER_PX * np.maximum(band_px - _SHARP_PX, 0.0))
-
-
-def _centroid(tiles: Tiles, k: int, blob: Blob, area: float, x: float, y: float, sigma: float, contrast: float) -> Centroid:
+def _centroid(
+    tiles: Tiles, k: int, blob: Blob, sums: list[list[float]], spread: list[list[float]], moving_px: float, contrast: float
+) -> Centroid:
+    """From the tile's moments: of the weights, and of the variance of those that noise can move."""
+    area = sums[0][0]
     if area < 1.0:
         return Centroid(blob.x_px, blob.y_px, blob.area_px, _LOST_SIGMA_PX, 0.0)
+    x, y = sums[0][1] / area, sums[1][0] / area
+    sigma = math.hypot(_sigma(spread, area, x, y), _misfit(moving_px, area))
     left, top, right, bottom = blob.rect
     # A disc fills pi / 4 of its box.
     quality = min(1.0, blob.cells / (0.7 * (right - left) * (bottom - top))) * min(1.0, contrast / _CONTRAST)
@@ -189,3 +177,20 @@ def _centroid(tiles: Tiles, k: int, blob: Blob, area: float, x: float, y: float,
         quality *= _CUT_QUALITY
         sigma += _CUT_SIGMA * area**0.5
     return Centroid(2 * tiles.origins[k][0] + x, 2 * tiles.origins[k][1] + y, area, sigma, quality)
+
+
+def _sigma(spread: list[list[float]], area: float, x: float, y: float) -> float:
+    """Standard deviation of each coordinate from the noise, px; spread has the moments of the cells' variances."""
+    # Cells' own coordinates, of which one is two pixels wide.
+    x, y = (x - 0.5) / 2.0, (y - 0.5) / 2.0
+    about = spread[0][2] + spread[2][0] - 2.0 * (x * spread[0][1] + y * spread[1][0]) + (x * x + y * y) * spread[0][0]
+    # Four pixels that move together: 4^2 times the cell's variance; pixels for cells: 2^2; the mean of two coordinates: 1 / 2.
+    return _SLOPE * math.sqrt(32.0 * max(about, 0.0)) / area
+
+
+def _misfit(moving_px: float, area: float) -> float:
+    """Standard deviation of each coordinate from light and blur, px."""
+    radius = math.sqrt(area / math.pi)
+    # The band of a disc has an area of 2 pi r times its width.
+    band_px = moving_px / (2.0 * math.pi * radius)
+    return radius * (_MISFIT + _MISFIT_PER_PX * max(band_px - _SHARP_PX, 0.0))

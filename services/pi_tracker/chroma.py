@@ -6,6 +6,7 @@ A cell without light has no colour: its hue and saturation are those of noise, a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,8 @@ import numpy.typing as npt
 from services.pi_tracker.frame import Frame
 from services.pi_tracker.planes import picture
 
-Array = npt.NDArray[np.float64]
+# Mostly float64; OpenCV's stubs do not say the type of what it returns.
+Array = npt.NDArray[Any]
 Mask = npt.NDArray[np.bool_]
 
 # As in colors.py: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U', L = 1.164 (Y - 16).
@@ -56,8 +58,8 @@ class Cells:
         value = np.maximum(_LUMA_GAIN * self.y + top, 1.0)
         return np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0), np.minimum(255.0 * spread / value, 255.0), np.minimum(value, 255.0)
 
-    def __getitem__(self, where: object) -> Cells:
-        return Cells(self.y[where], self.u[where], self.v[where])  # type: ignore[index]
+    def __getitem__(self, where: Any) -> Cells:
+        return Cells(self.y[where], self.u[where], self.v[where])
 
 
 def cells_of(frame: Frame) -> Cells:
@@ -77,9 +79,14 @@ def joined(parts: list[Cells]) -> Cells:
     return Cells(y, u, v)
 
 
-def hue_from(hue: Array, centre: float) -> Array:
+def hue_from(hue: Array, centre: float | Array) -> Array:
     """Signed distance of hues from a centre, -90..90."""
     return (hue - centre + 90.0) % 180.0 - 90.0
+
+
+def hue_apart(hue: float, other: float) -> float:
+    """Signed distance of one hue from another, -90..90."""
+    return (hue - other + 90.0) % 180.0 - 90.0
 
 
 def mean_hue(hue: Array, weight: Array) -> float:

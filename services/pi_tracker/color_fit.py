@@ -15,12 +15,14 @@ import numpy as np
 
 from rhot.calibration import ColorRange
 from rhot.errors import CalibrationError
-from services.pi_tracker.chroma import Array, Cells, Mask, cells_of, hue_from, joined, looks_like_skin, mean_hue
+from services.pi_tracker.chroma import Array, Cells, Mask, cells_of, hue_apart, hue_from, joined, looks_like_skin, mean_hue
 from services.pi_tracker.frame import Frame
 from services.pi_tracker.swatch import Pointer, Swatch, find_swatch
 
 # Share of a patch's cells left outside on each side of a bound: rims, highlights, and what else is no paint.
 _TAIL = 0.02
+# One paint's hue varies no more than this between pictures; the next paint of a set of six is 20 away.
+_SAME_HUE = 12.0
 # Hues beyond those quantiles: another pose, a little less light. Simulated paints turn by 2 to 3 between poses; half of the distance
 # to a neighbour if that is less.
 _HUE_MARGIN, _LEAST_HUE_MARGIN = 5.0, 2.0
@@ -33,14 +35,14 @@ _PALE = 0.10
 _SATURATION_SHARE, _VALUE_SHARE = (0.65, 0.92), (0.5, 0.75)
 # ... but never lower: below a value of 25 hue is noise; below a saturation of 25, white balance.
 _LEAST_SATURATION, _LEAST_VALUE = 25.0, 25.0
-# Steps in which those bounds are raised, and how much more than the least that is foreign may stay inside.
-_STEPS, _SPARE = 10, 1.5
+# Steps in which those bounds are raised, and which share of what could be kept out may stay inside.
+_STEPS, _SPARE = 10, 0.15
 # A bound that leaves more than this share of what is foreign inside does not help.
 _USELESS = 0.3
-# A foreign cell or two per picture is noise, and the tracker's filters take it away.
-_STRAY_CELLS = 2.0
-# Rim of a patch, in cells, that is neither paint nor background: blur, and the light that paint throws on skin.
-_RIM = 3
+# One foreign cell per picture is noise, and the tracker's filters take it away.
+_STRAY_CELLS = 1.0
+# Rim of a patch, in cells and as share of its size, that is neither paint nor background: blur, and the light that paint throws on skin.
+_RIM, _RIM_SHARE = 3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,44 +56,23 @@ class Samples:
     room: Cells  # (k,)
 
     @property
-    def frames(self) -> int:
-        return len({swatch.frame for swatch in self.swatches})
+    def frames(self) -> list[int]:
+        """The pictures, by number."""
+        return sorted({swatch.frame for swatch in self.swatches})
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
-    """A range before rounding: hue as centre and bounds about it, saturation, value."""
+class Study:
+    """Pictures, the patches in them, and notes on pointers that were left out."""
 
-    centre: float
-    low: float
-    high: float
-    saturation: tuple[float, float]
-    value: tuple[float, float]
-
-    def takes(self, cells: Cells) -> Mask:
-        """Which cells lie in it."""
-        hue, saturation, value = cells.hsv()
-        off = hue_from(hue, self.centre)
-        return (
-            (off >= self.low)
-            & (off <= self.high)
-            & (saturation >= self.saturation[0])
-            & (saturation <= self.saturation[1])
-            & (value >= self.value[0])
-            & (value <= self.value[1])
-        )
-
-    def rounded(self) -> ColorRange:
-        """As people edit it."""
-        low, high = round(self.centre + self.low) % 180, round(self.centre + self.high) % 180
-        return ColorRange(
-            hsv_low=(low, round(self.saturation[0]), round(self.value[0])),
-            hsv_high=(high, round(self.saturation[1]), round(self.value[1])),
-        )
+    cells: list[Cells]  # (h, w) each
+    covered: list[Mask]  # (h, w) each: patches with their rims
+    samples: dict[str, Samples]
+    notes: list[str]
 
 
-def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> tuple[dict[str, Samples], list[str]]:
-    """The samples of every colour, and a note for each pointer that showed nothing while another of its colour did.
+def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> Study:
+    """The samples of every colour; a pointer that shows nothing, or another colour than the rest, is noted and left out.
 
     frames are in the order of Pointer.frame. Raises CalibrationError if a colour has no pointer that shows it.
     """
@@ -110,9 +91,26 @@ def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> tuple[dict[s
     for color, found in swatches.items():
         if not found:
             raise CalibrationError(failures[color][0])
+    notes = [f"{text} (left out: the colour was found in other pictures)" for texts in failures.values() for text in texts]
+    for color, found in swatches.items():
+        swatches[color], odd = _agreeing(found, cells)
+        notes += [
+            f"{color} in picture {s.frame}: has another hue than in the others (left out: was something else pointed at?)" for s in odd
+        ]
     covered = [_covered([s for found in swatches.values() for s in found], number, part.shape) for number, part in enumerate(cells)]
-    notes = [f"{text} (left out; the colour was found in other pictures)" for texts in failures.values() for text in texts]
-    return {color: _samples(color, found, cells, covered) for color, found in swatches.items()}, notes
+    return Study(cells, covered, {color: _samples(color, found, cells, covered) for color, found in swatches.items()}, notes)
+
+
+def _agreeing(swatches: list[Swatch], cells: list[Cells]) -> tuple[list[Swatch], list[Swatch]]:
+    """Patches of like hue, and the odd ones among three or more; of two nobody knows which is wrong."""
+    if len(swatches) < 3:
+        return swatches, []
+    hues = np.array([_hues(cells[s.frame][s.core])[0] for s in swatches])
+    near = np.abs(hue_from(hues[:, None], hues[None, :])) <= _SAME_HUE
+    kept = near[int(np.argmax(near.sum(1)))]
+    if 2 * np.count_nonzero(kept) <= len(swatches):
+        return swatches, []
+    return [s for s, keep in zip(swatches, kept, strict=True) if keep], [s for s, keep in zip(swatches, kept, strict=True) if not keep]
 
 
 def _covered(swatches: Sequence[Swatch], number: int, shape: tuple[int, ...]) -> Mask:
@@ -120,8 +118,9 @@ def _covered(swatches: Sequence[Swatch], number: int, shape: tuple[int, ...]) ->
     mask = np.zeros(shape, np.uint8)
     for swatch in swatches:
         if swatch.frame == number:
-            mask |= swatch.mask.astype(np.uint8)
-    return cv2.dilate(mask, np.ones((2 * _RIM + 1, 2 * _RIM + 1), np.uint8)).astype(bool)
+            rim = max(_RIM, round(_RIM_SHARE * np.count_nonzero(swatch.whole) ** 0.5))
+            mask = np.maximum(mask, cv2.dilate(swatch.whole.astype(np.uint8), np.ones((2 * rim + 1, 2 * rim + 1), np.uint8)))
+    return mask.astype(bool)
 
 
 def _samples(color: str, swatches: list[Swatch], cells: list[Cells], covered: list[Mask]) -> Samples:
@@ -138,7 +137,7 @@ def fit(samples: Mapping[str, Samples]) -> dict[str, ColorRange]:
     for color, own in samples.items():
         foreign = joined([own.skin, own.room, *(other.paint for name, other in samples.items() if name != color)])
         near = [hues[name] for name in samples if name != color]
-        ranges[color] = _band(own, hues[color], near, foreign).rounded()
+        ranges[color] = _range(own, hues[color], near, foreign)
     return ranges
 
 
@@ -158,7 +157,7 @@ def _quantile(values: Array, weight: Array, share: float) -> float:
     return float(values[order][min(int(np.searchsorted(total, share * total[-1])), len(order) - 1)])
 
 
-def _band(own: Samples, hues: tuple[float, float, float], near: Sequence[tuple[float, float, float]], foreign: Cells) -> Band:
+def _range(own: Samples, hues: tuple[float, float, float], near: Sequence[tuple[float, float, float]], foreign: Cells) -> ColorRange:
     centre, low, high = hues
     low, high = low - _margin(hues, near, -1), high + _margin(hues, near, 1)
     _, saturation, value = own.paint.hsv()
@@ -167,12 +166,16 @@ def _band(own: Samples, hues: tuple[float, float, float], near: Sequence[tuple[f
     # The less chroma the more its noise turns the hue.
     turn = np.minimum(_CHROMA_NOISE / np.maximum(foreign.chroma, 1.0), 1.0) * _HUE_RADIAN
     alike = (off >= low - turn) & (off <= high + turn)
-    stray = _STRAY_CELLS * own.frames
+    stray = _STRAY_CELLS * len(own.frames)
     palest, richest = (float(np.quantile(saturation, share)) for share in (_PALE, 1.0 - _TAIL))
     darkest = float(np.quantile(value, _TAIL))
     saturation_low, value_low = _floors(palest, darkest, foreign_saturation[alike], foreign_value[alike], stray)
     alike &= (foreign_saturation >= saturation_low) & (foreign_value >= value_low)
-    return Band(centre, low, high, (saturation_low, _ceiling(richest, foreign_saturation[alike], stray)), (value_low, 255.0))
+    saturation_high = _ceiling(richest, foreign_saturation[alike], stray)
+    return ColorRange(
+        hsv_low=(round(centre + low) % 180, round(saturation_low), round(value_low)),
+        hsv_high=(round(centre + high) % 180, round(saturation_high), 255),
+    )
 
 
 def _margin(hues: tuple[float, float, float], near: Sequence[tuple[float, float, float]], side: int) -> float:
@@ -181,7 +184,7 @@ def _margin(hues: tuple[float, float, float], near: Sequence[tuple[float, float,
     edge = high if side > 0 else -low
     margin = _HUE_MARGIN
     for other, other_low, other_high in near:
-        apart = side * float(hue_from(np.float64(other), centre))
+        apart = side * hue_apart(other, centre)
         gap = apart + (other_low if side > 0 else -other_high) - edge
         # Behind it, or mixed with it: then hue does not part the two, and the report says so.
         if apart > 0.0 and gap > 0.0:
@@ -198,14 +201,13 @@ def _floors(palest: float, darkest: float, saturation: Array, value: Array, stra
     values = np.maximum(np.linspace(*_VALUE_SHARE, _STEPS) * darkest, _LEAST_VALUE)
     inside = np.array([[np.count_nonzero((saturation >= s) & (value >= v)) for v in values] for s in saturations])
     least = float(inside[-1, -1])
-    if inside[0, 0] <= stray or least > max(stray, _USELESS * inside[0, 0]):
-        # Nothing to keep out; or it cannot be kept out, and only paint would be lost.
+    if inside[0, 0] <= stray:
         return float(saturations[0]), float(values[0])
-    good = inside <= max(stray, _SPARE * least)
+    good = inside <= max(stray, least + _SPARE * (inside[0, 0] - least))
     effort = np.add.outer(np.arange(_STEPS), np.arange(_STEPS)).astype(np.float64)
-    i, j = np.unravel_index(int(np.argmin(np.where(good, effort, np.inf))), good.shape)
+    i, j = divmod(int(np.argmin(np.where(good, effort, np.inf))), _STEPS)
     # A step more, as the next picture's noise is another.
-    return float(saturations[min(i + 1, _STEPS - 1)] if i else saturations[0]), float(values[j])
+    return float(saturations[min(i + 1, _STEPS - 1)]), float(values[j])
 
 
 def _ceiling(richest: float, saturation: Array, stray: float) -> float:

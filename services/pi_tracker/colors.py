@@ -12,7 +12,6 @@ light blue), the second goes to another layer. Pure; a colour that is missing in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -31,27 +30,34 @@ _LUMA_GAIN = 255.0 / 219.0
 _RED_V, _GREEN_U, _GREEN_V, _BLUE_U = 1.596027, -0.391762, -0.812968, 2.017232
 
 
-@dataclass(frozen=True, eq=False)
 class ColorTable:
-    """Compiled colours: class k + 1 is names[k]; layers are (65536,) uint32 of the bytes class, low luma, high luma, 0."""
+    """Compiled colours: class k + 1 is names[k]; layers are (65536,) uint32 of the bytes class, low luma, high luma, 0.
 
-    names: tuple[str, ...]
-    layers: tuple[npt.NDArray[np.uint32], ...]
+    Belongs to one thread: it owns the buffers it works in.
+    """
+
+    def __init__(self, names: tuple[str, ...], layers: tuple[npt.NDArray[np.uint32], ...]) -> None:
+        self.names = names
+        self.layers = layers
+        self._buffer = np.empty((4, 0), np.uint8)
 
     def classify(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
         index = chroma.view(np.uint16)[:, :, 0]
-        labels = _gated(self.layers[0], index, luma)
+        labels = self._gated(self.layers[0], index, luma)
         for layer in self.layers[1:]:
             # Layers never claim the same cell: they share chromas, not lumas.
-            labels = np.maximum(labels, _gated(layer, index, luma))
+            labels = np.maximum(labels.copy(), self._gated(layer, index, luma))
         return labels
 
-
-def _gated(layer: npt.NDArray[np.uint32], index: npt.NDArray[np.uint16], luma: Image) -> Image:
-    found = layer.take(index).view(np.uint8).reshape(*luma.shape, 4)
-    classes, low, high, _ = cv2.split(found)
-    return cv2.bitwise_and(classes, cv2.inRange(luma, low, high))
+    def _gated(self, layer: npt.NDArray[np.uint32], index: npt.NDArray[np.uint16], luma: Image) -> Image:
+        if self._buffer.shape[1] < luma.size:
+            self._buffer = np.empty((4, luma.size), np.uint8)
+        # Fresh memory for the planes would cost four times what splitting costs.
+        classes, low, high, rest = planes = [plane[: luma.size].reshape(luma.shape) for plane in self._buffer]
+        cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4), planes)
+        cv2.inRange(luma, low, high, rest)
+        return cv2.bitwise_and(classes, rest, classes)
 
 
 def compile_colors(colors: Colors, wanted: Sequence[str], path: Path | str = "colors.json") -> ColorTable:

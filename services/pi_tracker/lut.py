@@ -38,6 +38,7 @@ class LutFinder:
         self._searches = 0
         self._identity = Identity(len(table.names), settings.roi_margin_px)
         self._boxes: dict[int, Rect] = {}
+        self._margin_px = settings.roi_margin_px
 
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image, at most one per colour."""
@@ -48,7 +49,9 @@ class LutFinder:
         chosen = {color: choice for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if choice is not None}
         self._lap("identity")
         # A marker that strayed from the others is looked for everywhere the next time.
-        self._boxes = {color: choice.blob.rect for color, choice in chosen.items() if choice.support >= _LEAST_SUPPORT}
+        boxes = {color: choice.blob.rect for color, choice in chosen.items() if choice.support >= _LEAST_SUPPORT}
+        self._margin_px = roi.margin(self._boxes, boxes, self._settings.roi_margin_px)
+        self._boxes = boxes
         markers = []
         measured = centroids(image, [choice.blob for choice in chosen.values()], self._noise)
         for (color, choice), found in zip(chosen.items(), measured, strict=True):
@@ -63,8 +66,7 @@ class LutFinder:
         self._searches += 1
         if not self._boxes or len(self._boxes) < len(self._names) or self._searches % _REVIEW == 0:
             return self._blobs(image, everywhere)
-        margin = self._settings.roi_margin_px
-        region = roi.around(roi.hull(list(self._boxes.values())), margin, image.size)
+        region = roi.around(roi.hull(list(self._boxes.values())), self._margin_px, image.size)
         found = self._blobs(image, region)
         if any(all(roi.cut(blob.rect, region, image.size) for blob in own) for own in found):
             # A marker has moved further than the margin: the same frame may still show it.

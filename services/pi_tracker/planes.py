@@ -37,7 +37,7 @@ class Picture(Protocol):
         """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle."""
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of every cell (h, w, 2)."""
+        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of every cell (2, h, w)."""
 
 
 class _Planar:
@@ -60,8 +60,8 @@ class _Planar:
         x0, y0, x1, y1 = rect
         w, h = x1 - x0, y1 - y0
         luma[: 2 * h, : 2 * w] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
-        chroma[:h, :w, 0] = self._u[y0:y1, x0:x1]
-        chroma[:h, :w, 1] = self._v[y0:y1, x0:x1]
+        chroma[0, :h, :w] = self._u[y0:y1, x0:x1]
+        chroma[1, :h, :w] = self._v[y0:y1, x0:x1]
 
 
 class _Packed:
@@ -81,7 +81,7 @@ class _Packed:
         w, h = x1 - x0, y1 - y0
         bgr = self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
         luma[: 2 * h, : 2 * w] = cv2.transform(bgr, _LUMA)
-        chroma[:h, :w] = cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA)
+        chroma[:, :h, :w] = cv2.split(cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA))
 
 
 def picture(frame: Frame) -> Picture:

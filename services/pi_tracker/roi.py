@@ -5,9 +5,13 @@ Pure. Rectangles are in cells of 2x2 pixels. A rectangle outside the image is cl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from services.pi_tracker.planes import Rect
+
+# A hand at rest still trembles and turns; and from one frame to the next a motion seldom more than doubles, also in another marker. (What
+# escapes is found in the same frame by searching the whole image.)
+_STILL_MARGIN_PX, _STEPS = 12, 2
 
 
 def whole(size: tuple[int, int]) -> Rect:
@@ -26,6 +30,12 @@ def around(rect: Rect, margin_px: int, size: tuple[int, int]) -> Rect:
 def hull(rects: Sequence[Rect]) -> Rect:
     """The smallest rectangle around all, at least one: one search of a hand costs less than one for each of its markers."""
     return (min(r[0] for r in rects), min(r[1] for r in rects), max(r[2] for r in rects), max(r[3] for r in rects))
+
+
+def margin(before: Mapping[int, Rect], now: Mapping[int, Rect], most_px: int) -> int:
+    """The margin that the markers' motion from the last frame to this one asks for, at most most_px; most_px where it is unknown."""
+    steps = [max(abs(b[0] - a[0]), abs(b[1] - a[1])) for key, b in now.items() if (a := before.get(key)) is not None]
+    return min(most_px, _STILL_MARGIN_PX + _STEPS * 2 * max(steps)) if steps else most_px
 
 
 def cut(blob: Rect, rect: Rect, size: tuple[int, int]) -> bool:

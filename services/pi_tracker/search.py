@@ -24,7 +24,7 @@ _SEAM_CELLS, _SEAM_SHARE = 3, 0.25
 
 
 class Blob(NamedTuple):
-    """A connected patch of one colour: class index from 0, its cells' bounding rectangle, their mask (0/1) and how many they are."""
+    """A connected patch of one colour: class index from 0, its cells' bounding rectangle, their mask (0/1) and how many have the colour."""
 
     color: int
     rect: Rect
@@ -58,11 +58,19 @@ class Searcher:
         if len(contours) > _MAX_CONTOURS:
             contours = sorted(contours, key=cv2.contourArea, reverse=True)[:_MAX_CONTOURS]
         found: list[Blob] = []
+        left, top = rect[:2]
         for contour in contours:
             x, y, w, h = cv2.boundingRect(contour)
-            if w * h >= self._min_cells:
-                part = (slice(y, y + h), slice(x, x + w))
-                found += self._of_contour(contour, labels[part], mask[part], (x, y), rect)
+            if w * h < self._min_cells:
+                continue
+            inside = labels[y : y + h, x : x + w]
+            counts = np.bincount(inside.ravel(), minlength=2).tolist()
+            mine = counts[-1]
+            if counts[0] + mine < w * h:
+                found += self._parted(contour, inside, (x, y), (left + x, top + y))
+            elif mine >= self._min_cells:
+                # One colour only, as a rule.
+                found.append(_blob(len(counts) - 1, mask[y : y + h, x : x + w], mine, (left + x, top + y)))
         return found
 
     def _filtered(self, labels: Image) -> Image:
@@ -78,20 +86,15 @@ class Searcher:
             mask = cv2.dilate(mask, self._element, anchor=(1, 1), iterations=self._dilate)
         return mask
 
-    def _of_contour(self, contour: Image, labels: Image, mask: Image, at: tuple[int, int], rect: Rect) -> list[Blob]:
-        """The blobs of one contour: one as a rule, several where markers touch. labels and mask are those of its rectangle."""
-        origin = (rect[0] + at[0], rect[1] + at[1])
-        counts = np.bincount(labels.ravel(), minlength=2).tolist()
-        if counts[0] + counts[-1] == labels.size:
-            return self._blob(len(counts) - 1, mask, origin)
-        # Only what lies inside the contour: its rectangle may hold others, too.
-        inside = np.zeros(mask.shape, np.uint8)
+    def _parted(self, contour: Image, labels: Image, at: tuple[int, int], origin: tuple[int, int]) -> list[Blob]:
+        """The blobs of a contour whose rectangle holds several colours, as where markers touch."""
+        inside = np.zeros(labels.shape, np.uint8)
         cv2.drawContours(inside, [contour], 0, 1, cv2.FILLED, offset=(-at[0], -at[1]))
         counts = np.bincount((labels * inside).ravel(), minlength=2).tolist()
         classes = [k for k, count in enumerate(counts) if k and count >= self._min_cells]
         if len(classes) == 1:
             # A few cells of other colours are noise.
-            return self._blob(classes[0], inside, origin)
+            return [_blob(classes[0], inside, counts[classes[0]], origin)]
         return [blob for k in classes for blob in self._of_class((labels == k).view(np.uint8) & inside, k, origin)]
 
     def _of_class(self, mask: Image, k: int, origin: tuple[int, int]) -> list[Blob]:
@@ -101,13 +104,14 @@ class Searcher:
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         found: list[Blob] = []
         for x, y, w, h in map(cv2.boundingRect, contours):
-            found += self._blob(k, mask[y : y + h, x : x + w], (origin[0] + x, origin[1] + y))
+            part = mask[y : y + h, x : x + w]
+            cells = cv2.countNonZero(part)
+            if cells >= self._min_cells:
+                found.append(_blob(k, part, cells, (origin[0] + x, origin[1] + y)))
         return found
 
-    def _blob(self, k: int, mask: Image, origin: tuple[int, int]) -> list[Blob]:
-        cells = cv2.countNonZero(mask)
-        if cells < self._min_cells:
-            return []
-        h, w = mask.shape
-        x, y = origin
-        return [Blob(k - 1, (x, y, x + w, y + h), mask, cells, 4.0 * cells, x + x + w - 0.5, y + y + h - 0.5)]
+
+def _blob(k: int, mask: Image, cells: int, origin: tuple[int, int]) -> Blob:
+    h, w = mask.shape
+    x, y = origin
+    return Blob(k - 1, (x, y, x + w, y + h), mask, cells, 4.0 * cells, x + x + w - 0.5, y + y + h - 0.5)

@@ -57,12 +57,13 @@ class Pointer:
 
 @dataclass(frozen=True, eq=False)
 class Swatch:
-    """One patch in one picture: its cells in the whole picture's mask, and those clear of its rim where there are enough."""
+    """One patch in one picture, as masks of the whole picture: its cells, those clear of its rim, and all that belongs to it."""
 
     color: str
     frame: int
     mask: Mask  # (h, w)
     core: Mask  # (h, w)
+    whole: Mask  # (h, w)
 
     @property
     def box_px(self) -> tuple[int, int, int, int]:
@@ -95,7 +96,22 @@ def find_swatch(cells: Cells, pointer: Pointer) -> Swatch:
         )
     mask = np.zeros(cells.shape, bool)
     mask[y0:y1, x0:x1] = found
-    return Swatch(pointer.color, pointer.frame, mask, _core(mask))
+    return Swatch(pointer.color, pointer.frame, mask, _core(mask), mask | _beyond(cells, rect, found) if pointer.is_box else mask)
+
+
+def _beyond(cells: Cells, rect: tuple[int, int, int, int], found: Mask) -> Mask:
+    """What a patch in a box continues to outside, as boxes cut things; nothing if it does not end within a box's size: the background."""
+    height, width = cells.shape
+    x0, y0, x1, y1 = rect
+    wide = max(x0 - (x1 - x0), 0), max(y0 - (y1 - y0), 0), min(2 * x1 - x0, width), min(2 * y1 - y0, height)
+    window = cells[wide[1] : wide[3], wide[0] : wide[2]]
+    starts = np.zeros(window.shape, bool)
+    starts[y0 - wide[1] : y1 - wide[1], x0 - wide[0] : x1 - wide[0]] = found
+    more = _grow(window, np.median(window[starts].tint, axis=0), starts)
+    mask = np.zeros(cells.shape, bool)
+    if not _touches_border(more, wide, cells):
+        mask[wide[1] : wide[3], wide[0] : wide[2]] = more
+    return mask
 
 
 def _window(cells: Cells, pointer: Pointer) -> tuple[int, int, int, int]:

@@ -1,10 +1,12 @@
-"""The surroundings of several blobs in one image, one below the other, so that one call of OpenCV or numpy works on all.
+"""The surroundings of several blobs in one image, side by side, so that one call of OpenCV or numpy works on all.
 
-Pure. Where the image ends, a tile ends: what is not `inside` counts nowhere.
+Side by side, not one below the other: OpenCV's filters cost by the row. Pure. Where the image ends, a tile ends: what is not
+`inside` counts nowhere.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,55 +25,62 @@ _GAP = 2
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """n tiles of h x w cells; images of all of them are (n, h, w), and OpenCV sees them as one of n h x w."""
+    """n tiles of h x w cells; an image of all of them is (h, n, w), and OpenCV sees it as one of h x (n w)."""
 
     size: tuple[int, int]  # of the image, in cells
     origins: list[tuple[int, int]]  # top left cell of each tile in the image
-    mask: Image  # (n, h, w) 0/1: the blobs
-    inside: Image  # (n, h, w) 0/1: the image
-    luma: Image  # Y - 16 of every pixel, float32 (n, 2h, 2w)
-    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (n, h, w, 4)
+    mask: Image  # (h, n, w) 0/1: the blobs
+    inside: Image  # (h, n, w) 0/1: the image
+    luma: Image  # Y - 16 of every pixel, float32 (2h, n, 2w)
+    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (h, 4, n, w)
 
 
 def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
     """Tiles around blobs, at least one."""
     rects = [_grown(blob.rect, picture.size) for blob in blobs]
-    h = max(rect[3] - rect[1] for rect in rects) + _GAP
-    w = max(rect[2] - rect[0] for rect in rects)
+    h = max(rect[3] - rect[1] for rect in rects)
+    w = max(rect[2] - rect[0] for rect in rects) + _GAP
     n = len(blobs)
-    mask, inside = np.zeros((2, n, h, w), np.uint8)
-    luma, chroma = np.zeros((n, 2 * h, 2 * w), np.uint8), np.zeros((n, h, w, 2), np.uint8)
+    mask, inside = np.zeros((2, h, n, w), np.uint8)
+    luma, chroma = np.zeros((2 * h, n, 2 * w), np.uint8), np.zeros((2, h, n, w), np.uint8)
     for k, (blob, (x0, y0, x1, y1)) in enumerate(zip(blobs, rects, strict=True)):
         left, top, right, bottom = blob.rect
-        mask[k, top - y0 : bottom - y0, left - x0 : right - x0] = blob.mask
-        inside[k, : y1 - y0, : x1 - x0] = 1
-        picture.copy_to((x0, y0, x1, y1), luma[k], chroma[k])
+        mask[top - y0 : bottom - y0, k, left - x0 : right - x0] = blob.mask
+        inside[: y1 - y0, k, : x1 - x0] = 1
+        picture.copy_to((x0, y0, x1, y1), luma[:, k], chroma[:, :, k])
     pixels = luma.astype(np.float32)
     pixels -= 16.0
-    cells = np.ones((n, h, w, 4), np.float32)
-    cells[..., 0] = cv2.resize(flat(pixels), (w, n * h), interpolation=cv2.INTER_AREA).reshape(n, h, w)
-    cells[..., 1:3] = chroma
-    cells[..., 1:3] -= 128.0
+    cells = np.ones((h, 4, n, w), np.float32)
+    cells[:, 0] = halved(pixels)
+    np.subtract(chroma.swapaxes(0, 1), np.float32(128.0), out=cells[:, 1:3])
     return Tiles(picture.size, [(rect[0], rect[1]) for rect in rects], mask, inside, pixels, cells)
 
 
 def flat(images: Image) -> Image:
-    """(n, h, w, ...) as one image (n h, w, ...), no copy."""
-    return images.reshape(-1, *images.shape[2:])
+    """(h, ..., w) as one image (h, ... w), no copy if it is contiguous."""
+    return images.reshape(images.shape[0], -1)
 
 
 def doubled(images: Image, interpolation: int = cv2.INTER_LINEAR) -> Image:
-    """Images of cells as ones of pixels; (n, h, w) -> (n, 2h, 2w). Tiles are apart by more than interpolation reaches."""
-    n, h, w = images.shape
-    return cv2.resize(flat(images), (2 * w, 2 * n * h), interpolation=interpolation).reshape(n, 2 * h, 2 * w)
+    """Images of cells as ones of pixels; (h, n, w) -> (2h, n, 2w). Tiles are apart by more than interpolation reaches."""
+    h, n, w = images.shape
+    return cv2.resize(flat(images), (2 * n * w, 2 * h), interpolation=interpolation).reshape(2 * h, n, 2 * w)
+
+
+def halved(images: Image) -> Image:
+    """Images of pixels as means of cells; (2h, n, 2w) -> (h, n, w)."""
+    h, n, w = images.shape
+    return cv2.resize(flat(images), (n * w // 2, h // 2), interpolation=cv2.INTER_AREA).reshape(h // 2, n, w // 2)
 
 
 def moments(images: Image, order: int) -> Image:
-    """Sums of each image times y^i x^j up to an order; (n, h, w) -> (n, order + 1, order + 1) indexed [i, j]."""
-    _, h, w = images.shape
-    return _powers(h, order).T @ (images @ _powers(w, order))
+    """Sums of each image times y^i x^j up to an order; (h, n, w) -> (order + 1, n, order + 1) indexed [i, :, j]."""
+    h, n, w = images.shape
+    rows = _powers(h, order).T @ flat(images)
+    return np.asarray(rows.reshape(order + 1, n, w) @ _powers(w, order))
 
 
+@functools.lru_cache(maxsize=256)
 def _powers(count: int, order: int) -> Image:
     return np.arange(count, dtype=np.float32)[:, None] ** np.arange(order + 1, dtype=np.float32)
 

@@ -81,9 +81,8 @@ def rig(count: int, size_px: tuple[int, int], focal_px: float, distortion: tuple
     """Cameras 75 mm apart along x, none of them parallel, centred or level with another."""
     cameras = []
     for k in range(count):
-        matrix = np.array(
-            [[focal_px * (1 + 0.01 * k), 0.0, (size_px[0] - 1) / 2 + 6 - 5 * k], [0.0, focal_px * (1 + 0.01 * k), size_px[1] / 2 - 4], [0, 0, 1]]
-        )
+        focal, centre = focal_px * (1 + 0.01 * k), ((size_px[0] - 1) / 2 + 6 - 5 * k, size_px[1] / 2 - 4)
+        matrix = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
         R = rotation_y(-0.012 * k) @ rotation_x(0.006 * k) @ rotation_z(0.008 * k)
         cameras.append(Camera(NAMES[k], size_px, matrix, np.array(distortion), transform(R, [0.075 * k, 0.001 * k, -0.002 * k])))
     return cameras

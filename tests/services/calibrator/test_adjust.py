@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rhot.transforms import rotation_from_vector, transform
-from services.calibrator.adjust import Free, State, adjust, derivatives, pixel_errors
+from services.calibrator.adjust import Free, adjust
+from services.calibrator.bundle import State, derivatives, pixel_errors
 from services.calibrator.lens_models import MODELS, USUAL
 from services.calibrator.model import lens_vector
 from services.calibrator.start import calibrate_lens
@@ -76,7 +77,9 @@ def test_a_rig_is_found_again_within_its_sigmas(pair):
     bench, views, true = pair
     start = State(
         true.lenses + np.array([15.0, -12.0, 8.0, 5.0, 0.05, -0.05, 0.0, 0.0, 0.0]),
-        np.stack([true.T_camera_from_rig[0], transform(rotation_from_vector([0.02, -0.03, 0.01]), [0.01, 0.01, 0.0]) @ true.T_camera_from_rig[1]]),
+        np.stack(
+            [true.T_camera_from_rig[0], transform(rotation_from_vector([0.02, -0.03, 0.01]), [0.01, 0.01, 0.0]) @ true.T_camera_from_rig[1]]
+        ),
         np.stack([transform(rotation_from_vector([0.05, 0.0, -0.05]), [0.01, -0.01, 0.02]) @ T for T in true.T_rig_from_board]),
     )
     found = adjust(views, start, Free(np.tile(USUAL.free, (2, 1)), np.array([False, True])))

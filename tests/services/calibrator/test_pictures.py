@@ -71,7 +71,8 @@ def test_named_cameras_come_in_the_order_they_are_named(folder):
 
 
 @pytest.mark.parametrize(
-    ("names", "reason"), [((), "holds no pictures"), (("notes.txt",), "holds no pictures"), (("a.png", "b1.jpg"), "left01.png and right01.png")]
+    ("names", "reason"),
+    [((), "holds no pictures"), (("notes.txt",), "holds no pictures"), (("a.png", "b1.jpg"), "left01.png and right01.png")],
 )
 def test_folders_that_say_nothing_are_refused(folder, names, reason):
     with pytest.raises(CalibrationError, match=reason):
