@@ -40,7 +40,9 @@ def urdf(chain: k.Chain) -> Path:
     text = '<robot name="finger"><link name="base"/>'
     for j, (axis, offset) in enumerate(zip(_AXES, offsets, strict=True)):
         low, high = chain.limits[j]
-        text += f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute"><parent link="{"base" if j == 0 else f"l{j - 1}"}"/>'
+        text += (
+            f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute"><parent link="{"base" if j == 0 else f"l{j - 1}"}"/>'
+        )
         text += f'<child link="l{j}"/><origin xyz="{offset}"/><axis xyz="{axis}"/>'
         text += f'<limit lower="{low}" upper="{high}" effort="1e3" velocity="1e3"/></joint>'
     text += f'<link name="tip">{inertial}</link><joint name="end" type="fixed"><parent link="l3"/><child link="tip"/>'

@@ -205,8 +205,10 @@ class Bus:
 
         self._session.get(topic.key(self.rig, **names), zenoh.handlers.Callback(on_reply, on_end), payload=asked, timeout=timeout_s)
         # Zenoh ends every query at its timeout; a second more covers a link that dies meanwhile.
+        # (Not wait_for: where the answer and a cancellation meet, Python 3.11's swallows the cancellation, and its task runs for ever.)
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(done, timeout_s + 1.0)
+            async with asyncio.timeout(timeout_s + 1.0):
+                await done
         return replies
 
     def answer(self, topic: Topic[Any], handler: Callable[[], Answer | Awaitable[Answer]], **names: str) -> None:
@@ -241,8 +243,7 @@ class Bus:
 
         async def answer_later(query: zenoh.Query) -> None:
             with query:
-                payload = b"" if query.payload is None else query.payload.to_bytes()
-                await self._reply(query, key, topic, lambda: handler(payload))
+                await self._reply(query, key, topic, lambda: handler(query.payload.to_bytes() if query.payload else b""))
 
         def on_query(query: zenoh.Query) -> None:
             if query.payload is None or len(query.payload) <= topic.max_bytes:

@@ -6,11 +6,12 @@ writes on its machine. Like all messages they are untrusted: what does not decod
 
 from __future__ import annotations
 
+import hashlib
 from typing import Annotated, Any, Literal
 
 import msgspec
 
-from rhot.messages import Message, Name
+from rhot.messages import Message, Name, Stamp
 
 Hue = Annotated[int, msgspec.Meta(ge=0, le=179)]
 Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
@@ -20,6 +21,11 @@ Microseconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 Gain = Annotated[float, msgspec.Meta(ge=0.0, le=64.0)]
 # Name of a picture that camera/{camera}/frame answered with: picture_name() of its bytes.
 PictureName = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{16}$")]
+
+
+def picture_name(picture: bytes) -> str:
+    """The name of a picture: who has its bytes can speak of it to who sent them."""
+    return hashlib.blake2b(picture, digest_size=8).hexdigest()
 
 
 class Calibration(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,7 +64,8 @@ class ExposureControl(Message, frozen=True, kw_only=True):
 
     Put with mode "auto", the camera's automatics run until they have settled; then their values are frozen, written, and told with mode
     "fixed". Numbers are 0 where nobody knows them; of a put, a 0 leaves that value as it is. adjustable is false of sources that have no
-    such controls (files, the simulator); note says what a person should know.
+    such controls (files, the simulator); note says what a person should know, and why a put was refused; changed_ns is when the tracker
+    last took or refused one.
     """
 
     mode: Literal["fixed", "auto"] = "fixed"
@@ -68,6 +75,7 @@ class ExposureControl(Message, frozen=True, kw_only=True):
     blue_gain: Gain = 0.0
     adjustable: bool = True
     note: str = ""
+    changed_ns: Stamp = 0
 
 
 class PointedAt(Message, frozen=True, kw_only=True):

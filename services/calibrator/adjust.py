@@ -56,7 +56,7 @@ def adjust(views: list[View], start: State, free: Free, *, soft_px: float = _SOF
     corners, chosen = stacked(views), _free_unknowns(free)
     state, damping, steps = start, 1e-3, 0
     equations = _equations(corners, state, soft_px)
-    while steps < max_steps and (len(chosen) or free.boards):
+    while steps < max_steps and np.isfinite(equations.cost) and (len(chosen) or free.boards):
         steps += 1
         proposal = _moved(state, *equations.step(chosen, free.boards, damping))
         cost = _cost(corners, proposal, soft_px)
@@ -128,7 +128,8 @@ class _Equations:
     def camera_variance(self, chosen: np.ndarray, boards: bool) -> Array:
         """Variance (m,) of each camera unknown for errors of one px, all others unknown; 0 where held."""
         variance = np.zeros(len(self.cameras))
-        if not len(chosen):
+        if not len(chosen) or not np.isfinite(self.cost):
+            variance[chosen] = np.inf
             return variance
         A = self.cameras[np.ix_(chosen, chosen)]
         if boards:

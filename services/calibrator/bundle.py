@@ -41,6 +41,14 @@ def rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(errors * errors, axis=-1)))) if len(errors) else 0.0
 
 
+def board_rms(views: list[View], errors: tuple[Array, ...], count: int) -> list[float]:
+    """RMS px of each of count board positions, over all its views."""
+    mine: list[list[Array]] = [[] for _ in range(count)]
+    for view, error in zip(views, errors, strict=True):
+        mine[view.board].append(error)
+    return [rms(np.concatenate(several)) if several else 0.0 for several in mine]
+
+
 def pixel_errors(views: list[View], state: State) -> tuple[Array, ...]:
     """Measured minus projected pixels (n, 2) of each view; NaN behind the camera."""
     corners = stacked(views)
@@ -59,6 +67,7 @@ class Corners:
 
 
 def stacked(views: list[View]) -> Corners:
+    """The corners of all views, one after the other."""
     counts = [len(view.points) for view in views]
     return Corners(
         np.concatenate([view.points for view in views]),
@@ -70,6 +79,7 @@ def stacked(views: list[View]) -> Corners:
 
 
 def corner_errors(corners: Corners, state: State) -> Array:
+    """Measured minus projected pixels (n, 2) of all corners."""
     T = state.T_camera_from_rig[corners.camera] @ state.T_rig_from_board[corners.board]
     p_camera = np.einsum("nij,nj->ni", T[:, :3, :3], corners.points) + T[:, :3, 3]
     return corners.pixels - project(state.lenses[corners.camera], p_camera)
@@ -84,6 +94,7 @@ def derivatives(views: list[View], state: State) -> tuple[Array, Array]:
 
 
 def corner_derivatives(corners: Corners, state: State) -> tuple[Array, Array]:
+    """As `derivatives`, of corners already stacked."""
     T_cr, T_rb = state.T_camera_from_rig[corners.camera], state.T_rig_from_board[corners.board]
     R_c = T_cr[:, :3, :3]
     turned = np.einsum("nij,nj->ni", T_rb[:, :3, :3], corners.points)

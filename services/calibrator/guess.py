@@ -52,7 +52,7 @@ def guess_corners(images: Iterable[np.ndarray]) -> tuple[int, int] | None:
     likely = [size for size, count in votes.items() if count >= max(1.0, _SHARE * total)]
     for size in sorted(likely, key=lambda size: (size[0] * size[1], size), reverse=True):
         # Growing may add a row that is none; a size counts if a detector told that size finds it.
-        if any(detect(picture, Board(*size, 1.0)) for picture in pictures):
+        if any(detect(picture, Board(*size, 1.0), quick=True) for picture in pictures):
             return size
     for size in _COMMON:
         if any(_classic(reduced(picture)[0], size) for picture in pictures[:6]):

@@ -14,7 +14,7 @@ from services.calibrator.adjust import Free, adjust
 from services.calibrator.boards import Board
 from services.calibrator.bundle import State, View, rms
 from services.calibrator.model import FX, FY, rays
-from services.calibrator.triangulate import epipolar_px, rigid_fit, triangulate
+from services.calibrator.triangulate import RigidFit, epipolar_px, rigid_fit, triangulate
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,21 @@ class BoardError:
 
 def board_error(views: list[View], state: State, board: Board) -> BoardError | None:
     """The error of one board position, whose views these are; None if no two cameras see the same six corners."""
+    measured = _measured(views, state, board)
+    if measured is None:
+        return None
+    fit, error = measured
+    return replace(error, reprojection_px=_reprojection(views, state, transform(fit.R_measured_from_board, fit.t)))
+
+
+def fit_squares(views: list[View], state: State, board: Board) -> float | None:
+    """BoardError.fit_squares alone, which is quicker."""
+    measured = _measured(views, state, board)
+    return measured[1].fit_squares if measured else None
+
+
+def _measured(views: list[View], state: State, board: Board) -> tuple[RigidFit, BoardError] | None:
+    """The triangulated board, its reprojection still missing."""
     ids = _common(views)
     if len(views) < 2 or len(ids) < 6:
         return None
@@ -48,12 +63,12 @@ def board_error(views: list[View], state: State, board: Board) -> BoardError | N
         epipolar_px(places[k] @ inverse(places[0]), seen[0], seen[k], float(np.sqrt(focals[0] * focals[k]))) for k in range(1, len(views))
     ]
     distance = float(np.linalg.norm(points - inverse(places[0])[:3, 3], axis=1).mean())
-    return BoardError(
-        rms(fit.errors) / board.square_m,
-        fit.scale,
-        _reprojection(views, state, transform(fit.R_measured_from_board, fit.t)),
-        float(np.sqrt(np.mean(np.square(epipolar)))),
-        distance,
+    return fit, BoardError(
+        fit_squares=rms(fit.errors) / board.square_m,
+        square_ratio=fit.scale,
+        reprojection_px=float("nan"),
+        epipolar_px=float(np.sqrt(np.mean(np.square(epipolar)))),
+        distance_m=distance,
     )
 
 

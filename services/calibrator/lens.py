@@ -14,14 +14,14 @@ import numpy as np
 from rhot.transforms import Array
 from services.calibrator.adjust import Adjusted, Free, adjust
 from services.calibrator.boards import Board
-from services.calibrator.bundle import State, View, rms
+from services.calibrator.bundle import State, View, board_rms, rms
 from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
 from services.calibrator.lens_checks import check_fit, check_lens, check_views, contradicting
 from services.calibrator.lens_models import USUAL, LensModel, choose, folds
 from services.calibrator.model import rays
 from services.calibrator.start import calibrate_lens, with_poses
-from services.calibrator.views import LeftOut, alone, others, same_size, subset, view_of
+from services.calibrator.views import LeftOut, alone, hurting, others, pull_percent, same_size, subset, view_of
 
 # Rounds of leaving out pictures; each round may show others that the worst ones hid.
 _ROUNDS = 4
@@ -31,7 +31,7 @@ _ROUNDS = 4
 class PictureError:
     """One picture: error of its corners in the calibration, and in the calibration from all other pictures.
 
-    pull_percent is by how much this picture raises the squared error of all others: what "hurts" means.
+    pull_percent is by how much this picture raises the error of all others, on average; hurts marks pictures to look at.
     """
 
     key: str
@@ -39,6 +39,7 @@ class PictureError:
     held_out_px: float
     held_out_squares: float
     pull_percent: float
+    hurts: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,18 +148,16 @@ def _pose_errors(lens: Array, view: View) -> Array:
 
 def _picture_errors(fit: Fit, model: LensModel, board: Board) -> list[PictureError]:
     state = fit.found.state
-    squared = np.array([np.sum(error * error) for error in fit.found.errors])
+    errors = board_rms(fit.views, fit.found.errors, len(fit.keys))
     pictures = []
     for k, (key, view) in enumerate(zip(fit.keys, fit.views, strict=True)):
         rest, start = subset(fit.views, state, others(len(fit.views), np.array([k])))
         without = adjust(rest, start, Free(model.free[None], np.array([False])))
-        least = float(sum(np.sum(error * error) for error in without.errors))
-        pull = 100.0 * (float(squared.sum() - squared[k]) / max(least, 1e-12) - 1.0)
+        pull = pull_percent(errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rest)))
         lens = without.state.lenses[0]
-        pictures.append(
-            PictureError(key, rms(fit.found.errors[k]), rms(_pose_errors(lens, view)), _on_board(lens, view) / board.square_m, pull)
-        )
-    return pictures
+        pictures.append(PictureError(key, errors[k], rms(_pose_errors(lens, view)), _on_board(lens, view) / board.square_m, pull))
+    bad = hurting(errors, [picture.pull_percent for picture in pictures])
+    return [replace(picture, hurts=hurts) for picture, hurts in zip(pictures, bad, strict=True)]
 
 
 def _on_board(lens: Array, view: View) -> float:

@@ -109,7 +109,8 @@ def _refuse_geometry(camera: str, size_px: tuple[int, int], lens: Array, focal: 
     span = f"its normals are at most {seen.normals_deg:.0f} degrees apart, its tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f}"
     if seen.normals_deg < _PARALLEL_DEG:
         raise CalibrationError(
-            f"camera {camera!r}: the board was never tilted ({span}), so focal length and distance cannot be told apart. {_HOW_TO}"
+            f"camera {camera!r}: the board was always held at about the same angle ({span}), so focal length and distance cannot "
+            f"be told apart. {_HOW_TO}"
         )
     if not np.isfinite(focal) or focal > _FOCAL_REFUSED:
         raise CalibrationError(

@@ -44,9 +44,9 @@ class PictureSet:
         """Camera names, in the order of the alphabet, but left before right."""
         return list(self.files)
 
-    def keys(self) -> list[str]:
+    def positions(self) -> list[str]:
         """Every board position some camera has a picture of, in order."""
-        return sorted({key for pictures in self.files.values() for key in pictures}, key=_natural)
+        return sorted({key for pictures in self.files.values() for key in pictures}, key=natural)
 
     def read(self, camera: str, key: str) -> np.ndarray:
         """One camera's picture as grey (h, w) uint8.
@@ -117,7 +117,7 @@ def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
         some = ", ".join(str(path.relative_to(folder)) for path in files[:4])
         raise CalibrationError(f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); {_EXAMPLES}")
     used = {path for pictures in best.files.values() for path in pictures.values()}
-    return PictureSet(best.files, tuple(path for path in files if path not in used))
+    return PictureSet(_in_step(best.files), tuple(path for path in files if path not in used))
 
 
 def split_side_by_side(image: np.ndarray, count: int) -> list[np.ndarray]:
@@ -131,6 +131,20 @@ def split_side_by_side(image: np.ndarray, count: int) -> list[np.ndarray]:
     return [np.ascontiguousarray(part) for part in np.split(image, count, axis=1)]
 
 
+def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
+    """Pictures named by the time they were taken share no name: as many from each camera are paired in their order.
+
+    Wrongly paired ones are found out by the calibration, which refuses them.
+    """
+    counts = {len(pictures) for pictures in files.values()}
+    if len(counts) > 1 or set.intersection(*(set(pictures) for pictures in files.values())):
+        return files
+    return {
+        camera: {str(number): pictures[key] for number, key in enumerate(sorted(pictures, key=natural), start=1)}
+        for camera, pictures in files.items()
+    }
+
+
 def _pictures(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise CalibrationError(f"{folder}: no such folder; give the folder of the board's pictures")
@@ -139,7 +153,7 @@ def _pictures(folder: Path) -> list[Path]:
     files = [path for path in files if not any(part.startswith(".") for part in path.relative_to(folder).parts)]
     if not files:
         raise CalibrationError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)}); {_EXAMPLES}")
-    return sorted(files, key=lambda path: _natural(str(path)))
+    return sorted(files, key=lambda path: natural(str(path)))
 
 
 def _parts(path: Path) -> list[str]:
@@ -179,7 +193,7 @@ def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str
     named = {_camera_name(group, place, value): pictures for value, pictures in files.items() if cameras is None or value in cameras}
     if len(named) < 2 or not all(_NAME.match(name) for name in named):
         return None
-    order = cameras or sorted(named, key=lambda name: (_side(name), _natural(name)))
+    order = cameras or sorted(named, key=lambda name: (_side(name), natural(name)))
     return _Reading({name: named[name] for name in order}, all(value.isdigit() for value in files))
 
 
@@ -209,6 +223,6 @@ def _side(name: str) -> int:
     return {"l": 0, "left": 0, "r": 2, "right": 2}.get(name.lower(), 1)
 
 
-def _natural(text: str) -> list[tuple[int, int, str]]:
+def natural(text: str) -> list[tuple[int, int, str]]:
     """Sort key in which 2 comes before 10."""
     return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.findall(r"\d+|\D+", text)]

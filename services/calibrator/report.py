@@ -10,7 +10,6 @@ from rhot.transforms import Array, inverse
 from services.calibrator.boards import Board
 from services.calibrator.lens import LensResult
 from services.calibrator.model import FX, FY, K1
-from services.calibrator.rig_checks import HURTS_PERCENT
 from services.calibrator.stereo import RigResult
 from services.calibrator.views import LeftOut
 
@@ -29,7 +28,7 @@ def lens_text(result: LensResult, board: Board) -> str:
     ]
     lines += [
         f"  {each.key:<16} {each.rms_px:>7.3f} {each.held_out_px:>13.3f} {each.held_out_squares:>9.4f} "
-        f"{each.pull_percent:>10.1f} %{_hurts(each.pull_percent)}"
+        f"{each.pull_percent:>10.1f} %{_hurts(each.hurts)}"
         for each in result.pictures
     ]
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
@@ -63,9 +62,7 @@ def rig_text(result: RigResult) -> str:
             if error
             else f"{'seen by one camera only':>55}"
         )
-        lines.append(
-            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.pull_percent)}"
-        )
+        lines.append(f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.hurts)}")
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 
 
@@ -88,8 +85,8 @@ def _percent(ratio: float) -> str:
     return f"{100.0 * (ratio - 1.0):+.2f} %"
 
 
-def _hurts(pull_percent: float) -> str:
-    return "   <- hurts" if pull_percent > HURTS_PERCENT else ""
+def _hurts(hurts: bool) -> str:
+    return "   <- hurts" if hurts else ""
 
 
 def _notes(left_out: Sequence[LeftOut], warnings: Sequence[str]) -> list[str]:

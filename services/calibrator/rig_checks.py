@@ -26,8 +26,6 @@ _SQUARES_WARNED = 0.06
 _SIDE_REFUSED, _SIDE_WARNED = 0.02, 0.005
 # One sigma of a camera's place, as a share of its distance from the first camera.
 _PLACE_REFUSED = 0.02
-# A position that raises the squared error of the others by this much percent is said to hurt; harmless ones stay below 2.
-HURTS_PERCENT = 5.0
 
 
 def check_shared(detections: dict[str, dict[str, Detection]]) -> None:
@@ -67,9 +65,12 @@ def check_rig(result: RigResult) -> tuple[str, ...]:
         )
     if abs(result.square_ratio - 1.0) > _SIDE_WARNED:
         warnings.append(f"triangulated squares are {100 * (result.square_ratio - 1.0):+.2f} % off; take more pictures")
-    worst = [position.key for position in result.positions if position.pull_percent > HURTS_PERCENT]
+    worst = [position.key for position in result.positions if position.hurts]
     if worst:
-        warnings.append(f"positions {', '.join(worst)} pull the calibration away from all others; look at these pictures, or take them out")
+        warnings.append(
+            f"positions {', '.join(worst)} do not fit the others well, or pull the calibration away from them; look at these "
+            "pictures, or take them out"
+        )
     return (*warnings, *_sides(result))
 
 

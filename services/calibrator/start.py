@@ -45,16 +45,17 @@ def board_pose(lens: Array, view: View) -> tuple[Array, float]:
     Collins & Bartoli, "Infinitesimal Plane-Based Pose Estimation" (2014), the better of its two poses.
     """
     seen = rays(lens, view.pixels)
-    if not np.all(np.isfinite(seen)):
-        return np.eye(4), float("inf")
     scale = float(np.ptp(view.points, axis=0).max())
+    # Far ahead: wrong, but in front of the camera, so that an adjustment can begin.
+    best, least = transform(np.eye(3), [0.0, 0.0, 5.0 * scale]), float("inf")
+    if not np.all(np.isfinite(seen)):
+        return best, least
     # Scaled to about 1 so that millimetre boards and metre boards are solved alike.
     points = np.ascontiguousarray(view.points / scale).reshape(-1, 1, 3)
     try:
         count, vectors, shifts, _ = cv2.solvePnPGeneric(points, seen.reshape(-1, 1, 2), np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
     except cv2.error:
-        return np.eye(4), float("inf")
-    best, least = np.eye(4), float("inf")
+        return best, least
     for vector, shift in zip(vectors[:count], shifts[:count], strict=True):
         T = transform(cv2.Rodrigues(vector)[0].astype(np.float64), scale * np.asarray(shift).reshape(3))
         error = rms(view.pixels - project(lens, view.points @ T[:3, :3].T + T[:3, 3]))

@@ -15,17 +15,18 @@ import numpy as np
 from rhot.transforms import Array
 from services.calibrator.adjust import Adjusted, Free, adjust
 from services.calibrator.boards import Board
-from services.calibrator.bundle import State, View, pixel_errors, rms
+from services.calibrator.bundle import State, View, board_rms, pixel_errors, rms
 from services.calibrator.coverage import Coverage, coverage
 from services.calibrator.detect import Detection
-from services.calibrator.heldout import BoardError, board_error
+from services.calibrator.heldout import BoardError, board_error, fit_squares
 from services.calibrator.lens import fit_lens
 from services.calibrator.lens_checks import check_fit, contradicting
 from services.calibrator.lens_models import USUAL, LensModel, choose, folds
+from services.calibrator.pictures import natural
 from services.calibrator.relate import place_cameras
 from services.calibrator.rig_checks import check_rig, check_shared
 from services.calibrator.start import board_pose
-from services.calibrator.views import LeftOut, others, same_size, subset, view_of
+from services.calibrator.views import LeftOut, hurting, others, pull_percent, same_size, subset, view_of
 
 _ROUNDS = 4
 Progress = Callable[[str], None]
@@ -35,13 +36,15 @@ Progress = Callable[[str], None]
 class PositionError:
     """One position of the board: RMS px of its corners in the calibration, its error held out, and how much it hurts the others.
 
-    held_out is None where no two cameras see it. pull_percent is by how much this position raises the squared error of all others.
+    held_out is None where no two cameras see it. pull_percent is by how much this position raises the error of all others;
+    hurts marks positions to look at.
     """
 
     key: str
     rms_px: float
     held_out: BoardError | None
     pull_percent: float
+    hurts: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +141,8 @@ def _start(detections: dict[str, dict[str, Detection]], board: Board, lenses: di
 
 
 def _ordered(detections: dict[str, dict[str, Detection]]) -> list[str]:
-    """All keys, each once, in the order the cameras list them."""
-    return list(dict.fromkeys(key for found in detections.values() for key in found))
+    """All keys, each once, 2 before 10."""
+    return sorted({key for found in detections.values() for key in found}, key=natural)
 
 
 def _pose(number: int, views: list[View], lenses: Array, places: Array) -> Array:
@@ -187,10 +190,7 @@ def _settle(rig: Rig, free: Free) -> tuple[Rig, list[LeftOut]]:
 
 def position_rms(rig: Rig) -> list[float]:
     """RMS px of every position of the board."""
-    return [
-        rms(np.concatenate([error for view, error in zip(rig.views, rig.found.errors, strict=True) if view.board == k]))
-        for k in range(len(rig.keys))
-    ]
+    return board_rms(rig.views, rig.found.errors, len(rig.keys))
 
 
 def _refit(rig: Rig, model: LensModel) -> Adjusted:
@@ -205,24 +205,22 @@ def _held_out_squares(rig: Rig, board: Board, model: LensModel) -> float:
     for part in folds(len(rig.keys)):
         rest, start = subset(rig.views, found.state, others(len(rig.keys), part))
         state = adjust(rest, start, _free(rig, model, None)).state
-        errors = [board_error([view for view in rig.views if view.board == k], state, board) for k in part]
-        squares += [error.fit_squares**2 for error in errors if error]
+        errors = [fit_squares([view for view in rig.views if view.board == k], state, board) for k in part]
+        squares += [error**2 for error in errors if error is not None]
     return float(np.sqrt(np.mean(squares))) if squares else float("inf")
 
 
 def _positions(rig: Rig, board: Board, free: Free) -> list[PositionError]:
-    squared = [
-        sum(float(np.sum(e * e)) for v, e in zip(rig.views, rig.found.errors, strict=True) if v.board == k) for k in range(len(rig.keys))
-    ]
+    errors = position_rms(rig)
     result = []
-    for k, (key, error_px) in enumerate(zip(rig.keys, position_rms(rig), strict=True)):
+    for k, key in enumerate(rig.keys):
         rest, start = subset(rig.views, rig.found.state, others(len(rig.keys), np.array([k])))
         without = adjust(rest, start, free)
-        least = sum(float(np.sum(error * error)) for error in without.errors)
-        pull = 100.0 * ((sum(squared) - squared[k]) / max(least, 1e-12) - 1.0)
+        pull = pull_percent(errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rig.keys) - 1))
         mine = [view for view in rig.views if view.board == k]
-        result.append(PositionError(key, error_px, board_error(mine, without.state, board), pull))
-    return result
+        result.append(PositionError(key, errors[k], board_error(mine, without.state, board), pull))
+    bad = hurting(errors, [position.pull_percent for position in result])
+    return [replace(position, hurts=hurts) for position, hurts in zip(result, bad, strict=True)]
 
 
 def _result(

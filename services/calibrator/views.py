@@ -12,6 +12,9 @@ from services.calibrator.boards import Board
 from services.calibrator.bundle import State, View
 from services.calibrator.detect import Detection
 
+# Positions of the real pairs are at most 1.6 times as far off as the median one, and pull by less than 1 %.
+_FAR, _PULL_PERCENT = 3.0, 5.0
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -52,6 +55,21 @@ def subset(views: Iterable[View], state: State, boards: Iterable[int]) -> tuple[
     numbers = {int(board): number for number, board in enumerate(boards)}
     kept = [replace(view, board=numbers[view.board]) for view in views if view.board in numbers]
     return kept, replace(state, T_rig_from_board=state.T_rig_from_board[np.array(list(numbers), dtype=np.int64)])
+
+
+def pull_percent(with_it: list[float], without_it: list[float]) -> float:
+    """By how much one position raises the error of all others, on average: their RMS px with it and without it, in the same order.
+
+    A mean of ratios: another bad position among them must not drown the rest.
+    """
+    ratios = np.array(with_it) / np.maximum(without_it, 1e-9)
+    return 100.0 * float(np.mean(ratios) - 1.0) if len(ratios) else 0.0
+
+
+def hurting(errors_px: list[float], pulls_percent: list[float]) -> list[bool]:
+    """Which positions a person should look at: far from the calibration, or pulling it away from the others."""
+    limit = _FAR * float(np.median(errors_px)) if errors_px else 0.0
+    return [error > limit or pull > _PULL_PERCENT for error, pull in zip(errors_px, pulls_percent, strict=True)]
 
 
 def others(count: int, held_out: np.ndarray) -> list[int]:

@@ -23,6 +23,7 @@ from services.cli.session import session
 from services.cli.simulate import simulate
 from services.cli.top import top
 from services.cli.track import track
+from services.cli.tune import tune
 from services.cli.up import up
 from services.cli.warm import warm
 
@@ -53,6 +54,7 @@ def application() -> typer.Typer:
     for function in COMMANDS:
         app.command(name=function.__name__)(function)
     app.add_typer(calibrate)
+    app.add_typer(tune, name="tune")
     return app
 
 

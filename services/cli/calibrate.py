@@ -5,11 +5,12 @@ from __future__ import annotations
 import typer
 
 from services.cli.calibrate_depth import depth
+from services.cli.calibrate_eye import camera, colors
 from services.cli.calibrate_lens import lens
 from services.cli.calibrate_stereo import stereo
 from services.cli.calibrate_world import world
 
-COMMANDS = (lens, stereo, world, depth)
+COMMANDS = (camera, colors, lens, stereo, world, depth)
 
 calibrate = typer.Typer(
     name="calibrate",

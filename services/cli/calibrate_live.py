@@ -91,6 +91,7 @@ class _Job:
         self._rig, self._names, self._folder = rig, names, folder
         self._square_m, self._count, self._teller = square_m, count, teller
         self._next = _first_free(folder, names)
+        self._size: tuple[int, int] | None = None
 
     async def run(self, board: Board | None, endpoints: list[str]) -> None:
         """Ask, judge, keep, until there are enough."""
@@ -128,9 +129,13 @@ class _Job:
         from services.calibrator.boards import Board
         from services.calibrator.guess import guess_corners
 
-        size = guess_corners(images.values())
-        self._teller.status("no board yet: show the whole board" if size is None else f"a board of {size[0]}x{size[1]} inner corners")
-        return Board(*size, self._square_m) if size else None
+        before, self._size = self._size, guess_corners(images.values())
+        # A board that is just coming into the picture is counted too small: two takes must agree.
+        if self._size is None or self._size != before:
+            self._teller.status("looking for the board: show all of it, and hold it still")
+            return None
+        self._teller.line(f"a board of {self._size[0]}x{self._size[1]} inner corners")
+        return Board(*self._size, self._square_m)
 
     def _keep(self, pictures: dict[str, bytes]) -> None:
         for name, picture in pictures.items():

@@ -94,11 +94,13 @@ def detect_all(pictures: PictureSet, board: Board | None, square_m: float, progr
     """The board (counted if not given) and where each picture shows it, with a progress line."""
     import cv2
 
-    from services.calibrator.gather import find_boards, the_board
+    from services.calibrator.gather import find_boards, larger_board, the_board
 
     # More threads than one gain nothing here, and change the order of sums.
     cv2.setNumThreads(1)
     known = the_board(pictures, board, square_m)
+    if board is not None and (note := larger_board(pictures, board)):
+        typer.echo(f"note: {note}", err=True)
     shown = Progress("rhot calibrate: looking for the board,", sum(len(files) for files in pictures.files.values()), progress)
     try:
         found, blind = find_boards(pictures, known, shown.advance)

@@ -35,6 +35,11 @@ _CLOCK_WALK_S, _HEIGHT_WALK_PX = 1e-4, 0.01
 _GATE, _CONTRADICTIONS = 4.0, 24
 # A landmark moves if its speed is this many times its uncertainty (1.6 sigma per frame time for the cubic's slope).
 _MOVING = 8.0
+# Heights that differ by more than this are not a calibrated pair's (stereo RMS of real pairs is .22 px; a bump of .2 deg is 1.8 px), ...
+MOVED_PX = 1.5
+# ... and if two in five of the last hundred looks (2 s of six markers) do, it is no wrong marker and no fast motion: a camera rolled
+# by 3 deg moves four in six of a hand's markers that far.
+_MOVED_NEW, _MOVED_SHARE, _MOVED_OVER = 0.01, 0.4, 0.2
 # Half the step of the numerical speed: short against a frame.
 _STEP_S = 1e-3
 
@@ -54,6 +59,9 @@ class ClockTuner:
         self.contradicted = 0
         # Mean square of the epipolar residual, in px^2 of the mean focal length, over the last hundred or so looks.
         self._residual2 = 0.0
+        # Per pair: the share of looks beyond MOVED_PX, the mean size of these, and whether it is reported.
+        self._beyond = np.zeros((len(self._pairs), 2))
+        self._moved = np.zeros(len(self._pairs), dtype=bool)
         self._height_sigmas = np.array([_HEIGHT_SIGMA_PX / pair.focal_px for pair in self._pairs.values()])
         self.reset()
 
@@ -82,6 +90,15 @@ class ClockTuner:
         heights = self._state[self._cameras :]
         pairs = zip(self._pairs.items(), heights, strict=True)
         return {f"{self._names[a]}_{self._names[b]}": float(height) * pair.focal_px for ((a, b), pair), height in pairs}
+
+    @property
+    def moved_px(self) -> dict[tuple[str, str], float]:
+        """Pairs of cameras whose views have not fitted for seconds, and by how much: one of them was bumped since it was calibrated."""
+        found = {}
+        for (a, b), moved, (_, size) in zip(self._pairs, self._moved.tolist(), self._beyond.tolist(), strict=True):
+            if moved:
+                found[self._names[a], self._names[b]] = size
+        return found
 
     def observe(self, view: View, times_s: Array) -> tuple[float, float]:
         """Learn from a frame whose observations have times_s (n,) uncorrected; its camera's correction and sigma for pairing, both in s."""
@@ -129,6 +146,7 @@ class ClockTuner:
             gain = self._cov @ H
             S = float(H @ gain) + variance + (_NOISE_PX / focal_px) ** 2
             left = height - float(self._state[self._cameras + index])
+            self._watch(index, abs(height) * focal_px)
             self._residual2 += 0.01 * (min((left * focal_px) ** 2, 1e6) - self._residual2)
             if left * left > _GATE**2 * S:
                 self._contradict()
@@ -138,6 +156,15 @@ class ClockTuner:
             if self._enabled:
                 self._state += gain * (left / S)
                 self._cov -= np.outer(gain, gain) / S
+
+    def _watch(self, index: int, height_px: float) -> None:
+        """Note one look's height difference."""
+        beyond = self._beyond[index]
+        beyond[0] += _MOVED_NEW * ((height_px > MOVED_PX) - beyond[0])
+        if height_px > MOVED_PX:
+            beyond[1] += 0.05 * (min(height_px, 1e3) - beyond[1]) if beyond[1] else min(height_px, 1e3)
+        # Once reported it stays so until most looks fit again.
+        self._moved[index] = beyond[0] > (_MOVED_OVER if self._moved[index] else _MOVED_SHARE)
 
     def _contradict(self) -> None:
         """Something does not fit: a wrong marker now and then, or clocks that have changed."""

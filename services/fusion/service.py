@@ -84,6 +84,7 @@ class _Report:
         self._accepted = 0
         self._busy_s: list[float] = []
         self._said: set[str] = set()
+        self._moved: set[tuple[str, str]] = set()
 
     def note(self, busy_s: float) -> None:
         """One frame took that long."""
@@ -102,9 +103,21 @@ class _Report:
         values["observations_hz"] = (counts.accepted - self._accepted) / elapsed_s
         values["step_p50_us"] = 1e6 * sorted(self._busy_s)[len(self._busy_s) // 2]
         values["epipolar_px"] = step.clocks.epipolar_px
+        self._tell_moved()
         values |= {f"late_{name}_ms": 1e3 * late_s for name, late_s in step.clocks.late_s.items()}
         values |= {f"height_{pair}_px": height_px for pair, height_px in step.clocks.heights_px.items()}
         values |= {name: float(getattr(counts, name)) for name in ("gated", "late", "refused", "started", "dropped", "incoherent")}
         values |= {f"frames_{reason}": float(count) for reason, count in step.refusals.items()}
         self._accepted = counts.accepted
         self._busy_s.clear()
+
+    def _tell_moved(self) -> None:
+        """Report a bumped camera when it shows, and again when it shows once more."""
+        moved = self._step.clocks.moved_px
+        for pair in moved.keys() - self._moved:
+            self._service.error(
+                f"the views of cameras {pair[0]} and {pair[1]} differ by {moved[pair]:.1f} px in height: one of them has moved since the "
+                f"calibration; fasten it and run `rhot calibrate stereo`"
+            )
+        self._moved = set(moved)
+        self._service.values["moved_pairs"] = float(len(moved))

@@ -8,6 +8,7 @@ Missing cameras or markers make landmarks `predicted`, then absent; a hand of wh
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 
@@ -18,6 +19,7 @@ from rhot.config import RigConfig
 from rhot.errors import CalibrationError
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
+from services.fusion.bias import Bias
 from services.fusion.clocks import ClockTuner
 from services.fusion.coherence import coherent, reach_m
 from services.fusion.kalman import KalmanMethod
@@ -52,6 +54,7 @@ class FusionStep:
         self._slots = self._observer.slots
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._surface = Surface(self._slots, hands, self._observer.cameras)
+        self._bias = Bias(self._surface.extended, self._observer.cameras)
         self._hands = [hand for hand in HANDS if hand in config.hand]
         self._reach_m = {hand: reach_m(hands[hand]) for hand in self._hands}
         self._rows = {hand: np.array([row for row, slot in enumerate(self._slots) if slot.hand == hand]) for hand in self._hands}
@@ -80,7 +83,7 @@ class FusionStep:
             self._restart(view.instant_ns)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s
         late_s, clock_sigma_s = self.clocks.observe(view, times_s)
-        self.method.observe(view, times_s - late_s, clock_sigma_s)
+        self.method.observe(dataclasses.replace(view, sigma=self._bias.note(view)), times_s - late_s, clock_sigma_s)
         due_ns = self._pace.frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._tell(due_ns)
 
@@ -105,6 +108,7 @@ class FusionStep:
         """One message per hand for an instant (master clock)."""
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
         positions, covariances = self._surface.to_axis(estimates.positions_m, estimates.covariances_m2, estimates.cameras, instant_ns)
+        covariances = covariances + self._bias.covariances(positions, estimates.cameras)
         sigmas = np.sqrt(np.maximum(np.einsum("nii->ni", covariances), 0.0))
         usable = estimates.found & np.isfinite(positions).all(axis=1) & np.isfinite(sigmas).all(axis=1)
         self._seq += 1

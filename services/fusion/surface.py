@@ -12,7 +12,8 @@ the painted axis is
 
 so there is nothing to push: a push by the radius would be 6.3 mm wrong. What depends on the finger's direction is taken off when
 a pose tells it (patch.py; on rendered scenes the RMS error fell from .49, 1.17, 1.75 to .23, .35, .91 mm along x, y, z); without
-one it stays, and the covariance says so. Dabs (radius 0) lie where they are seen, but for what their bulge and the light do.
+one it stays, and the covariance says so. Dabs (radius 0) lie where they are seen, but for what their bulge does. What light,
+background and detector do to a centre is bias.py's matter.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ from services.fusion.triangulation import extrinsics
 
 # What is left along the viewing ray and along each axis across it, in radii of the paint, from the figures above.
 SIGMA_UNKNOWN = (0.29, 0.16)
-SIGMA_KNOWN = (0.13, 0.08)
-# Of a dab, in every direction, as a share of its diameter: .9 mm of 16 mm on rendered wrists.
-SIGMA_DAB = 0.06
+# With the solver's directions (3-5 deg off): .1-.2 mm of model error on rendered tips, the rest for tips that are partly hidden.
+SIGMA_KNOWN = (0.06, 0.04)
+# Of a dab, in every direction, as a share of its diameter: .3, .5 and 1.35 mm of 16 mm on rendered wrists, which bulge.
+SIGMA_DAB = 0.05
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
 
@@ -47,6 +49,8 @@ class Surface:
         self._slots = slots
         self._radii_m = np.array([paint.radius_m for paint in paints])
         self._dabs_m = np.array([paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints])
+        # Which landmarks are paint of some size (S,), not points.
+        self.extended: Bools = np.array([paint.radius_m > 0.0 or paint.extent_m > 0.0 for paint in paints], dtype=bool)
         self._tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
         self._R, self._t = extrinsics(cameras)
         self._eye_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)

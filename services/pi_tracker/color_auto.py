@@ -38,8 +38,9 @@ _LEAST_SATURATION, _LEAST_VALUE = 55.0, 35.0
 _LARGEST, _FILL = 0.02, 0.35
 # Skin in shade and between fingers: hues about this, within that, less saturated than orange paint is.
 _SKIN = (10.0, 14.0, 185.0)
-# A paint has at least this share of the strongest one's chroma; the simulator's have a third of it and more, its dark corners a sixth.
-_WEAKEST = 0.25
+# A marker stands out at least so much against the one that stands out most: the simulator's a quarter, its dark corners a tenth; the
+# gaps between the fingers that hold a pastel ball a ninth.
+_LEAST_SHARE = 0.2
 # Hues nearer than this to another paint, to skin or to much of the room are not suggested.
 _CLEAR = 12.0
 # Share of a picture's cells a hue must cover to count as the room's.
@@ -82,8 +83,8 @@ def propose(frames: Sequence[Frame], wanted: Sequence[str] = ()) -> tuple[list[P
     patches = [patch for number, part in enumerate(cells) for patch in _patches(part, number)]
     # Seen in at least half of the pictures: a reflection or a passing thing is not.
     groups = [group for group in _grouped(patches) if 2 * len({patch.frame for patch in group}) >= len(frames)]
-    strongest = max(map(_strength, groups), default=0.0)
-    groups = [group for group in sorted(groups, key=_strength, reverse=True) if _strength(group) >= _WEAKEST * strongest]
+    largest = max(map(_standing_out, groups), default=0.0)
+    groups = [group for group in sorted(groups, key=_standing_out, reverse=True) if _standing_out(group) >= _LEAST_SHARE * largest]
     groups = [group for number, group in enumerate(groups) if not any(_same_thing(group, other) for other in groups[:number])]
     proposals, taken = [], set[str]()
     for group in groups:
@@ -141,9 +142,8 @@ def _grouped(patches: list[_Patch]) -> list[list[_Patch]]:
     return groups
 
 
-def _strength(group: list[_Patch]) -> float:
-    """How strong a colour is."""
-    return float(np.median([patch.chroma for patch in group]))
+def _standing_out(group: list[_Patch]) -> float:
+    return float(np.median([_weight(patch) for patch in group]))
 
 
 def _same_thing(group: list[_Patch], stronger: list[_Patch]) -> bool:

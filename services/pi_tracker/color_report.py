@@ -187,3 +187,8 @@ def statistics(report: Report) -> dict[str, Any]:
         "separation": {f"{p.a}/{p.b}": {"d": p.separation, "hue_gap": p.hue_gap} for p in report.pairs},
         "warnings": list(report.warnings),
     }
+
+
+def colors_file(report: Report, fitted: Mapping[str, ColorRange], known: Mapping[str, ColorRange], **made: Any) -> Colors:
+    """Fitted ranges beside those of other colours that stay; made is date, tool and inputs of the file."""
+    return Colors(colors={**known, **fitted}, residuals=statistics(report), **made)

@@ -11,7 +11,7 @@ light blue), the second goes to another layer. Pure; a colour that is missing in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -39,25 +39,51 @@ class ColorTable:
     def __init__(self, names: tuple[str, ...], layers: tuple[npt.NDArray[np.uint32], ...]) -> None:
         self.names = names
         self.layers = layers
+        parts = [layer.view(np.uint8).reshape(-1, 4) for layer in layers]
+        self._classes = [np.ascontiguousarray(part[:, 0]) for part in parts]
+        # No class, no luma: low above high.
+        self._bounds = [_lookup(np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8))) for part in parts]
         self._buffer = np.empty((4, 0), np.uint8)
 
-    def classify(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
-        index = chroma.view(np.uint16)[:, :, 0]
-        labels = self._gated(self.layers[0], index, luma)
-        for layer in self.layers[1:]:
-            # Layers never claim the same cell: they share chromas, not lumas.
-            labels = np.maximum(labels.copy(), self._gated(layer, index, luma))
-        return labels
-
-    def _gated(self, layer: npt.NDArray[np.uint32], index: npt.NDArray[np.uint16], luma: Image) -> Image:
+    def mask(self, luma: Image, chroma: Image) -> Image:
+        """255 where any colour is; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
         if self._buffer.shape[1] < luma.size:
             self._buffer = np.empty((4, luma.size), np.uint8)
         # Fresh memory for the planes would cost four times what splitting costs.
-        classes, low, high, rest = planes = [plane[: luma.size].reshape(luma.shape) for plane in self._buffer]
-        cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4), planes)
-        cv2.inRange(luma, low, high, rest)
-        return cv2.bitwise_and(classes, rest, classes)
+        low, high, mask, more = self._buffer[:, : luma.size].reshape(4, *luma.shape)
+        index = chroma.view(np.uint16)[:, :, 0]
+        for number, bounds in enumerate(self._bounds):
+            cv2.split(bounds(index).view(np.uint8).reshape(*luma.shape, 2), (low, high))
+            cv2.inRange(luma, low, high, more if number else mask)
+            if number:
+                cv2.bitwise_or(mask, more, mask)
+        return mask
+
+    def classes_at(self, luma: Image, chroma: Image) -> Image:
+        """The class of every cell that the mask shows, of others any; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
+        index = chroma.view(np.uint16)[:, :, 0]
+        return self._classes[0].take(index) if len(self.layers) == 1 else self.classify(luma, chroma)
+
+    def classify(self, luma: Image, chroma: Image) -> Image:
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
+        index = chroma.view(np.uint16)[:, :, 0]
+        labels = np.zeros(luma.shape, np.uint8)
+        for layer in self.layers:
+            # Layers never claim the same cell: they share chromas, not lumas.
+            classes, low, high, _ = cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4))
+            found = cv2.bitwise_and(classes, cv2.inRange(np.ascontiguousarray(luma), low, high))
+            labels = np.maximum(labels, found)
+        return labels
+
+
+def _lookup(pairs: Bytes) -> Callable[[Image], Image]:
+    """A table (65536, 2) of bytes to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy; gives uint16."""
+    table = np.ascontiguousarray(pairs).view(np.uint16).ravel()
+    try:
+        cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
+    except cv2.error:
+        return table.take
+    return lambda index: cv2.LUT(index, table[None])
 
 
 def compile_colors(colors: Colors, wanted: Sequence[str], path: Path | str = "colors.json") -> ColorTable:

@@ -68,7 +68,7 @@ class LutFinder:
             return self._blobs(image, everywhere)
         region = roi.around(roi.hull(list(self._boxes.values())), self._margin_px, image.size)
         found = self._blobs(image, region)
-        if any(all(roi.cut(blob.rect, region, image.size) for blob in own) for own in found):
+        if any(not own or roi.cut(max(own, key=_cells).rect, region, image.size) for own in found):
             # A marker has moved further than the margin: the same frame may still show it.
             return self._blobs(image, everywhere)
         return found
@@ -80,6 +80,10 @@ class LutFinder:
             if shape_fits(blob, self._settings.max_area_px):
                 found[blob.color].append(blob)
         return found
+
+
+def _cells(blob: Blob) -> int:
+    return blob.cells
 
 
 def _marker(name: str, found: Centroid, certainty: float) -> Marker:

@@ -21,14 +21,15 @@ from services.pi_tracker.planes import Picture, Rect
 _MAX_CONTOURS = 64
 # What is left of a marker among others after a cell of its width is taken away, at least; of a seam next to nothing is.
 _SEAM_CELLS, _SEAM_SHARE = 3, 0.25
+_AT_ONCE_CELLS = 20_000
 
 
 class Blob(NamedTuple):
-    """A connected patch of one colour: class index from 0, its cells' bounding rectangle, their mask (0/1) and how many have the colour."""
+    """A connected patch of one colour: class index from 0, its cells' bounding rectangle, their mask and how many have the colour."""
 
     color: int
     rect: Rect
-    mask: Image  # (h, w) of the rectangle
+    mask: Image  # (h, w) of the rectangle, not 0 where the blob is
     cells: int
     # Area in pixels, and the middle of the rectangle: near enough to tell blobs apart.
     area_px: float
@@ -52,33 +53,34 @@ class Searcher:
     def blobs(self, picture: Picture, rect: Rect) -> list[Blob]:
         """All blobs of at least min_area_px, in no order."""
         luma, chroma = picture.cells(rect)
-        labels = self._table.classify(luma, chroma)
-        mask = self._filtered(labels)
+        mask = self._filtered(self._table.mask(luma, chroma))
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         if len(contours) > _MAX_CONTOURS:
             contours = sorted(contours, key=cv2.contourArea, reverse=True)[:_MAX_CONTOURS]
         found: list[Blob] = []
         left, top = rect[:2]
+        # Looking up all classes of a hand's rectangle at once costs less than those of each blob, but not of a whole image.
+        labels = self._table.classes_at(luma, chroma) & mask if luma.size <= _AT_ONCE_CELLS else None
         for contour in contours:
             x, y, w, h = cv2.boundingRect(contour)
             if w * h < self._min_cells:
                 continue
-            inside = labels[y : y + h, x : x + w]
+            part = (slice(y, y + h), slice(x, x + w))
+            inside = self._table.classes_at(luma[part], chroma[part]) & mask[part] if labels is None else labels[part]
             counts = np.bincount(inside.ravel(), minlength=2).tolist()
             mine = counts[-1]
             if counts[0] + mine < w * h:
                 found += self._parted(contour, inside, (x, y), (left + x, top + y))
             elif mine >= self._min_cells:
                 # One colour only, as a rule.
-                found.append(_blob(len(counts) - 1, mask[y : y + h, x : x + w], mine, (left + x, top + y)))
+                found.append(_blob(len(counts) - 1, mask[part], mine, (left + x, top + y)))
         return found
 
-    def _filtered(self, labels: Image) -> Image:
-        """1 where a colour is, after Gaussian, erosion and dilation."""
-        mask = cv2.threshold(labels, 0, 1, cv2.THRESH_BINARY)[1]
+    def _filtered(self, mask: Image) -> Image:
+        """The mask after Gaussian, erosion and dilation."""
         if self._gaussian:
-            blurred = cv2.GaussianBlur(mask * np.uint8(255), (self._gaussian, self._gaussian), 0)
-            mask = cv2.threshold(blurred, 127, 1, cv2.THRESH_BINARY)[1]
+            mask = cv2.GaussianBlur(mask, (self._gaussian, self._gaussian), 0)
+            mask = cv2.threshold(mask, 127, 255, cv2.THRESH_BINARY)[1]
         # An even element reaches to one side; the opposite anchors of erosion and dilation bring the blob back to its place.
         if self._erode:
             mask = cv2.erode(mask, self._element, anchor=(0, 0), iterations=self._erode)

@@ -85,14 +85,14 @@ def find_swatch(cells: Cells, pointer: Pointer) -> Swatch:
     if seed is None:
         what = "has no colour of its own: what is in it looks like what is around it" if pointer.is_box else "is on something grey"
         raise CalibrationError(f"{pointer}: {what}; point at the paint itself, in better light if it is dark")
-    found = _grow(window, seed, starts)
+    found = grow(window, seed, starts)
     # The seed was one place's; the patch's own colour is a better one.
-    found = _grow(window, np.median(window[found].tint, axis=0), found) if found.any() else found
+    found = grow(window, np.median(window[found].tint, axis=0), found) if found.any() else found
     if np.count_nonzero(found) < MIN_CELLS:
         raise CalibrationError(f"{pointer}: only {4 * np.count_nonzero(found)} px of one colour are there; {4 * MIN_CELLS} px are needed")
     if not pointer.is_box and _touches_border(found, rect, cells):
         raise CalibrationError(
-            f"{pointer}: that colour does not end near the click; is it the background? Draw a box around the marker instead"
+            f"{pointer}: that colour goes on far beyond the click; is it the background, or a sleeve? Point at the paint, or box it"
         )
     mask = np.zeros(cells.shape, bool)
     mask[y0:y1, x0:x1] = found
@@ -107,7 +107,7 @@ def _beyond(cells: Cells, rect: tuple[int, int, int, int], found: Mask) -> Mask:
     window = cells[wide[1] : wide[3], wide[0] : wide[2]]
     starts = np.zeros(window.shape, bool)
     starts[y0 - wide[1] : y1 - wide[1], x0 - wide[0] : x1 - wide[0]] = found
-    more = _grow(window, np.median(window[starts].tint, axis=0), starts)
+    more = grow(window, np.median(window[starts].tint, axis=0), starts)
     mask = np.zeros(cells.shape, bool)
     if not _touches_border(more, wide, cells):
         mask[wide[1] : wide[3], wide[0] : wide[2]] = more
@@ -117,19 +117,20 @@ def _beyond(cells: Cells, rect: tuple[int, int, int, int], found: Mask) -> Mask:
 def _window(cells: Cells, pointer: Pointer) -> tuple[int, int, int, int]:
     """Cells in which to look; raises CalibrationError for places outside the picture."""
     height, width = cells.shape
-    right, bottom = pointer.x_px + pointer.width_px, pointer.y_px + pointer.height_px
-    inside = 0 <= pointer.x_px < 2 * width and 0 <= pointer.y_px < 2 * height and right <= 2 * width and bottom <= 2 * height
-    if not inside:
+    # Boxes may reach beyond the picture, as things at its edge do; their middle may not.
+    x, y = pointer.x_px + pointer.width_px / 2.0, pointer.y_px + pointer.height_px / 2.0
+    if not (0.0 <= x < 2 * width and 0.0 <= y < 2 * height):
         raise CalibrationError(f"{pointer}: lies outside the picture, which is {2 * width}x{2 * height} px")
     if pointer.is_box:
-        x0, y0 = int(pointer.x_px) // 2, int(pointer.y_px) // 2
-        x1, y1 = int(np.ceil(right / 2.0)), int(np.ceil(bottom / 2.0))
+        x0, y0 = max(int(pointer.x_px) // 2, 0), max(int(pointer.y_px) // 2, 0)
+        x1 = min(int(np.ceil((pointer.x_px + pointer.width_px) / 2.0)), width)
+        y1 = min(int(np.ceil((pointer.y_px + pointer.height_px) / 2.0)), height)
         if (x1 - x0) * (y1 - y0) < MIN_CELLS or min(pointer.width_px, pointer.height_px) < 2.0:
             raise CalibrationError(f"{pointer}: is too small; draw it around the whole marker")
         return x0, y0, x1, y1
     reach = int(max(16.0, _WINDOW * width))
-    x, y = int(pointer.x_px) // 2, int(pointer.y_px) // 2
-    return max(x - reach, 0), max(y - reach, 0), min(x + reach + 1, width), min(y + reach + 1, height)
+    column, row = int(pointer.x_px) // 2, int(pointer.y_px) // 2
+    return max(column - reach, 0), max(row - reach, 0), min(column + reach + 1, width), min(row + reach + 1, height)
 
 
 def _click_seed(window: Cells, pointer: Pointer, origin: tuple[int, int]) -> tuple[Array | None, Mask]:
@@ -193,7 +194,7 @@ def _histogram(cells: Cells, weight: Array) -> Array:
     return cv2.blur(wrapped, (3, 3), borderType=cv2.BORDER_CONSTANT)[1:-1]
 
 
-def _grow(window: Cells, tint: Array, starts: Mask) -> Mask:
+def grow(window: Cells, tint: Array, starts: Mask) -> Mask:
     """Cells of like chroma over luma connected to any of the starts."""
     strength = float(np.hypot(*tint))
     if strength <= 0.0:

@@ -48,6 +48,7 @@ def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
         mask[top - y0 : bottom - y0, k, left - x0 : right - x0] = blob.mask
         inside[: y1 - y0, k, : x1 - x0] = 1
         picture.copy_to((x0, y0, x1, y1), luma[:, k], chroma[:, :, k])
+    np.minimum(mask, 1, out=mask)
     pixels = luma.astype(np.float32)
     pixels -= 16.0
     cells = np.ones((h, 4, n, w), np.float32)

@@ -21,6 +21,7 @@ from services.viewer.model import ViewModel
 from services.viewer.scene import Scene
 from services.viewer.server import Audience, open_server
 from services.viewer.setup import read_setup
+from services.viewer.sinks.calibrate import Calibrate
 
 log = logging.getLogger("rhot.viewer")
 
@@ -39,12 +40,16 @@ async def serve(service: Service) -> None:
         present = asyncio.Event()
         Audience(server, lambda count: loop.call_soon_threadsafe(present.set if count else present.clear))
         gui, scene = Gui(server, config, setup.notes), Scene(server, config, setup.cameras, setup.paints)
+        calibrating = service.tasks.create_task(Calibrate(service, server).run())
         service.values["port"] = server.get_port()
         log.info("live view at http://127.0.0.1:%d", server.get_port())
         service.ready()
-        while True:
-            await present.wait()
-            await _live(service, present, gui, scene)
+        try:
+            while True:
+                await present.wait()
+                await _live(service, present, gui, scene)
+        finally:
+            calibrating.cancel()
 
 
 async def _live(service: Service, present: asyncio.Event, gui: Gui, scene: Scene) -> None:

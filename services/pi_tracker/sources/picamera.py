@@ -17,6 +17,7 @@ from rhot.calibration import Exposure
 from rhot.config import CameraTable
 from rhot.errors import SourceError
 from services.pi_tracker.frame import Frame, Image
+from services.pi_tracker.sources.controls import Controls
 
 # Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2) 18.9 us.
 _LINE_US = {"ov5647": 33.7, "imx219": 18.9}
@@ -31,6 +32,7 @@ class PiCamera:
 
     def __init__(self, table: CameraTable, number: int, exposure: Exposure | None) -> None:
         self.notes: list[str] = []
+        self.controls = Controls()
         self._table = table
         self._number = number
         self._exposure = exposure
@@ -87,15 +89,12 @@ class PiCamera:
                 f"run `rhot calibrate camera {self._table.name}`"
             )
             return controls
-        return controls | {
-            "AeEnable": False,
-            "AwbEnable": False,
-            "ExposureTime": round(self._exposure.exposure_us),
-            "AnalogueGain": self._exposure.gain,
-            "ColourGains": (self._exposure.red_gain, self._exposure.blue_gain),
-        }
+        return controls | _fixed(self._exposure)
 
     def read(self) -> Frame:
+        wanted = self.controls.take()
+        if wanted is not None:
+            self._camera.set_controls({"AeEnable": True, "AwbEnable": True} if wanted.exposure is None else _fixed(wanted.exposure))
         try:
             request = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
         except TimeoutError:
@@ -105,6 +104,7 @@ class PiCamera:
             image = unpadded(request.make_buffer("main"), self._size, self._stride)
         finally:
             request.release()
+        self.controls.reported = _reported(metadata)
         frame = Frame(self._table.name, self._seq, self._stamp_ns(metadata), self._row_time_ns, self._size, image, "i420")
         self._seq += 1
         return frame
@@ -119,6 +119,25 @@ class PiCamera:
         if self._camera is not None:
             self._camera.close()
             self._camera = None
+
+
+def _fixed(exposure: Exposure) -> dict[str, Any]:
+    """The controls that fix an exposure."""
+    return {
+        "AeEnable": False,
+        "AwbEnable": False,
+        "ExposureTime": round(exposure.exposure_us),
+        "AnalogueGain": exposure.gain,
+        "ColourGains": (exposure.red_gain, exposure.blue_gain),
+    }
+
+
+def _reported(metadata: dict[str, Any]) -> Exposure | None:
+    """What an image was taken with; None if the metadata do not say all of it."""
+    exposure_us, gain, gains = (metadata.get(key) for key in ("ExposureTime", "AnalogueGain", "ColourGains"))
+    if not exposure_us or gain is None or gains is None or len(gains) != 2:
+        return None
+    return Exposure(exposure_us=float(exposure_us), gain=float(gain), red_gain=float(gains[0]), blue_gain=float(gains[1]))
 
 
 def unpadded(buffer: Image, size_px: tuple[int, int], stride: int) -> Image:

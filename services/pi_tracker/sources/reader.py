@@ -14,6 +14,7 @@ from typing import Protocol
 
 from rhot import clock
 from services.pi_tracker.frame import Frame
+from services.pi_tracker.sources.controls import Controls
 
 # Frames of a file read ahead: enough to hide one slow decode.
 _AHEAD = 4
@@ -40,6 +41,8 @@ class Source(Protocol):
 
     live: bool
     notes: list[str]
+    # Exposure, of sources that have it.
+    controls: Controls | None
     # Frames that came and were not delivered: overtaken by newer ones, or malformed.
     dropped: int
     rejected: int
@@ -57,6 +60,7 @@ class Threaded:
     def __init__(self, reader: Reader, *, paced: bool = False) -> None:
         self.live = reader.live
         self.notes = reader.notes
+        self.controls: Controls | None = getattr(reader, "controls", None)
         self.dropped = 0
         self.rejected = 0
         self._reader = reader

@@ -15,6 +15,7 @@ from rhot import clock, topics
 from rhot.bus import Bus, Sample
 from rhot.messages import SimFrame
 from services.pi_tracker.frame import Frame
+from services.pi_tracker.sources.controls import Controls
 
 # The frame in work and the next.
 _QUEUE = 2
@@ -27,6 +28,7 @@ class SimulatorSource:
 
     def __init__(self, bus: Bus, camera: str) -> None:
         self.notes: list[str] = []
+        self.controls: Controls | None = None
         self.dropped = 0
         self.rejected = 0
         self._bus = bus

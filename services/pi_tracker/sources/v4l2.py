@@ -19,9 +19,10 @@ from rhot.calibration import Exposure
 from rhot.config import CameraTable
 from rhot.errors import SourceError
 from services.pi_tracker.frame import Frame
+from services.pi_tracker.sources.controls import Controls
 
-# V4L2_EXPOSURE_MANUAL of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us.
-_MANUAL, _EXPOSURE_UNIT_US = 1, 100.0
+# V4L2_EXPOSURE_MANUAL and _APERTURE_PRIORITY of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us.
+_MANUAL, _AUTOMATIC, _EXPOSURE_UNIT_US = 1, 3, 100.0
 # A stamp further from now than this is not of this frame.
 _STAMP_SLACK_NS = 2_000_000_000
 
@@ -40,6 +41,8 @@ class OpenCvCamera:
         capture: Callable[..., Any] = cv2.VideoCapture,
     ) -> None:
         self.notes: list[str] = []
+        # A GStreamer pipeline has properties of its own for that.
+        self.controls = Controls("what the driver reports while its automatics run may be old") if api == cv2.CAP_V4L2 else None
         self._table = table
         self._device = device
         self._exposure = exposure
@@ -81,7 +84,30 @@ class OpenCvCamera:
         if not self._capture.set(key, value):
             self.notes.append(f"camera {self._table.name!r}: the driver refuses {what} = {value:g}")
 
+    def _automatic(self) -> None:
+        self._set("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _AUTOMATIC)
+        self._set("automatic white balance", cv2.CAP_PROP_AUTO_WB, 1)
+
+    def _obey(self, controls: Controls) -> None:
+        """Set what is wanted; while the automatics run, tell what the driver says."""
+        wanted = controls.take()
+        if wanted is not None:
+            self._exposure = wanted.exposure
+            if wanted.exposure is None:
+                self._automatic()
+            else:
+                self._fix(wanted.exposure)
+        if not controls.watched:
+            return
+        keys = (cv2.CAP_PROP_EXPOSURE, cv2.CAP_PROP_GAIN, cv2.CAP_PROP_WHITE_BALANCE_RED_V, cv2.CAP_PROP_WHITE_BALANCE_BLUE_U)
+        units, gain, red, blue = (float(self._capture.get(key)) for key in keys)
+        # OpenCV says -1 or 0 of what a driver does not have.
+        known = units > 0.0 and min(gain, red, blue) >= 0.0
+        controls.reported = Exposure(exposure_us=units * _EXPOSURE_UNIT_US, gain=gain, red_gain=red, blue_gain=blue) if known else None
+
     def read(self) -> Frame:
+        if self.controls is not None:
+            self._obey(self.controls)
         ok, image = self._capture.read()
         if not ok or image is None:
             raise SourceError(f"camera {self._table.name!r}: {self._device!r} delivers no more images; is it unplugged?")

@@ -12,15 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.optimize
 
 from rhot.transforms import Array
-from services.solver.person.marks import UNKNOWNS, contracted
-from services.solver.person.problem import Equations, Poses, Problem, coupling_information, equations
+from services.solver.person.elimination import Eliminated
+from services.solver.person.marks import contracted
+from services.solver.person.problem import Equations, Poses, Problem, equations
 
-# Rounds of Newton's method for the poses: 3 to 5 near the solution, 30 from a bad start.
+# Rounds of Newton's method for the poses: 3 to 5 near the solution.
 _ROUNDS = 60
+# Of Levenberg's for poses and person together, as a start: 20 to 30.
+_START_ROUNDS = 60
 # Of the quasi-Newton method for the person: 30 to 60 on simulated recordings.
 _STEPS = 150
 # Shift of the person in standard deviations for the second derivative by differences of the first.
@@ -29,7 +31,7 @@ _DIFFERENCE = 0.02
 
 @dataclass(frozen=True)
 class Fit:
-    """The person found: unknowns x, their covariance, poses, how well the points are met, and each take's covariance of angles."""
+    """The person found: unknowns x (p,), their covariance (p, p), poses; objective in nats, and how often it was evaluated."""
 
     x: Array
     covariance: Array
@@ -48,104 +50,152 @@ class Marginal:
     def __call__(self, x: Array) -> tuple[float, Array]:
         """-log posterior density of the person but for a constant, and its gradient."""
         self.evaluations += 1
-        self.poses, found, factors = best_poses(self.problem, x, self.poses)
-        log_det, by_pose, by_x = _volume(self.problem, found, factors)
-        gradient = found.g + by_x
-        for take, factor, own in zip(found.takes, factors, by_pose, strict=True):
-            gradient = gradient - take.X.T @ scipy.linalg.cho_solve(factor, own, check_finite=False)
-        return 0.5 * (found.cost + log_det), gradient
+        self.poses, found = best_poses(self.problem, x, self.poses)
+        eliminated = Eliminated(self.problem, found)
+        frames, mixed, _ = eliminated.covariances()
+        free, F, free_log_det = _free(self.problem, found)
+        by_pose, by_x = _volume(self.problem, found, frames - free, mixed)
+        by_ratio = np.zeros(len(x))
+        for row in range(5):
+            second, last = 8 + 4 * row, 9 + 4 * row
+            # d/dr of 1/2 logdet(F'HF) = tr(P F'H dF), dF[last, second] = 1 where free
+            on = self.problem.free[self.problem.take_of, 4 * row + 2]
+            P_FH = np.einsum("na,nab->nb", F[1][:, second], np.swapaxes(F[0], 1, 2) @ found.H)
+            by_ratio[-5 + row] = float((P_FH[:, last] * on).sum()) * found.measures.G[-5 + row, len(x) - 5 + row]
+        moved, _ = _newton(self.problem, found).by_person()
+        gradient = found.person_g + by_x - by_ratio + np.einsum("na,nap->p", by_pose, moved)
+        return 0.5 * (float(found.costs.sum()) + float(x @ x) + eliminated.log_det() - free_log_det), gradient
 
     def information(self, x: Array) -> Array:
-        """Second derivative by central differences of the gradient; (unknowns, unknowns)."""
-        rows = []
-        for step in _DIFFERENCE * np.eye(len(x)):
-            rows.append((self(x + step)[1] - self(x - step)[1]) / (2.0 * _DIFFERENCE))
-        H = np.array(rows)
+        """Second derivative by differences of the gradient; (p, p)."""
+        here = self(x)[1]
+        H = np.array([(self(x + step)[1] - here) / _DIFFERENCE for step in _DIFFERENCE * np.eye(len(x))])
         return 0.5 * (H + H.T)
-
-
-def best_poses(problem: Problem, x: Array, poses: Poses) -> tuple[Poses, Equations, list]:
-    """The most plausible poses of a person, from poses nearby; with the equations there and the factors of their matrices."""
-    found = equations(problem, x, poses)
-    damping = 0.0
-    for _ in range(_ROUNDS):
-        step, slope = np.empty((len(problem.points), UNKNOWNS)), 0.0
-        for take, own in zip(problem.takes, found.takes, strict=True):
-            damped = own.H + damping * np.diag(np.diag(own.H))
-            move = -scipy.linalg.cho_solve(scipy.linalg.cho_factor(damped, lower=True, check_finite=False), own.g, check_finite=False)
-            step[take.rows] = move.reshape(-1, UNKNOWNS)
-            slope -= float(own.g @ move)
-        # Half the predicted gain, in nats: far below anything that matters, and small enough for the gradient to be exact.
-        if slope < 1e-7:
-            break
-        tried = poses.moved(step)
-        new = equations(problem, x, tried)
-        if new.cost <= found.cost:
-            poses, found, damping = tried, new, 0.0 if damping < 1e-6 else 0.1 * damping
-        else:
-            damping = max(8.0 * damping, 1e-4)
-            if damping > 1e8:
-                break
-    factors = [scipy.linalg.cho_factor(own.H, lower=True, check_finite=False) for own in found.takes]
-    return poses, found, factors
 
 
 def fit(problem: Problem, poses: Poses, x: Array) -> Fit:
     """From a first guess of poses and person."""
+    x, poses = start(problem, poses, x)
     function = Marginal(problem, poses)
     # In units in which the cost alone is a sphere the method needs few steps.
     scale = _spread(problem, x, function)
+
+    def scaled(y: Array) -> tuple[float, Array]:
+        value, gradient = function(x + scale @ y)
+        return value, scale.T @ gradient
+
     done = scipy.optimize.minimize(
-        lambda y: _scaled(function, x, scale, y), np.zeros(len(x)), jac=True, method="L-BFGS-B", options={"maxiter": _STEPS, "ftol": 1e-9, "gtol": 1e-3}
+        scaled, np.zeros(len(x)), jac=True, method="L-BFGS-B", options={"maxiter": _STEPS, "ftol": 1e-9, "gtol": 1e-3}
     )
     x = x + scale @ done.x
-    information = function.information(x)
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = np.linalg.eigh(function.information(x))
     # The prior is part of the information, so nothing is known worse than before but by what the approximation gets wrong.
     covariance = (vectors / np.maximum(values, 1.0)) @ vectors.T
     objective, _ = function(x)
     return Fit(x, covariance, function.poses, objective, function.evaluations)
 
 
-def _scaled(function: Marginal, x: Array, scale: Array, y: Array) -> tuple[float, Array]:
-    value, gradient = function(x + scale @ y)
-    return value, scale.T @ gradient
+def start(problem: Problem, poses: Poses, x: Array) -> tuple[Array, Poses]:
+    """Poses and person that fit best together: biased, but near."""
+    damping, found = 1e-3, equations(problem, x, poses)
+    cost = float(found.costs.sum() + x @ x)
+    for _ in range(_START_ROUNDS):
+        eliminated = Eliminated(problem, found, damping=np.full(len(problem.takes), damping))
+        moved, offsets = eliminated.by_person()
+        A = found.person_H + np.einsum("nap,naq->pq", found.X, moved) + np.einsum("tap,taq->pq", found.offsets_X, offsets)
+        A[np.diag_indices_from(A)] += damping * np.diag(found.person_H)
+        b = found.person_g + np.einsum("nap,na->p", moved, found.g) + np.einsum("tap,ta->p", offsets, found.offsets_g)
+        dx = -np.linalg.solve(A, b)
+        own, own_offsets = eliminated.solve(found.g, found.offsets_g)
+        tried = poses.moved(moved @ dx - own, offsets @ dx - own_offsets)
+        new = equations(problem, x + dx, tried)
+        new_cost = float(new.costs.sum() + (x + dx) @ (x + dx))
+        if new_cost < cost:
+            done = cost - new_cost < 1e-3 * (1.0 + 1e-3 * cost)
+            x, poses, found, cost, damping = x + dx, tried, new, new_cost, max(0.2 * damping, 1e-9)
+            if done:
+                break
+        else:
+            damping *= 6.0
+            if damping > 1e8:
+                break
+    return x, poses
+
+
+def best_poses(problem: Problem, x: Array, poses: Poses) -> tuple[Poses, Equations]:
+    """The most plausible poses of a person, from poses nearby, and the equations there. Takes are improved independently."""
+    found = equations(problem, x, poses)
+    damping = np.zeros(len(problem.takes))
+    for _ in range(_ROUNDS):
+        eliminated = _newton(problem, found, damping)
+        step, offsets = eliminated.solve(found.g, found.offsets_g)
+        gains = problem.by_take((step * found.g).sum(axis=1)) + (offsets * found.offsets_g).sum(axis=1)
+        # Far below a nat, and small enough for the gradient to be exact.
+        if gains.max() < 1e-8:
+            break
+        tried = poses.moved(-step, -offsets)
+        new = equations(problem, x, tried)
+        better = new.costs <= found.costs + 1e-9
+        if better.all():
+            poses, found = tried, new
+        elif better.any():
+            frames = better[problem.take_of]
+            mixed = [np.where(frames.reshape(-1, *(1,) * (a.ndim - 1)), b, a) for a, b in zip(poses[:3], tried[:3], strict=True)]
+            poses = Poses(*mixed, np.where(better[:, None], tried.offsets, poses.offsets))
+            found = equations(problem, x, poses)
+        damping = np.where(better, np.where(damping < 1e-4, 0.0, 0.1 * damping), np.maximum(8.0 * damping, 1e-3))
+        if damping.max() > 1e8:
+            break
+    return poses, found
+
+
+def _newton(problem: Problem, found: Equations, damping: Array | None = None) -> Eliminated:
+    """Newton's matrix where it is definite, else Gauss and Newton's."""
+    try:
+        return Eliminated(problem, found, damping=damping, bent=True)
+    except np.linalg.LinAlgError:
+        return Eliminated(problem, found, damping=damping)
 
 
 def _spread(problem: Problem, x: Array, function: Marginal) -> Array:
     """A square root of the person's covariance by the cost alone."""
-    function.poses, found, factors = best_poses(problem, x, function.poses)
-    A = found.H.copy()
-    for take, factor in zip(found.takes, factors, strict=True):
-        A -= take.X.T @ scipy.linalg.cho_solve(factor, take.X, check_finite=False)
+    function.poses, found = best_poses(problem, x, function.poses)
+    moved, offsets = Eliminated(problem, found).by_person()
+    A = found.person_H + np.einsum("nap,naq->pq", found.X, moved) + np.einsum("tap,taq->pq", found.offsets_X, offsets)
     values, vectors = np.linalg.eigh(0.5 * (A + A.T))
     return vectors / np.sqrt(np.maximum(values, 1.0))
 
 
-def _volume(problem: Problem, found: Equations, factors: list) -> tuple[float, list[Array], Array]:
-    """log det of the poses' information, half its derivative by each take's poses and by the person's unknowns."""
-    log_det, covariances = 0.0, []
-    for factor, own in zip(factors, found.takes, strict=True):
-        log_det += 2.0 * float(np.log(np.diag(factor[0])).sum())
-        covariances.append(scipy.linalg.cho_solve(factor, np.eye(len(own.g)), check_finite=False))
-    n = len(problem.points)
-    C = np.empty((n, UNKNOWNS, UNKNOWNS))
-    by_ratio = np.zeros(5)
-    for take, covariance in zip(problem.takes, covariances, strict=True):
-        full = covariance.reshape(take.count, UNKNOWNS, take.count, UNKNOWNS)
-        C[take.rows] = full[np.arange(take.count), :, np.arange(take.count), :]
-        information = coupling_information(take.count)
-        for row, ratio in enumerate(found.measures.ratios.tolist()):
-            second, last = 6 + 4 * row + 2, 6 + 4 * row + 3
-            by_ratio[row] += float(((ratio * full[:, second, :, second] - full[:, last, :, second]) * information).sum())
+def _free(problem, found):
+    n = len(found.H)
+    F = np.zeros((n, 26, 26))
+    on = np.concatenate([np.ones((n, 6), bool), problem.free[problem.take_of]], axis=1)
+    i = np.arange(26)
+    F[:, i, i] = on
+    for row, ratio in enumerate(found.measures.ratios.tolist()):
+        second, last = 8 + 4 * row, 9 + 4 * row
+        F[:, last, second] = np.where(on[:, second], ratio, 0.0)
+    A = np.swapaxes(F, 1, 2) @ found.H @ F
+    A[:, i, i] += ~on
+    P = np.linalg.inv(A)
+    P[:, i, i] -= ~on
+    return F @ P @ np.swapaxes(F, 1, 2), (F, P), float(np.linalg.slogdet(A)[1].sum())
+
+
+def _volume(problem: Problem, found: Equations, C: Array, mixed: Array) -> tuple[Array, Array]:
+    """Half the derivative of log det by the frames' unknowns (n, 26) and by the person's (p,)."""
     marks = found.marks
     JC = marks.J @ C[:, None]
     by_pose, by_measure = contracted(problem.shape, marks, found.weights @ JC)
-    by_measure[-5:] += by_ratio
+    for row, ratio in enumerate(found.measures.ratios.tolist()):
+        second, last, offset = 8 + 4 * row, 9 + 4 * row, 20 + row
+        information = problem.changing[problem.take_of, offset]
+        of_ratio = ratio * C[:, second, second] - C[:, last, second] + mixed[:, second, offset]
+        by_measure[-5 + row] += float(of_ratio @ information)
     # Turning the wrist turns the rig's axes, and with them which direction is seen well.
-    SW = JC @ np.swapaxes(marks.J, 2, 3) @ found.weights
-    uneven = (SW - np.swapaxes(SW, 2, 3)).sum(axis=1)
+    SW = (JC @ np.swapaxes(marks.J, 2, 3) @ found.weights).sum(axis=1)
+    uneven = SW - np.swapaxes(SW, 1, 2)
     by_pose[:, :3] += np.stack([uneven[:, 1, 2], uneven[:, 2, 0], uneven[:, 0, 1]], axis=1)
     slope, bend = found.edges
     by_pose[:, 6:] += np.einsum("naa->na", C[:, 6:, 6:]) * slope * bend
-    return log_det, [by_pose[take.rows].ravel() for take in problem.takes], found.measures.G.T @ by_measure
+    return by_pose, found.measures.G.T @ by_measure

@@ -85,6 +85,37 @@ def contracted(shape: Shape, marks: Marks, V: Array) -> tuple[Array, Array]:
     return by_pose, by_measure
 
 
+def curved(shape: Shape, marks: Marks, v: Array) -> tuple[Array, Array]:
+    """sum v . d2p by a frame's unknowns twice, (n, 26, 26), and by them and the person's measures, (n, 26, measures); v (n, m, 3)."""
+    n = len(v)
+    twice, mixed = np.zeros((n, UNKNOWNS, UNKNOWNS)), np.zeros((n, UNKNOWNS, shape.measures))
+    for i, (row, k) in enumerate(shape.places):
+        J, pull, p, own = marks.J[:, i], v[:, i], marks.points[:, i], marks.by_measure[:, i]
+        outer = p[:, :, None] * pull[:, None, :]
+        twice[:, :3, :3] += 0.5 * (outer + np.swapaxes(outer, 1, 2)) - _dots(pull, p)[:, None, None] * np.eye(3)
+        # Rows v x e_j: what the wrist's turn makes of any further movement of the point.
+        turned = np.swapaxes(-_cross_columns(pull), 1, 2)
+        mixed[:, :3] += turned @ own
+        if row < 0:
+            continue
+        columns = [6 + 4 * row + a for a in range(min(k + 2, 4))]
+        rooted = np.stack([np.cross(pull, marks.axes[:, row, a]) for a in range(len(columns))], axis=1)
+        chain = J[:, :, columns]
+        wrist = turned @ chain
+        twice[:, :3, columns] += wrist
+        twice[:, columns, :3] += np.swapaxes(wrist, 1, 2)
+        pairs = rooted @ chain  # (n, a, b): v . (axis_a x J_b), right where a <= b
+        upper = np.triu(pairs) + np.swapaxes(np.triu(pairs, 1), 1, 2)
+        twice[:, columns[0] : columns[-1] + 1, columns[0] : columns[-1] + 1] += upper
+        beyond = rooted @ own
+        for a, c in enumerate(columns):
+            for bone in range(_ROOT[a], k):
+                mixed[:, c, 3 * row + bone] += beyond[:, a, 3 * row + bone]
+            mixed[:, c, 45 + 3 * row : 48 + 3 * row] += np.cross(chain[:, :, a], pull)
+            mixed[:, c, 60 + 3 * i : 63 + 3 * i] += beyond[:, a, 60 + 3 * i : 63 + 3 * i]
+    return twice, mixed
+
+
 def _chains(measures: Geometry, angles: Array, side: float) -> tuple[Array, Array, Array]:
     """Roots (n, 5, 4, 3) and axes (n, 5, 4, 3) of the joints, and the bones' frames (n, 5, 3, 3, 3)."""
     n = len(angles)

@@ -12,11 +12,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from rhot.transforms import Array, rotation_from_vector
-from services.solver.person.marks import UNKNOWNS, Marks, marks_of
+from services.solver.person.marks import UNKNOWNS, Marks, curved, marks_of
 from services.solver.person.shape import Geometry, Shape
 
+# An angle that may change by more says nothing of a person.
+FREE_RAD = np.deg2rad(60.0)
+# What lasts in a take: offsets of the 20 angles and of the five couplings.
+OFFSETS = 25
 # Deviation of DIP from ratio * PIP, lasting and changing: as in services/solver/constraints.py, where one look has no lasting part.
 _COUPLING_RAD = np.deg2rad([4.0, 4.0])
 # Beyond a table's limit the next 5 deg are one standard deviation; the edge is rounded over 2 deg, or else the optimum jumps.
@@ -27,65 +32,76 @@ _HUBER = 5.0
 
 @dataclass(frozen=True)
 class Take:
-    """Frames first..first+count of one exercise; expected angles (20,) rad and standard deviations, lasting and changing (20,)."""
+    """Some frames of one exercise: expected angles (20,) rad and their standard deviations, lasting and changing (20,)."""
 
     name: str
-    first: int
     count: int
     expected: Array
     lasting: Array
     changing: Array
 
     @property
-    def rows(self) -> slice:
-        """Its frames."""
-        return slice(self.first, self.first + self.count)
+    def free(self) -> npt.NDArray[np.bool_]:
+        """(20,) which angles nothing is expected of."""
+        return self.changing > FREE_RAD
 
 
 class Poses(NamedTuple):
-    """The hand in every frame."""
+    """The hand in every frame, and what lasts in every take."""
 
     rotations: Array  # (n, 3, 3) wrist in the rig frame
     positions: Array  # (n, 3)
     angles: Array  # (n, 5, 4)
+    offsets: Array  # (takes, 25) rad
 
-    def moved(self, step: Array) -> Poses:
-        """After a step (n, 26) in the wrist frame."""
+    def moved(self, step: Array, offsets: Array) -> Poses:
+        """After a step (n, 26) in the wrist frame and one of the offsets."""
         turns = np.array([rotation_from_vector(v) for v in step[:, :3]])
         shifts = np.einsum("nij,nj->ni", self.rotations, step[:, 3:6])
-        return Poses(self.rotations @ turns, self.positions + shifts, self.angles + step[:, 6:].reshape(-1, 5, 4))
+        return Poses(self.rotations @ turns, self.positions + shifts, self.angles + step[:, 6:].reshape(-1, 5, 4), self.offsets + offsets)
 
 
-@dataclass(frozen=True)
 class Problem:
-    """What was seen: points (n, m, 3) in the rig frame and weights 1/sigma^2 (n, m, 3), 0 where missing; and what is expected."""
+    """What was seen, points (n, m, 3) in the rig frame and weights 1/sigma^2 (n, m, 3), 0 where missing; and what is expected."""
 
-    shape: Shape
-    points: Array
-    weights: Array
-    takes: tuple[Take, ...]
-    limits: Array  # (5, 4, 2) rad
+    def __init__(self, shape: Shape, points: Array, weights: Array, takes: tuple[Take, ...], limits: Array) -> None:
+        self.shape, self.points, self.weights, self.takes, self.limits = shape, points, weights, takes, limits
+        counts = [take.count for take in takes]
+        self.take_of = np.repeat(np.arange(len(takes)), counts)
+        self.first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        self.free = np.array([take.free for take in takes])
+        # Expected value (takes, 25) and 1/sd^2 of what lasts and what changes; of a coupling's deviation nothing is expected.
+        self.expected = np.array([take.expected for take in takes])
+        self.lasting = np.array([[*take.lasting**-2.0, *(_COUPLING_RAD[0] ** -2.0,) * 5] for take in takes])
+        self.changing = np.array([[*take.changing**-2.0, *(_COUPLING_RAD[1] ** -2.0,) * 5] for take in takes])
 
-
-class TakeEquations(NamedTuple):
-    """Normal equations of one take of k frames."""
-
-    H: Array  # (26 k, 26 k)
-    X: Array  # (26 k, unknowns) with the person's unknowns
-    g: Array  # (26 k,)
+    def by_take(self, values: Array) -> Array:
+        """Sums over the frames of each take; (n, ...) -> (takes, ...)."""
+        return np.add.reduceat(values, self.first, axis=0)
 
 
 class Equations(NamedTuple):
-    """Normal equations at (x, poses); cost is the sum of squares in standard deviations."""
+    """Normal equations at (person, poses); n frames, t takes, p unknowns of the person.
 
-    cost: float
-    takes: list[TakeEquations]
-    H: Array  # (unknowns, unknowns) of the person
-    g: Array  # (unknowns,)
+    H is Gauss and Newton's matrix, which is definite; bent is what Newton's has more, and bent_X likewise.
+    """
+
+    costs: Array  # (t,) sums of squares in standard deviations
+    H: Array  # (n, 26, 26)
+    B: Array  # (n, 26, 25) with the take's offsets
+    X: Array  # (n, 26, p) with the person
+    g: Array  # (n, 26)
+    offsets_H: Array  # (t, 25), diagonal
+    offsets_X: Array  # (t, 25, p)
+    offsets_g: Array  # (t, 25)
+    person_H: Array  # (p, p)
+    person_g: Array  # (p,)
+    bent: Array  # (n, 26, 26)
+    bent_X: Array  # (n, 26, p)
     measures: Geometry
     marks: Marks
     weights: Array  # (n, m, 3, 3) in the wrist frame, with Huber's factor
-    edges: tuple[Array, Array]  # first derivative of the soft limits' residuals and its derivative, (n, 20) each
+    edges: tuple[Array, Array]  # first and second derivative of the soft limits' residuals, (n, 20) each
 
 
 def equations(problem: Problem, x: Array, poses: Poses) -> Equations:
@@ -93,80 +109,94 @@ def equations(problem: Problem, x: Array, poses: Poses) -> Equations:
     shape = problem.shape
     measures = shape.geometry(x)
     marks = marks_of(shape, measures, poses.angles, shape.table.side)
+    error, weights, cost = _errors(problem, marks, poses)
+    pull = np.einsum("nmij,nmj->nmi", weights, error)
+    Jx = marks.by_measure @ measures.G
+    WJ = weights @ marks.J
+    H = np.einsum("nmia,nmib->nab", WJ, marks.J)
+    X = np.einsum("nmia,nmib->nab", WJ, Jx)
+    g = np.einsum("nmia,nmi->na", marks.J, pull)
+    person_H = np.einsum("nmia,nmib->ab", weights @ Jx, Jx) + np.eye(shape.unknowns)
+    person_g = np.einsum("nmia,nmi->a", Jx, pull) + x
+    bent, mixed = curved(shape, marks, pull)
+    bent_X = mixed @ measures.G
+    residual, slope, bend = _edges(poses.angles.reshape(-1, 20), problem.limits.reshape(20, 2))
+    cost += (residual**2).sum(axis=1)
+    diagonal = np.arange(6, UNKNOWNS)
+    g[:, 6:] += slope * residual
+    H[:, diagonal, diagonal] += slope**2
+    bent[:, diagonal, diagonal] += bend * residual
+    parts = Equations(
+        costs=problem.by_take(cost) + (poses.offsets**2 * problem.lasting).sum(axis=1),
+        H=H,
+        B=np.zeros((len(H), UNKNOWNS, OFFSETS)),
+        X=X,
+        g=g,
+        offsets_H=problem.lasting.copy(),
+        offsets_X=np.zeros((len(problem.takes), OFFSETS, shape.unknowns)),
+        offsets_g=problem.lasting * poses.offsets,
+        person_H=person_H,
+        person_g=person_g,
+        bent=bent,
+        bent_X=bent_X,
+        measures=measures,
+        marks=marks,
+        weights=weights,
+        edges=(slope, bend),
+    )
+    _add_expected(problem, poses, parts)
+    _add_coupling(problem, poses, parts)
+    return parts
+
+
+def _errors(problem: Problem, marks: Marks, poses: Poses) -> tuple[Array, Array, Array]:
+    """Of each landmark: error (n, m, 3) and weights (n, m, 3, 3) in the wrist frame; of each frame: Huber's cost (n,)."""
     R = poses.rotations
     error = marks.points - np.einsum("nji,nmj->nmi", R, problem.points - poses.positions[:, None])
     weights = np.einsum("nji,nmj,njk->nmik", R, problem.weights, R)
-    square = np.einsum("nmi,nmij,nmj->nm", error, weights, error)
+    square = np.maximum(np.einsum("nmi,nmij,nmj->nm", error, weights, error), 0.0)
     distance = np.sqrt(square)
     factor = np.where(distance <= _HUBER, 1.0, _HUBER / np.maximum(distance, _HUBER))
-    weights = weights * factor[:, :, None, None]
-    cost = float(np.where(distance <= _HUBER, square, _HUBER * (2.0 * distance - _HUBER)).sum()) + float(x @ x)
-    Jx = marks.by_measure @ measures.G
-    WJ = weights @ marks.J
-    frame_H = np.einsum("nmia,nmib->nab", WJ, marks.J)
-    frame_X = np.einsum("nmia,nmib->nab", WJ, Jx)
-    frame_g = np.einsum("nmia,nmi->na", WJ, error)
-    flat = Jx.reshape(-1, shape.unknowns)
-    H = flat.T @ (weights @ Jx).reshape(-1, shape.unknowns) + np.eye(shape.unknowns)
-    g = flat.T @ np.einsum("nmij,nmj->nmi", weights, error).ravel() + x
-    residual, slope, bend = _edges(poses.angles.reshape(-1, 20), problem.limits.reshape(20, 2))
-    cost += float((residual**2).sum())
-    frame_g[:, 6:] += slope * residual
-    diagonal = np.arange(6, UNKNOWNS)
-    frame_H[:, diagonal, diagonal] += slope**2
-    takes = []
-    for take in problem.takes:
-        rows = take.rows
-        own, more = _expected(take, poses.angles[rows], frame_H[rows], frame_X[rows], frame_g[rows])
-        cost += more + _coupled(take, poses.angles[rows], measures, own, H, g)
-        size = UNKNOWNS * take.count
-        takes.append(TakeEquations(own.H.reshape(size, size), own.X.reshape(size, -1), own.g.reshape(size)))
-    return Equations(cost, takes, H, g, measures, marks, weights, (slope, bend))
+    cost = np.where(distance <= _HUBER, square, _HUBER * (2.0 * distance - _HUBER)).sum(axis=1)
+    return error, weights * factor[:, :, None, None], cost
 
 
-def lasting_information(count: int, lasting: float, changing: float) -> Array:
-    """Inverse of changing^2 I + lasting^2 11', (count, count)."""
-    return (np.eye(count) - lasting**2 / (changing**2 + count * lasting**2)) / changing**2
+def _add_expected(problem: Problem, poses: Poses, parts: Equations) -> None:
+    """Angles about what their take expects plus what lasts."""
+    information = problem.changing[problem.take_of, :20]
+    off = poses.angles.reshape(-1, 20) - problem.expected[problem.take_of] - poses.offsets[problem.take_of, :20]
+    pull = information * off
+    angles = np.arange(20)
+    parts.H[:, 6 + angles, 6 + angles] += information
+    parts.B[:, 6 + angles, angles] -= information
+    parts.g[:, 6:] += pull
+    parts.offsets_H[:, :20] += problem.by_take(information)
+    parts.offsets_g[:, :20] -= problem.by_take(pull)
+    parts.costs[:] += problem.by_take((pull * off).sum(axis=1))
 
 
-def coupling_information(count: int) -> Array:
-    """Of the deviations of DIP from ratio * PIP in a take's frames."""
-    return lasting_information(count, float(_COUPLING_RAD[0]), float(_COUPLING_RAD[1]))
-
-
-def _expected(take: Take, angles: Array, H: Array, X: Array, g: Array) -> tuple[TakeEquations, float]:
-    """A take's equations with what is expected of its angles; H becomes (k, 26, k, 26)."""
-    k, cost = take.count, 0.0
-    full = np.zeros((k, UNKNOWNS, k, UNKNOWNS))
-    full[np.arange(k), :, np.arange(k), :] = H
-    g = g.copy()
-    for a in range(20):
-        information = lasting_information(k, take.lasting[a], take.changing[a])
-        off = angles.reshape(k, 20)[:, a] - take.expected[a]
-        pull = information @ off
-        full[:, 6 + a, :, 6 + a] += information
-        g[:, 6 + a] += pull
-        cost += float(off @ pull)
-    return TakeEquations(full, X.copy(), g), cost
-
-
-def _coupled(take: Take, angles: Array, measures: Geometry, own: TakeEquations, H: Array, g: Array) -> float:
-    """Add DIP = ratio * PIP of all digits; returns its cost."""
-    information, cost = coupling_information(take.count), 0.0
-    for row, ratio in enumerate(measures.ratios.tolist()):
-        second, last = 6 + 4 * row + 2, 6 + 4 * row + 3
-        unknown = len(g) - 5 + row
-        pull = information @ (angles[:, row, 3] - ratio * angles[:, row, 2])
-        by_ratio = -angles[:, row, 2] * measures.G[-5 + row, unknown]
+def _add_coupling(problem: Problem, poses: Poses, parts: Equations) -> None:
+    """DIP = ratio * PIP plus what lasts, of all digits."""
+    unknowns, G = problem.shape.unknowns, parts.measures.G
+    for row, ratio in enumerate(parts.measures.ratios.tolist()):
+        second, last, offset, unknown = 8 + 4 * row, 9 + 4 * row, 20 + row, unknowns - 5 + row
+        information = problem.changing[problem.take_of, offset]
+        off = poses.angles[:, row, 3] - ratio * poses.angles[:, row, 2] - poses.offsets[problem.take_of, offset]
+        pull = information * off
+        by_ratio = -poses.angles[:, row, 2] * G[-5 + row, unknown]
         for i, di in ((second, -ratio), (last, 1.0)):
-            own.g[:, i] += di * pull
-            own.X[:, i, unknown] += di * (information @ by_ratio)
+            parts.g[:, i] += di * pull
+            parts.X[:, i, unknown] += di * information * by_ratio
+            parts.B[:, i, offset] -= di * information
             for j, dj in ((second, -ratio), (last, 1.0)):
-                own.H[:, i, :, j] += di * dj * information
-        g[unknown] += by_ratio @ pull
-        H[unknown, unknown] += by_ratio @ information @ by_ratio
-        cost += float((angles[:, row, 3] - ratio * angles[:, row, 2]) @ pull)
-    return cost
+                parts.H[:, i, j] += di * dj * information
+        parts.bent_X[:, second, unknown] -= pull * G[-5 + row, unknown]
+        parts.person_g[unknown] += float(by_ratio @ pull)
+        parts.person_H[unknown, unknown] += float((by_ratio**2) @ information)
+        parts.offsets_H[:, offset] += problem.by_take(information)
+        parts.offsets_g[:, offset] -= problem.by_take(pull)
+        parts.offsets_X[:, offset, unknown] -= problem.by_take(information * by_ratio)
+        parts.costs[:] += problem.by_take(pull * off)
 
 
 def _edges(angles: Array, limits: Array) -> tuple[Array, Array, Array]:
@@ -174,7 +204,7 @@ def _edges(angles: Array, limits: Array) -> tuple[Array, Array, Array]:
     out_low, out_high = (limits[:, 0] - angles) / _EDGE_RAD, (angles - limits[:, 1]) / _EDGE_RAD
     scale = _EDGE_RAD / _LIMIT_RAD
     low, high = np.logaddexp(0.0, out_low), np.logaddexp(0.0, out_high)
-    s_low, s_high = 1.0 / (1.0 + np.exp(-np.clip(out_low, -60, 60))), 1.0 / (1.0 + np.exp(-np.clip(out_high, -60, 60)))
+    s_low, s_high = (1.0 / (1.0 + np.exp(-np.clip(out, -60.0, 60.0))) for out in (out_low, out_high))
     slope = (s_high - s_low) / _LIMIT_RAD
     bend = (s_high * (1.0 - s_high) + s_low * (1.0 - s_low)) / (_LIMIT_RAD * _EDGE_RAD)
     return scale * (high + low), slope, bend

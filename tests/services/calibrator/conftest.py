@@ -45,26 +45,26 @@ class Bench:
                     found[camera.name][key] = Detection(np.arange(self.board.size), noisy, camera.size_px)
         return found
 
-    def picture(self, camera: Camera, key: str, *, blur_px: float = 0.7, noise: float = 2.0, seed: int = 1) -> np.ndarray:
-        """A rendered grey picture: each pixel the mean of 2x2 rays into the printed board."""
+    def picture(self, camera: Camera, key: str, *, blur_px: float = 0.7, noise: float = 2.0, seed: int = 1, fine: int = 2) -> np.ndarray:
+        """A rendered grey picture: each pixel the mean of fine x fine rays into the printed board."""
         width, height = camera.size_px
-        seen = fine_rays(camera)
+        seen = fine_rays(camera, fine)
         T = inverse(self.poses[key]) @ camera.T_rig_from_camera
         towards = np.concatenate([seen, np.ones((len(seen), 1))], axis=1) @ T[:3, :3].T
         on_board = T[:3, 3] - towards * (T[2, 3] / towards[:, 2])[:, None]
-        grey = printed(self.board, on_board).reshape(height, 2, width, 2).mean(axis=(1, 3))
+        grey = printed(self.board, on_board).reshape(height, fine, width, fine).mean(axis=(1, 3))
         grey = cv2.GaussianBlur(grey, (0, 0), blur_px)
         grey = grey + np.random.default_rng(seed).normal(0.0, noise, grey.shape)
         return np.clip(grey, 0, 255).astype(np.uint8)
 
 
-def fine_rays(camera: Camera) -> Array:
-    """Rays (4 w h, 2) of a picture of twice the resolution: exact every 8 px, cubic splines between (1e-6 px)."""
+def fine_rays(camera: Camera, fine: int) -> Array:
+    """Rays (n, 2) of a picture of `fine` times the resolution: exact every 8 px, cubic splines between (1e-6 px)."""
     width, height = camera.size_px
     coarse_x, coarse_y = np.linspace(-1.0, width, width // 8 + 1), np.linspace(-1.0, height, height // 8 + 1)
     nodes = np.stack(np.meshgrid(coarse_x, coarse_y), axis=-1).reshape(-1, 2)
     exact = rays(lens_vector(camera.matrix, camera.distortion), nodes).reshape(len(coarse_y), len(coarse_x), 2)
-    x, y = (np.arange(2 * width) + 0.5) / 2 - 0.5, (np.arange(2 * height) + 0.5) / 2 - 0.5
+    x, y = (np.arange(fine * width) + 0.5) / fine - 0.5, (np.arange(fine * height) + 0.5) / fine - 0.5
     return np.stack([RectBivariateSpline(coarse_y, coarse_x, exact[..., k])(y, x).reshape(-1) for k in (0, 1)], axis=1)
 
 

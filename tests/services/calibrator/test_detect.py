@@ -23,8 +23,8 @@ def test_a_chessboard_is_found_and_numbered(make_bench, size_px):
 
 
 def test_a_large_picture_is_searched_small_and_refined_large(make_bench):
-    bench = make_bench(positions=1, size_px=(1920, 1440), focal_px=1582.0)
-    found = detect(bench.picture(bench.cameras[0], "01", blur_px=2.0), bench.board, quick=True)
+    bench = make_bench(positions=1, size_px=(1400, 1050), focal_px=1154.0)
+    found = detect(bench.picture(bench.cameras[0], "01", blur_px=2.0, fine=1), bench.board, quick=True)
     assert found is not None
     assert np.sqrt(np.mean(np.sum((found.corners - bench.corners(bench.cameras[0], "01")) ** 2, axis=1))) < 0.1
 

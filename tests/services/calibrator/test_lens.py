@@ -61,13 +61,14 @@ def test_pictures_that_contradict_are_left_out_and_named(make_bench):
 
 
 def test_a_picture_that_hurts_is_marked(make_bench):
-    """Test: a board bent in one picture, too little to be left out. Expected: it pulls more than all others, and the report says so."""
+    """Test: a board bent in one picture, too little to be left out. Expected: it is marked, and the report says so."""
     bench = make_bench(1, positions=10)
     found = bench.detections(0.05)["left"]
     key = list(found)[2]
     found[key] = replace(found[key], corners=found[key].corners + 0.1 * (bench.board.grid - [4.0, 2.5]) ** 2)
     result = calibrate_camera("left", found, bench.board)
-    assert max(result.pictures, key=lambda picture: picture.pull_percent).key == key
+    assert key in [picture.key for picture in result.pictures if picture.hurts]
+    assert sum(picture.hurts for picture in result.pictures) <= 2
     assert "<- hurts" in lens_text(result, bench.board)
 
 
@@ -75,7 +76,7 @@ def test_a_picture_that_hurts_is_marked(make_bench):
     ("arguments", "reason"),
     [
         ({"positions": 3}, "only 3 usable pictures"),
-        ({"tilt_deg": 1.0}, "never tilted"),
+        ({"tilt_deg": 4.0}, "about the same angle|never tilted"),
         ({"spread": 0.0, "depth_m": (1.2, 1.3), "positions": 8}, "corners cover"),
     ],
 )

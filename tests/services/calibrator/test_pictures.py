@@ -47,14 +47,21 @@ def test_cameras_and_positions_are_found_out(folder, pattern, given, found):
     pictures = find_pictures(folder(*names_of(pattern, given)))
     assert pictures.cameras == found
     assert all(len(files) == 4 for files in pictures.files.values())
-    assert len(pictures.keys()) == 4
+    assert len(pictures.positions()) == 4
     assert not pictures.left_out
 
 
 def test_pairs_belong_together_whatever_the_zeros(folder):
     pictures = find_pictures(folder("left01.png", "left02.png", "left10.png", "right1.png", "right2.png", "right10.png"))
-    assert pictures.keys() == ["1", "2", "10"]
+    assert pictures.positions() == ["1", "2", "10"]
     assert pictures.files["right"]["10"].name == "right10.png"
+
+
+def test_pictures_named_by_time_are_paired_in_their_order(folder):
+    pictures = find_pictures(folder("left/100.png", "left/205.png", "left/310.png", "right/101.png", "right/206.png", "right/311.png"))
+    assert [pictures.files["right"][key].name for key in pictures.positions()] == ["101.png", "206.png", "311.png"]
+    uneven = find_pictures(folder("left/415.png"))
+    assert not set(uneven.files["left"]) & set(uneven.files["right"])
 
 
 def test_other_pictures_are_listed_and_a_missing_partner_is_no_error(folder):

@@ -28,7 +28,7 @@ def place_errors(bench, result: RigResult) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("cameras", [2, 3])
 def test_a_rig_is_found_again(make_bench, cameras):
-    bench = make_bench(cameras, positions=12)
+    bench = make_bench(cameras, positions=9)
     result = calibrate_rig(bench.detections(0.1), bench.board)
     for shift_mm, turn_deg in place_errors(bench, result):
         assert shift_mm < 0.5
@@ -42,7 +42,7 @@ def test_a_rig_is_found_again(make_bench, cameras):
 
 
 def test_the_same_pictures_give_the_same_rig(make_bench):
-    bench = make_bench(positions=8)
+    bench = make_bench(positions=6)
     a, b = (calibrate_rig(bench.detections(0.1), bench.board) for _ in range(2))
     np.testing.assert_array_equal(a.state.T_camera_from_rig, b.state.T_camera_from_rig)
     assert rig_text(a) == rig_text(b)
@@ -51,12 +51,24 @@ def test_the_same_pictures_give_the_same_rig(make_bench):
 @pytest.mark.parametrize("size", [(7, 7), (8, 6)])
 def test_boards_that_look_the_same_turned_are_numbered_alike(make_bench, size):
     """Test: the second camera begins at any corner of a symmetric board. Expected: the cameras agree all the same."""
-    bench = make_bench(positions=10, board=Board(*size, 0.025))
+    bench = make_bench(positions=8, board=Board(*size, 0.025))
     found, options = bench.detections(0.1), turns(*size)
     for k, key in enumerate(found["right"]):
         found["right"][key] = replace(found["right"][key], corners=found["right"][key].corners[options[k % len(options)]])
     result = calibrate_rig(found, bench.board)
-    assert place_errors(bench, result)[1][0] < 0.5
+    assert place_errors(bench, result)[1][0] < 1.0
+
+
+def test_partly_seen_charuco_boards_calibrate(make_bench):
+    """Test: each camera sees another two thirds of a ChArUco board's corners. Expected: the same rig."""
+    bench = make_bench(positions=9, board=Board(9, 6, 0.025, "charuco", "DICT_4X4_50"))
+    generator, parts = np.random.default_rng(1), {}
+    for camera, found in bench.detections(0.1).items():
+        keep = {key: np.sort(generator.choice(54, 38, replace=False)) for key in found}
+        parts[camera] = {key: replace(shown, ids=keep[key], corners=shown.corners[keep[key]]) for key, shown in found.items()}
+    result = calibrate_rig(parts, bench.board)
+    assert place_errors(bench, result)[1][0] < 0.8
+    assert all(position.held_out for position in result.positions if all(position.key in found for found in parts.values()))
 
 
 def test_given_lenses_are_kept(make_bench):
@@ -70,11 +82,11 @@ def test_given_lenses_are_kept(make_bench):
 
 def test_cameras_need_not_all_see_every_board(make_bench):
     """Test: the third camera shares boards with the second only. Expected: it is joined through the second."""
-    bench = make_bench(3, positions=16)
+    bench = make_bench(3, positions=13)
     found = bench.detections(0.1)
     keys = list(found["right"])
-    found["left"] = {key: shown for key, shown in found["left"].items() if key in keys[:9]}
-    found["third"] = {key: shown for key, shown in found["third"].items() if key in keys[8:]}
+    found["left"] = {key: shown for key, shown in found["left"].items() if key in keys[:8]}
+    found["third"] = {key: shown for key, shown in found["third"].items() if key in keys[7:]}
     result = calibrate_rig(found, bench.board)
     assert all(shift_mm < 1.0 for shift_mm, _ in place_errors(bench, result))
 

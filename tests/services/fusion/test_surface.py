@@ -12,7 +12,7 @@ from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPo
 from rhot.transforms import quaternion_from_rotation, rotation_from_vector
 from services.fusion.observations import Slot
 from services.fusion.patch import centroid_shift, located_shift, shift_table
-from services.fusion.surface import SIGMA_UNKNOWN, Surface
+from services.fusion.surface import SIGMA_DAB, SIGMA_UNKNOWN, Surface
 from services.fusion.synthetic import Setup
 from services.fusion.triangulation import extrinsics
 
@@ -126,7 +126,7 @@ def test_without_a_pose_points_stay_and_sigma_says_so(surface):
     np.testing.assert_array_equal(positions, POSITIONS)
     depth_mm = 1e3 * np.sqrt(covariances[:, 2, 2])
     assert depth_mm[1] == pytest.approx(0.29 * 6.8, rel=0.05)
-    assert depth_mm[0] == pytest.approx(0.06 * 16.0, rel=0.05)
+    assert depth_mm[0] == pytest.approx(SIGMA_DAB * 16.0, rel=0.05)
 
 
 def test_a_pose_corrects_tips_while_it_is_fresh(surface):

@@ -25,7 +25,7 @@ def pairs(studio, tip, searcher, noise, count=72):
         name = list(studio.paints)[i % 6]
         x, y, apart = 32 + rng.uniform(-1, 1), 32 + rng.uniform(-1, 1), rng.uniform(-1, 1)
         look = {"wall": tuple(rng.uniform(60, 200) + rng.uniform(-10, 10, 3))}
-        shape = {"length_px": 9 * rng.uniform(0.9, 1.3), "turn_rad": rng.uniform(0, 2 * np.pi), "light": rng.uniform(-1, 1)}
+        shape = {"length_px": 9 * rng.uniform(0.9, 1.3), "turn_rad": rng.uniform(0, 2 * np.pi), "light_rad": rng.uniform(-1, 1)}
         views = []
         for side in range(2):
             frame, truth = studio.frame([tip(name, x + side * apart, y, 9.0, **shape)], seq=2 * i + side, **look)

@@ -44,6 +44,33 @@ def test_the_table_is_the_hsv_test(gamut, low, high):
     assert (ours != theirs)[clear].mean() < 0.02
 
 
+def test_the_mask_is_where_a_class_is(gamut):
+    luma, chroma, _, _ = gamut
+    ranges = {
+        "a": span((100, 100, 160), (130, 255, 255)),
+        "b": span((100, 100, 40), (130, 255, 150)),
+        "c": span((20, 90, 50), (60, 255, 255)),
+    }
+    for names in (["c"], ["a", "b", "c"]):
+        table = compile_colors(Colors(colors=ranges), names)
+        classes = table.classify(luma, chroma)
+        mask = table.mask(luma, chroma).copy()
+        assert np.array_equal(mask > 0, classes > 0)
+        assert np.array_equal(table.classes_at(luma, chroma)[mask > 0], classes[mask > 0])
+
+
+def test_numpy_looks_up_what_opencv_does(gamut, monkeypatch):
+    luma, chroma, _, _ = gamut
+    colors = Colors(colors={"a": span((100, 100, 60), (130, 255, 255))})
+    expected = compile_colors(colors, ["a"]).mask(luma, chroma).copy()
+
+    def refuse(*_):
+        raise cv2.error("an OpenCV before 5 takes bytes only")
+
+    monkeypatch.setattr(cv2, "LUT", refuse)
+    assert np.array_equal(compile_colors(colors, ["a"]).mask(luma, chroma), expected)
+
+
 def test_a_range_that_is_empty_in_itself_finds_nothing(gamut):
     luma, chroma, _, _ = gamut
     table = compile_colors(Colors(colors={"a": span((0, 200, 0), (179, 100, 255)), "b": span((0, 0, 200), (179, 255, 100))}), ["a", "b"])

@@ -14,11 +14,19 @@ FRAME_NS = 33_333_333
 START_NS = 1_700_000_000_000_000_000
 
 
+def filled(color, rect, mask=None):
+    """A blob of a rectangle, full but for a mask."""
+    x0, y0, x1, y1 = rect
+    mask = np.ones((y1 - y0, x1 - x0), np.uint8) if mask is None else mask
+    cells = int(np.count_nonzero(mask))
+    return Blob(color, rect, mask, cells, 4.0 * cells, x0 + x1 - 0.5, y0 + y1 - 0.5)
+
+
 def blob(color, x_px, y_px, side_px=14):
     """A square blob about a pixel."""
     cells = max(side_px // 2, 1)
     x0, y0 = round(x_px / 2 - cells / 2), round(y_px / 2 - cells / 2)
-    return Blob(color, (x0, y0, x0 + cells, y0 + cells), np.ones((cells, cells), np.uint8), cells * cells)
+    return filled(color, (x0, y0, x0 + cells, y0 + cells))
 
 
 def hand(x_px, y_px, side_px=14):
@@ -33,7 +41,7 @@ def chosen(identity, blobs, seq):
     choices = identity.choose(blobs, stamp_ns)
     for color, choice in enumerate(choices):
         if choice is not None:
-            identity.follow(color, *choice.blob.centre_px, choice.blob.area_px, stamp_ns)
+            identity.follow(color, choice.blob.x_px, choice.blob.y_px, choice.blob.area_px, stamp_ns)
     return [None if choice is None else choice.blob for choice in choices]
 
 
@@ -113,8 +121,8 @@ def test_stamps_that_stand_still_or_run_backwards_are_survived(stamps):
 def test_shapes_that_no_patch_of_paint_has():
     assert shape_fits(blob(0, 50, 50), 20_000.0)
     assert not shape_fits(blob(0, 50, 50, 200), 20_000.0)
-    stripe = Blob(0, (0, 0, 40, 2), np.ones((2, 40), np.uint8), 80)
-    cross = Blob(0, (0, 0, 40, 40), np.eye(40, dtype=np.uint8), 40)
+    stripe = filled(0, (0, 0, 40, 2))
+    cross = filled(0, (0, 0, 40, 40), np.eye(40, dtype=np.uint8))
     assert not shape_fits(stripe, 20_000.0)
     assert not shape_fits(cross, 20_000.0)
 

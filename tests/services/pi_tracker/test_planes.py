@@ -22,7 +22,7 @@ def test_bgr_and_i420_agree(studio, tip):
     for a, b in zip(planar.cells(rect), packed.cells(rect), strict=True):
         assert a.shape == b.shape
         assert np.abs(a.astype(int) - b.astype(int)).max() <= 1
-    buffers = [(np.zeros((50, 44), np.uint8), np.zeros((25, 22, 2), np.uint8)) for _ in range(2)]
+    buffers = [(np.zeros((50, 44), np.uint8), np.zeros((2, 25, 22), np.uint8)) for _ in range(2)]
     for image, (luma, chroma) in zip((planar, packed), buffers, strict=True):
         image.copy_to(rect, luma, chroma)
         assert not luma[44:].any()

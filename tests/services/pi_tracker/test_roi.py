@@ -31,17 +31,23 @@ def test_a_region_of_nonsense_still_has_a_cell(rect):
     assert 0 <= y0 < y1 <= 240
 
 
-@given(some=st.lists(rects(), max_size=7))
-def test_joined_rectangles_cover_the_same(some):
-    joined = roi.joined(some)
-    assert len(joined) <= len(some)
-    for rect in some:
-        assert any(o[0] <= rect[0] and o[1] <= rect[1] and o[2] >= rect[2] and o[3] >= rect[3] for o in joined)
+@given(some=st.lists(rects(), min_size=1, max_size=7))
+def test_the_hull_covers_all_and_no_more(some):
+    x0, y0, x1, y1 = roi.hull(some)
+    assert all(x0 <= r[0] and y0 <= r[1] and x1 >= r[2] and y1 >= r[3] for r in some)
+    assert any(r[0] == x0 for r in some)
+    assert any(r[3] == y1 for r in some)
 
 
-def test_the_regions_of_a_hand_become_one():
-    markers = [(100, 80, 106, 87), (112, 70, 118, 78), (124, 74, 130, 80), (110, 120, 118, 128)]
-    assert len(roi.joined(roi.around(rect, 40, SIZE) for rect in markers)) == 1
+def test_the_margin_follows_the_motion():
+    still = {0: (10, 10, 16, 16), 1: (30, 10, 36, 16)}
+    assert roi.margin(still, still, 40) == 12
+    moved = {0: (12, 10, 18, 16), 1: (30, 13, 36, 19)}
+    assert roi.margin(still, moved, 40) == 12 + 2 * 2 * 3
+    assert roi.margin(still, {0: (90, 10, 96, 16)}, 40) == 40
+    assert roi.margin(still, still, 5) == 5
+    assert roi.margin({}, still, 40) == 40
+    assert roi.margin(still, {}, 40) == 40
 
 
 def test_a_cut_blob_is_one_that_may_go_on_outside():

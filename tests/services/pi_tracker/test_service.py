@@ -21,6 +21,7 @@ from services.pi_tracker.service import serve
 
 DEADLINE_S = 15.0
 SIZE = (160, 120)
+FOLDER = CameraTable(name="left", source="folder:shots")
 
 
 @pytest.fixture
@@ -185,8 +186,9 @@ async def test_a_recording_begins_with_the_session_and_ends_the_service(config, 
         ({"camera": [CameraTable(name="left", source="folder:nowhere")]}, CaptureError, "no such folder of images"),
         ({"camera": [CameraTable(name="left", source="kinect")]}, ConfigError, "unknown source 'kinect'"),
         ({"camera": [CameraTable(name="other")]}, ConfigError, "has no camera 'left'; it has"),
-        ({"hand": {"right": HandTable(markers={"index_tip": "mauve"})}}, CalibrationError, "colour 'mauve'"),
-        ({"folder": "/nowhere"}, CalibrationError, "rhot calibrate colors left"),
+        # A live camera would start, to be calibrated over the bus; a recording cannot be.
+        ({"hand": {"right": HandTable(markers={"index_tip": "mauve"})}, "camera": [FOLDER]}, CalibrationError, "colour 'mauve'"),
+        ({"folder": "/nowhere", "camera": [FOLDER]}, CalibrationError, "rhot calibrate colors left"),
     ],
 )
 async def test_what_is_wrong_ends_it_with_a_reason(config, router, change, error, message):

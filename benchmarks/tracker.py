@@ -1,0 +1,232 @@
+"""The eye beside the seed's: how fast and how exact, in one process: `python benchmarks/tracker.py [--frames N] [--json FILE]`.
+
+The seed's pipeline is re-created (services/pi_tracker/seed.py): per colour HSV, Gaussian, threshold, erosion, dilation, contours,
+largest, centroid. Both see the same simulated pictures, six colours, 640 x 480, in turns of ten frames so that the machine's moods hit
+both; ours as the camera's YUV420, the seed's as BGR (whose conversion is not counted). Times are medians:
+  search   the whole image to the blobs of all colours
+  roi      the same around the last places: the seed with its 40 px margin, ours with the margin that the motion asks for, up to 40 px
+  step     ours in all: frame in hand -> identity, sub-pixel position, sigma -> message encoded
+search_ratio and roi_ratio are the seed's over ours. The seed ends with a contour's centroid; ours goes on: `refine` is that part, and
+roi_all_ratio counts it. Precision is that of a 9 px tip at 5 grey levels of noise: disparity between independently noisy views, and error
+against the truth. With $RHOT_DATA (default ../shared/data) the real video is tracked by both; with mediapipe installed its hand detector
+is timed beside them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+
+from rhot.calibration import ColorRange, Colors, load_colors
+from rhot.config import RigConfig, Tracker, load_rig
+from services.pi_tracker import roi, synthetic
+from services.pi_tracker.colors import compile_colors
+from services.pi_tracker.frame import Frame
+from services.pi_tracker.planes import Picture, picture
+from services.pi_tracker.search import Blob, Searcher
+from services.pi_tracker.seed import SeedFinder
+from services.pi_tracker.sources.video import VideoReader
+from services.pi_tracker.step import TrackerStep
+from services.simulator.frames import FrameSource
+from services.simulator.scene import load_scene
+
+ROOT = Path(__file__).parents[1]
+DATA = Path(os.environ.get("RHOT_DATA", ROOT.parent / "shared" / "data"))
+SCENE, CAMERA, TURN = "piano", "left", 10
+VIEWS, NOISE = 240, 5.0
+BALL = Colors(colors={"green": ColorRange(hsv_low=(35, 60, 40), hsv_high=(85, 255, 255))})
+
+Times = dict[str, list[int]]
+
+
+def timed(times: Times, name: str, work: Callable[[], Any]) -> Any:
+    """Run once and note how long it took, ns."""
+    started = time.perf_counter_ns()
+    result = work()
+    times[name].append(time.perf_counter_ns() - started)
+    return result
+
+
+def simulated(config: RigConfig, count: int) -> list[Frame]:
+    """Pictures of one simulated camera."""
+    source = FrameSource(load_scene(config, name=SCENE, seed=1), CAMERA)
+    taken = (source.take(seq) for seq in range(count))
+    return [Frame(CAMERA, t.seq, t.stamp_ns, t.row_time_ns, t.size_px, t.image, "i420") for t in taken if t.image is not None]
+
+
+def as_bgr(frame: Frame) -> Frame:
+    """The same picture as the seed's camera delivers it."""
+    return replace(frame, image=cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420), layout="bgr")
+
+
+def in_hand(frame: Frame) -> Frame:
+    """The frame just written to memory, as a camera's driver leaves it."""
+    return replace(frame, image=frame.image.copy())
+
+
+class Ours:
+    """Our stages on one frame after the other."""
+
+    def __init__(self, colors: Colors, wanted: Sequence[str], times: Times) -> None:
+        self._searcher = Searcher(compile_colors(colors, wanted), Tracker())
+        self._step = TrackerStep(CAMERA, colors, Tracker(), (640, 480), wanted, time.perf_counter_ns)
+        self._encoder = msgspec.json.Encoder()
+        self._times = times
+        self._boxes: dict[int, roi.Rect] = {}
+        self._margin_px = 40
+
+    def run(self, frame: Frame) -> None:
+        """Search, ROI and the whole step."""
+        frame = in_hand(frame)
+        found = timed(self._times, "search", lambda: self._searcher.blobs(image := picture(frame), roi.whole(image.size)))
+        if self._boxes:
+            frame = in_hand(frame)
+            timed(self._times, "roi", lambda: self._near(picture(frame)))
+        boxes = {blob.color: blob.rect for blob in found}
+        self._margin_px, self._boxes = roi.margin(self._boxes, boxes, 40), boxes
+        frame = in_hand(frame)
+        timed(self._times, "step", lambda: self._encoder.encode(self._step.step(frame)))
+        self._times["refine"].append(round(self._step.times_ms["centroid"] * 1e6))
+
+    def _near(self, image: Picture) -> list[Blob]:
+        return self._searcher.blobs(image, roi.around(roi.hull(list(self._boxes.values())), self._margin_px, image.size))
+
+
+def speed(config: RigConfig, colors: Colors, count: int) -> dict[str, float]:
+    """Both pipelines over the simulator's frames; medians in ms."""
+    times: Times = defaultdict(list)
+    frames = simulated(config, count)
+    pictures = [as_bgr(frame) for frame in frames]
+    ours, tracking = Ours(colors, config.colors, times), SeedFinder(colors, Tracker(), config.colors)
+    for start in range(0, len(frames), TURN):
+        for frame in frames[start : start + TURN]:
+            ours.run(frame)
+        for frame in map(in_hand, pictures[start : start + TURN]):
+            timed(times, "seed_search", partial(SeedFinder(colors, Tracker(), config.colors).find, frame))
+        for frame in map(in_hand, pictures[start : start + TURN]):
+            timed(times, "seed_roi", partial(tracking.find, frame))
+    return {name: float(np.median(values[TURN:])) * 1e-6 for name, values in times.items()}
+
+
+def precision() -> dict[str, float]:
+    """Both pipelines on pairs of noisy views of single tips, under changing light, before changing walls."""
+    rng = np.random.default_rng(1)
+    errors: dict[str, list[list[float]]] = {"ours": [], "seed": []}
+    normalised: list[float] = []
+    colors, settings, size = synthetic.ranges(), Tracker(), (64, 64)
+    for n in range(VIEWS):
+        name = list(synthetic.PAINTS)[n % len(synthetic.PAINTS)]
+        x, y, apart = (*(32 + rng.uniform(-1, 1, 2)), rng.uniform(-1, 1))
+        shape = {"length_px": 9 * rng.uniform(0.9, 1.3), "turn_rad": rng.uniform(0, 2 * np.pi), "light_rad": rng.uniform(-1, 1)}
+        wall = tuple(rng.uniform(60, 200) + rng.uniform(-10, 10, 3))
+        pair: dict[str, list[float]] = {"ours": [], "seed": []}
+        for side in range(2):
+            clean, truth = synthetic.clean([synthetic.Tip(name, x + side * apart, y, 9.0, **shape)], size, wall=wall)
+            bgr = synthetic.noisy(clean, NOISE, 2 * n + side)
+            (ours,) = TrackerStep("left", colors, settings, size, [name]).step(synthetic.frame_of(bgr)).markers or (None,)
+            (seed,) = SeedFinder(colors, settings, [name]).find(synthetic.frame_of(bgr, layout="bgr")) or (None,)
+            for kind, marker in (("ours", ours), ("seed", seed)):
+                if marker is not None:
+                    pair[kind] += [marker.x_px - truth[name][0], marker.y_px - truth[name][1]]
+            if ours is not None:
+                normalised += [(ours.x_px - truth[name][0]) / ours.sigma_px, (ours.y_px - truth[name][1]) / ours.sigma_px]
+        for kind, values in pair.items():
+            if len(values) == 4:
+                errors[kind].append(values)
+    ours_px, seed_px = np.array(errors["ours"]), np.array(errors["seed"])
+    return {
+        "disparity_rms_px": rms(ours_px[:, 2] - ours_px[:, 0]),
+        "bias_px": rms(ours_px),
+        "normalised_error": rms(np.array(normalised)),
+        "missed": 1.0 - len(ours_px) / VIEWS,
+        "seed_disparity_rms_px": rms(seed_px[:, 2] - seed_px[:, 0]),
+        "seed_bias_px": rms(seed_px),
+    }
+
+
+def rms(values: Any) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def real_video(path: Path) -> dict[str, float]:
+    """Both pipelines over a real recording, one colour; jitter is the RMS second difference of the centre's x, px."""
+    times: Times = defaultdict(list)
+    paths: dict[str, dict[int, float]] = {"lut": {}, "seed": {}}
+    steps = {method: TrackerStep("cam", BALL, Tracker(method=method), (640, 480), ["green"]) for method in ("lut", "seed")}  # type: ignore[arg-type]
+    reader = VideoReader("cam", path, 30.0)
+    reader.open()
+    while (frame := reader.read()) is not None:
+        for method, step in steps.items():
+            markers = timed(times, method, partial(step.step, frame)).markers
+            if markers:
+                paths[method][frame.seq] = markers[0].x_px
+    reader.close()
+    result: dict[str, float] = {}
+    for method in steps:
+        seen = paths[method]
+        second = [seen[n - 1] - 2 * seen[n] + seen[n + 1] for n in seen if n - 1 in seen and n + 1 in seen]
+        result |= {f"video_{method}_found": len(seen), f"video_{method}_ms": float(np.median(times[method])) * 1e-6}
+        result[f"video_{method}_jitter_px"] = float(np.median(np.abs(second)))
+    return result
+
+
+def media_pipe(config: RigConfig, count: int) -> dict[str, float]:
+    """MediaPipe Hands on the same pictures: ms per frame, and the jitter of the index finger's tip as for the video."""
+    import mediapipe
+
+    tips, times = [], defaultdict(list)
+    with mediapipe.solutions.hands.Hands(max_num_hands=1) as hands:
+        for frame in simulated(config, count):
+            rgb = cv2.cvtColor(frame.image, cv2.COLOR_YUV2RGB_I420)
+            found = timed(times, "ms", partial(hands.process, rgb)).multi_hand_landmarks
+            tips.append(found[0].landmark[8].x * 640 if found else np.nan)
+    return {"mediapipe_ms": float(np.median(times["ms"])) * 1e-6, "mediapipe_jitter_px": float(np.nanmedian(np.abs(np.diff(tips, 2))))}
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description="Speed and precision of pi_tracker beside the seed's pipeline")
+    parser.add_argument("--frames", type=int, default=150)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    config = load_rig(ROOT / "config" / "sim.toml")
+    t = speed(config, load_colors(config.calibration_dir, CAMERA), max(options.frames, 3 * TURN))
+    result = {
+        "search_ratio": t["seed_search"] / t["search"],
+        "roi_ratio": t["seed_roi"] / t["roi"],
+        "roi_all_ratio": t["seed_roi"] / (t["roi"] + t["refine"]),
+        "step_ms": t["step"],
+        **precision(),
+        **{f"{name}_ms": value for name, value in t.items() if name != "step"},
+    }
+    video = DATA / "color_video" / "ball2.mp4"
+    if video.is_file():
+        result |= real_video(video)
+    if importlib.util.find_spec("mediapipe"):
+        result |= media_pipe(config, options.frames)
+    else:
+        print("mediapipe is not installed: left out", file=sys.stderr)
+    for name, value in result.items():
+        print(f"{name:24s} {value:10.3f}")
+    if options.json:
+        options.json.write_text(json.dumps({name: round(value, 4) for name, value in result.items()}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""`rhot tune filter RECORDING`: a 1-Euro filter that suits one's own hand and cameras.
+
+Record the hand held still for some seconds, then moving as fast as it will, with `method = "triangulate"` and `filter = "none"`; the
+RECORDING is the folder that `rhot track` wrote, its points.jsonl, or an MCAP file of `rhot record`. Points that were filtered already
+(another method) still give a proposal, which is then a second filter's. A recording without a still or without a fast stretch is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+
+from rhot import topics
+from rhot.capture import read_lines
+from rhot.errors import CaptureError
+from rhot.messages import HandPoints
+
+if TYPE_CHECKING:
+    from services.fusion.tuning import Proposal
+
+tune = typer.Typer(
+    name="tune",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Propose settings from recordings.",
+)
+
+
+@tune.callback()
+def _group() -> None:
+    """Keeps `filter` a subcommand although it is the only one yet."""
+
+
+@tune.command(name="filter")
+def tune_filter(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="result folder of `rhot track`, points.jsonl, or .mcap")],
+    jitter: Annotated[float, typer.Option(min=0.05, max=1.0, help="wanted jitter at rest, as a share of the unfiltered one")] = 0.5,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+) -> None:
+    """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
+    # Not above: numba and scipy take longer to import than other commands take to run.
+    from services.fusion import tuning
+
+    proposal = tuning.propose(tuning.tracks(points_of(recording)), jitter)
+    typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
+
+
+def points_of(recording: Path) -> Iterator[HandPoints]:
+    """All HandPoints of a recording, in order.
+
+    Raises CaptureError if it is none, or is damaged.
+    """
+    path = recording / "points.jsonl" if recording.is_dir() else recording
+    if path.suffix != ".mcap":
+        yield from read_lines(path, HandPoints)
+        return
+    from services.recorder.reader import read
+
+    for record in read(path):
+        if topics.find(record.key) is not topics.POINTS:
+            continue
+        try:
+            yield msgspec.json.decode(record.payload, type=HandPoints)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None
+
+
+def _text(proposal: Proposal) -> str:
+    """The table, and what to paste."""
+    lines = [
+        f"still {proposal.still_s:.1f} s, jitter {proposal.noise_mm:.2f} mm on each axis",
+        f"moving {proposal.moving_s:.1f} s, {proposal.speed_m_s:.2f} m/s RMS",
+        "",
+        "jitter at rest   mincutoff_hz     beta   error in motion      lag",
+    ]
+    for row in proposal.rows:
+        mark = "  <- proposed" if row == proposal.best else ""
+        lines.append(
+            f"{row.jitter_mm:8.2f} mm {100 * row.jitter_share:3.0f} % {row.mincutoff_hz:11.2f} {row.beta:8.1f} {row.error_mm:12.2f} mm "
+            f"{row.lag_ms:8.0f} ms{mark}"
+        )
+    best = proposal.best
+    lines += ["", "[fusion.one_euro]", f"mincutoff_hz = {best.mincutoff_hz:g}", f"beta = {best.beta:g}"]
+    return "\n".join(lines)
