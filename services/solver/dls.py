@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from rhot.transforms import Array
-from services.solver.box_qp import Integers, box_qp
+from services.solver.box_qp import Integers, Scratch, box_qp, scratch
 from services.solver.constraints import clamp
 from services.solver.kinematics import (
     Chain,
@@ -29,8 +29,10 @@ from services.solver.kinematics import (
     length_of,
     reach_of,
     scaled,
+    tip_rotation,
     to_canonical,
 )
+from services.solver.turns import turn_between
 
 # What is asked for: the painted point alone; with the last bone's axes; with last flexion = ratio * second flexion.
 POSITION, POSE, COUPLED = 0, 1, 2
@@ -71,12 +73,41 @@ def goal(kind: int, point: Array, rotation: Array | None = None) -> Goal:
     return Goal(kind, np.asarray(point, dtype=np.float64), np.eye(3) if rotation is None else rotation, np.zeros((2, 4)))
 
 
-@njit(cache=True)
-def _equations(chain: Chain, wanted: Goal, q: Array, p: Array, J: Array, H: Array, g: Array) -> tuple[float, float]:
-    """Fill H (4, 4) and g (4,) with the goal's normal equations (without damping); returns cost and distance left.
+class Desk(NamedTuple):
+    """Room to work in: allocating it at every start would cost as much as an iteration."""
 
-    p (3,) and J (6, 4) are room to work in.
-    """
+    p: Array  # (3,) the painted point
+    J: Array  # (6, 4)
+    turn: Array  # (3,) the rotation that is left
+    H: Array  # (4, 4)
+    g: Array  # (4,)
+    low: Array  # (4,)
+    high: Array  # (4,)
+    step: Array  # (4,)
+    best: Array  # (4,)
+    qp: Scratch
+
+
+@njit(cache=True)
+def _desk() -> Desk:
+    return Desk(
+        np.empty(3),
+        np.empty((6, 4)),
+        np.empty(3),
+        np.empty((4, 4)),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        scratch(4),
+    )
+
+
+@njit(cache=True)
+def _equations(chain: Chain, wanted: Goal, q: Array, desk: Desk) -> tuple[float, float]:
+    """Fill H and g with the goal's normal equations (without damping); returns cost and distance left."""
+    p, J, H, g = desk.p, desk.J, desk.H, desk.g
     jacobian(chain, q, p, J)
     x, y, z = wanted.point[0] - p[0], wanted.point[1] - p[1], wanted.point[2] - p[2]
     square = x * x + y * y + z * z
@@ -87,14 +118,14 @@ def _equations(chain: Chain, wanted: Goal, q: Array, p: Array, J: Array, H: Arra
             H[a, b] = J[0, a] * J[0, b] + J[1, a] * J[1, b] + J[2, a] * J[2, b]
     if wanted.kind == POSE:
         # A rotation vector: exact also beyond 90 deg, where the study's differential folds back.
-        u, v, w = turn_left(q, wanted.rotation)
-        cost += u * u + v * v + w * w
+        turn = desk.turn
+        turn_between(tip_rotation(q), wanted.rotation, turn)
+        cost += turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
         # Axes: that of abduction is y, the three of flexion are one and square to it.
-        g[0] -= v
+        g[0] -= turn[1]
         H[0, 0] += 1.0
-        bend = J[3, 1] * u + J[5, 1] * w
         for a in range(1, 4):
-            g[a] -= bend
+            g[a] -= J[3, a] * turn[0] + J[5, a] * turn[2]
             for b in range(1, a + 1):
                 H[a, b] += 1.0
     elif wanted.kind == COUPLED:
@@ -118,26 +149,13 @@ def _equations(chain: Chain, wanted: Goal, q: Array, p: Array, J: Array, H: Arra
 
 
 @njit(cache=True)
-def _descend(chain: Chain, wanted: Goal, q: Array, most: int, room: Array) -> tuple[int, float, float]:
-    """One start: improve q in place; returns iterations, cost, distance left. The digit's length is 1.
-
-    room (30, 4) is to work in: allocating at every start would cost as much as an iteration.
-    """
-    limits, best, p, J, H, g, low, high, step = (
-        chain.limits,
-        room[0],
-        room[1],
-        room[2:8],
-        room[8:12],
-        room[12],
-        room[13],
-        room[14],
-        room[15],
-    )
+def _descend(chain: Chain, wanted: Goal, q: Array, most: int, desk: Desk) -> tuple[int, float, float]:
+    """One start: improve q in place; returns iterations, cost, distance left. The digit's length is 1."""
+    limits, H, low, high, step, best = chain.limits, desk.H, desk.low, desk.high, desk.step, desk.best
     best_cost, best_distance, steps, largest, caution = np.inf, np.inf, 0, 1.0, 1.0
     best[:] = q
     for iteration in range(most + 1):
-        cost, distance = _equations(chain, wanted, q, p, J, H, g)
+        cost, distance = _equations(chain, wanted, q, desk)
         if cost < best_cost:
             best[:], best_cost, best_distance, steps = q, cost, distance, iteration
             caution = max(0.1 * caution, 1.0)
@@ -149,7 +167,7 @@ def _descend(chain: Chain, wanted: Goal, q: Array, most: int, room: Array) -> tu
         for a in range(4):
             H[a, a] += caution * 0.01 * cost + 1e-15
             low[a], high[a] = limits[a, 0] - q[a], limits[a, 1] - q[a]
-        if not box_qp(H, g, low, high, step, room[16:]):
+        if not box_qp(H, desk.g, low, high, step, desk.qp):
             break
         largest = 0.0
         for a in range(4):
@@ -193,15 +211,15 @@ def solve(chain: Chain, wanted: Goal, q: Array, most: int, tolerance: float) -> 
     unit = scaled(chain, 1.0 / total)
     aim = Goal(wanted.kind, wanted.point * (shrink / total), wanted.rotation, wanted.keep)
     _unlock(unit, length_of(aim.point), q)
-    room = np.empty((30, 4))
-    used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS), room)
+    desk = _desk()
+    used, cost, distance = _descend(unit, aim, q, min(most, START_ITERATIONS), desk)
     trial, again = np.empty(4), 0
     for attempt in range(4):
         if distance * total <= tolerance or used >= most:
             break
         for j in range(4):
             trial[j] = chain.limits[j, 0] + _AGAIN[attempt, j] * (chain.limits[j, 1] - chain.limits[j, 0])
-        steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS), room)
+        steps, trial_cost, left = _descend(unit, aim, trial, min(most - used, START_ITERATIONS), desk)
         used += steps
         again += 1
         if trial_cost < cost:

@@ -158,30 +158,6 @@ def tip_rotation(q: Array) -> Array:
 
 
 @njit(cache=True)
-def turn_left(q: Array, goal: Array) -> tuple[float, float, float]:
-    """The rotation vector that turns the last bone's axes at q into goal (3, 3): that of goal tip_rotation(q)^T, without forming it."""
-    s0, c0 = math.sin(q[0]), math.cos(q[0])
-    s, c = math.sin(q[1] + q[2] + q[3]), math.cos(q[1] + q[2] + q[3])
-    # Column by column of tip_rotation(q).
-    trace = x = y = z = 0.0
-    for column in range(3):
-        if column == 0:
-            r0, r1, r2 = c0, 0.0, -s0
-        elif column == 1:
-            r0, r1, r2 = -s0 * s, c, -c0 * s
-        else:
-            r0, r1, r2 = s0 * c, s, c0 * c
-        u, v, w = goal[0, column], goal[1, column], goal[2, column]
-        trace += r0 * u + r1 * v + r2 * w
-        x += r1 * w - r2 * v
-        y += r2 * u - r0 * w
-        z += r0 * v - r1 * u
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    factor = 0.5 if sine < 1e-9 else 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine
-    return factor * x, factor * y, factor * z
-
-
-@njit(cache=True)
 def hand_frames(chains: Chains, wrist_rotation: Array, wrist_m: Array, angles: Array, positions: Array, rotations: Array) -> None:
     """Fill positions (26, 3) and rotations (26, 3, 3) of all joints as rhot.hand.forward does; angles (5, 4) rad."""
     for j in range(26):

@@ -18,7 +18,7 @@ from numba import njit
 from rhot.hand import JOINTS, HandModel
 from rhot.transforms import Array
 from services.solver.belief import UNKNOWNS, Belief
-from services.solver.box_qp import EXTRA_ROWS, Integers, box_qp
+from services.solver.box_qp import Integers, box_qp, scratch
 from services.solver.kinematics import CHAINS, Chains
 from services.solver.turns import rotation_vector, turned
 
@@ -158,7 +158,7 @@ def fit(chains: Chains, marks: Marks, belief: Belief, R: Array, t: Array, q: Arr
     """
     H, g, D = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS), np.empty((UNKNOWNS, UNKNOWNS))
     low, high, step = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf), np.empty(UNKNOWNS)
-    new_q, room = np.empty((5, 4)), np.empty((UNKNOWNS + EXTRA_ROWS, UNKNOWNS))
+    new_q, room = np.empty((5, 4)), scratch(UNKNOWNS)
     new_H, new_g = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS)
     cost = _normal_equations(chains, marks, belief, R, t, q, H, g)
     damping = _DAMPING_START
