@@ -83,8 +83,11 @@ async def feed(client, points):
     """Two seconds of frames; points arrive and are where the hand is."""
     publishers = {name: client.publisher(topics.MARKERS, camera=name) for name in Setup().names}
     path, setup = Path(), Setup(clock_error_s=0.0, loss=0.0)
+    while not all(publisher.wanted for publisher in publishers.values()):
+        await asyncio.sleep(0.01)
     for frame in frames(setup, path, 1.0):
         publishers[frame.camera].put(frame)
+        await asyncio.sleep(0.005)  # not all at once: what the network cannot take is dropped by design
     async for message in points:
         if len(message.points) == 6 and message.stamp_ns > START_NS + 8 * 10**8:
             assert message.hand == "right"
