@@ -1,9 +1,8 @@
 """The pinhole camera with Brown-Conrady distortion, and where each camera stands in the rig.
 
 Frames: `camera` is x right, y down, z forward (OpenCV); pixel (0, 0) is the centre of the top left pixel.
-A point behind the camera projects to NaN; a pixel outside the range where the distortion can be undone comes back
-as the last iterate, which callers reject by its reprojection residual. An uncalibrated camera is the caller's
-matter: rhot.config loads what exists and says what is missing.
+A point behind the camera projects to NaN, and a pixel that no ray of the lens model reaches undistorts to NaN. An uncalibrated
+camera is the caller's matter: rhot.config loads what exists and says what is missing.
 """
 
 from __future__ import annotations
@@ -71,21 +70,52 @@ class Camera:
         )
 
     def rays_from_pixels(self, pixels: npt.ArrayLike) -> Array:
-        """Undistorted normalised image points (x/z, y/z) (n, 2) of pixels (n, 2).
-
-        Fixed-point iteration on the distortion; 20 rounds bring it below 1e-9 for lenses up to |k1| = 0.4.
-        """
+        """Undistorted normalised image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the lens model has no inverse."""
         px = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
         m = self.matrix
         y = (px[:, 1] - m[1, 2]) / m[1, 1]
         x = (px[:, 0] - m[0, 2] - m[0, 1] * y) / m[0, 0]
-        target = np.stack([x, y], axis=1)  # (n, 2)
-        if not np.any(self.distortion):
-            return target
-        xy = target.copy()
-        for _ in range(20):
-            xy += target - _distort(xy, self.distortion)
-        return xy
+        return undistort(np.stack([x, y], axis=1), self.distortion)
+
+
+def undistort(target: Array, distortion: Array) -> Array:
+    """Image points (n, 2) that Brown-Conrady (k1, k2, p1, p2, k3) takes to `target` (n, 2); NaN where it takes none there.
+
+    Newton's method: the usual fixed-point iteration diverges at the corners of wide-angle lenses.
+    """
+    if not np.any(distortion):
+        return target.copy()
+    xy = target.copy()
+    # Damped steps at most: quadratic convergence needs 5 for |k1| = 0.4.
+    for _ in range(30):
+        miss = target - _distort(xy, distortion)
+        if not np.nanmax(np.abs(miss), initial=0.0) > 1e-13:
+            break
+        (a, b), (c, d) = _distortion_derivatives(xy, distortion)
+        determinant = a * d - b * c
+        safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
+        step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
+        # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))
+    off = np.abs(_distort(xy, distortion) - target).max(axis=1)
+    (a, b), (c, d) = _distortion_derivatives(xy, distortion)
+    good = (off < 1e-9) & (a * d - b * c > 0.0)
+    return np.where(good[:, None], xy, np.nan)
+
+
+def _distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """The 2x2 derivative (n,) each of the distorted by the undistorted image point, by rows."""
+    k1, k2, p1, p2, k3 = distortion
+    x, y = xy[:, 0], xy[:, 1]
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    mixed = x * y * slope + 2.0 * (p1 * x + p2 * y)
+    return (
+        (radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, mixed),
+        (mixed, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
+    )
 
 
 def _distort(xy: Array, distortion: Array) -> Array:

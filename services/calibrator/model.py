@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot.camera import Camera
+from rhot.camera import Camera, undistort
 from rhot.transforms import Array
 
 # Order of a lens vector.
@@ -58,30 +58,8 @@ def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array
 
 
 def rays(lens: Array, pixels: Array) -> Array:
-    """Undistorted image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the model has no inverse.
-
-    Newton's method, since the fixed-point iteration diverges at the corners of wide-angle lenses.
-    """
-    target = (pixels - lens[[CX, CY]]) / lens[[FX, FY]]
-    # Start on the radius that the radial part alone gives, so that Newton stays on the near branch.
-    xy = target.copy()
-    # 30 damped steps: quadratic convergence needs 5 for |k1| = 0.4.
-    for _ in range(30):
-        x, y = xy[:, 0], xy[:, 1]
-        miss = target - np.stack(_distort(lens, x, y), axis=1)
-        (a, b), (c, d) = _distortion_derivatives(lens, x, y)
-        determinant = a * d - b * c
-        safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
-        step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
-        if not np.nanmax(np.abs(miss), initial=0.0) > 1e-13:
-            break
-        # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
-        length = np.linalg.norm(step, axis=1, keepdims=True)
-        xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))
-    off = np.abs(np.stack(_distort(lens, xy[:, 0], xy[:, 1]), axis=1) - target).max(axis=1)
-    (a, b), (c, d) = _distortion_derivatives(lens, xy[:, 0], xy[:, 1])
-    good = (off < 1e-9) & (a * d - b * c > 0.0)
-    return np.where(good[:, None], xy, np.nan)
+    """Undistorted image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the model has no inverse."""
+    return undistort((pixels - lens[[CX, CY]]) / lens[[FX, FY]], lens[K1:])
 
 
 def _pixels(lens: Array, distorted: tuple[Array, Array]) -> Array:

@@ -28,7 +28,11 @@ def rays_of(camera: Camera) -> Array32:
     """Unit direction of every pixel's ray in the camera frame; (h, 3, w) float32, so that rows are contiguous."""
     w, h = camera.size_px
     x, y = np.meshgrid(np.arange(w, dtype=np.float64), np.arange(h, dtype=np.float64))
-    xy = camera.rays_from_pixels(np.stack([x.ravel(), y.ravel()], axis=1))
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1)
+    xy = camera.rays_from_pixels(pixels)
+    # A lens model that folds over has no ray for its outermost pixels; real ones show a dim rim there, which a plain pinhole stands for.
+    plain = Camera(camera.name, camera.size_px, camera.matrix, np.zeros(5), camera.T_rig_from_camera)
+    xy = np.where(np.isnan(xy), plain.rays_from_pixels(pixels), xy)
     rays = np.concatenate([xy, np.ones((h * w, 1))], axis=1)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     return np.ascontiguousarray(rays.reshape(h, w, 3).transpose(0, 2, 1).astype(np.float32))

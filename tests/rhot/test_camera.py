@@ -45,3 +45,16 @@ def test_an_undistorted_camera_is_a_plain_pinhole():
     camera = Camera("c", (640, 480), pinhole((640, 480), 1.0), np.zeros(5), np.eye(4))
     assert np.allclose(camera.rays_from_pixels([[319.5, 239.5]]), 0.0)
     assert np.allclose(camera.project([[0.0, 0.0, 1.0]]), [[319.5, 239.5]])
+
+
+def test_the_corners_of_a_wide_lens_undistort_where_fixed_point_iteration_diverges():
+    wide = Camera("c", (640, 480), pinhole((640, 480), np.deg2rad(95.0)), np.array([-0.25, 0.05, 1e-3, -1e-3, 0.0]), np.eye(4))
+    rays = np.column_stack([np.linspace(-1.0, 1.0, 41), np.linspace(-0.75, 0.75, 41)])
+    assert np.allclose(wide.rays_from_pixels(wide.pixels_from_rays(rays)), rays, atol=1e-9)
+
+
+def test_a_pixel_beyond_the_lens_model_has_no_ray():
+    folded = Camera("c", (640, 480), pinhole((640, 480), np.deg2rad(62.5)), np.array([-0.8, 0.0, 0.0, 0.0, 0.0]), np.eye(4))
+    rays = folded.rays_from_pixels([[320.0, 240.0], [1e6, 240.0]])
+    assert np.isfinite(rays[0]).all()
+    assert np.isnan(rays[1]).all()
