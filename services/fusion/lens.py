@@ -1,6 +1,6 @@
 """Undistorted rays of pixels, compiled: the same model as rhot.camera.Camera, fast enough for every frame of every camera.
 
-Camera.rays_from_pixels takes hundreds of us for six pixels (rounds of small numpy calls), this 1 us; tests hold the two equal. A pixel whose
+Camera.rays_from_pixels takes hundreds of us for six pixels (small numpy calls), this 1 us; tests hold the two equal. A pixel whose
 distortion cannot be undone (outside the lens model's range) comes back as not valid, never as a wrong ray.
 """
 
