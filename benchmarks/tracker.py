@@ -1,27 +1,31 @@
 """The eye beside the seed's: how fast and how exact, in one process: `python benchmarks/tracker.py [--frames N] [--json FILE]`.
 
 The seed's pipeline is re-created (services/pi_tracker/seed.py): per colour HSV, Gaussian, threshold, erosion, dilation, contours,
-largest, centroid. Both see the same simulated pictures, six colours, 640 x 480, in turns of ten frames so that the machine's moods hit
-both; ours as the camera's YUV420, the seed's as BGR (whose conversion is not counted). Times are medians:
-  search   the whole image to the blobs of all colours
-  roi      the same around the last places: the seed with its 40 px margin, ours with the margin that the motion asks for, up to 40 px
-  step     ours in all: frame in hand -> identity, sub-pixel position, sigma -> message encoded
-search_ratio and roi_ratio are the seed's over ours. The seed ends with a contour's centroid; ours goes on: `refine` is that part, and
-roi_all_ratio counts it. Precision is that of a 9 px tip at 5 grey levels of noise: disparity between independently noisy views, and error
-against the truth. With $RHOT_DATA (default ../shared/data) the real video is tracked by both; with mediapipe installed its hand detector
-is timed beside them.
+largest, centroid. Both see the same simulated pictures, six colours, 640 x 480, stage by stage in turns of ten frames so that the
+machine's moods hit both; ours as the camera's YUV420, the seed's as BGR (whose conversion is not counted). Times are medians:
+    search   the whole image to the blobs of all colours
+    roi      the same around the last places: the seed with its 40 px margin, ours with what the motion asks for, up to 40 px
+    step     ours in all: frame in hand -> identity, sub-pixel position, sigma -> message encoded
+search_ratio and roi_ratio are the seed's over ours. The seed ends with a contour's centroid; ours goes on: `refine` is that part,
+and roi_all_ratio counts it.
+
+Precision is that of a 9 px tip at 5 grey levels of noise: disparity between independently noisy views, and error against the truth.
+With $RHOT_DATA (default ../shared/data) the real video is tracked by both; with mediapipe installed its hand detector is timed
+beside them.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import ctypes
 import importlib.util
 import json
 import os
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -36,7 +40,7 @@ from rhot.config import RigConfig, Tracker, load_rig
 from services.pi_tracker import roi, synthetic
 from services.pi_tracker.colors import compile_colors
 from services.pi_tracker.frame import Frame
-from services.pi_tracker.planes import Picture, picture
+from services.pi_tracker.planes import picture
 from services.pi_tracker.search import Blob, Searcher
 from services.pi_tracker.seed import SeedFinder
 from services.pi_tracker.sources.video import VideoReader
@@ -48,6 +52,8 @@ ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("RHOT_DATA", ROOT.parent / "shared" / "data"))
 SCENE, CAMERA, TURN = "piano", "left", 10
 VIEWS, NOISE = 240, 5.0
+# glibc's malloc.h
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 BALL = Colors(colors={"green": ColorRange(hsv_low=(35, 60, 40), hsv_high=(85, 255, 255))})
 
 Times = dict[str, list[int]]
@@ -78,48 +84,49 @@ def in_hand(frame: Frame) -> Frame:
     return replace(frame, image=frame.image.copy())
 
 
-class Ours:
-    """Our stages on one frame after the other."""
-
-    def __init__(self, colors: Colors, wanted: Sequence[str], times: Times) -> None:
-        self._searcher = Searcher(compile_colors(colors, wanted), Tracker())
-        self._step = TrackerStep(CAMERA, colors, Tracker(), (640, 480), wanted, time.perf_counter_ns)
-        self._encoder = msgspec.json.Encoder()
-        self._times = times
-        self._boxes: dict[int, roi.Rect] = {}
-        self._margin_px = 40
-
-    def run(self, frame: Frame) -> None:
-        """Search, ROI and the whole step."""
-        frame = in_hand(frame)
-        found = timed(self._times, "search", lambda: self._searcher.blobs(image := picture(frame), roi.whole(image.size)))
-        if self._boxes:
-            frame = in_hand(frame)
-            timed(self._times, "roi", lambda: self._near(picture(frame)))
-        boxes = {blob.color: blob.rect for blob in found}
-        self._margin_px, self._boxes = roi.margin(self._boxes, boxes, 40), boxes
-        frame = in_hand(frame)
-        timed(self._times, "step", lambda: self._encoder.encode(self._step.step(frame)))
-        self._times["refine"].append(round(self._step.times_ms["centroid"] * 1e6))
-
-    def _near(self, image: Picture) -> list[Blob]:
-        return self._searcher.blobs(image, roi.around(roi.hull(list(self._boxes.values())), self._margin_px, image.size))
-
-
 def speed(config: RigConfig, colors: Colors, count: int) -> dict[str, float]:
-    """Both pipelines over the simulator's frames; medians in ms."""
+    """Both pipelines over the simulator's frames, stage by stage in turns; medians in ms."""
     times: Times = defaultdict(list)
     frames = simulated(config, count)
     pictures = [as_bgr(frame) for frame in frames]
-    ours, tracking = Ours(colors, config.colors, times), SeedFinder(colors, Tracker(), config.colors)
+    searcher = Searcher(compile_colors(colors, config.colors), Tracker())
+    step = TrackerStep(CAMERA, colors, Tracker(), (640, 480), config.colors, time.perf_counter_ns)
+    encoder, tracking = msgspec.json.Encoder(), SeedFinder(colors, Tracker(), config.colors)
     for start in range(0, len(frames), TURN):
-        for frame in frames[start : start + TURN]:
-            ours.run(frame)
-        for frame in map(in_hand, pictures[start : start + TURN]):
+        ours, theirs = frames[start : start + TURN], pictures[start : start + TURN]
+        hulls = [
+            roi.hull(blob.rect for blob in timed(times, "search", partial(everywhere, searcher, frame))) for frame in map(in_hand, ours)
+        ]
+        for frame, before, last in zip(map(in_hand, ours[2:]), hulls, hulls[1:], strict=False):
+            timed(times, "roi", partial(nearby, searcher, frame, before, last))
+        for frame in map(in_hand, ours):
+            timed(times, "step", lambda frame=frame: encoder.encode(step.step(frame)))
+            times["refine"].append(round(step.times_ms["centroid"] * 1e6))
+        for frame in map(in_hand, theirs):
             timed(times, "seed_search", partial(SeedFinder(colors, Tracker(), config.colors).find, frame))
-        for frame in map(in_hand, pictures[start : start + TURN]):
+        for frame in map(in_hand, theirs):
             timed(times, "seed_roi", partial(tracking.find, frame))
     return {name: float(np.median(values[TURN:])) * 1e-6 for name, values in times.items()}
+
+
+def keep_memory() -> None:
+    """Have glibc keep freed images instead of returning their pages: else the kernel at its whim doubles the seed's time (not ours)."""
+    with contextlib.suppress(OSError, AttributeError):
+        libc = ctypes.CDLL("libc.so.6")
+        libc.mallopt(M_MMAP_THRESHOLD, 64 << 20)
+        libc.mallopt(M_TRIM_THRESHOLD, 512 << 20)
+
+
+def everywhere(searcher: Searcher, frame: Frame) -> list[Blob]:
+    """Our search of a whole image."""
+    image = picture(frame)
+    return searcher.blobs(image, roi.whole(image.size))
+
+
+def nearby(searcher: Searcher, frame: Frame, before: roi.Rect, last: roi.Rect) -> list[Blob]:
+    """Our search around the markers' hull in the last frame, given that in the one before, too."""
+    image = picture(frame)
+    return searcher.blobs(image, roi.around(last, roi.margin(before, last, Tracker().roi_margin_px), image.size))
 
 
 def precision() -> dict[str, float]:
@@ -205,6 +212,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     cv2.setNumThreads(1)
+    keep_memory()
     config = load_rig(ROOT / "config" / "sim.toml")
     t = speed(config, load_colors(config.calibration_dir, CAMERA), max(options.frames, 3 * TURN))
     result = {

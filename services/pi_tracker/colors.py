@@ -47,10 +47,7 @@ class ColorTable:
 
     def mask(self, luma: Image, chroma: Image) -> Image:
         """255 where any colour is; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
-        if self._buffer.shape[1] < luma.size:
-            self._buffer = np.empty((4, luma.size), np.uint8)
-        # Fresh memory for the planes would cost four times what splitting costs.
-        low, high, mask, more = self._buffer[:, : luma.size].reshape(4, *luma.shape)
+        low, high, mask, more = self._planes(luma)
         index = chroma.view(np.uint16)[:, :, 0]
         for number, bounds in enumerate(self._bounds):
             cv2.split(bounds(index).view(np.uint8).reshape(*luma.shape, 2), (low, high))
@@ -59,21 +56,36 @@ class ColorTable:
                 cv2.bitwise_or(mask, more, mask)
         return mask
 
+    def classify(self, luma: Image, chroma: Image) -> Image:
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
+        return self.classes_and_mask(luma, chroma)[0]
+
+    def classes_and_mask(self, luma: Image, chroma: Image) -> tuple[Image, Image]:
+        """Class of every cell, and 255 where there is one; good until the next call."""
+        classes, low, high, mask = planes = self._planes(luma)
+        index = chroma.view(np.uint16)[:, :, 0]
+        labels, seen = classes, mask
+        for number, layer in enumerate(self.layers):
+            cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4), planes)
+            cv2.inRange(luma, low, high, mask)
+            if len(self.layers) == 1:
+                return cv2.bitwise_and(classes, mask, classes), mask
+            found = cv2.bitwise_and(classes, mask)
+            # Layers never claim the same cell: they share chromas, not lumas.
+            labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
+        return labels, seen
+
     def classes_at(self, luma: Image, chroma: Image) -> Image:
         """The class of every cell that the mask shows, of others any; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
-        index = chroma.view(np.uint16)[:, :, 0]
-        return self._classes[0].take(index) if len(self.layers) == 1 else self.classify(luma, chroma)
+        if len(self.layers) == 1:
+            return self._classes[0].take(chroma.view(np.uint16)[:, :, 0])
+        return self.classify(np.ascontiguousarray(luma), chroma)
 
-    def classify(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
-        index = chroma.view(np.uint16)[:, :, 0]
-        labels = np.zeros(luma.shape, np.uint8)
-        for layer in self.layers:
-            # Layers never claim the same cell: they share chromas, not lumas.
-            classes, low, high, _ = cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4))
-            found = cv2.bitwise_and(classes, cv2.inRange(np.ascontiguousarray(luma), low, high))
-            labels = np.maximum(labels, found)
-        return labels
+    def _planes(self, luma: Image) -> list[Image]:
+        """Four images to work in: fresh memory would cost four times what splitting into it costs."""
+        if self._buffer.shape[1] < luma.size:
+            self._buffer = np.empty((4, luma.size), np.uint8)
+        return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
 
 
 def _lookup(pairs: Bytes) -> Callable[[Image], Image]:
