@@ -42,7 +42,10 @@ class ColorTable:
         parts = [layer.view(np.uint8).reshape(-1, 4) for layer in layers]
         self._classes = [np.ascontiguousarray(part[:, 0]) for part in parts]
         # No class, no luma: low above high.
-        self._bounds = [_lookup(np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8))) for part in parts]
+        bounds = [np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8)) for part in parts]
+        self._bounds = [_lookup(np.ascontiguousarray(pairs).view(np.uint16).ravel()) for pairs in bounds]
+        # OpenCV looks up signed integers only.
+        self._packed = [_lookup(layer.view(np.int32)) for layer in layers]
         self._buffer = np.empty((4, 0), np.uint8)
 
     def mask(self, luma: Image, chroma: Image) -> Image:
@@ -65,8 +68,8 @@ class ColorTable:
         classes, low, high, mask = planes = self._planes(luma)
         index = chroma.view(np.uint16)[:, :, 0]
         labels, seen = classes, mask
-        for number, layer in enumerate(self.layers):
-            cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4), planes)
+        for number, packed in enumerate(self._packed):
+            cv2.split(packed(index).view(np.uint8).reshape(*luma.shape, 4), planes)
             cv2.inRange(luma, low, high, mask)
             if len(self.layers) == 1:
                 return cv2.bitwise_and(classes, mask, classes), mask
@@ -88,9 +91,8 @@ class ColorTable:
         return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
 
 
-def _lookup(pairs: Bytes) -> Callable[[Image], Image]:
-    """A table (65536, 2) of bytes to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy; gives uint16."""
-    table = np.ascontiguousarray(pairs).view(np.uint16).ravel()
+def _lookup(table: npt.NDArray[np.generic]) -> Callable[[Image], Image]:
+    """A table (65536,) of uint16 or int32 to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
     try:
         cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
     except cv2.error:

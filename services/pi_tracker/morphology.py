@@ -2,41 +2,42 @@
 row.
 
 The element is 2x2, and a round of dilation covers the cells to the other side than a round of erosion takes, so that a round of
-each leaves a blob where it was. Rows run into each other at the image's sides: a blob at the right edge loses a column to the
-next row's first cell and gets it back. Pure.
+each leaves a blob where it was. Nothing lies outside the mask. Pure.
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from services.pi_tracker.frame import Image
 
+_ELEMENT = np.ones((2, 2), np.uint8)
+
 
 def opened(mask: Image, erode: int, dilate: int) -> Image:
     """A contiguous mask of 0 and 255 after rounds of erosion, then of dilation; (h, w) -> (h, w), a new image unless both are 0."""
-    width = mask.shape[1]
-    flat = mask.ravel()
+    height, width = mask.shape
+    # A round of erosion has no answer for the last row and the last cell before it; there would be nothing left of a mask this small.
+    if erode and mask.size <= erode * (width + 1):
+        return np.zeros_like(mask)
+    # Rows run into each other, but that an erosion and a dilation of one row of cells cancel holds for any row, this long one included.
+    flat, back = mask.ravel(), min(erode, dilate)
     for _ in range(erode):
-        flat = _with_next(flat, width)
-        flat = _with_next(flat, 1)
-    for _ in range(dilate):
-        flat = _with_last(flat, width)
-        flat = _with_last(flat, 1)
-    return flat.reshape(mask.shape)
+        pairs = flat[:-1] & flat[1:]
+        flat = pairs[:-width] & pairs[width:]
+    for _ in range(back):
+        flat = _spread(_spread(flat, 1), width)
+    if erode > back:
+        flat = np.concatenate((flat, np.zeros(mask.size - flat.size, np.uint8)))
+    result = flat.reshape(height, width)
+    # Without an erosion to cancel, a blob at the right side would come out at the left.
+    return cv2.dilate(result, _ELEMENT, anchor=(1, 1), iterations=dilate - back) if dilate > back else result
 
 
-def _with_next(flat: Image, step: int) -> Image:
-    """Each cell and the one `step` further on; the last `step` stay."""
-    result = np.empty_like(flat)
-    np.bitwise_and(flat[:-step], flat[step:], result[:-step])
-    result[-step:] = flat[-step:]
-    return result
-
-
-def _with_last(flat: Image, step: int) -> Image:
-    """Each cell or the one `step` before; the first `step` stay."""
-    result = np.empty_like(flat)
-    np.bitwise_or(flat[:-step], flat[step:], result[step:])
-    result[:step] = flat[:step]
+def _spread(flat: Image, step: int) -> Image:
+    """Each cell or the one `step` before it; (n,) -> (n + step,)."""
+    result = np.zeros(flat.size + step, np.uint8)
+    result[: flat.size] = flat
+    result[step:] |= flat
     return result
