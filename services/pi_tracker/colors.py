@@ -91,7 +91,7 @@ class ColorTable:
         return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
 
 
-def _lookup(table: npt.NDArray[np.generic]) -> Callable[[Image], Image]:
+def _lookup(table: npt.NDArray[np.uint16] | npt.NDArray[np.int32]) -> Callable[[Image], Image]:
     """A table (65536,) of uint16 or int32 to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
     try:
         cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
