@@ -69,4 +69,6 @@ def clamp(q: Array, limits: Array) -> None:
     """Bring q (n,) into limits (n, 2) in place; what is not finite goes to mid-range."""
     for j in range(q.size):
         low, high = limits[j, 0], limits[j, 1]
-        q[j] = min(max(q[j], low), high) if np.isfinite(q[j]) else 0.5 * (low + high)
+        # Nearly always true, and never for what is not a number.
+        if not low <= q[j] <= high:
+            q[j] = min(max(q[j], low), high) if np.isfinite(q[j]) else 0.5 * (low + high)
