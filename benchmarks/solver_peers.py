@@ -1,4 +1,4 @@
-"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py; what is not installed is skipped.
+"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py; what is absent is skipped and says why.
 
 Every peer gets the same chain (as URDF, or the functions of kinematics.py), the same goals (tip pose) and the same end: position within
 1e-6 mm and orientation within 1e-8 rad, or 100 iterations. It starts each frame from its own last solution.
@@ -7,7 +7,7 @@ Every peer gets the same chain (as URDF, or the functions of kinematics.py), the
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +23,15 @@ Solve = Callable[[Array, Array], Array]
 _AXES = ("0 1 0", "-1 0 0", "-1 0 0", "-1 0 0")
 
 
-def peers(chain: k.Chain) -> Iterator[tuple[str, Solve]]:
-    """(name, solver) of every peer that is installed."""
+def peers(chain: k.Chain) -> tuple[dict[str, Solve], dict[str, str]]:
+    """The solvers of all peers that are installed, and why the others are not among them, both by name."""
+    installed, skipped = {}, {}
     for name, make in PEERS.items():
         try:
-            solve = make(chain)
-        except ImportError:
-            continue
-        yield name, solve
+            installed[name] = make(chain)
+        except ImportError as error:
+            skipped[name] = f"{error}; pip install {PACKAGES.get(name, name)}"
+    return installed, skipped
 
 
 def urdf(chain: k.Chain) -> Path:
@@ -202,4 +203,5 @@ def roboticstoolbox(chain: k.Chain) -> Solve:
 
 # Peers whose problem has no limits: their result may still keep them by luck.
 WITHOUT_LIMITS = ("roboticstoolbox",)
+PACKAGES = {"roboticstoolbox": "roboticstoolbox-python", "mink": "mink daqp", "pin-pink": "pin-pink daqp"}
 PEERS = {"placo": placo, "mink": mink, "pin-pink": pink, "roboticstoolbox": roboticstoolbox, "ikpy": ikpy, "scipy": scipy}
