@@ -6,7 +6,7 @@ Keys, with the figure that is wanted:
   paper_first_it (33), paper_later_it (3-10)                                    the study's own algorithm: median of first frames, 10-90 %
   dls_reach >= .999, fabrik_reach >= .995, fabrik_alone, fabrik_turn_rad <= 1e-6, violations = 0   random reachable goals, every digit
   finger_us <= 5, five_us <= 15, hand_us <= 250, step_us                        medians, one process; step_us is points in, message out
-  start_s <= 1                                                                  imports and kernels from a warm cache, in a process of its own
+  start_s <= 1                                                                  imports and kernels from a warm cache, in a new process
   peer_ratio >= 5, peers_us, peers_skipped                                      fastest peer that keeps limits / ours at the same accuracy
   flexion_deg <= 5.5, orientation_deg <= 4.5, *_knuckle_deg <= 2.3, 1.7          simulated hands, 1 mm of noise on wrist and tips
 Peers that are not installed are skipped and named with the reason (solver_peers.py); without any, peer_ratio is missing.
