@@ -68,7 +68,7 @@ def habit(model: HandModel) -> Habit:
         sigma = np.deg2rad(_THUMB_COUPLING_DEG if row == 0 else _COUPLING_DEG)
         information += np.outer(coupled, coupled) * (digit.coupling_weight / sigma) ** 2
     covariance = np.linalg.inv(information)
-    shares = np.linalg.solve(together.T @ information @ together, together.T @ information)
+    shares = np.asarray(np.linalg.solve(together.T @ information @ together, together.T @ information), dtype=np.float64)
     return Habit(covariance @ pull, information, 0.5 * (covariance + covariance.T), together, shares)
 
 
