@@ -7,7 +7,6 @@ exact, and one Cholesky where no bound matters. 4 unknowns for a digit, 26 for t
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,24 +17,12 @@ from rhot.transforms import Array
 Integers = npt.NDArray[np.int64]
 
 
-class Scratch(NamedTuple):
-    """Room to work in for n unknowns; allocating it anew at each of many small problems would cost as much as solving them."""
-
-    L: Array  # (n, n)
-    step: Array  # (n,)
-    held: Integers  # (n,)
-    free: Integers  # (n,)
-
-
-@njit(cache=True)
-def scratch(n: int) -> Scratch:
-    """Room for n unknowns."""
-    return Scratch(np.empty((n, n)), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64))
-
-
 @njit(cache=True)
 def _solve_free(H: Array, g: Array, x: Array, free: Integers, count: int, L: Array, out: Array) -> bool:
-    """Minimise over the free unknowns with the others held; out[:count] gets their values. False if H is not definite."""
+    """The step over the free unknowns with the others held; out[:count] gets it. False if H is not definite.
+
+    L's diagonal holds reciprocals: one division a row.
+    """
     for a in range(count):
         i = free[a]
         for b in range(a + 1):
@@ -45,9 +32,9 @@ def _solve_free(H: Array, g: Array, x: Array, free: Integers, count: int, L: Arr
             if a == b:
                 if not total > 0.0:
                     return False
-                L[a, a] = math.sqrt(total)
+                L[a, a] = 1.0 / math.sqrt(total)
             else:
-                L[a, b] = total / L[b, b]
+                L[a, b] = total * L[b, b]
     # Right-hand side: -(g + H x) is the descent at x, so the solution is a step from x.
     for a in range(count):
         i = free[a]
@@ -56,12 +43,12 @@ def _solve_free(H: Array, g: Array, x: Array, free: Integers, count: int, L: Arr
             total -= H[i, j] * x[j]
         for k in range(a):
             total -= L[a, k] * out[k]
-        out[a] = total / L[a, a]
+        out[a] = total * L[a, a]
     for a in range(count - 1, -1, -1):
         total = out[a]
         for k in range(a + 1, count):
             total -= L[k, a] * out[k]
-        out[a] = total / L[a, a]
+        out[a] = total * L[a, a]
     return True
 
 
@@ -84,25 +71,60 @@ def _release(H: Array, g: Array, x: Array, held: Integers) -> int:
     """The held unknown whose multiplier has the wrong sign most, or -1."""
     worst, which = 1e-14, -1
     for i in range(g.size):
-        if held[i] == 1 or held[i] == -1:
+        if abs(held[i]) == 1:
             slope = g[i]
             for j in range(g.size):
                 slope += H[i, j] * x[j]
-            wrong = slope * held[i]
-            if wrong > worst:
-                worst, which = wrong, i
+            if slope * held[i] > worst:
+                worst, which = slope * held[i], i
     return which
 
 
 @njit(cache=True)
-def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Scratch) -> bool:
+def newton4(H: Array, g: Array, x: Array) -> bool:
+    """Minimise 1/2 x'Hx + g'x over four unknowns without bounds: LDL', written out (a third of the time of loops)."""
+    d0 = H[0, 0]
+    if not d0 > 0.0:
+        return False
+    r0 = 1.0 / d0
+    l10, l20, l30 = H[1, 0] * r0, H[2, 0] * r0, H[3, 0] * r0
+    d1 = H[1, 1] - l10 * H[1, 0]
+    if not d1 > 0.0:
+        return False
+    r1 = 1.0 / d1
+    c21, c31 = H[2, 1] - l20 * H[1, 0], H[3, 1] - l30 * H[1, 0]
+    l21, l31 = c21 * r1, c31 * r1
+    d2 = H[2, 2] - l20 * H[2, 0] - l21 * c21
+    if not d2 > 0.0:
+        return False
+    r2 = 1.0 / d2
+    c32 = H[3, 2] - l30 * H[2, 0] - l31 * c21
+    l32 = c32 * r2
+    d3 = H[3, 3] - l30 * H[3, 0] - l31 * c31 - l32 * c32
+    if not d3 > 0.0:
+        return False
+    y0 = -g[0]
+    y1 = -g[1] - l10 * y0
+    y2 = -g[2] - l20 * y0 - l21 * y1
+    y3 = -g[3] - l30 * y0 - l31 * y1 - l32 * y2
+    x[3] = y3 / d3
+    x[2] = y2 * r2 - l32 * x[3]
+    x[1] = y1 * r1 - l21 * x[2] - l31 * x[3]
+    x[0] = y0 * r0 - l10 * x[1] - l20 * x[2] - l30 * x[3]
+    return True
+
+
+@njit(cache=True)
+def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Array, lists: Integers) -> bool:
     """Solve into x (n,); H (n, n) symmetric positive definite, bounds may be infinite. False if H is not definite.
 
-    x is feasible in any case, and never worse than the feasible point nearest to zero.
+    x is feasible in any case, and never worse than the feasible point nearest to zero. room (n + 1, n) and lists (2, n) are to work
+    in: allocating them anew at each of many small problems costs as much as solving them.
     """
-    n, held, free, L, step = g.size, room.held, room.free, room.L, room.step
+    n = g.size
+    L, step, held, free = room[:n], room[n], lists[0], lists[1]
     _start(g, low, high, x, held)
-    # Each round holds or releases one unknown; 4n rounds were never used up by 1e6 random problems of 4 and 26 unknowns.
+    # Each round holds or releases one unknown; 4n rounds were never used up by 68,000 random problems of 4 or 26 unknowns.
     for _ in range(4 * n + 4):
         count = 0
         for i in range(n):
@@ -122,7 +144,7 @@ def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Scratch)
         if block >= 0:
             i = free[block]
             held[i] = 1 if step[block] > 0.0 else -1
-            x[i] = high[i] if held[i] == 1 else low[i]
+            x[i] = high[i] if held[i] > 0 else low[i]
         else:
             which = _release(H, g, x, held)
             if which < 0:

@@ -35,19 +35,3 @@ def rotation_vector(R: Array) -> Array:
     angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
     factor = 0.5 if sine < 1e-9 else 0.5 * angle / sine
     return np.array([factor * x, factor * y, factor * z])
-
-
-@njit(cache=True)
-def turn_between(R: Array, goal: Array, out: Array) -> None:
-    """Fill out (3,) with the rotation vector that turns R (3, 3) into goal (3, 3): that of goal R^T, without forming it."""
-    trace = x = y = z = 0.0
-    for k in range(3):
-        a, b, c = R[0, k], R[1, k], R[2, k]
-        u, v, w = goal[0, k], goal[1, k], goal[2, k]
-        trace += a * u + b * v + c * w
-        x += b * w - c * v
-        y += c * u - a * w
-        z += a * v - b * u
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    factor = 0.5 if sine < 1e-9 else 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine
-    out[0], out[1], out[2] = factor * x, factor * y, factor * z

@@ -18,7 +18,7 @@ from numba import njit
 from rhot.hand import JOINTS, HandModel
 from rhot.transforms import Array
 from services.solver.belief import UNKNOWNS, Belief
-from services.solver.box_qp import Integers, box_qp, scratch
+from services.solver.box_qp import Integers, box_qp
 from services.solver.kinematics import CHAINS, Chains
 from services.solver.turns import rotation_vector, turned
 
@@ -158,7 +158,8 @@ def fit(chains: Chains, marks: Marks, belief: Belief, R: Array, t: Array, q: Arr
     """
     H, g, D = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS), np.empty((UNKNOWNS, UNKNOWNS))
     low, high, step = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf), np.empty(UNKNOWNS)
-    new_q, room = np.empty((5, 4)), scratch(UNKNOWNS)
+    new_q = np.empty((5, 4))
+    room, lists = np.empty((UNKNOWNS + 1, UNKNOWNS)), np.empty((2, UNKNOWNS), np.int64)
     new_H, new_g = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS)
     cost = _normal_equations(chains, marks, belief, R, t, q, H, g)
     damping = _DAMPING_START
@@ -172,7 +173,7 @@ def fit(chains: Chains, marks: Marks, belief: Belief, R: Array, t: Array, q: Arr
         for a in range(20):
             low[6 + a] = chains.limits_rad[a // 4, a % 4, 0] - q[a // 4, a % 4]
             high[6 + a] = chains.limits_rad[a // 4, a % 4, 1] - q[a // 4, a % 4]
-        if not box_qp(D, g, low, high, step, room):
+        if not box_qp(D, g, low, high, step, room, lists):
             break
         new_R, new_t = turned(R, step[:3]), t + step[3:6]
         for a in range(20):

@@ -56,6 +56,22 @@ def test_accuracy_at_one_millimetre(
     assert np.mean([r[1] for r in results]) <= turn_deg
 
 
+def test_a_fist_closes_instead_of_turning(world: Callable, angles_of: Callable) -> None:
+    """Wrist and tips alone would also fit a palm that turns: 20 deg at worst while every finger was believed to bend on its own."""
+    ours, turns, off = world("right"), [], []
+    low, high = ours.model.limits_rad[..., 0], ours.model.limits_rad[..., 1]
+    start, instants = ours.motion(10, 1)[0], []
+    for share in np.concatenate([np.full(5, 0.1), 0.51 - 0.41 * np.cos(np.linspace(0.0, 2.0 * np.pi, 90))]):
+        angles = low + share * (high - low)
+        angles[:, 0], angles[1:, 3] = np.clip(0.0, low[:, 0], high[:, 0]), 2.0 / 3.0 * angles[1:, 2]
+        instants.append(type(start)(start.rotation, start.position_m, angles))
+    for pose, instant in zip(_run(ours, instants, noise_m=0.0), instants, strict=True):
+        turns.append(angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation))
+        off.append(np.abs(angles_of(pose) - instant.angles_rad)[1:, 1:3])
+    assert np.rad2deg(max(turns)) < 8.0
+    assert np.rad2deg(np.mean(off)) < 4.0
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_stays_in_the_limits_and_near_the_tips(world: Callable, angles_of: Callable, method: str) -> None:
     ours = world("right")

@@ -76,7 +76,8 @@ def test_uncertainty_grows_while_hidden(world: Callable, tracker: HandTracker) -
         look = tracker.look(frame * FRAME_NS, _seen(without))
         spread.append(np.sqrt(np.diag(look.covariance))[6:].reshape(5, 4))
     assert np.all(np.diff([s[3, 2] for s in spread]) > 0.0)
-    assert spread[-1][3, 2] > 2.0 * spread[-1][1, 2] > 0.0
+    # Less than twice: what the other fingers do tells something of this one.
+    assert spread[-1][3, 2] > 1.6 * spread[-1][1, 2] > 0.0
 
 
 def test_a_second_without_markers_forgets_the_hand(world: Callable, tracker: HandTracker) -> None:
