@@ -62,6 +62,9 @@ async def _camera(rig: RigConfig, endpoints: list[str], name: str, wanted: list[
         light = assess(await live(bus, name, 3))
     typer.echo(f"camera {name}: {exposure_text(state)}")
     typer.echo(light_text(light))
+    if not state.adjustable:
+        # Advice would name options that this camera does not have.
+        return
     for line in advice(light, state.exposure_us, state.red_gain, state.blue_gain):
         typer.echo(f"warning: {line}", err=True)
 

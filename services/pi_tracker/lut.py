@@ -6,6 +6,7 @@ that cannot be it is not taken for it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from rhot.config import Tracker
@@ -17,12 +18,17 @@ from services.pi_tracker.frame import Frame
 from services.pi_tracker.identity import Identity, shape_fits
 from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture, Rect, picture
+from services.pi_tracker.room import Room
 from services.pi_tracker.search import Blob, Searcher
 
-# Every so many frames the whole image is searched although nothing is lost, so that a mistake does not last.
-_REVIEW = 15
+# Every so many frames the whole image is searched although nothing is lost, so that a mistake does not last; and in the first ones, to
+# learn what stands in the room.
+_REVIEW, _FIRST = 15, 6
 # A marker that fits the others worse than this may be a thing in the room.
 _LEAST_SUPPORT = 0.3
+# Where half of a disc is hidden, the centre of the rest is 4 r / (3 pi) from the whole's: .24 of the square root of its area, in some
+# direction; so much per coordinate and share. And never is all of it hidden.
+_HIDDEN_SIGMA, _MOST_HIDDEN = 0.34, 0.9
 Lap = Callable[[str], None]
 
 
@@ -37,6 +43,10 @@ class LutFinder:
         self._noise = Noise()
         self._searches = 0
         self._identity = Identity(len(table.names), settings.roi_margin_px)
+        self._room = Room()
+        # All blobs of the frame in hand, things in the room among them, and where they were searched.
+        self._all: list[Blob] = []
+        self._region: Rect = (0, 0, 0, 0)
         # Where all markers were, None if one was not seen, and how far around it they will be.
         self._hull: Rect | None = None
         self._margin_px = settings.roi_margin_px
@@ -48,14 +58,16 @@ class LutFinder:
         blobs = self._search(image)
         self._lap("search")
         chosen = {color: choice for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if choice is not None}
+        if len(self._all) > len(chosen) or not self._room.settled:
+            self._room.learn(image, self._region, self._all, [choice.blob.rect for choice in chosen.values()], self._noise, frame.stamp_ns)
         self._lap("identity")
         # A marker that strayed from the others is looked for everywhere the next time.
         self._expect([choice.blob.rect for choice in chosen.values() if choice.support >= _LEAST_SUPPORT])
         markers = []
         measured = centroids(image, [choice.blob for choice in chosen.values()], self._noise)
         for (color, choice), found in zip(chosen.items(), measured, strict=True):
-            self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
-            markers.append(_marker(self._names[color], found, choice.certainty))
+            hidden = self._identity.follow(color, found.x_px, found.y_px, found.area_px, frame.stamp_ns)
+            markers.append(_marker(self._names[color], found, choice.certainty, hidden))
         self._lap("centroid")
         return markers
 
@@ -63,7 +75,7 @@ class LutFinder:
         """Plausible blobs of each colour: near the last places, else in the whole image."""
         everywhere = roi.whole(image.size)
         self._searches += 1
-        if self._hull is None or self._searches % _REVIEW == 0:
+        if self._hull is None or self._searches <= _FIRST or self._searches % _REVIEW == 0:
             return self._blobs(image, everywhere)
         region = roi.around(self._hull, self._margin_px, image.size)
         found = self._blobs(image, region)
@@ -84,7 +96,8 @@ class LutFinder:
     def _blobs(self, image: Picture, region: Rect) -> list[list[Blob]]:
         """Plausible blobs of each colour in a rectangle."""
         found: list[list[Blob]] = [[] for _ in self._names]
-        for blob in self._searcher.blobs(image, region):
+        self._region, self._all = region, self._searcher.blobs(image, region)
+        for blob in self._room.without(image, self._all, self._noise):
             if shape_fits(blob, self._settings.max_area_px):
                 found[blob.color].append(blob)
         return found
@@ -94,13 +107,15 @@ def _cells(blob: Blob) -> int:
     return blob.cells
 
 
-def _marker(name: str, found: Centroid, certainty: float) -> Marker:
+def _marker(name: str, found: Centroid, certainty: float, hidden: float) -> Marker:
+    """hidden is the share of it that another marker covers: it moves the centre, nobody knows where to."""
+    whole_px2 = found.area_px / (1.0 - min(hidden, _MOST_HIDDEN))
     return Marker(
         color=name,
         # A hundredth of the best sigma is as fine as the position deserves.
         x_px=round(found.x_px, 3),
         y_px=round(found.y_px, 3),
         area_px=round(found.area_px, 1),
-        sigma_px=round(found.sigma_px, 4),
-        quality=round(found.quality * certainty, 3),
+        sigma_px=round(math.hypot(found.sigma_px, _HIDDEN_SIGMA * hidden * math.sqrt(whole_px2)), 4),
+        quality=round(found.quality * certainty * (1.0 - hidden), 3),
     )

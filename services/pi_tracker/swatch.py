@@ -92,7 +92,7 @@ def find_swatch(cells: Cells, pointer: Pointer) -> Swatch:
         raise CalibrationError(f"{pointer}: only {4 * np.count_nonzero(found)} px of one colour are there; {4 * MIN_CELLS} px are needed")
     if not pointer.is_box and _touches_border(found, rect, cells):
         raise CalibrationError(
-            f"{pointer}: that colour goes on far beyond the click; is it the background, or a sleeve? Point at the paint, or box it"
+            f"{pointer}: that colour goes on far beyond the click; is it the background, or a sleeve? Point at the paint itself"
         )
     mask = np.zeros(cells.shape, bool)
     mask[y0:y1, x0:x1] = found

@@ -18,7 +18,7 @@ _ANY = ColorRange(hsv_low=(0, 80, 40), hsv_high=(179, 255, 255))
 
 @dataclass
 class Session:
-    """One camera's calibration. wanted are the colours of rig.toml."""
+    """One camera's calibration. wanted are the colours of rig.toml, next_camera is one that was not calibrated yet, "" if all were."""
 
     camera: str
     wanted: list[str]
@@ -28,6 +28,7 @@ class Session:
     edited: dict[str, ColorRange] = field(default_factory=dict)
     error: str = ""
     saved: str = ""
+    next_camera: str = ""
 
     @property
     def names(self) -> list[str]:

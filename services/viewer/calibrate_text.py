@@ -12,6 +12,10 @@ from services.viewer.panels import text
 
 _STYLE = "font-size:0.85em;line-height:1.4;padding:0 0.6em;"
 _RED, _GREEN, _AMBER = "#c0392b", "#1e8449", "#b9770e"
+_LEGEND = (
+    '<div style="color:#666;font-size:0.9em">taken: share of the paint in its range; d\': how far apart, in standard deviations; '
+    "4 and more is good</div>"
+)
 # Lines of warnings and notes: enough for six colours, short enough for a panel.
 _MOST = 8
 
@@ -25,7 +29,13 @@ def to_do(session: Session, chosen: str, *, pictures: bool) -> str:
     if session.error:
         lines.append(_colored(session.error, _RED))
     clicks = sum(one.color == chosen for one in session.pointed)
-    if clicks:
+    complete = done.issuperset(session.names)
+    if complete and session.changed:
+        lines.append("All colours are pointed at: <b>put them in force</b>, or turn the hand and click again where a mask has holes.")
+    elif complete:
+        onward = f"Now <b>camera {text(session.next_camera)}</b>." if session.next_camera else "Untick <i>show picture</i> to see the hand."
+        lines.append(f"This camera is done. {onward}")
+    elif clicks:
         lines.append(f"<b>{text(chosen)}</b>: {clicks} click{'s' if clicks > 1 else ''}. Click again where its mask has holes, or move on.")
     else:
         lines.append(f"Hold the hand still and <b>click the middle of the {text(chosen)} marker</b> in the picture.")
@@ -44,7 +54,7 @@ def report(session: Session) -> str:
     if not rows and not lines:
         return _box("nothing fitted yet; the masks show what is in force" if session.in_force.colors else "no colours are in force yet")
     head = "<tr><td></td><td>taken</td><td>from skin</td><td>nearest</td></tr>" if rows else ""
-    table = f'<table style="width:100%;font-size:0.95em">{head}{"".join(rows)}</table>' if rows else ""
+    table = f'<table style="width:100%;font-size:0.95em">{head}{"".join(rows)}</table>{_LEGEND}' if rows else ""
     return _box(table + "<br>".join(lines))
 
 
@@ -79,12 +89,17 @@ def verdict(session: Session) -> str:
     """What is in force, and what is missing."""
     lines = []
     if session.saved:
-        lines.append(_colored(f"in force on camera {session.camera}, and written on its machine, {session.saved}", _GREEN))
+        lines.append(_colored(f"in force on camera {session.camera}, and written on its machine, {_clock(session.saved)}", _GREEN))
     elif session.changed:
         lines.append("not in force yet: press the button")
     if session.missing:
         lines.append(f"still missing: {', '.join(text(name) for name in session.missing)}")
     return _box("<br>".join(lines) or "this is what is in force")
+
+
+def _clock(date: str) -> str:
+    """The time of day of an ISO date."""
+    return date.partition("T")[2][:8]
 
 
 def _colored(value: str, color: str) -> str:

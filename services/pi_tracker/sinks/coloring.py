@@ -41,6 +41,8 @@ class Coloring:
         self._camera = service.config.camera_named(service.instance)
         self._path = service.config.calibration_dir / f"{self._camera.name}.colors.json"
         self._told_ns: dict[str, int] = {}
+        # What health was last told of colours: with new ones it is no longer so.
+        self._complaint = ""
         self._seen_ns = _changed_ns(self._path)
         self.in_force = Colors(colors={})
         service.values["colors_refused"] = 0
@@ -60,7 +62,7 @@ class Coloring:
         for drifted in self._drift.drifted():
             if not 0 <= frame.stamp_ns - self._told_ns.get(drifted.color, -_DRIFT_EVERY_NS) < _DRIFT_EVERY_NS:
                 self._told_ns[drifted.color] = frame.stamp_ns
-                self._service.error(drifted.text(self._camera.name))
+                self._complain(drifted.text(self._camera.name))
 
     async def follow_file(self) -> None:
         """Take what is saved by hand into force, for ever."""
@@ -74,7 +76,7 @@ class Coloring:
                     if colors != self.in_force:
                         self._take(colors)
                 except CalibrationError as error:
-                    self._service.error(str(error))
+                    self._complain(str(error))
 
     async def follow_bus(self) -> None:
         """Take what is put on the bus into force and write it to the file, for ever."""
@@ -97,13 +99,13 @@ class Coloring:
                 raise CalibrationError(f"{self._path} cannot be written: {error}") from None
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
             self._service.values["colors_refused"] += 1
-            self._service.error(f"colours{made[:120]} put on the bus for camera {self._camera.name!r} are refused: {error}")
+            self._complain(f"colours{made[:120]} put on the bus for camera {self._camera.name!r} are refused: {error}")
             return
         self._seen_ns = _changed_ns(self._path)
         self._put_in_force(colors, step)
         missing = [name for name in self._service.config.colors if name not in colors.colors]
         if missing:
-            self._service.error(f"camera {self._camera.name!r}: {', '.join(missing)} not calibrated yet, and not tracked until then")
+            self._complain(f"camera {self._camera.name!r}: {', '.join(missing)} not calibrated yet, and not tracked until then")
         log.info("new colours in force%s: %s", made[:120], ", ".join(sorted(colors.colors)))
 
     def _take(self, colors: Colors) -> None:
@@ -119,7 +121,7 @@ class Coloring:
             colors = Colors(colors={})
         there = self._there(colors)
         self._put_in_force(colors, self._made(colors, there))
-        self._service.error(f"{reason}. Until then {', '.join(there) or 'nothing'} is tracked")
+        self._complain(f"{reason}. Until then {', '.join(there) or 'nothing'} is tracked")
 
     def _there(self, colors: Colors) -> list[str]:
         """Those of the wanted colours that there are; without a hand, all."""
@@ -132,8 +134,15 @@ class Coloring:
     def _put_in_force(self, colors: Colors, step: TrackerStep) -> None:
         self.in_force, self.step, self._drift = colors, step, Drift(colors)
         self._told_ns.clear()
+        if self._service.last_error == self._complaint:
+            self._service.last_error = ""
         for name in [name for name in self._service.values if name.endswith(("_hue_off", "_outside"))]:
             del self._service.values[name]
+
+    def _complain(self, text: str) -> None:
+        """In health until other colours are in force."""
+        self._service.error(text)
+        self._complaint = self._service.last_error
 
     def _answer(self) -> Colors:
         return self.in_force

@@ -44,6 +44,8 @@ class Calibrate:
         # Newest last: (name, picture, when it was sent to the browsers).
         self._pictures: list[tuple[str, Image, float]] = []
         self._chosen = ""
+        # Cameras whose colours were put in force from here.
+        self._done: set[str] = set()
 
     async def run(self) -> None:
         """For ever."""
@@ -167,6 +169,9 @@ class Calibrate:
             self._session.error = str(error)
         else:
             self._session.was_saved(made)
+            self._done.add(self._session.camera)
+            others = [camera.name for camera in self._service.config.camera if camera.name not in self._done]
+            self._session.next_camera = others[0] if others else ""
 
     def _show_chosen(self) -> None:
         if self._chosen not in self._session.names:

@@ -7,7 +7,6 @@ import pytest
 
 from services.pi_tracker.company import Candidate, best_set, support
 from services.pi_tracker.identity import Identity, Track, shape_fits
-from services.pi_tracker.room import Room
 from services.pi_tracker.search import Blob
 
 FRAME_NS = 33_333_333
@@ -59,18 +58,59 @@ def test_a_hand_is_told_from_things_that_keep_company_too():
     assert chosen(Identity(6, 40), blobs, 0) == tips
 
 
-def test_a_marker_that_hides_is_not_replaced_by_a_thing_that_stands_there():
+def test_a_marker_half_hidden_by_another_is_known_by_its_place():
+    """A few cells beside a larger blob are that one's rim as a rule, but not where the marker itself must be."""
     identity = Identity(6, 40)
-    thing = blob(1, 420, 330, 16)
-    for seq in range(12):
-        tips = hand(300 + 4 * seq, 250)
-        chosen(identity, [[tip] if color != 1 else [tip, thing] for color, tip in enumerate(tips)], seq)
-    for seq in range(12, 60):
-        tips = hand(300 + 4 * seq, 250)
-        found = chosen(identity, [[tip] if color != 1 else [thing] for color, tip in enumerate(tips)], seq)
-        assert found[1] is None
-    tips = hand(300 + 4 * 60, 250)
-    assert chosen(identity, [[tip] if color != 1 else [thing, tip] for color, tip in enumerate(tips)], 60) == tips
+    for seq in range(5):
+        tips = hand(300 + 9 * seq, 250)
+        chosen(identity, [[tip] for tip in tips], seq)
+    tips = hand(345, 250)
+    x1, y0 = tips[2].rect[2], tips[2].rect[1]
+    sliver = filled(1, (x1, y0, x1 + 2, y0 + 4))
+    rim = filled(5, (x1, y0 + 4, x1 + 2, y0 + 7))
+    blobs = [[tip] for tip in tips]
+    blobs[5].append(rim)
+    blobs[1] = [sliver]
+    blobs[2] = [tips[2]]
+    found = chosen(identity, blobs, 5)
+    assert found[5] == tips[5]
+    # Forty pixels from where it was.
+    assert found[1] is None
+    near = filled(1, (*tips[1].rect[:2], tips[1].rect[0] + 2, tips[1].rect[1] + 4))
+    blobs[1] = [near]
+    blobs[2] = [blob(2, near.rect[2] * 2 + 7, near.rect[1] * 2 + 7)]
+    assert chosen(identity, blobs, 5)[1] == near
+
+
+def test_a_hidden_marker_moves_with_the_hand():
+    identity = Identity(6, 40)
+    for seq in range(3):
+        chosen(identity, [[tip] for tip in hand(200 + 20 * seq, 250)], seq)
+    for seq in range(3, 8):
+        tips = hand(200 + 20 * seq, 250)
+        chosen(identity, [[tip] if color != 3 else [] for color, tip in enumerate(tips)], seq)
+    tips = hand(200 + 20 * 8, 250)
+    sliver = filled(3, (*tips[3].rect[:2], tips[3].rect[0] + 2, tips[3].rect[1] + 4))
+    beside = blob(2, sliver.rect[0] * 2 - 7, sliver.rect[1] * 2 + 4)
+    blobs = [[tip] for tip in tips]
+    blobs[3], blobs[2] = [sliver], [beside]
+    assert chosen(identity, blobs, 8)[3] == sliver
+
+
+def test_what_another_marker_hides_is_told():
+    identity = Identity(2, 40)
+    left, right = blob(0, 100, 100), blob(1, 160, 100)
+    for seq in range(4):
+        chosen(identity, [[left], [right]], seq)
+    near = blob(1, 112, 100)
+    stamp_ns = START_NS + 4 * FRAME_NS
+    assert None not in identity.choose([[left], [near]], stamp_ns)
+    whole_px2 = left.area_px
+    assert identity.follow(0, left.x_px, left.y_px, 0.5 * whole_px2, stamp_ns) == pytest.approx(0.5)
+    # Nothing touches it: then it is only far away.
+    stamp_ns += FRAME_NS
+    assert None not in identity.choose([[left], [right]], stamp_ns)
+    assert identity.follow(0, left.x_px, left.y_px, 0.5 * whole_px2, stamp_ns) == 0.0
 
 
 def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
@@ -140,27 +180,3 @@ def test_the_best_set_of_nothing_is_nothing():
     assert best_set([[], []]) == [None, None]
     only = Candidate(blob(1, 50, 50), 0.5)
     assert best_set([[], [only]]) == [None, (only, 1.0)]
-
-
-def test_the_room_learns_what_stands_and_forgets_what_is_gone():
-    room = Room()
-    thing = blob(0, 100, 100, 30)
-    for seq in range(3):
-        room.learn(thing, START_NS + seq * FRAME_NS)
-        assert not room.holds(thing)
-    room.learn(blob(0, 101, 100, 30), START_NS + 3 * FRAME_NS)
-    assert room.holds(thing)
-    assert room.holds(blob(0, 98, 98, 16))  # half of it hidden
-    assert not room.holds(blob(0, 130, 100, 30))
-    room.learn(blob(0, 400, 100, 30), START_NS + 120_000_000_000)
-    assert not room.holds(thing)
-
-
-def test_the_room_does_not_grow_for_ever():
-    room = Room()
-    for seq in range(500):
-        room.learn(blob(0, 10 * (seq % 60), 3 * (seq % 100), 10), START_NS + seq)
-    standing = blob(0, 333, 222, 30)
-    for seq in range(4):
-        room.learn(standing, START_NS + 500 + seq)
-    assert room.holds(standing)

@@ -91,6 +91,24 @@ def test_what_is_saved_says_how_it_was_made(session: Session) -> None:
     assert "in force on camera left" in calibrate_text.verdict(session)
 
 
+def test_the_page_says_what_comes_next(session: Session) -> None:
+    def says(color: str) -> str:
+        return calibrate_text.to_do(session, color, pictures=True)
+
+    assert "click the middle of the green marker" in says("green")
+    pointed(session, "green")
+    assert "Click again where its mask has holes" in says("green")
+    for color in ("blue", "cyan"):
+        pointed(session, color)
+    assert "put them in force" in says("cyan")
+    session.was_saved(session.file("2026-01-02T03:04:05.678+00:00"))
+    session.next_camera = "right"
+    assert "This camera is done. Now <b>camera right</b>" in says("cyan")
+    assert calibrate_text.verdict(session).count("03:04:05<") == 1
+    session.next_camera = ""
+    assert "to see the hand" in says("cyan")
+
+
 def test_texts_escape_and_survive_whatever_the_network_says(session: Session) -> None:
     session.point("green", PICTURE, 1.0, 1.0)
     odd = {

@@ -62,6 +62,19 @@ async def test_what_cannot_be_is_refused_with_the_reason(config, tracking, seen,
         await seen(client, "blue", "green")
 
 
+async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(config, tracking, seen, colors):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        with pytest.raises(CalibrationError):
+            await client.set_colors("left", Colors(date="d", tool="t", colors={"green": NOTHING}))
+        assert "are refused" in service.last_error
+        await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
+        assert service.last_error == ""
+        service.error("something else")
+        await client.set_colors("left", Colors(date="f", tool="t", colors=colors.colors))
+        assert service.last_error == "something else"
+
+
 GARBAGE = [
     b"",
     b"{}",
