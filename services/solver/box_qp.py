@@ -139,6 +139,12 @@ def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Array, l
             left = high[i] - x[i] if step[a] > 0.0 else x[i] - low[i]
             if abs(step[a]) * length > left:
                 length, block = left / abs(step[a]), a
+        total = 0.0
+        for a in range(count):
+            total += abs(step[a])
+        # Not a number (from H's upper triangle or g): nothing moves.
+        if not math.isfinite(total):
+            return False
         for a in range(count):
             x[free[a]] += length * step[a]
         if block >= 0:

@@ -255,6 +255,7 @@ def solve_digits(
     near, nowhere = np.empty((2, 4)), np.eye(3)
     for row in range(5):
         if seen[row] != 0:
+            clamp(angles[row], chains.limits_rad[row])
             near[0], near[1] = angles[row], keep[row]
             point = to_canonical(chains.base_m[row], chains.base_rotation[row], chains.side, points[row])
             wanted = Goal(COUPLED, point, nowhere, near)

@@ -29,6 +29,7 @@ from typing import Literal
 import numpy as np
 
 from rhot.transforms import Array
+from services.solver.constraints import clamp
 from services.solver.dls import NOT_CONVERGED, SOLVED, UNREACHABLE
 from services.solver.kinematics import Chain, jacobian, tip, tip_rotation
 
@@ -76,7 +77,9 @@ def differential(p: Array, R: Array, goal: Array, goal_R: Array) -> Array:
 
 
 def step(J: Array, e: Array, factors: Array, form: Form) -> Array:
-    """One dq (4,) from J (6, 4) with lengths in mm, e (6,) and damping factors (6,)."""
+    """One dq (4,) from J (6, 4) with lengths in mm, e (6,) and damping factors (6,); not a number where those have overflowed."""
+    if not np.all(np.isfinite(factors)):
+        return np.full(4, np.nan)
     if form == "normal":
         return J.T @ np.linalg.solve(J @ J.T + np.diag(factors**2), e)
     U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
@@ -88,9 +91,11 @@ def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Readi
     """One frame: tip to point (3,), metres, and last bone to rotation (3, 3), canonical frame, from q0 (4,) (feed-forward)."""
     limits = chain.limits
     q = np.array(q0, dtype=np.float64)
-    # A target that far cannot be squared in double precision, and no hand is a kilometre wide.
-    if not (np.all(np.isfinite(point)) and np.abs(point).max() < 1e3 and np.all(np.isfinite(rotation))):
-        return Frame(np.clip(q, limits[:, 0], limits[:, 1]), 0, 0.0, NOT_CONVERGED)
+    if options.clip or not np.all(np.isfinite(q)):
+        clamp(q, limits)
+    # A target that far cannot be squared in double precision, and no hand is a kilometre wide; a rotation's elements are within 1.
+    if not (np.all(np.abs(point) < 1e3) and np.all(np.abs(rotation) < 2.0)):
+        return Frame(q, 0, 0.0, NOT_CONVERGED)
     p, J, used, moved = np.empty(3), np.empty((6, 4)), 0, np.inf
     while used < options.most and moved >= TOLERANCE:
         used += 1
@@ -98,6 +103,9 @@ def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Readi
         J[:3] *= _MM
         e = differential(p, tip_rotation(q), point, rotation)
         new = q + step(J, e, damping(q, limits), options.form)
+        # Without clipping, angles that wind up have a damping beyond all numbers.
+        if not np.all(np.isfinite(new)):
+            break
         if options.clip:
             new = np.clip(new, limits[:, 0], limits[:, 1])
         moved, q = float(np.linalg.norm(new - q)), new

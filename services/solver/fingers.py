@@ -16,6 +16,7 @@ from rhot.config import Solver
 from rhot.hand import DIGITS
 from rhot.transforms import Array
 from services.solver import analytic, dls, dls_paper, fabrik, fabrik_seed
+from services.solver.constraints import clamp
 from services.solver.kinematics import Chains, chain_of, tip_rotation, to_canonical
 from services.solver.rotor import BOX
 
@@ -28,6 +29,8 @@ STATES: dict[int, Status] = {dls.SOLVED: "solved", dls.UNREACHABLE: "unreachable
 _TRUST_RAD = 0.1
 # A tip is reached when it is as near as its own uncertainty allows: 3 standard deviations.
 _SIGMAS = 3.0
+# No room is a kilometre wide; what is not a number is not within it either.
+_ROOM_M = 1e3
 
 
 @dataclass(frozen=True)
@@ -52,9 +55,11 @@ class Fingers:
 def solve_fingers(settings: Solver, chains: Chains, start_rad: Array, tips: Mapping[str, Tip]) -> Fingers:
     """Bring the painted tips (by digit) to where they were seen, starting from the whole hand's angles start_rad (5, 4).
 
-    Tips that no camera saw in this frame are solved for too, but called predicted.
+    Tips that no camera saw in this frame are solved for too, but called predicted. Points that are no place in a room are not tips.
     """
+    tips = {name: tip for name, tip in tips.items() if np.all(np.abs(tip.point_m) < _ROOM_M)}
     angles = start_rad.copy()
+    clamp(angles.reshape(-1), chains.limits_rad.reshape(-1, 2))
     ends = np.zeros((5, 3))
     points, seen = np.zeros((5, 3)), np.zeros(5, np.int64)
     for row, name in enumerate(DIGITS):

@@ -1,4 +1,7 @@
-"""Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three OpenXR poses as a test of frames."""
+"""Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three OpenXR poses as a test of frames.
+
+`pytest -rP tests/services/solver/test_real_motion.py` prints the table of docs/accuracy.md.
+"""
 
 from __future__ import annotations
 
@@ -85,13 +88,30 @@ def _chain(rec: Recording, row: int) -> k.Chain:
     return k.Chain(lengths, np.array([0.0, 0.0, -lengths[2]]), np.array(WIDE), np.array([SAME, 1.0]))
 
 
+def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
+    """Print a line of the table; mean differences of the flexions (3,) in degrees.
+
+    found, own: (frames, n, 4) rad. No flexion may jump by more than 20 deg between frames where the recording does not: it lost two
+    frames once and jumps by 27 deg there.
+    """
+    jumps, theirs = (np.abs(np.diff(angles, axis=0))[..., 1:] > np.deg2rad(20.0) for angles in (found, own))
+    off = np.rad2deg(np.abs(found - own)[..., 1:].mean(axis=(0, 1)))
+    share = 100.0 * np.mean(left_m <= 1e-4)
+    print(
+        f"{what:16s} tips within 0.1 mm {share:5.1f} %, worst {1e3 * np.max(left_m):.3f} mm; "
+        f"MCP {off[0]:4.1f} PIP {off[1]:4.1f} DIP {off[2]:4.1f} deg; jumps {int((jumps & ~theirs).sum())} (recording: {int(theirs.sum())})"
+    )
+    assert not np.any(jumps & ~theirs)
+    return off
+
+
 @pytest.mark.parametrize("name", FINGERS)
 @pytest.mark.parametrize("method", ["dls", "fabrik", "analytic"])
 def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, method: str) -> None:
     """Tip within 0.1 mm, joints within 1.5 mm of the sensor's, no jump that the recording does not have."""
     row = DIGITS.index(name)
     chain, base = _chain(fist, row), _base(fist, row)
-    q, found, gaps = np.zeros(4), [], []
+    q, found, gaps, lefts = np.zeros(4), [], [], []
     for frame, joints in enumerate(fist.joints_m[:, row]):
         point = (fist.axes[frame] @ base).T @ (joints[3] - joints[0])
         if method == "dls":
@@ -102,15 +122,13 @@ def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, metho
             _, left, _ = analytic.solve(chain, point, q, 1e-4)
         # The sensor's DIP equals its PIP to a tenth of a degree only, and the closed form knows no other.
         assert left <= (2e-4 if method == "analytic" else 1e-4)
+        lefts.append(left)
         assert np.all((q >= chain.limits[:, 0]) & (q <= chain.limits[:, 1]))
         found.append(q.copy())
         elbow = fist.axes[frame] @ base @ rotation_y(q[0]) @ rotation_x(-q[1]) @ np.array([0.0, 0.0, -chain.lengths[0]])
         gaps.append(np.linalg.norm(joints[0] + elbow - joints[1]))
-    own = _own_angles(fist, row, base)
-    # The recording jumps too, where it lost frames: ours must not add to it.
-    jumps = np.abs(np.diff(found, axis=0)) - np.abs(np.diff(own, axis=0))
-    assert np.rad2deg(jumps[:, 1:].max()) < 20.0
-    assert np.rad2deg(np.abs(np.array(found) - own)[:, 1:].mean()) < 3.0
+    off = _compare(f"{method} {name}", np.array(found)[:, None], _own_angles(fist, row, base)[:, None], np.array(lefts))
+    assert off.mean() < 1.0
     assert np.mean(gaps) < 1.5e-3
 
 
@@ -134,7 +152,7 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
     """Tips within 0.1 mm wherever the joints allow it, and no jump of its own.
 
     The recording has no wrist, so the palm's centre stands in for it: 3 to 4 cm from the knuckles instead of 9, and the knuckles move
-    by millimetres about it, which costs orientation (14 deg on average) and, for 1 tip in 50, half a millimetre at a joint's limit.
+    by millimetres about it, which costs orientation (14 deg on average) and, for 1 tip in 40, up to 0.9 mm at a joint's limit.
     """
     model = _leap_hand(fist)
     step, found, gaps, turns = SolverStep(RigConfig(), {"right": model}), [], [], []
@@ -149,12 +167,12 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
         gaps.append([finger.residual_m for finger in pose.fingers[1:]])
         R = rotation_from_quaternion(pose.wrist.orientation_wxyz)
         turns.append(np.arccos(np.clip(0.5 * (np.trace(R.T @ fist.axes[frame]) - 1.0), -1.0, 1.0)))
-    assert np.mean(np.array(gaps) <= 1e-4) > 0.97
-    assert np.max(gaps) < 1.5e-3
-    assert np.rad2deg(np.mean(turns)) < 18.0
     own = np.stack([_own_angles(fist, row, _base(fist, row)) for row in range(1, 5)], axis=1)
-    jumps = np.abs(np.diff(np.array(found)[:, 1:], axis=0)) - np.abs(np.diff(own, axis=0))
-    assert np.rad2deg(jumps[:, :, 1:].max()) < 20.0
+    off = _compare("dls, whole hand", np.array(found)[:, 1:], own, np.array(gaps))
+    assert np.mean(np.array(gaps) <= 1e-4) > 0.97
+    assert np.max(gaps) < 1e-3
+    assert np.rad2deg(np.mean(turns)) < 18.0
+    assert off.mean() < 9.0
 
 
 def _openxr_poses(folder: Path) -> dict[str, dict[str, Array]]:
@@ -203,17 +221,21 @@ def _openxr_digit(pose: dict[str, Array], row: int, digit: Digit) -> tuple[k.Cha
 
 @pytest.mark.parametrize("name", FINGERS)
 def test_recorded_poses_are_reproduced(rhot_data: Path, name: str) -> None:
-    """From knuckle and tip pose: tip within 3 mm, joints within 6 mm; real fingers twist by some degrees, ours do not."""
+    """From knuckle and tip pose: tip within 0.1 mm, joints within 5 mm; real fingers twist by some degrees, ours do not."""
     row = DIGITS.index(name)
-    for pose in _openxr_poses(rhot_data).values():
+    for stem, pose in _openxr_poses(rhot_data).items():
         digit = default_hand("left").digits[row]
         chain, base, target, axes = _openxr_digit(pose, row, digit)
         q = np.zeros(4)
         dls.solve(chain, dls.goal(dls.POSE, target, axes), q, 60, 1e-4)
         dls.solve(chain, dls.goal(dls.POSITION, target), q, 60, 1e-4)
-        assert np.linalg.norm(k.tip(chain, q) - target) < 3e-3
+        tip_off = np.linalg.norm(k.tip(chain, q) - target)
+        assert tip_off < 1e-4
+        joint_off = []
         R, p = base @ rotation_y(-q[0]), pose[JOINTS[CHAIN_JOINTS[row][0]]][:3, 3]
         for flexion, length, joint in zip(q[1:], chain.lengths, CHAIN_JOINTS[row][1:], strict=True):
             R = R @ rotation_x(-flexion)
             p = p - length * R[:, 2]
-            assert np.linalg.norm(p - pose[JOINTS[joint]][:3, 3]) < 6e-3
+            joint_off.append(np.linalg.norm(p - pose[JOINTS[joint]][:3, 3]))
+        assert max(joint_off) < 5e-3
+        print(f"{stem:8s} {name:7s} tip {1e3 * tip_off:.2f} mm, joints within {1e3 * max(joint_off):.1f} mm")
