@@ -12,8 +12,9 @@ the painted axis is
 
 so there is nothing to push: a push by the radius would be 6.3 mm wrong. What depends on the finger's direction is taken off when
 a pose tells it (patch.py; on rendered scenes the RMS error fell from .49, 1.17, 1.75 to .23, .35, .91 mm along x, y, z); without
-one it stays, and the covariance says so. Dabs (radius 0) lie where they are seen, but for what their bulge does. What light,
-background and detector do to a centre is bias.py's matter.
+one it stays, and the covariance says so. A dab (radius 0) marks the point of the skin under its middle, but skin falls away from
+there: the centre of what is seen lies deeper, by `dab_sag_m` against the skin's normal. What light, background and detector do to a
+centre is bias.py's matter.
 """
 
 from __future__ import annotations
@@ -35,10 +36,18 @@ from services.fusion.triangulation import extrinsics
 SIGMA_UNKNOWN = (0.29, 0.16)
 # With the solver's directions (3-5 deg off): .1-.2 mm of model error on rendered tips, the rest for tips that are partly hidden.
 SIGMA_KNOWN = (0.06, 0.04)
-# Of a dab, in every direction, as a share of its diameter: .3, .5 and 1.35 mm of 16 mm on rendered wrists, which bulge.
-SIGMA_DAB = 0.05
+# Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.3 mm deep, of which their sag explains .76.
+SIGMA_DAB = 0.025
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
+
+
+def dab_sag_m(radius_m: float, limb_m: float) -> float:
+    """How deep the middle of a dab of radius_m lies under its highest point, on skin that curves both ways with limb_m as at a joint.
+
+    A sphere falls by r^2 / 2R at r from the top; over a disc the mean of r^2 is half its edge's. 0 for a limb of no thickness.
+    """
+    return radius_m**2 / (4.0 * limb_m) if limb_m > radius_m else 0.0
 
 
 class Surface:
@@ -51,6 +60,11 @@ class Surface:
         self._dabs_m = np.array([paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints])
         # Which landmarks are paint of some size (S,), not points.
         self.extended: Bools = np.array([paint.radius_m > 0.0 or paint.extent_m > 0.0 for paint in paints], dtype=bool)
+        offsets = np.array([paint.offset_m for paint in paints]).reshape(-1, 3)
+        limbs_m = np.linalg.norm(offsets, axis=1)
+        # Outward normal of a dab's skin in its joint's frame (S, 3), and how deep its middle lies under the landmark.
+        self._normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
+        self._sags_m = np.array([dab_sag_m(0.5 * dab_m, limb_m) for dab_m, limb_m in zip(self._dabs_m, limbs_m, strict=True)])
         self._tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
         self._R, self._t = extrinsics(cameras)
         self._eye_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
@@ -62,31 +76,36 @@ class Surface:
         self._stamps_ns = [-_POSE_AGE_NS - 1] * len(self._slots)
 
     def note(self, pose: HandPose) -> None:
-        """Remember which way the fingers of a solved hand point: -z of each joint."""
+        """Remember which way the fingers of a solved hand point, -z of each joint, and which way the skin under a dab faces."""
         joints = {joint.name: joint for joint in pose.joints if joint.source != "predicted"}
         for row, slot in enumerate(self._slots):
             joint = joints.get(slot.landmark)
-            if slot.hand != pose.hand or joint is None or self._radii_m[row] == 0.0:
+            if slot.hand != pose.hand or joint is None or not self.extended[row]:
                 continue
             quaternion = np.array(joint.orientation_wxyz)
             if 0.4 < np.abs(quaternion).max() < 1.1:
-                self._directions[row] = -rotation_from_quaternion(quaternion)[:, 2]
+                R = rotation_from_quaternion(quaternion)
+                self._directions[row] = -R[:, 2] if self._radii_m[row] > 0.0 else R @ self._normals[row]
                 self._stamps_ns[row] = pose.stamp_ns
 
     def to_axis(self, positions_m: Array, covariances_m2: Array, seen_by: Bools, instant_ns: int) -> tuple[Array, Array]:
         """Landmarks (S, 3) and covariances (S, 3, 3) from located paint centres; seen_by (S, C) tells which cameras located them."""
-        positions = positions_m.copy()
+        away = positions_m - self._eye_rig
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)  # (S, 3)
+        # Skin that a camera sees faces it, more or less.
+        positions = positions_m - self._sags_m[:, None] * away
         sigmas = np.tile(SIGMA_UNKNOWN, (len(positions), 1))
         shift = np.zeros(3)
         for row, stamp_ns in enumerate(self._stamps_ns):
             if abs(instant_ns - stamp_ns) > _POSE_AGE_NS:
                 continue
+            if self._radii_m[row] == 0.0:
+                positions[row] = positions_m[row] + self._sags_m[row] * self._directions[row]
+                continue
             by = seen_by[row] if np.count_nonzero(seen_by[row]) >= 2 else np.ones_like(seen_by[row])
             if located_shift(self._tables[row], positions_m[row], self._directions[row], self._R[by], self._t[by], shift):
                 positions[row] -= shift
                 sigmas[row] = SIGMA_KNOWN
-        away = positions - self._eye_rig
-        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)  # (S, 3)
         along = away[:, :, None] * away[:, None, :]  # (S, 3, 3)
         variances = (sigmas * self._radii_m[:, None]) ** 2 + (SIGMA_DAB * self._dabs_m[:, None]) ** 2  # (S, 2)
         blur = variances[:, 0, None, None] * along + variances[:, 1, None, None] * (np.eye(3) - along)

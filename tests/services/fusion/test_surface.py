@@ -12,7 +12,7 @@ from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPo
 from rhot.transforms import quaternion_from_rotation, rotation_from_vector
 from services.fusion.observations import Slot
 from services.fusion.patch import centroid_shift, located_shift, shift_table
-from services.fusion.surface import SIGMA_DAB, SIGMA_UNKNOWN, Surface
+from services.fusion.surface import SIGMA_DAB, SIGMA_UNKNOWN, Surface, dab_sag_m
 from services.fusion.synthetic import Setup
 from services.fusion.triangulation import extrinsics
 
@@ -121,9 +121,26 @@ BOTH = np.ones((2, 2), dtype=bool)
 TOWARDS = tuple(quaternion_from_rotation(rotation_from_vector([0.5, 0.0, 0.0])).tolist())
 
 
-def test_without_a_pose_points_stay_and_sigma_says_so(surface):
+# 16 mm of paint on a wrist 21 mm thick.
+SAG_M = dab_sag_m(0.008, 0.021)
+
+
+def is_untouched(positions) -> bool:
+    """The tip is where it was, the dab is nearer to the cameras by its sag."""
+    return np.array_equal(positions[1], POSITIONS[1]) and np.linalg.norm(positions[0]) < np.linalg.norm(POSITIONS[0]) - 0.9 * SAG_M
+
+
+def test_the_middle_of_a_dab_lies_under_its_top():
+    """Against points spread evenly over the cap of a sphere, seen from above; a dab on nothing lies where it is seen."""
+    r = 0.008 * np.sqrt((np.arange(100_000) + 0.5) / 100_000)
+    assert dab_sag_m(0.008, 0.021) == pytest.approx(np.mean(0.021 - np.sqrt(0.021**2 - r**2)), rel=0.05)
+    assert dab_sag_m(0.008, 0.0) == 0.0
+
+
+def test_without_a_pose_tips_stay_and_sigma_says_so(surface):
     positions, covariances = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)
-    np.testing.assert_array_equal(positions, POSITIONS)
+    assert is_untouched(positions)
+    np.testing.assert_allclose(np.linalg.norm(positions[0] - POSITIONS[0]), SAG_M)
     depth_mm = 1e3 * np.sqrt(covariances[:, 2, 2])
     assert depth_mm[1] == pytest.approx(0.29 * 6.8, rel=0.05)
     assert depth_mm[0] == pytest.approx(SIGMA_DAB * 16.0, rel=0.05)
@@ -132,20 +149,21 @@ def test_without_a_pose_points_stay_and_sigma_says_so(surface):
 def test_a_pose_corrects_tips_while_it_is_fresh(surface):
     surface.note(pose(10**18, TOWARDS))
     positions, covariances = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 33_000_000)
-    np.testing.assert_array_equal(positions[0], POSITIONS[0])
+    # The palm side of the wrist, -y of its frame, turned with the hand.
+    np.testing.assert_allclose(positions[0] - POSITIONS[0], SAG_M * np.array([0.0, -np.cos(0.5), -np.sin(0.5)]), atol=1e-12)
     assert -3e-3 < positions[1, 2] - POSITIONS[1, 2] < -1e-3
     assert np.sqrt(covariances[1, 2, 2]) < 1e-3
     late, _ = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 400_000_000)
-    np.testing.assert_array_equal(late, POSITIONS)
+    assert is_untouched(late)
     surface.forget()
-    np.testing.assert_array_equal(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0], POSITIONS)
+    assert is_untouched(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
 
 
 @pytest.mark.parametrize("wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)])
 def test_absurd_or_predicted_poses_are_not_believed(surface, wxyz):
     surface.note(pose(10**18, wxyz))
     surface.note(pose(10**18, TOWARDS, source="predicted"))
-    np.testing.assert_array_equal(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0], POSITIONS)
+    assert is_untouched(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
 
 
 def test_any_number_of_cameras_agrees_on_the_shift():
