@@ -20,7 +20,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ import solver_peers
 from solver_hands import Motion, anywhere, grasp, messages, moving
 
 from rhot.config import RigConfig
-from rhot.hand import BASIC_LANDMARKS, HANDS, HandName, default_hand
+from rhot.hand import BASIC_LANDMARKS, HANDS, HandModel, default_hand
 from rhot.messages import HandPose
 from rhot.transforms import Array, angle_between, rotation_from_quaternion
 from services.solver import dls, dls_paper, fabrik
@@ -186,24 +186,34 @@ def beside_peers(rounds: int) -> dict[str, Any]:
 
 
 def accuracy(seeds: int) -> dict[str, Any]:
-    """Random motions and fists, right and left hands, 1 mm of noise; the first 5 of 150 frames are left out."""
+    """With wrist and tips alone, and with the middle knuckle painted."""
     found: dict[str, Any] = {}
-    for suffix, names in (("", BASIC_LANDMARKS), ("_knuckle", (*BASIC_LANDMARKS, "middle_proximal"))):
-        cases = itertools.product(range(seeds), ("random", "fist"), HANDS)
-        errors = [_errors(hand, names, kind, seed) for seed, kind, hand in cases]
-        flexion, turn, thumb, abduction = np.mean(errors, axis=0).tolist()
+    for suffix, extra in (("", ()), ("_knuckle", ("middle_proximal",))):
+        flexion, turn, thumb, abduction = with_painted(extra, seeds)
         found |= {f"flexion{suffix}_deg": flexion, f"orientation{suffix}_deg": turn}
         found |= {f"thumb{suffix}_deg": thumb, f"abduction{suffix}_deg": abduction}
     return found
 
 
-def _errors(hand: HandName, names: tuple[str, ...], kind: str, seed: int) -> tuple[float, float, float, float]:
-    """Mean errors of one motion in degrees: flexion of the fingers, orientation, thumb, abduction of the fingers."""
-    model, rng = default_hand(hand), np.random.default_rng([seed, kind == "fist", hand == "left"])
-    motion: Motion = moving(model, rng, kind)
-    step = SolverStep(RigConfig(), {model.hand: model})
+def with_painted(extra: Sequence[str], seeds: int) -> tuple[float, float, float, float]:
+    """Mean errors over random motions and fists, right and left hands, 1 mm of noise; extra: painted beside wrist and tips."""
     rows = []
-    for frame, line in enumerate(messages(model, motion, names, rng, 1e-3)):
+    for seed, kind, hand in itertools.product(range(seeds), ("random", "fist"), HANDS):
+        model, rng = default_hand(hand), np.random.default_rng([seed, kind == "fist", hand == "left"])
+        rows.append(errors_of(model, moving(model, rng, kind), (*BASIC_LANDMARKS, *extra), rng))
+    flexion, turn, thumb, abduction = np.mean(rows, axis=0).tolist()
+    return flexion, turn, thumb, abduction
+
+
+def errors_of(
+    model: HandModel, motion: Motion, names: Sequence[str], rng: np.random.Generator, painted: HandModel | None = None
+) -> tuple[float, float, float, float]:
+    """Mean errors of one motion in degrees: flexion of the fingers, orientation, thumb, abduction of the fingers.
+
+    painted: the hand as it is, where it differs from the model of it. The first 5 frames are left out.
+    """
+    step, rows = SolverStep(RigConfig(), {model.hand: model}), []
+    for frame, line in enumerate(messages(painted or model, motion, names, rng, 1e-3)):
         pose = step.step(line)
         if pose is not None and frame >= 5:
             off = np.abs(_angles(pose) - motion.angles_rad[frame])

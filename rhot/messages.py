@@ -121,17 +121,25 @@ FingerStatus = Literal["solved", "unreachable", "not_converged", "predicted"]
 
 
 class FingerPose(Message, frozen=True, kw_only=True):
-    """One digit's solution: residual_m is the distance left between the model's marker and the measured one."""
+    """One digit's solution: residual_m is the distance left between the model's marker and the measured one.
+
+    sigma_rad is one standard deviation of its angles (root mean square over those that can move), None if the sender knows none.
+    """
 
     name: Literal["thumb", "index", "middle", "ring", "little"]
     angles_rad: FingerAngles
     residual_m: NonNegative
     iterations: Count
     status: FingerStatus
+    sigma_rad: NonNegative | None = None
 
 
 class HandPose(Message, frozen=True, kw_only=True):
-    """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from thumb to little."""
+    """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from thumb to little.
+
+    wrist_sigma_m and wrist_sigma_rad are one standard deviation of how far the wrist's position and orientation may be off, as
+    lengths of vectors, from the covariance of the solution; None if the sender knows none.
+    """
 
     hand: HandName
     seq: Count
@@ -140,6 +148,8 @@ class HandPose(Message, frozen=True, kw_only=True):
     wrist: WristPose
     joints: Annotated[list[HandJoint], msgspec.Meta(min_length=26, max_length=26)]
     fingers: Annotated[list[FingerPose], msgspec.Meta(min_length=5, max_length=5)]
+    wrist_sigma_m: NonNegative | None = None
+    wrist_sigma_rad: NonNegative | None = None
     sent_ns: Stamp = 0
 
 

@@ -1,4 +1,4 @@
-"""A solved hand as a HandPose message: 26 joints in OpenXR order, angles by name, where each value comes from, rounded floats."""
+"""A solved hand as a HandPose message: 26 joints in OpenXR order, angles by name, where each value comes from and how sure it is."""
 
 from __future__ import annotations
 
@@ -76,7 +76,25 @@ class Skeleton:
     sources: list[JointSource]
 
 
-def hand_pose(points: HandPoints, method: str, skeleton: Skeleton, fingers: Fingers) -> HandPose:
+@dataclass(frozen=True)
+class Spread:
+    """One standard deviation: of the wrist's place (m) and turn (rad) as lengths of vectors, of each digit's angles (rad)."""
+
+    wrist_m: float
+    wrist_rad: float
+    fingers_rad: list[float]
+
+
+def spread_of(covariance: Array, limits: Array) -> Spread:
+    """From the covariance (26, 26) of a pose; limits (5, 4, 2) tell which angles can move. Half a turn and a metre say: unknown."""
+    variance = np.maximum(np.diag(covariance), 0.0)
+    free = limits[:, :, 1] > limits[:, :, 0]
+    angles = np.where(free, variance[6:].reshape(5, 4), 0.0).sum(axis=1) / np.maximum(free.sum(axis=1), 1)
+    wrist_rad, wrist_m = math.sqrt(variance[:3].sum()), math.sqrt(variance[3:6].sum())
+    return Spread(min(wrist_m, 1.0), min(wrist_rad, math.pi), np.minimum(np.sqrt(angles), math.pi).tolist())
+
+
+def hand_pose(points: HandPoints, method: str, skeleton: Skeleton, fingers: Fingers, spread: Spread) -> HandPose:
     """The message; fingers are already rounded and within limits."""
     where, how = rounded(skeleton.positions_m), rounded(quaternions(skeleton.rotations))
     joints = [
@@ -91,11 +109,13 @@ def hand_pose(points: HandPoints, method: str, skeleton: Skeleton, fingers: Fing
         method=method,
         wrist=WristPose(position_m=tuple(where[wrist]), orientation_wxyz=tuple(how[wrist])),
         joints=joints,
-        fingers=[_finger(row, name, fingers) for row, name in enumerate(DIGITS)],
+        fingers=[_finger(row, name, fingers, spread.fingers_rad[row]) for row, name in enumerate(DIGITS)],
+        wrist_sigma_m=round(spread.wrist_m, _DIGITS),
+        wrist_sigma_rad=round(spread.wrist_rad, _DIGITS),
     )
 
 
-def _finger(row: int, name: str, fingers: Fingers) -> FingerPose:
+def _finger(row: int, name: str, fingers: Fingers, sigma_rad: float) -> FingerPose:
     abduction, first, second, last = fingers.angles_rad[row].tolist()
     if name == "thumb":
         angles = FingerAngles(abduction=abduction, cmc=first, mcp=second, pip=0.0, dip=last)
@@ -107,4 +127,5 @@ def _finger(row: int, name: str, fingers: Fingers) -> FingerPose:
         residual_m=round(fingers.residual_m[row], _DIGITS),
         iterations=fingers.iterations[row],
         status=fingers.status[row],
+        sigma_rad=round(sigma_rad, _DIGITS),
     )

@@ -18,7 +18,7 @@ from rhot.hand import DIGITS, TIPS, HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose
 from services.solver.fingers import Fingers, Tip, solve_fingers
 from services.solver.kinematics import hand_frames
-from services.solver.pose import Skeleton, hand_pose, rounded, rounded_inside, sources
+from services.solver.pose import Skeleton, hand_pose, rounded, rounded_inside, sources, spread_of
 from services.solver.screen import Seen, places, usable
 from services.solver.tracker import ENOUGH, HandTracker, Look
 
@@ -59,7 +59,7 @@ class _Hand:
         located = len(measured) >= ENOUGH
         solved = [any(self._known[name].digit == row for name in measured) for row in range(5)]
         skeleton = Skeleton(positions, rotations, self._radii, sources(measured, located, solved))
-        return hand_pose(points, self._settings.method, skeleton, fingers)
+        return hand_pose(points, self._settings.method, skeleton, fingers, spread_of(look.covariance, chains.limits_rad))
 
     def _fingers(self, look: Look, seen: Mapping[str, Seen]) -> Fingers:
         chains = self._tracker.chains

@@ -145,6 +145,27 @@ def test_none_until_found_and_for_hands_that_are_not_ours(world: Callable) -> No
     assert step.step(ours.message({name: found[name] for name in ("wrist", *TIPS[:3])}, 3)) is not None
 
 
+def test_the_pose_says_how_sure_it_is(world: Callable, angles_of: Callable) -> None:
+    """Errors in published standard deviations: about 1, over random motions; a hidden finger and a lost hand are less sure."""
+    ours, turns, bends = world("right"), [], []
+    instants = ours.motion(14, 150)
+    for pose, instant in zip(_run(ours, instants), instants, strict=True):
+        turn = angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation)
+        turns.append(turn / pose.wrist_sigma_rad)
+        off = np.sqrt(np.mean(np.square(angles_of(pose) - instant.angles_rad), axis=1))
+        bends.append(off[1:] / [finger.sigma_rad for finger in pose.fingers[1:]])
+    assert 0.4 < np.sqrt(np.mean(np.square(turns))) < 1.6
+    assert 0.4 < np.sqrt(np.mean(np.square(bends))) < 1.6
+    step = _solver()
+    places = ours.points(instants[0])
+    seen = step.step(ours.message(places, 0))
+    hidden = step.step(ours.message({name: p for name, p in places.items() if name != "ring_tip"}, 1))
+    lost = step.step(ours.message({}, 8))
+    assert hidden.fingers[3].sigma_rad > 1.3 * seen.fingers[3].sigma_rad
+    assert lost.wrist_sigma_rad > 1.5 * seen.wrist_sigma_rad
+    assert lost.wrist_sigma_m > 10.0 * seen.wrist_sigma_m
+
+
 def test_hidden_markers_are_predicted(world: Callable) -> None:
     ours, step = world("right"), _solver()
     for frame, instant in enumerate(ours.motion(11, 20)):
