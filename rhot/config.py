@@ -56,6 +56,9 @@ class Tracker(Table, frozen=True, kw_only=True):
     method: Literal["lut", "seed"] = "lut"
     # RHOT, section 9.1: 40 px gave the most consistent tracking.
     roi_margin_px: Annotated[int, msgspec.Meta(ge=0, le=500)] = 40
+    # The lens's distortion taken out of whole pictures, as the seed did at first; needs <camera>.lens.json. For comparison: it costs
+    # time, and fusion takes it out of the markers' positions anyway.
+    rectify: bool = False
     # Gaussian kernel (odd, 0 = off) and erode / dilate rounds, on the mask.
     gaussian_px: Annotated[int, msgspec.Meta(ge=0, le=31)] = 3
     erode: Annotated[int, msgspec.Meta(ge=0, le=10)] = 1
