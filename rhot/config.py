@@ -47,6 +47,8 @@ class CameraTable(Table, frozen=True, kw_only=True):
     source: str = "picamera2"
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=240.0)] = 30.0
     size_px: tuple[Pixels, Pixels] = (640, 480)
+    # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all with the same fps, expose together.
+    sync: Literal["off", "server", "client"] = "off"
     # Host that runs this camera's tracker; empty: the machine of `rhot up`.
     host: str = ""
 
