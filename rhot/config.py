@@ -47,6 +47,8 @@ class CameraTable(Table, frozen=True, kw_only=True):
     source: str = "picamera2"
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=240.0)] = 30.0
     size_px: tuple[Pixels, Pixels] = (640, 480)
+    # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all with the same fps, expose together.
+    sync: Literal["off", "server", "client"] = "off"
     # Host that runs this camera's tracker; empty: the machine of `rhot up`.
     host: str = ""
 
@@ -56,6 +58,9 @@ class Tracker(Table, frozen=True, kw_only=True):
     method: Literal["lut", "seed"] = "lut"
     # RHOT, section 9.1: 40 px gave the most consistent tracking.
     roi_margin_px: Annotated[int, msgspec.Meta(ge=0, le=500)] = 40
+    # The lens's distortion taken out of whole pictures, as the seed did at first; needs <camera>.lens.json. For comparison: it costs
+    # time, and fusion takes it out of the markers' positions anyway.
+    rectify: bool = False
     # Gaussian kernel (odd, 0 = off) and erode / dilate rounds, on the mask.
     gaussian_px: Annotated[int, msgspec.Meta(ge=0, le=31)] = 3
     erode: Annotated[int, msgspec.Meta(ge=0, le=10)] = 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from rhot.calibration import load_colors, load_objects
+from rhot.calibration import load_colors, load_lens, load_objects
 from rhot.capture import read_lines
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError
@@ -98,7 +98,8 @@ def _tracker(config: RigConfig, name: str) -> TrackerStep:
     wanted = config.colors or sorted(colors.colors)
     if not wanted:
         raise CalibrationError(f"{path}: has no colour; add one with `rhot calibrate colors {name}`")
-    return TrackerStep(name, colors, config.tracker, config.camera_named(name).size_px, wanted, colors_path=path)
+    lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
+    return TrackerStep(name, colors, config.tracker, config.camera_named(name).size_px, wanted, colors_path=path, lens=lens)
 
 
 def _write(writer: ResultWriter, output: Output) -> None:

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import cv2
 
-from rhot.calibration import Colors
+from rhot.calibration import Colors, Lens
 from rhot.config import Tracker
-from rhot.messages import MarkerFrame
+from rhot.messages import Marker, MarkerFrame
 from services.pi_tracker.colors import compile_colors
 from services.pi_tracker.frame import Frame
 from services.pi_tracker.lut import LutFinder
+from services.pi_tracker.rectify import Rectifier
 from services.pi_tracker.seed import SeedFinder
 
 Clock = Callable[[], int]
@@ -26,7 +27,8 @@ class TrackerStep:
     """The tracker of one camera.
 
     wanted are the colours to look for; all must be in colors, else CalibrationError (naming colors_path). size_px is the size in
-    rig.toml; a frame of another size is tracked as it is. clock, if given, is read at the stages' ends, for times_ms.
+    rig.toml; a frame of another size is tracked as it is. clock, if given, is read at the stages' ends, for times_ms. With a lens, frames
+    are rectified first (rectify.py).
     """
 
     def __init__(
@@ -38,6 +40,7 @@ class TrackerStep:
         wanted: Sequence[str],
         clock: Clock | None = None,
         colors_path: Path | str = "",
+        lens: Lens | None = None,
     ) -> None:
         # More OpenCV threads gain nothing on images this small, and cost the other cores.
         cv2.setNumThreads(1)
@@ -45,6 +48,7 @@ class TrackerStep:
         self.size_px = size_px
         self._settings = settings
         self._wanted = tuple(wanted)
+        self._rectifier = None if lens is None else Rectifier(lens)
         self._clock = clock
         self._last_ns = 0
         # Duration of each stage of the last step in ms; empty without a clock.
@@ -64,7 +68,7 @@ class TrackerStep:
         """Find the markers of one frame; the offset is the camera clock's, as rhot.clock estimates it."""
         if self._clock is not None:
             started_ns = self._last_ns = self._clock()
-        markers = self._finder.find(frame)
+        markers = self._find(frame)
         if self._clock is not None:
             self.times_ms["step"] = (self._clock() - started_ns) * 1e-6
         return MarkerFrame(
@@ -77,6 +81,13 @@ class TrackerStep:
             size_px=frame.size_px,
             markers=markers,
         )
+
+    def _find(self, frame: Frame) -> list[Marker]:
+        if self._rectifier is None:
+            return self._finder.find(frame)
+        rectified = self._rectifier.frame(frame)
+        self._lap("rectify")
+        return self._rectifier.back(self._finder.find(rectified))
 
     def _lap(self, stage: str) -> None:
         if self._clock is not None:

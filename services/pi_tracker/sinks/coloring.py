@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from rhot import topics
-from rhot.calibration import Colors, load_colors, save
+from rhot.calibration import Colors, load_colors, load_lens, save
 from rhot.errors import CalibrationError
 from rhot.messages import Marker
 from rhot.service import Service
@@ -129,7 +129,9 @@ class Coloring:
 
     def _made(self, colors: Colors, wanted: list[str]) -> TrackerStep:
         config = self._service.config
-        return TrackerStep(self._camera.name, colors, config.tracker, self._camera.size_px, wanted, time.perf_counter_ns, self._path)
+        name, size_px = self._camera.name, self._camera.size_px
+        lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
+        return TrackerStep(name, colors, config.tracker, size_px, wanted, time.perf_counter_ns, self._path, lens)
 
     def _put_in_force(self, colors: Colors, step: TrackerStep) -> None:
         self.in_force, self.step, self._drift = colors, step, Drift(colors)

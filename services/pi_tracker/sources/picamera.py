@@ -3,6 +3,8 @@
 FrameWallClock is the instant at which row 0 starts to be read out, the end of its exposure; half the exposure before it is the middle.
 SensorTimestamp counts from boot and is never used. Without an exposure calibration the camera's auto modes stay on and the notes say so.
 A missing package or camera, a system too old for FrameWallClock, and a camera that stops delivering raise SourceError.
+With sync in the [[camera]] table cameras of several Pis expose together (libcamera's software synchronisation, picamera2 0.3.25 on); frames
+are delivered before that is reached, too, with their true stamps, and a camera that finds no partner says so once.
 Written from picamera2's sources and tested against a stand-in; not tried on hardware.
 """
 
@@ -23,6 +25,10 @@ from services.pi_tracker.sources.controls import Controls
 _LINE_US = {"ov5647": 33.7, "imx219": 18.9}
 # The slowest exposure of a 10 fps camera is 100 ms; one that is silent for this long is gone.
 _SILENCE_S = 2.0
+# The server tells its clients the common instant some seconds ahead; who has not heard of one by then hears no server.
+_SYNC_S = 15.0
+# A client moves its frames by stretching and shortening them: a sensor at its fastest cannot.
+_FULL_SPEED = 0.97
 
 
 class PiCamera:
@@ -41,6 +47,7 @@ class PiCamera:
         self._size = table.size_px
         self._row_time_ns = 0.0
         self._seq = 0
+        self._synced = table.sync == "off"
 
     def open(self) -> None:
         module = _package()
@@ -71,6 +78,8 @@ class PiCamera:
             controls=self._controls(),
         )
         self._camera.configure(config)
+        if mode and self._table.sync != "off" and self._table.fps > _FULL_SPEED * mode["fps"]:
+            self.notes.append(f"camera {self._table.name!r}: fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one")
         main = self._camera.camera_configuration()["main"]
         self._stride, self._size = int(main["stride"]), (int(main["size"][0]), int(main["size"][1]))
         if self._size != tuple(self._table.size_px):
@@ -82,7 +91,7 @@ class PiCamera:
 
     def _controls(self) -> dict[str, Any]:
         frame_us = round(1e6 / self._table.fps)
-        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)}
+        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)} | _sync(self._table)
         if self._exposure is None:
             self.notes.append(
                 f"camera {self._table.name!r}: no exposure calibration, its auto modes stay on and colours may drift; "
@@ -105,9 +114,22 @@ class PiCamera:
         finally:
             request.release()
         self.controls.reported = _reported(metadata)
+        self._watch_sync(metadata)
         frame = Frame(self._table.name, self._seq, self._stamp_ns(metadata), self._row_time_ns, self._size, image, "i420")
         self._seq += 1
         return frame
+
+    def _watch_sync(self, metadata: dict[str, Any]) -> None:
+        """Say once that there is no server, where a camera is to be in step with others."""
+        if self._synced:
+            return
+        self._synced = bool(metadata.get("SyncReady"))
+        if not self._synced and self._seq >= _SYNC_S * self._table.fps:
+            self.notes.append(
+                f"camera {self._table.name!r}: sync = {self._table.sync!r}, but not in step with any other after {_SYNC_S:g} s; "
+                "is there one camera with the other role, at the same fps, in the same network?"
+            )
+            self._synced = True
 
     def _stamp_ns(self, metadata: dict[str, Any]) -> int:
         wall_ns = metadata.get("FrameWallClock")
@@ -119,6 +141,16 @@ class PiCamera:
         if self._camera is not None:
             self._camera.close()
             self._camera = None
+
+
+def _sync(table: CameraTable) -> dict[str, Any]:
+    """The control that gives a camera its part in software synchronisation."""
+    if table.sync == "off":
+        return {}
+    roles = getattr(getattr(importlib.import_module("libcamera").controls, "rpi", None), "SyncModeEnum", None)
+    if roles is None:
+        raise SourceError(f'camera {table.name!r}: this libcamera cannot synchronise; `sudo apt full-upgrade`, or set sync = "off"')
+    return {"SyncMode": roles.Server if table.sync == "server" else roles.Client}
 
 
 def _fixed(exposure: Exposure) -> dict[str, Any]:

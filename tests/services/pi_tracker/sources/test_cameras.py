@@ -196,6 +196,46 @@ def test_a_pi_camera_without_calibration_says_so(picamera2):
     assert any("rhot calibrate camera left" in note for note in camera.notes)
 
 
+@pytest.fixture
+def roles(picamera2, monkeypatch):
+    """libcamera with software synchronisation: its controls.rpi.SyncModeEnum."""
+    found = types.SimpleNamespace(Off=0, Server=1, Client=2)
+    monkeypatch.setattr(sys.modules["libcamera"], "controls", types.SimpleNamespace(rpi=types.SimpleNamespace(SyncModeEnum=found)), False)
+    return found
+
+
+@pytest.mark.parametrize(("sync", "role"), [("server", "Server"), ("client", "Client")])
+def test_pi_cameras_are_told_their_part_in_synchronisation(picamera2, roles, sync, role):
+    source = PiCamera(table(sync=sync), 0, EXPOSURE)
+    source.open()
+    assert picamera2.made[0].camera_configuration()["controls"]["SyncMode"] == getattr(roles, role)
+    picamera2.made[0].metadata["SyncReady"] = True
+    for _ in range(1000):
+        source.read()
+    assert source.notes == []
+
+
+def test_a_client_without_a_server_says_so_once_and_delivers(picamera2, roles):
+    source = PiCamera(table(sync="client"), 0, EXPOSURE)
+    source.open()
+    picamera2.made[0].metadata["SyncReady"] = False
+    assert [source.read().seq for _ in range(1000)] == list(range(1000))
+    assert [note for note in source.notes if "not in step" in note] == source.notes
+    assert len(source.notes) == 1
+
+
+def test_synchronising_at_full_speed_is_advised_against(picamera2, roles):
+    source = PiCamera(table(sync="client", fps=46.3), 0, EXPOSURE)
+    source.open()
+    assert any("lower" in note for note in source.notes)
+
+
+def test_an_old_libcamera_cannot_synchronise(picamera2, monkeypatch):
+    monkeypatch.setattr(sys.modules["libcamera"], "controls", types.SimpleNamespace(), False)
+    with pytest.raises(SourceError, match="cannot synchronise"):
+        PiCamera(table(sync="server"), 0, EXPOSURE).open()
+
+
 def test_an_unknown_sensor_has_no_row_time(picamera2, monkeypatch):
     monkeypatch.setattr(picamera2, "cameras", [{"Model": "imx999"}])
     camera = PiCamera(table(), 0, EXPOSURE)
