@@ -32,6 +32,8 @@ _ALONE = 0.1
 _SURE = 0.6
 # However unlike its track, a blob in good company may be the marker after all: the track may have been wrong.
 _SECOND_THOUGHT = 0.4
+# No marker shrinks to such a share of its size within so long; what does is noise, or something pale that a dim light brings near.
+_SHRUNK, _SHRUNK_NS, _NOISE = 1.0 / 16.0, 5_000_000_000, 0.1
 # A track that moves less than this a frame stands still, and after so many frames may be no marker.
 _STILL_PX, _STANDING = 1.0, 4
 # A small blob at the rim of a larger one of another colour is, as a rule, that one's edge in coloured light: so much less likely a marker,
@@ -197,6 +199,8 @@ class Identity:
         prior = 1.0 if track is None else max(likeness, _SECOND_THOUGHT)
         if track is not None and track.is_at(blob, stamp_ns):
             return max(prior, _SURE)
+        if track is not None and blob.area_px < _SHRUNK * track.area_px and 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS:
+            return _NOISE
         halo = any(is_halo(blob, other) for number, others in enumerate(blobs) if number != color for other in others)
         return prior * _HALO if halo else prior
 

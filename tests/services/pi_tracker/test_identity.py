@@ -140,6 +140,16 @@ def test_a_single_colour_takes_the_blob_like_its_last():
     assert chosen(identity, [[far, near]], 1) == [near]
 
 
+def test_a_speck_far_away_is_not_the_marker_that_left_a_moment_ago():
+    identity = Identity(1, 40)
+    for seq in range(4):
+        chosen(identity, [[blob(0, 300 + 40 * seq, 200, 60)]], seq)
+    speck = blob(0, 60, 60, 8)
+    assert chosen(identity, [[speck]], 6) == [None]
+    # Long after, nobody knows how far away it is.
+    assert chosen(identity, [[speck]], 400) == [speck]
+
+
 def test_two_alike_are_ambiguous():
     identity = Identity(1, 40)
     chosen(identity, [[blob(0, 100, 100)]], 0)
