@@ -189,7 +189,13 @@ class Identity:
         if len(own) > 1 and track is not None and track.still >= _STANDING:
             # What has not moved for a while may be a thing in the room; among others it has no advantage.
             priors = [min(prior, _SECOND_THOUGHT) for prior in priors]
-        return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
+        return [Candidate(self._whole(track, blob, stamp_ns), prior) for blob, prior in zip(own, priors, strict=True)]
+
+    @staticmethod
+    def _whole(track: Track | None, blob: Blob, stamp_ns: int) -> Blob:
+        """A blob that is what others leave of a marker to see keeps company as the whole would."""
+        hidden = track is not None and blob.area_px < track.area_px and track.is_at(blob, stamp_ns)
+        return blob._replace(area_px=track.area_px) if track is not None and hidden else blob
 
     def _prior(self, color: int, blob: Blob, blobs: list[list[Blob]], stamp_ns: int) -> float:
         track = self._tracks[color]
