@@ -20,10 +20,19 @@ _SIZE_RATIO = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A blob with what its own track says of it, 0..1."""
+    """A blob with what its own track says of it, 0..1.
+
+    whole_px2 is the area with which it keeps company, where another marker hides part of it; 0: its own.
+    """
 
     blob: Blob
     prior: float
+    whole_px2: float = 0.0
+
+    @property
+    def company(self) -> Blob:
+        """The blob as it would be if nothing hid it."""
+        return self.blob._replace(area_px=self.whole_px2) if self.whole_px2 else self.blob
 
 
 def best_set(candidates: Sequence[Sequence[Candidate]]) -> list[tuple[Candidate, float] | None]:
@@ -50,7 +59,7 @@ def support(blob: Blob, others: Sequence[Blob]) -> float:
 def _gathered(anchor: Candidate, own: Sequence[Candidate]) -> Candidate | None:
     if any(candidate is anchor for candidate in own):
         return anchor
-    return max(own, key=lambda c: c.prior * _fit(anchor.blob, c.blob), default=None)
+    return max(own, key=lambda c: c.prior * _fit(anchor.company, c.company), default=None)
 
 
 def _total(members: Sequence[Candidate]) -> float:
@@ -58,12 +67,12 @@ def _total(members: Sequence[Candidate]) -> float:
     total = 0.01 * sum(member.prior for member in members)
     for i, a in enumerate(members):
         for b in members[:i]:
-            total += _fit(a.blob, b.blob) * a.prior * b.prior
+            total += _fit(a.company, b.company) * a.prior * b.prior
     return total
 
 
 def _support(member: Candidate, members: Sequence[Candidate | None]) -> float:
-    return support(member.blob, [other.blob for other in members if other is not None and other is not member])
+    return support(member.company, [other.company for other in members if other is not None and other is not member])
 
 
 def _fit(a: Blob, b: Blob) -> float:

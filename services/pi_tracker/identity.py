@@ -24,14 +24,17 @@ _LEAST = 0.25
 _AREA_KEEP = 0.8
 # ... while another colour touches it, with this share: what is hidden of it should not be forgotten within a few frames.
 _AREA_KEEP_TOUCHED = 0.98
-# Areas vary by less than this from frame to frame; what is missing beyond it, where another colour touches, is hidden.
-_AREA_NOISE = 0.15
+# Areas vary by less than this; what is missing beyond it is hidden where another colour touches. Where none does, it may be a finger that
+# turns, but not by so much between two frames: then something without paint is in front.
+_AREA_NOISE, _AREA_STEP = 0.15, 0.35
 # What company counts against having none at all.
 _ALONE = 0.1
 # A blob as like its own track as this, and the only one of its colour, is the marker without asking the others.
 _SURE = 0.6
 # However unlike its track, a blob in good company may be the marker after all: the track may have been wrong.
 _SECOND_THOUGHT = 0.4
+# No marker shrinks to such a share of its size within so long; what does is noise, or something pale that a dim light brings near.
+_SHRUNK, _SHRUNK_NS, _NOISE = 1.0 / 16.0, 5_000_000_000, 0.1
 # A track that moves less than this a frame stands still, and after so many frames may be no marker.
 _STILL_PX, _STANDING = 1.0, 4
 # A small blob at the rim of a larger one of another colour is, as a rule, that one's edge in coloured light: so much less likely a marker,
@@ -93,11 +96,15 @@ class Track:
         size = min(blob.area_px, self.area_px) / max(blob.area_px, self.area_px, 1.0)
         return float(size**0.5 / (1.0 + (dx * dx + dy * dy) / (reach * reach)))
 
+    def is_recent(self, stamp_ns: int) -> bool:
+        """Whether it was seen a moment ago."""
+        return 0 <= stamp_ns - self.seen_ns <= _LATELY_NS
+
     def is_at(self, blob: Blob, stamp_ns: int) -> bool:
         """Whether a blob is where this marker, seen a moment ago, must be."""
         gap_ns = stamp_ns - self.seen_ns
         x, y = self.predicted(stamp_ns)
-        return 0 <= gap_ns <= _LATELY_NS and max(abs(blob.x_px - x), abs(blob.y_px - y)) <= _THERE_PX + _THERE_PX_S * gap_ns * 1e-9
+        return self.is_recent(stamp_ns) and max(abs(blob.x_px - x), abs(blob.y_px - y)) <= _THERE_PX + _THERE_PX_S * gap_ns * 1e-9
 
 
 def shape_fits(blob: Blob, max_area_px: float) -> bool:
@@ -153,6 +160,11 @@ class Identity:
         self._carry(chosen, stamp_ns)
         return chosen
 
+    def expected(self, color: int, stamp_ns: int) -> tuple[float, float] | None:
+        """Where a marker must be that was seen a moment ago, px."""
+        track = self._tracks[color]
+        return track.predicted(stamp_ns) if track is not None and track.is_recent(stamp_ns) else None
+
     def _carry(self, chosen: list[Choice | None], stamp_ns: int) -> None:
         """Markers that are not seen move as the others do."""
         moved = [
@@ -168,17 +180,15 @@ class Identity:
                 track.carry(dx, dy, stamp_ns)
 
     def follow(self, color: int, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> float:
-        """Take in a marker that was measured; says which share of it another marker hides, 0..1."""
+        """Take in a marker that was measured; says which share of it is hidden, 0..1."""
         track = self._tracks[color]
         if track is None:
             self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns)
             return 0.0
-        if not self._touched[color]:
-            track.follow(x_px, y_px, area_px, stamp_ns)
-            return 0.0
         missing = 1.0 - area_px / max(track.area_px, 1.0)
-        track.follow(x_px, y_px, area_px, stamp_ns, _AREA_KEEP_TOUCHED)
-        return missing if missing > _AREA_NOISE else 0.0
+        touched = self._touched[color]
+        track.follow(x_px, y_px, area_px, stamp_ns, _AREA_KEEP_TOUCHED if touched else _AREA_KEEP)
+        return missing if missing > (_AREA_NOISE if touched else _AREA_STEP) else 0.0
 
     def _candidates(self, color: int, blobs: list[list[Blob]], stamp_ns: int) -> list[Candidate]:
         own = blobs[color]
@@ -187,7 +197,9 @@ class Identity:
         if len(own) > 1 and track is not None and track.still >= _STANDING:
             # What has not moved for a while may be a thing in the room; among others it has no advantage.
             priors = [min(prior, _SECOND_THOUGHT) for prior in priors]
-        return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
+        hidden = [track is not None and track.is_at(blob, stamp_ns) and blob.area_px < track.area_px for blob in own]
+        whole_px2 = 0.0 if track is None else track.area_px
+        return [Candidate(blob, prior, whole_px2 * part) for blob, prior, part in zip(own, priors, hidden, strict=True)]
 
     def _prior(self, color: int, blob: Blob, blobs: list[list[Blob]], stamp_ns: int) -> float:
         track = self._tracks[color]
@@ -197,6 +209,8 @@ class Identity:
         prior = 1.0 if track is None else max(likeness, _SECOND_THOUGHT)
         if track is not None and track.is_at(blob, stamp_ns):
             return max(prior, _SURE)
+        if track is not None and blob.area_px < _SHRUNK * track.area_px and 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS:
+            return _NOISE
         halo = any(is_halo(blob, other) for number, others in enumerate(blobs) if number != color for other in others)
         return prior * _HALO if halo else prior
 

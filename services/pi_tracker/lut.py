@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import msgspec
+
 from rhot.config import Tracker
 from rhot.messages import Marker
 from services.pi_tracker import roi
@@ -29,6 +31,8 @@ _LEAST_SUPPORT = 0.3
 # Where half of a disc is hidden, the centre of the rest is 4 r / (3 pi) from the whole's: .24 of the square root of its area, in some
 # direction; so much per coordinate and share. And never is all of it hidden.
 _HIDDEN_SIGMA, _MOST_HIDDEN = 0.34, 0.9
+# About a marker's width around the place where it must be.
+_SLIVER_PX = 14
 Lap = Callable[[str], None]
 
 
@@ -39,6 +43,7 @@ class LutFinder:
         self._names = table.names
         self._settings = settings
         self._searcher = Searcher(table, settings)
+        self._unfiltered = Searcher(table, msgspec.structs.replace(settings, erode=0, dilate=0, gaussian_px=0))
         self._lap = lap
         self._noise = Noise()
         self._searches = 0
@@ -56,6 +61,10 @@ class LutFinder:
         image = picture(frame)
         self._noise.look(image)
         blobs = self._search(image)
+        for color, own in enumerate(blobs):
+            place = None if own else self._identity.expected(color, frame.stamp_ns)
+            if place is not None:
+                own += self._slivers(image, color, place)
         self._lap("search")
         chosen = {color: choice for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if choice is not None}
         if len(self._all) > len(chosen) or not self._room.settled:
@@ -84,6 +93,13 @@ class LutFinder:
             return self._blobs(image, everywhere)
         return found
 
+    def _slivers(self, image: Picture, color: int, place: tuple[float, float]) -> list[Blob]:
+        """What the mask filters took away of a marker that another one hides, where it must be."""
+        column, row = (min(max(int(v) // 2, 0), n - 1) for v, n in zip(place, image.size, strict=True))
+        region = roi.around((column, row, column + 1, row + 1), _SLIVER_PX, image.size)
+        found = self._room.without(image, self._unfiltered.blobs(image, region), self._noise)
+        return [blob for blob in found if blob.color == color and shape_fits(blob, self._settings.max_area_px)]
+
     def _expect(self, rects: list[Rect]) -> None:
         """Where to look in the next frame, given where markers are in this one."""
         if not rects or len(rects) < len(self._names):
@@ -108,7 +124,7 @@ def _cells(blob: Blob) -> int:
 
 
 def _marker(name: str, found: Centroid, certainty: float, hidden: float) -> Marker:
-    """hidden is the share of it that another marker covers: it moves the centre, nobody knows where to."""
+    """hidden is the share of it that is covered: it moves the centre, nobody knows where to."""
     whole_px2 = found.area_px / (1.0 - min(hidden, _MOST_HIDDEN))
     return Marker(
         color=name,

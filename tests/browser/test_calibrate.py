@@ -158,6 +158,7 @@ def test_from_the_first_click_to_new_ranges_in_force(chromium: Any, page_url: st
     page.get_by_text("in force on camera left, and written on its machine").wait_for(**wait)
     assert set(load_colors(tmp_path / "calibration", "left").colors) == {"green", "blue"}
     until(page, lambda: {marker.color for marker in camera[-1].markers} == {"green", "blue"})
+    page.get_by_text("This camera is done.").wait_for(**wait)
     found = {marker.color: marker for marker in camera[-1].markers}
     assert abs(found["green"].x_px - 120.0) < 6.0
     assert abs(found["blue"].x_px - 200.0) < 6.0
@@ -167,6 +168,20 @@ def test_from_the_first_click_to_new_ranges_in_force(chromium: Any, page_url: st
     x, y = (round(v) for v in green)
     about = pixels(page)[y - 60 : y + 60, x - 60 : x + 60]
     assert (about.max(axis=2) < 40).sum() + (about.min(axis=2) > 225).sum() > 60
+
+    # By hand: a range that takes nothing green, and the tracker no longer does.
+    hue_from, hue_to = page.locator("input[type=text]").all()[-2:]
+    assert int(hue_from.input_value()) == load_colors(tmp_path / "calibration", "left").colors["green"].hsv_low[0]
+    for box, value in ((hue_from, "0"), (hue_to, "9")):
+        box.fill(value)
+        box.press("Enter")
+    page.get_by_text("set by hand: green").wait_for(**wait)
+    page.get_by_text("not in force yet").wait_for(**wait)
+    page.get_by_role("button", name="put in force").click()
+    until(page, lambda: [marker.color for marker in camera[-1].markers] == ["blue"])
+    by_hand = load_colors(tmp_path / "calibration", "left")
+    assert (by_hand.colors["green"].hsv_low[0], by_hand.colors["green"].hsv_high[0]) == (0, 9)
+    assert by_hand.inputs["by_hand"] == ["green"]
 
     # And back to the rig.
     switch.click()

@@ -97,7 +97,7 @@ def test_a_hidden_marker_moves_with_the_hand():
     assert chosen(identity, blobs, 8)[3] == sliver
 
 
-def test_what_another_marker_hides_is_told():
+def test_what_is_hidden_of_a_marker_is_told():
     identity = Identity(2, 40)
     left, right = blob(0, 100, 100), blob(1, 160, 100)
     for seq in range(4):
@@ -107,10 +107,11 @@ def test_what_another_marker_hides_is_told():
     assert None not in identity.choose([[left], [near]], stamp_ns)
     whole_px2 = left.area_px
     assert identity.follow(0, left.x_px, left.y_px, 0.5 * whole_px2, stamp_ns) == pytest.approx(0.5)
-    # Nothing touches it: then it is only far away.
-    stamp_ns += FRAME_NS
-    assert None not in identity.choose([[left], [right]], stamp_ns)
-    assert identity.follow(0, left.x_px, left.y_px, 0.5 * whole_px2, stamp_ns) == 0.0
+    # Nothing touches it: it turns away.
+    for share, hidden in ((0.9, 0.0), (0.8, 0.0), (0.7, 0.0), (0.4, 0.5)):
+        stamp_ns += FRAME_NS
+        assert None not in identity.choose([[left], [right]], stamp_ns)
+        assert identity.follow(0, left.x_px, left.y_px, share * whole_px2, stamp_ns) == pytest.approx(hidden, abs=0.1)
 
 
 def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
@@ -138,6 +139,16 @@ def test_a_single_colour_takes_the_blob_like_its_last():
     assert chosen(identity, [[first]], 0) == [first]
     near, far = blob(0, 112, 100, 18), blob(0, 400, 300, 40)
     assert chosen(identity, [[far, near]], 1) == [near]
+
+
+def test_a_speck_far_away_is_not_the_marker_that_left_a_moment_ago():
+    identity = Identity(1, 40)
+    for seq in range(4):
+        chosen(identity, [[blob(0, 300 + 40 * seq, 200, 60)]], seq)
+    speck = blob(0, 60, 60, 8)
+    assert chosen(identity, [[speck]], 6) == [None]
+    # Long after, nobody knows how far away it is.
+    assert chosen(identity, [[speck]], 400) == [speck]
 
 
 def test_two_alike_are_ambiguous():
