@@ -1,4 +1,4 @@
-"""Where the landmarks of many frames are for given angles, with first derivatives, and what the second ones contract to.
+"""Where the landmarks of many frames are for given angles, with derivatives.
 
 All in the wrist frame. A frame's 26 unknowns are a small turn and shift of the wrist (both in the wrist frame) and the 20 angles;
 the person's are the measures of shape.Geometry. Plain numpy over all frames at once: a calibration looks at a hundred.
@@ -24,7 +24,6 @@ class Marks(NamedTuple):
     points: Array  # (n, m, 3)
     J: Array  # (n, m, 3, 26) by a frame's unknowns
     by_measure: Array  # (n, m, 3, measures) by the person's
-    axes: Array  # (n, 5, 4, 3) of the angles
 
 
 def marks_of(shape: Shape, measures: Geometry, angles: Array, side: float) -> Marks:
@@ -50,70 +49,7 @@ def marks_of(shape: Shape, measures: Geometry, angles: Array, side: float) -> Ma
             own[:, :, 45 + 3 * row : 48 + 3 * row] = _cross_columns(p - measures.bases[row])
         J[:, i, :, :3] = _cross_columns(points[:, i])
         J[:, i, :, 3:6] = np.eye(3)
-    return Marks(points, J, by_measure, axes)
-
-
-def contracted(shape: Shape, marks: Marks, V: Array) -> tuple[Array, Array]:
-    """sum V . dJ by each frame's 26 unknowns, (n, 26), and by the person's measures, (measures,), for V (n, m, 3, 26).
-
-    The second derivative of a chain of hinges is axis x (derivative of the part beyond it).
-    """
-    by_pose, by_measure = np.zeros((len(V), UNKNOWNS)), np.zeros(shape.measures)
-    for i, (row, k) in enumerate(shape.places):
-        J, v, own = marks.J[:, i], V[:, i], marks.by_measure[:, i]
-        # Columns of the wrist's turn are e_j x p; v_j x e_j collects what multiplies dp.
-        beyond = np.stack([v[:, 1, 2] - v[:, 2, 1], v[:, 2, 0] - v[:, 0, 2], v[:, 0, 1] - v[:, 1, 0]], axis=1)
-        if row >= 0:
-            count = min(k + 2, 4)
-            columns = [6 + 4 * row + a for a in range(count)]
-            pulls = [np.cross(v[:, :, c], marks.axes[:, row, a]) for a, c in enumerate(columns)]
-            turns = [np.cross(J[:, :, c], v[:, :, c]) for c in columns]
-            sofar = beyond.copy()
-            for a, c in enumerate(columns):
-                by_pose[:, c] += _dots(J[:, :, c], sofar) + _dots(marks.axes[:, row, a], sum(turns[a:], np.zeros_like(beyond)))
-                sofar += pulls[a]
-            for bone in range(k):
-                moved = beyond + sum((pulls[a] for a in range(count) if _ROOT[a] <= bone), np.zeros_like(beyond))
-                by_measure[3 * row + bone] += _dots(own[:, :, 3 * row + bone], moved).sum()
-            turn = slice(45 + 3 * row, 48 + 3 * row)
-            by_measure[turn] += np.einsum("nij,ni->j", own[:, :, turn], beyond) + sum(turns, np.zeros_like(beyond)).sum(axis=0)
-            offset = slice(60 + 3 * i, 63 + 3 * i)
-            by_measure[offset] += np.einsum("nij,ni->j", own[:, :, offset], sofar)
-            by_measure[15 + 3 * row : 18 + 3 * row] += beyond.sum(axis=0)
-        else:
-            by_measure += np.einsum("nij,ni->j", own, beyond)
-    return by_pose, by_measure
-
-
-def curved(shape: Shape, marks: Marks, v: Array) -> tuple[Array, Array]:
-    """sum v . d2p by a frame's unknowns twice, (n, 26, 26), and by them and the person's measures, (n, 26, measures); v (n, m, 3)."""
-    n = len(v)
-    twice, mixed = np.zeros((n, UNKNOWNS, UNKNOWNS)), np.zeros((n, UNKNOWNS, shape.measures))
-    for i, (row, k) in enumerate(shape.places):
-        J, pull, p, own = marks.J[:, i], v[:, i], marks.points[:, i], marks.by_measure[:, i]
-        outer = p[:, :, None] * pull[:, None, :]
-        twice[:, :3, :3] += 0.5 * (outer + np.swapaxes(outer, 1, 2)) - _dots(pull, p)[:, None, None] * np.eye(3)
-        # Rows v x e_j: what the wrist's turn makes of any further movement of the point.
-        turned = np.swapaxes(-_cross_columns(pull), 1, 2)
-        mixed[:, :3] += turned @ own
-        if row < 0:
-            continue
-        columns = [6 + 4 * row + a for a in range(min(k + 2, 4))]
-        rooted = np.stack([np.cross(pull, marks.axes[:, row, a]) for a in range(len(columns))], axis=1)
-        chain = J[:, :, columns]
-        wrist = turned @ chain
-        twice[:, :3, columns] += wrist
-        twice[:, columns, :3] += np.swapaxes(wrist, 1, 2)
-        pairs = rooted @ chain  # (n, a, b): v . (axis_a x J_b), right where a <= b
-        upper = np.triu(pairs) + np.swapaxes(np.triu(pairs, 1), 1, 2)
-        twice[:, columns[0] : columns[-1] + 1, columns[0] : columns[-1] + 1] += upper
-        beyond = rooted @ own
-        for a, c in enumerate(columns):
-            for bone in range(_ROOT[a], k):
-                mixed[:, c, 3 * row + bone] += beyond[:, a, 3 * row + bone]
-            mixed[:, c, 45 + 3 * row : 48 + 3 * row] += np.cross(chain[:, :, a], pull)
-            mixed[:, c, 60 + 3 * i : 63 + 3 * i] += beyond[:, a, 60 + 3 * i : 63 + 3 * i]
-    return twice, mixed
+    return Marks(points, J, by_measure)
 
 
 def _chains(measures: Geometry, angles: Array, side: float) -> tuple[Array, Array, Array]:
@@ -153,7 +89,3 @@ def _cross_columns(v: Array) -> Array:
     zero = np.zeros(len(v))
     x, y, z = v.T
     return np.stack([np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], axis=2)
-
-
-def _dots(a: Array, b: Array) -> Array:
-    return np.einsum("ni,ni->n", a, b)

@@ -24,13 +24,15 @@ METACARPAL_SD = (0.06, 0.067, 0.06, 0.06, 0.06)
 SIZE_SD = 0.10
 # Where the first joint of a chain sits beside its metacarpal's direction; the thumb's saddle joint in all directions. The wrist
 # frame of the tables was fitted by eye to three recorded poses: not better than this.
-_ACROSS_M, _THUMB_BASE_M = 0.002, 0.004
-# How a chain's straight posture may be turned about its axis of abduction and about its bone, rad.
-_TURN_SD, _THUMB_TURN_SD = np.deg2rad([3.0, 5.0]), np.deg2rad([6.0, 10.0])
-# Where a dab of paint is put: the wrist has no landmark under the skin, the other places have.
-_WRIST_PAINT_M, _PAINT_M = 0.004, 0.002
+_ACROSS_M, _THUMB_BASE_M = 0.0015, 0.003
+# How a chain's straight posture may be turned about its axis of abduction and about its bone, rad. Tight: wrist and tips hardly
+# show it, and a finger whose roll is wrong by 6 deg doubles the solver's error, so that guessing is worse than the table.
+_TURN_SD, _THUMB_TURN_SD = np.deg2rad([1.5, 1.0]), np.deg2rad([3.0, 3.0])
+# Where a dab of paint is put: the wrist has no landmark under the skin, the other places have. A dipped tip is painted all round:
+# its middle is on the bone's axis (first two coordinates) but for cameras' views, FACTS "0.3 radii" in the worst case.
+_WRIST_PAINT_M, _PAINT_M, _TIP_PAINT_M = (0.002, 0.002, 0.002), (0.002, 0.002, 0.002), (0.0005, 0.0005, 0.002)
 # DIP/PIP of real hands: .68-.74 in strong flexion, less when relaxed (finger study, Fig. 7).
-_COUPLING_SD = 0.1
+_COUPLING_SD = 0.05
 
 SIZE, BONES, BASES, TURNS, PAINT = 0, slice(1, 16), slice(16, 31), slice(31, 41), 41
 
@@ -67,7 +69,8 @@ class Shape:
         self._bases = np.array([digit.base_m for digit in table.digits])
         self._rotations = np.array([rotation_from_quaternion(digit.base_wxyz) for digit in table.digits])
         self._offsets = np.array([table.paint[name].offset_m for name in self.names])
-        self._paint_sd = np.array([_WRIST_PAINT_M if name == "wrist" else _PAINT_M for name in self.names])
+        sds = [_WRIST_PAINT_M if name == "wrist" else _TIP_PAINT_M if name in TIPS else _PAINT_M for name in self.names]
+        self._paint_sd = np.array(sds)
         # Paint on a tip reaches as far from its end on every hand.
         self._grows = np.array([name not in TIPS for name in self.names])
 
@@ -84,9 +87,9 @@ class Shape:
         rotations = np.array([self._turned(row, x, G) for row in range(5)])
         factor = np.where(self._grows, size, 1.0)[:, None]
         count = 3 * len(self.names)
-        offsets = factor * self._offsets + self._paint_sd[:, None] * x[PAINT : PAINT + count].reshape(-1, 3)
+        offsets = factor * self._offsets + self._paint_sd * x[PAINT : PAINT + count].reshape(-1, 3)
         G[60 : 60 + count, SIZE] = (SIZE_SD * size * self._grows[:, None] * self._offsets).ravel()
-        G[60 : 60 + count, PAINT : PAINT + count] = np.diag(np.repeat(self._paint_sd, 3))
+        G[60 : 60 + count, PAINT : PAINT + count] = np.diag(self._paint_sd.ravel())
         ratios = np.array([digit.coupling for digit in self.table.digits]) + _COUPLING_SD * x[-5:]
         G[-5:, -5:] = _COUPLING_SD * np.eye(5)
         return Geometry(lengths, bases, metacarpals, rotations, offsets, ratios, G)
