@@ -6,11 +6,12 @@ import typer
 
 from services.cli.calibrate_depth import depth
 from services.cli.calibrate_eye import camera, colors
+from services.cli.calibrate_hand import hand
 from services.cli.calibrate_lens import lens
 from services.cli.calibrate_stereo import stereo
 from services.cli.calibrate_world import world
 
-COMMANDS = (camera, colors, lens, stereo, world, depth)
+COMMANDS = (camera, colors, lens, stereo, world, depth, hand)
 
 calibrate = typer.Typer(
     name="calibrate",

@@ -23,6 +23,7 @@ from rhot.messages import Truth
 from rhot.transforms import Array, rotation_x, rotation_z, transform
 from services.simulator.actors import GRIP_M, Hand, HandState, Stage, Thing, beside, stage_of
 from services.simulator.clocks import CameraClock, camera_clock
+from services.simulator.guided import guided
 from services.simulator.motion import MOTIONS, Unrest
 from services.simulator.pose_kernel import Skeleton
 from services.simulator.scenes import SceneSpec, scene_spec
@@ -134,7 +135,7 @@ def _hands(config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras:
         table = config.hand.get(name)
         model = load_hand(config.calibration_dir, name, table.scale if table else 1.0)
         own = seed * len(HANDS) + HANDS.index(name)
-        motion = MOTIONS[spec.motion](model, own)
+        motion = (guided if spec.motion == "guided" else MOTIONS[spec.motion])(model, own)
         stage = _stage(spec, name, len(names), own, cameras)
         landmarks = dict(table.markers) if table else {}
         hands[name] = Hand(name, model, Skeleton(model), landmarks, motion, Unrest(own), stage, spec.speed * speed)

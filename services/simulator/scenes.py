@@ -67,6 +67,7 @@ SCENES: dict[str, SceneSpec] = {
     "grab": SceneSpec("grab", "the hand takes an object, carries it about and puts it back", tilt_deg=30.0),
     "random": SceneSpec("random", "all joints wander through their ranges", tilt_deg=42.0),
     "still": SceneSpec("still", "an open hand held still", tilt_deg=20.0),
+    "guided": SceneSpec("guided", "the exercises of `rhot calibrate hand`, at its pace (48 s)", tilt_deg=42.0),
     "hard": SceneSpec(
         "random",
         "fast motion, blur, coloured clutter, coloured light on the skin, more noise",
