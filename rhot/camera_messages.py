@@ -16,6 +16,7 @@ from rhot.messages import Message, Name, Stamp
 Hue = Annotated[int, msgspec.Meta(ge=0, le=179)]
 Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
 Pixel = Annotated[float, msgspec.Meta(ge=-65536.0, le=65536.0)]
+WholePixel = Annotated[int, msgspec.Meta(ge=-65536, le=65536)]
 # Longer than any camera's frame; a gain of 64 is more than sensors have.
 Microseconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 Gain = Annotated[float, msgspec.Meta(ge=0.0, le=64.0)]
@@ -102,7 +103,7 @@ class Patch(Message, frozen=True, kw_only=True):
 
     color: Name
     picture: PictureName
-    box_px: tuple[int, int, int, int]
+    box_px: tuple[WholePixel, WholePixel, WholePixel, WholePixel]
 
 
 class FitResult(Message, frozen=True, kw_only=True):

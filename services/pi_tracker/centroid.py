@@ -7,9 +7,9 @@ what is left, Y - a, comes from behind. With the lumas of pure paint Yp and pure
 best is
     (a Yp + (Yb - (Y - a)) Yb) / (Yp^2 + Yb^2).
 The centroid is weighted with that share: it is not pulled to the lit side of a finger, and skin, wall and neighbouring fingers
-cancel. s and Yb are taken from the ring around the blob and carried inwards, Yp from its core and carried outwards, each over a
-short distance, as skin lies on one side and the room on the others, and light falls off across a finger. Only the blob, one cell
-larger, counts: weights over the whole ROI pick up neighbouring fingers (.76 px).
+cancel. s and Yb are those of the nearest cells of the ring around the blob, each side of the edge its own: skin lies on one side and
+the room, which is another one in each camera, on the others. Yp is carried outwards from the core over a short distance, as light
+falls off across a finger. Only the blob, one cell larger, counts: weights over the whole ROI pick up neighbouring fingers (.76 px).
 
 All blobs of a frame are measured in one stack of tiles: the cost is in the calls, not in the pixels. Pure. A blob cut off by the
 image's edge, one of a paint that hardly differs from what is around it, and one of a few cells are measured all the same, and
@@ -19,7 +19,7 @@ their sigma and quality say so.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,22 +33,27 @@ from services.pi_tracker.search import Blob
 from services.pi_tracker.tiles import Tiles, doubled, flat, halved, moments, stacked
 
 _SQUARE = np.ones((3, 3), np.uint8)
-_WIDE = np.ones((5, 5), np.uint8)
-# Background is averaged over this many cells, paint luma over the next neighbours (absolute error on the simulator's hands .36 px with
-# one value for all, .21 with 7 and 5 cells, .18 with 5 and 3).
-_BACKGROUND_CELLS, _PAINT_CELLS = 5, 3
+# The background beside a pixel is that of the ring's cells weighted with a Gaussian of so many cells: the nearest count. (Error of
+# disparity, simulated hands at 1.0, 0.5 and moving at 0.7 m: mean of a ring's 5 x 5 cells .110, .082, .165 px; this .086, .076, .150.
+# Even the true background, known in every pixel, would hardly be better: .069 against .076 without noise at 1.0 m.)
+_NEAR_CELLS, _BACKGROUND_CELLS = 0.8, 5
+# Paint luma is that of the next neighbours (absolute error with one value for all .36 px, with 5 cells .21, with 3 .18).
+_PAINT_CELLS = 3
 # The share of paint is noisy about 0 and 1; this slope about 1/2 lets clipping remove most of that noise at little loss of
 # sub-pixel position (disparity RMS at sigma 5: slope 1.5 .052, 2 .053, 3 .056 px; absolute error .237, .223, .209).
 _SLOPE = 2.0
+# Weight of the mean of all known cells beside that of near ones: nothing where there are any (a Gaussian two cells off is .0005),
+# everything where there are none.
+_FAINT = 1e-5
 # Cores smaller than this hold no pure paint; then the whole mask must do.
 _MIN_CORE = 3
 # Luma below which a ratio of chroma to luma is noise.
 _DARKEST = 8.0
-# What noise does not explain: light that changes across the paint moves its centre by this share of its radius, the more the vaguer
-# its edge is, i.e. the wider than 1.6 px the band in which the share of paint is neither 0 nor 1 (blur, coloured light, dark sides).
-# Fitted to the simulator's hands: error over sigma .9-1.1 in four scenes, sharp ones and one with blur and coloured light, where a
-# constant gave 1.5-5.9.
-_MISFIT, _MISFIT_PER_PX, _SHARP_PX = 0.016, 0.12, 1.6
+# What noise does not explain, px: light, shade and what lies behind move the centre by this much, near or far; and more, the vaguer its
+# edge is, i.e. the wider than 1.85 px the band in which the share of paint is neither 0 nor 1 (blur, coloured light, dark sides). Fitted
+# to the simulator's hands (noise taken off): .08-.11 still at 0.5 and 1.0 m, .14-.17 moving at 0.7 m, .57 and .78 where the band is 2.3
+# and 2.8 px, in coloured light. Error over sigma is then .8-.9 still, 1.2 moving and in coloured light.
+_MISFIT_PX, _MISFIT_PER_PX, _SHARP_PX = 0.12, 1.0, 1.85
 # Paint this far from its surroundings in chroma per luma is told from them without doubt; the paints of the simulator lie at .4 to .7.
 _CONTRAST = 0.25
 # Of a blob without any paint when looked at closely.
@@ -118,9 +123,9 @@ class _Paint:
 
 
 def _paint(tiles: Tiles, reach: Image) -> _Paint:
-    ring = (_dilated(reach, _WIDE) - reach) & tiles.inside
-    (y_b, u_b, v_b), around = _carried(tiles.cells, ring, _BACKGROUND_CELLS)
-    (y_p, *_), paint = _carried(tiles.cells, _cores(tiles.mask), _PAINT_CELLS)
+    ring = (_dilated(reach, _SQUARE) - reach) & tiles.inside
+    (y_b, u_b, v_b), around = _carried(tiles.cells, ring, _near)
+    (y_p, *_), paint = _carried(tiles.cells, _cores(tiles.mask), _next)
     y_b, y_p = np.maximum(y_b, _DARKEST), np.maximum(y_p, _DARKEST)
     s_u, s_v = u_b / y_b, v_b / y_b
     p_uv, s_uv = paint[1:3] / np.maximum(paint[0], _DARKEST), around[1:3] / np.maximum(around[0], _DARKEST)  # (2, n)
@@ -146,8 +151,16 @@ def _dilated(masks: Image, element: Image) -> Image:
     return cv2.dilate(flat(masks), element).reshape(masks.shape)
 
 
-def _carried(cells: Image, known: Image, size: int) -> tuple[Image, Image]:
-    """Y, U, V where they are known, averaged over size x size cells, and their mean where that does not reach.
+def _near(image: Image) -> Image:
+    return cv2.GaussianBlur(image, (_BACKGROUND_CELLS, _BACKGROUND_CELLS), _NEAR_CELLS, borderType=cv2.BORDER_CONSTANT)
+
+
+def _next(image: Image) -> Image:
+    return cv2.blur(image, (_PAINT_CELLS, _PAINT_CELLS), borderType=cv2.BORDER_CONSTANT)
+
+
+def _carried(cells: Image, known: Image, spread: Callable[[Image], Image]) -> tuple[Image, Image]:
+    """Y, U, V where they are known, spread by a filter, and their mean where that does not reach.
 
     cells (h, 4, n, w), known (h, n, w) -> (3, h, n, w), and the means (3, n).
     """
@@ -155,10 +168,9 @@ def _carried(cells: Image, known: Image, size: int) -> tuple[Image, Image]:
     kept = cells * known[:, None]
     total = moments(kept.reshape(h, 4 * n, w), 0).reshape(4, n)
     mean = total[:3] / np.maximum(total[3], 1.0)
-    window = cv2.boxFilter(flat(kept), -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT).reshape(kept.shape)
-    # The mean counts as a hundredth of a cell: nothing beside known ones, everything where there are none.
-    window[:, :3] += 0.01 * mean[:, :, None]
-    return (window[:, :3] / (window[:, 3:] + 0.01)).swapaxes(0, 1), mean
+    window = spread(flat(kept)).reshape(kept.shape)
+    window[:, :3] += _FAINT * mean[:, :, None]
+    return (window[:, :3] / (window[:, 3:] + _FAINT)).swapaxes(0, 1), mean
 
 
 def _centroid(
@@ -193,4 +205,4 @@ def _misfit(moving_px: float, area: float) -> float:
     radius = math.sqrt(area / math.pi)
     # The band of a disc has an area of 2 pi r times its width.
     band_px = moving_px / (2.0 * math.pi * radius)
-    return radius * (_MISFIT + _MISFIT_PER_PX * max(band_px - _SHARP_PX, 0.0))
+    return _MISFIT_PX + _MISFIT_PER_PX * max(band_px - _SHARP_PX, 0.0)

@@ -19,7 +19,7 @@ MOST_COLORS = 64
 
 
 def check_colors(colors: Colors, wanted: Sequence[str]) -> None:
-    """Raises CalibrationError saying which colour is wrong, and how. wanted are the colours of rig.toml; empty: any."""
+    """Raises CalibrationError saying which colour is wrong, and how. wanted are colours that must be there."""
     if not colors.colors:
         raise CalibrationError("there is no colour in it")
     if len(colors.colors) > MOST_COLORS:
@@ -35,6 +35,6 @@ def check_colors(colors: Colors, wanted: Sequence[str]) -> None:
     missing = [name for name in wanted if name not in colors.colors]
     if missing:
         raise CalibrationError(
-            f"{', '.join(map(repr, missing))} of rig.toml's markers {'is' if len(missing) == 1 else 'are'} not in it; "
+            f"{', '.join(map(repr, missing))} of rig.toml's markers, which {'is' if len(missing) == 1 else 'are'} tracked, would be lost; "
             f"it has {', '.join(sorted(colors.colors))}"
         )

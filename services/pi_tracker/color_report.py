@@ -17,13 +17,14 @@ from rhot.calibration import ColorRange, Colors
 from services.pi_tracker.chroma import Array, Cells, Mask, hue_apart, mean_hue
 from services.pi_tracker.color_fit import Study
 from services.pi_tracker.colors import compile_colors
-from services.pi_tracker.swatch import MIN_CELLS
 
 # Measured: a pastel ball before a pale wall, followed without one false detection: 4.0 from skin, 3.8 from the wall; the simulator's six
 # paints in cluttered light: 4.3 and more. Two dabs of one paint: below 1.
 COLLIDE, CLOSE = 2.5, 3.5
 # Fewer cells than this say nothing about a cloud.
 _FEW = 8
+# Foreign blobs smaller than this are noise that comes and goes: 32 px.
+_THING_CELLS = 8
 # Tails left out of a cloud's spread, and the least spread there is: rounding of chroma at mid luma.
 _TAIL, _LEAST_SPREAD = 0.02, 0.004
 
@@ -126,8 +127,8 @@ def _color(study: Study, color: str, number: int, labels: list[Array]) -> ColorR
         typical,
         round(float(np.concatenate(inside).mean()), 3),
         round(separation(own.paint, own.skin), 1),
-        4 * cells if cells >= MIN_CELLS else 0,
-        (x, y, picture) if cells >= MIN_CELLS else None,
+        4 * cells if cells >= _THING_CELLS else 0,
+        (x, y, picture) if cells >= _THING_CELLS else None,
     )
 
 

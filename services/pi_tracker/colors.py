@@ -42,15 +42,15 @@ class ColorTable:
         parts = [layer.view(np.uint8).reshape(-1, 4) for layer in layers]
         self._classes = [np.ascontiguousarray(part[:, 0]) for part in parts]
         # No class, no luma: low above high.
-        self._bounds = [_lookup(np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8))) for part in parts]
+        bounds = [np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8)) for part in parts]
+        self._bounds = [_lookup(np.ascontiguousarray(pairs).view(np.uint16).ravel()) for pairs in bounds]
+        # OpenCV looks up signed integers only.
+        self._packed = [_lookup(layer.view(np.int32)) for layer in layers]
         self._buffer = np.empty((4, 0), np.uint8)
 
     def mask(self, luma: Image, chroma: Image) -> Image:
         """255 where any colour is; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
-        if self._buffer.shape[1] < luma.size:
-            self._buffer = np.empty((4, luma.size), np.uint8)
-        # Fresh memory for the planes would cost four times what splitting costs.
-        low, high, mask, more = self._buffer[:, : luma.size].reshape(4, *luma.shape)
+        low, high, mask, more = self._planes(luma)
         index = chroma.view(np.uint16)[:, :, 0]
         for number, bounds in enumerate(self._bounds):
             cv2.split(bounds(index).view(np.uint8).reshape(*luma.shape, 2), (low, high))
@@ -59,26 +59,40 @@ class ColorTable:
                 cv2.bitwise_or(mask, more, mask)
         return mask
 
+    def classify(self, luma: Image, chroma: Image) -> Image:
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
+        return self.classes_and_mask(luma, chroma)[0]
+
+    def classes_and_mask(self, luma: Image, chroma: Image) -> tuple[Image, Image]:
+        """Class of every cell, and 255 where there is one; good until the next call."""
+        classes, low, high, mask = planes = self._planes(luma)
+        index = chroma.view(np.uint16)[:, :, 0]
+        labels, seen = classes, mask
+        for number, packed in enumerate(self._packed):
+            cv2.split(packed(index).view(np.uint8).reshape(*luma.shape, 4), planes)
+            cv2.inRange(luma, low, high, mask)
+            if len(self.layers) == 1:
+                return cv2.bitwise_and(classes, mask, classes), mask
+            found = cv2.bitwise_and(classes, mask)
+            # Layers never claim the same cell: they share chromas, not lumas.
+            labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
+        return labels, seen
+
     def classes_at(self, luma: Image, chroma: Image) -> Image:
         """The class of every cell that the mask shows, of others any; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
-        index = chroma.view(np.uint16)[:, :, 0]
-        return self._classes[0].take(index) if len(self.layers) == 1 else self.classify(luma, chroma)
+        if len(self.layers) == 1:
+            return self._classes[0].take(chroma.view(np.uint16)[:, :, 0])
+        return self.classify(np.ascontiguousarray(luma), chroma)
 
-    def classify(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
-        index = chroma.view(np.uint16)[:, :, 0]
-        labels = np.zeros(luma.shape, np.uint8)
-        for layer in self.layers:
-            # Layers never claim the same cell: they share chromas, not lumas.
-            classes, low, high, _ = cv2.split(layer.take(index).view(np.uint8).reshape(*luma.shape, 4))
-            found = cv2.bitwise_and(classes, cv2.inRange(np.ascontiguousarray(luma), low, high))
-            labels = np.maximum(labels, found)
-        return labels
+    def _planes(self, luma: Image) -> list[Image]:
+        """Four images to work in: fresh memory would cost four times what splitting into it costs."""
+        if self._buffer.shape[1] < luma.size:
+            self._buffer = np.empty((4, luma.size), np.uint8)
+        return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
 
 
-def _lookup(pairs: Bytes) -> Callable[[Image], Image]:
-    """A table (65536, 2) of bytes to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy; gives uint16."""
-    table = np.ascontiguousarray(pairs).view(np.uint16).ravel()
+def _lookup(table: npt.NDArray[np.uint16] | npt.NDArray[np.int32]) -> Callable[[Image], Image]:
+    """A table (65536,) of uint16 or int32 to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
     try:
         cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
     except cv2.error:

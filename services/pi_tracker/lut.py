@@ -37,7 +37,8 @@ class LutFinder:
         self._noise = Noise()
         self._searches = 0
         self._identity = Identity(len(table.names), settings.roi_margin_px)
-        self._boxes: dict[int, Rect] = {}
+        # Where all markers were, None if one was not seen, and how far around it they will be.
+        self._hull: Rect | None = None
         self._margin_px = settings.roi_margin_px
 
     def find(self, frame: Frame) -> list[Marker]:
@@ -49,9 +50,7 @@ class LutFinder:
         chosen = {color: choice for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns)) if choice is not None}
         self._lap("identity")
         # A marker that strayed from the others is looked for everywhere the next time.
-        boxes = {color: choice.blob.rect for color, choice in chosen.items() if choice.support >= _LEAST_SUPPORT}
-        self._margin_px = roi.margin(self._boxes, boxes, self._settings.roi_margin_px)
-        self._boxes = boxes
+        self._expect([choice.blob.rect for choice in chosen.values() if choice.support >= _LEAST_SUPPORT])
         markers = []
         measured = centroids(image, [choice.blob for choice in chosen.values()], self._noise)
         for (color, choice), found in zip(chosen.items(), measured, strict=True):
@@ -64,14 +63,23 @@ class LutFinder:
         """Plausible blobs of each colour: near the last places, else in the whole image."""
         everywhere = roi.whole(image.size)
         self._searches += 1
-        if not self._boxes or len(self._boxes) < len(self._names) or self._searches % _REVIEW == 0:
+        if self._hull is None or self._searches % _REVIEW == 0:
             return self._blobs(image, everywhere)
-        region = roi.around(roi.hull(list(self._boxes.values())), self._margin_px, image.size)
+        region = roi.around(self._hull, self._margin_px, image.size)
         found = self._blobs(image, region)
         if any(not own or roi.cut(max(own, key=_cells).rect, region, image.size) for own in found):
             # A marker has moved further than the margin: the same frame may still show it.
             return self._blobs(image, everywhere)
         return found
+
+    def _expect(self, rects: list[Rect]) -> None:
+        """Where to look in the next frame, given where markers are in this one."""
+        if not rects or len(rects) < len(self._names):
+            self._hull = None
+            return
+        now = roi.hull(rects)
+        self._margin_px = roi.margin(self._hull, now, self._settings.roi_margin_px)
+        self._hull = now
 
     def _blobs(self, image: Picture, region: Rect) -> list[list[Blob]]:
         """Plausible blobs of each colour in a rectangle."""

@@ -5,13 +5,13 @@ Pure. Rectangles are in cells of 2x2 pixels. A rectangle outside the image is cl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 
 from services.pi_tracker.planes import Rect
 
-# A hand at rest still trembles and turns; and from one frame to the next a motion seldom more than doubles, also in another marker. (What
-# escapes is found in the same frame by searching the whole image.)
-_STILL_MARGIN_PX, _STEPS = 12, 2
+# A hand at rest still trembles and turns, and from one frame to the next a motion seldom more than doubles. (What escapes is found in the
+# same frame by searching the whole image.)
+_STILL_MARGIN_PX, _STEPS = 8, 2
 
 
 def whole(size: tuple[int, int]) -> Rect:
@@ -27,15 +27,18 @@ def around(rect: Rect, margin_px: int, size: tuple[int, int]) -> Rect:
     return (left, top, max(min(x1 + margin, size[0]), left + 1), max(min(y1 + margin, size[1]), top + 1))
 
 
-def hull(rects: Sequence[Rect]) -> Rect:
+def hull(rects: Iterable[Rect]) -> Rect:
     """The smallest rectangle around all, at least one: one search of a hand costs less than one for each of its markers."""
-    return (min(r[0] for r in rects), min(r[1] for r in rects), max(r[2] for r in rects), max(r[3] for r in rects))
+    x0, y0, x1, y1 = zip(*rects, strict=True)
+    return (min(x0), min(y0), max(x1), max(y1))
 
 
-def margin(before: Mapping[int, Rect], now: Mapping[int, Rect], most_px: int) -> int:
-    """The margin that the markers' motion from the last frame to this one asks for, at most most_px; most_px where it is unknown."""
-    steps = [max(abs(b[0] - a[0]), abs(b[1] - a[1])) for key, b in now.items() if (a := before.get(key)) is not None]
-    return min(most_px, _STILL_MARGIN_PX + _STEPS * 2 * max(steps)) if steps else most_px
+def margin(before: Rect | None, now: Rect, most_px: int) -> int:
+    """The margin that the motion of the markers' hull from the last frame to this one asks for; most_px where it is unknown."""
+    if before is None:
+        return most_px
+    step = max(abs(now[0] - before[0]), abs(now[1] - before[1]), abs(now[2] - before[2]), abs(now[3] - before[3]))
+    return min(most_px, _STILL_MARGIN_PX + _STEPS * 2 * step)
 
 
 def cut(blob: Rect, rect: Rect, size: tuple[int, int]) -> bool:

@@ -50,7 +50,7 @@ class Session:
 
     @property
     def missing(self) -> list[str]:
-        """Colours of rig.toml without a range: the tracker would refuse the rest without them."""
+        """Colours of rig.toml without a range: they are not tracked."""
         return [name for name in self.wanted if name not in self.ranges]
 
     def point(self, color: str, picture: str, x_px: float, y_px: float) -> None:

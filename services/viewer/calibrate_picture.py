@@ -25,9 +25,11 @@ _KERNEL = np.ones((2, 2), np.uint8)
 
 def decoded(picture: bytes) -> Image | None:
     """PNG as BGR (h, w, 3), None if it is none."""
-    if not picture:
+    try:
+        return cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        # Nothing at all, or a picture of a size that no memory holds.
         return None
-    return cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
 
 
 def mask_of(hsv: Image, span: ColorRange) -> Image:
@@ -59,5 +61,5 @@ def shown(
             cv2.drawContours(rgb, contours, -1, _CHOSEN if color == chosen else _OTHER, 1)
     for patch in patches:
         x, y, w, h = patch.box_px
-        cv2.rectangle(rgb, (x - 4, y - 4), (x + w + 3, y + h + 3), _CHOSEN, 1, cv2.LINE_AA)
+        cv2.rectangle(rgb, (x - 4, y - 4), (x + w + 3, y + h + 3), _CHOSEN, 1)
     return rgb

@@ -77,13 +77,14 @@ def _number(value: Any, form: str) -> str:
 
 def verdict(session: Session) -> str:
     """What is in force, and what is missing."""
+    lines = []
     if session.saved:
-        return _box(_colored(f"in force on camera {session.camera}, and written on its machine, {session.saved}", _GREEN))
+        lines.append(_colored(f"in force on camera {session.camera}, and written on its machine, {session.saved}", _GREEN))
+    elif session.changed:
+        lines.append("not in force yet: press the button")
     if session.missing:
-        return _box(f"still missing: {', '.join(text(name) for name in session.missing)}")
-    if session.changed:
-        return _box("not in force yet: press the button")
-    return _box("this is what is in force")
+        lines.append(f"still missing: {', '.join(text(name) for name in session.missing)}")
+    return _box("<br>".join(lines) or "this is what is in force")
 
 
 def _colored(value: str, color: str) -> str:

@@ -88,8 +88,9 @@ class Coloring:
             made = f" of {colors.date} by {colors.tool}"
             if not colors.date:
                 colors = msgspec.structs.replace(colors, date=datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
-            check_colors(colors, self._service.config.colors)
-            step = self._made(colors, self._wanted(colors))
+            # Colours may come one after the other, but none that is tracked may go.
+            check_colors(colors, [name for name in self._service.config.colors if name in self.in_force.colors])
+            step = self._made(colors, self._there(colors))
             try:
                 await asyncio.to_thread(save, self._path, colors)
             except OSError as error:
@@ -100,11 +101,15 @@ class Coloring:
             return
         self._seen_ns = _changed_ns(self._path)
         self._put_in_force(colors, step)
+        missing = [name for name in self._service.config.colors if name not in colors.colors]
+        if missing:
+            self._service.error(f"camera {self._camera.name!r}: {', '.join(missing)} not calibrated yet, and not tracked until then")
         log.info("new colours in force%s: %s", made[:120], ", ".join(sorted(colors.colors)))
 
     def _take(self, colors: Colors) -> None:
         """Into force with the next frame; raises CalibrationError and keeps the old."""
-        self._put_in_force(colors, self._made(colors, self._wanted(colors)))
+        # Without a hand nobody says which colours matter: all of them do.
+        self._put_in_force(colors, self._made(colors, self._service.config.colors or sorted(colors.colors)))
 
     def _start_without(self, reason: str) -> None:
         """Into force: those of the wanted colours that there are, none if need be."""
@@ -112,13 +117,13 @@ class Coloring:
             colors = load_colors(self._path.parent, self._camera.name)
         except CalibrationError:
             colors = Colors(colors={})
-        there = [name for name in self._service.config.colors if name in colors.colors]
+        there = self._there(colors)
         self._put_in_force(colors, self._made(colors, there))
         self._service.error(f"{reason}. Until then {', '.join(there) or 'nothing'} is tracked")
 
-    def _wanted(self, colors: Colors) -> list[str]:
-        """Without a hand nobody says which colours matter: all of them do."""
-        return self._service.config.colors or sorted(colors.colors)
+    def _there(self, colors: Colors) -> list[str]:
+        """Those of the wanted colours that there are; without a hand, all."""
+        return [name for name in self._service.config.colors or sorted(colors.colors) if name in colors.colors]
 
     def _made(self, colors: Colors, wanted: list[str]) -> TrackerStep:
         config = self._service.config

@@ -6,7 +6,9 @@ frames there were of how many. A video of unknown frame rate takes the rate of i
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -18,6 +20,8 @@ from services.pi_tracker.frame import Frame, Image
 _SLACK_FRAMES, _SLACK = 2, 0.02
 # Below and above this no camera's video can be; such a rate is a broken header.
 _FPS_RANGE = (0.1, 1000.0)
+# LOG_LEVEL_SILENT
+_SILENT = 0
 _GREY = {int.from_bytes(code, "little") for code in (b"Y800", b"GREY", b"Y8  ")}
 
 
@@ -67,13 +71,8 @@ class Decoder:
     def open(self) -> None:
         if not self._path.is_file():
             raise CaptureError(f"{self._path}: no such video file")
-        # FFmpeg's own words on a broken file would come before ours, on the raw standard error.
-        os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        try:
+        with _quiet():
             self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
-        finally:
-            cv2.utils.logging.setLogLevel(level)
         if not self._capture.isOpened():
             raise CaptureError(
                 f"{self._path}: cannot be decoded: not a video, or cut short (an mp4 has its index at the end). "
@@ -103,3 +102,16 @@ class Decoder:
         if self._capture is not None:
             self._capture.release()
             self._capture = None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without OpenCV's and FFmpeg's own words on a broken file, which would come before ours on the raw standard error."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # OpenCV 4.10 has setLogLevel beside imread, later ones in a module of its own.
+    logging = getattr(cv2.utils, "logging", cv2)
+    level = logging.setLogLevel(_SILENT)
+    try:
+        yield
+    finally:
+        logging.setLogLevel(level)

@@ -179,5 +179,4 @@ class Calibrate:
             return
         session = self._session
         to_do = calibrate_text.to_do(session, self._chosen, pictures=bool(self._pictures))
-        savable = session.changed and not session.missing
-        self._gui.say(to_do, calibrate_text.report(session), calibrate_text.verdict(session), savable=savable)
+        self._gui.say(to_do, calibrate_text.report(session), calibrate_text.verdict(session), savable=session.changed)

@@ -196,3 +196,21 @@ def test_a_real_ball_boxed_in_three_frames_is_found_in_all_and_nowhere_else(ball
     found = {frame.seq for frame in ball if step.step(frame).markers}
     assert found <= THERE
     assert len(found) >= 865
+
+
+def test_hues_are_drawn_in_where_skin_begins(studio, tip, monkeypatch):
+    """Yellow ochre next to skin: as pale as it, a few hues away."""
+    monkeypatch.setitem(studio.paints, "sand", (90, 185, 190))
+    frames, pointers = [], []
+    for seq in range(2):
+        frame, truth = studio.frame([tip("sand", 60.0 + 9 * seq, 60.0, width_px=20.0, length_px=24.0)], seq=seq, size_px=SIZE)
+        frames.append(frame)
+        x, y = truth["sand"]
+        pointers.append(Pointer("sand", seq, x - 12, y - 12, 24, 24))
+    study = gather(frames, pointers)
+    fitted = fit(study.samples)
+    (one,) = examine(study, fitted).colors
+    assert one.inside > 0.75
+    assert one.room_px < 60
+    # Skin has a hue of 11 here, the paint 28.
+    assert 14 <= fitted["sand"].hsv_low[0] <= 27

@@ -53,7 +53,7 @@ def test_the_mask_is_where_a_class_is(gamut):
     }
     for names in (["c"], ["a", "b", "c"]):
         table = compile_colors(Colors(colors=ranges), names)
-        classes = table.classify(luma, chroma)
+        classes = table.classify(luma, chroma).copy()
         mask = table.mask(luma, chroma).copy()
         assert np.array_equal(mask > 0, classes > 0)
         assert np.array_equal(table.classes_at(luma, chroma)[mask > 0], classes[mask > 0])

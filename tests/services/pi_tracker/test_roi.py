@@ -40,14 +40,12 @@ def test_the_hull_covers_all_and_no_more(some):
 
 
 def test_the_margin_follows_the_motion():
-    still = {0: (10, 10, 16, 16), 1: (30, 10, 36, 16)}
-    assert roi.margin(still, still, 40) == 12
-    moved = {0: (12, 10, 18, 16), 1: (30, 13, 36, 19)}
-    assert roi.margin(still, moved, 40) == 12 + 2 * 2 * 3
-    assert roi.margin(still, {0: (90, 10, 96, 16)}, 40) == 40
+    still = (10, 10, 60, 50)
+    assert roi.margin(still, still, 40) == 8
+    assert roi.margin(still, (12, 10, 60, 53), 40) == 8 + 2 * 2 * 3
+    assert roi.margin(still, (90, 10, 140, 50), 40) == 40
     assert roi.margin(still, still, 5) == 5
-    assert roi.margin({}, still, 40) == 40
-    assert roi.margin(still, {}, 40) == 40
+    assert roi.margin(None, still, 40) == 40
 
 
 def test_a_cut_blob_is_one_that_may_go_on_outside():

@@ -47,7 +47,7 @@ async def test_the_file_itself_can_be_put_by_any_tool(config, tracking, seen, co
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"green": None}, "'green' of rig.toml's markers is not in it"),
+        ({"green": None}, "'green' of rig.toml's markers, which is tracked, would be lost"),
         ({"green": ColorRange(hsv_low=(0, 200, 0), hsv_high=(10, 100, 255))}, "lowest saturation, 200, is above its highest"),
     ],
 )
@@ -145,3 +145,15 @@ async def test_a_camera_that_is_not_there_is_said_to_be_missing(config, tracking
         for asked in (client.colors("nobody"), client.set_colors("nobody", colors), client.exposure("nobody")):
             with pytest.raises(BusError, match="no tracker of camera 'nobody' answers"):
                 await asked
+
+
+async def test_colours_may_come_one_after_the_other(config, tracking, seen, colors, tmp_path):
+    (tmp_path / "calibration" / "left.colors.json").unlink()
+    async with tracking(config) as (service, client):
+        await seen(client)
+        green = Colors(date="1", tool="t", colors={"green": colors.colors["green"]})
+        await client.set_colors("left", green)
+        assert "blue not calibrated yet" in service.last_error
+        await seen(client, "green")
+        await client.set_colors("left", Colors(date="2", tool="t", colors={**green.colors, "blue": colors.colors["blue"]}))
+        await seen(client, "blue", "green")

@@ -1,0 +1,175 @@
+"""Calibrating colours as a new user does: real viewer and tracker processes, a real browser, clicks on painted fingers."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import zenoh
+
+from rhot import topics
+from rhot.bus import client_config
+from rhot.calibration import load_colors
+from rhot.messages import MarkerFrame, Session, SimFrame
+from services.pi_tracker.synthetic import PAINTS, Tip, clean, frame_of, noisy
+
+pytestmark = pytest.mark.browser
+DEADLINE_S = 30.0
+SIZE = (320, 240)
+RIG = """
+[rig]
+name = "desk"
+[[camera]]
+name = "left"
+source = "simulator"
+size_px = [320, 240]
+[hand.right.markers]
+index_tip = "green"
+thumb_tip = "blue"
+[viewer]
+port = 0
+"""
+
+
+@pytest.fixture(scope="module")
+def shot() -> np.ndarray:
+    """What the camera sees: a green and a blue finger tip."""
+    tips = [Tip("green", 120.0, 120.0, width_px=20.0, length_px=24.0), Tip("blue", 200.0, 110.0, width_px=20.0, length_px=24.0)]
+    return clean(tips, SIZE)[0]
+
+
+@pytest.fixture
+def camera(router: str, shot: np.ndarray) -> Iterator[list[MarkerFrame]]:
+    """The camera, the master that started the session, and what the tracker sends."""
+    stop, seen = threading.Event(), list[MarkerFrame]()
+
+    def film() -> None:
+        image = frame_of(noisy(shot, 4.0, 1), 0, "i420").image
+        with zenoh.open(client_config([router])) as session:
+
+            def answer(query: zenoh.Query) -> None:
+                with query:
+                    query.reply(topics.SESSION.key("desk"), msgspec.json.encode(Session(running=True, start_ns=1)))
+
+            session.declare_queryable(topics.SESSION.key("desk"), answer)
+            key = topics.MARKERS.key("desk", camera="left")
+            session.declare_subscriber(key, lambda s: seen.append(msgspec.json.decode(s.payload.to_bytes(), type=MarkerFrame)))
+            for seq in itertools.count():
+                told = SimFrame(camera="left", seq=seq, stamp_ns=time.time_ns(), row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
+                session.put(topics.SIM_FRAME.key("desk", camera="left"), image.tobytes(), attachment=msgspec.json.encode(told))
+                if stop.wait(1 / 15):
+                    return
+
+    thread = threading.Thread(target=film)
+    thread.start()
+    yield seen
+    stop.set()
+    thread.join()
+
+
+@pytest.fixture
+def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
+    """A tracker without any calibration and a viewer, as processes; the page's address."""
+    (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    common = ["--config", str(tmp_path / "rig.toml"), "--connect", router]
+    processes = []
+    with ExitStack() as stack:
+        for words in (["services.pi_tracker", "--camera", "left"], ["services.viewer"]):
+            command = [sys.executable, "-m", *words, *common]
+            processes.append(
+                stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=repository, env=environment))
+            )
+        output = processes[1].stdout
+        assert output is not None
+        line = next(line for line in output if "live view at" in line)
+        yield msgspec.json.decode(line)["text"].removeprefix("live view at ")
+        for process in processes:
+            process.terminate()
+            assert process.stdout is not None
+            process.stdout.read()
+    assert [process.returncode for process in processes] == [0, 0]
+
+
+def pixels(page: Any) -> np.ndarray:
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    return np.array(image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
+
+
+def where(page: Any, paint: str) -> tuple[float, float] | None:
+    """The middle of a paint in the page, None if it is not there; the panel on the right is left out."""
+    rgb = pixels(page)[:, :-400]
+    near = np.abs(rgb - np.array(PAINTS[paint][::-1])).max(axis=2) < 45
+    rows, columns = np.nonzero(near)
+    return (float(np.median(columns)), float(np.median(rows))) if len(rows) > 150 else None
+
+
+def until(page: Any, condition: Any) -> Any:
+    deadline = time.monotonic() + DEADLINE_S
+    while not (found := condition()) and time.monotonic() < deadline:
+        page.wait_for_timeout(100)
+    assert found
+    return found
+
+
+def test_from_the_first_click_to_new_ranges_in_force(chromium: Any, page_url: str, camera: list[MarkerFrame], tmp_path: Path) -> None:
+    page = chromium.new_page(viewport={"width": 1200, "height": 800})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(page_url)
+    wait = {"timeout": DEADLINE_S * 1e3}
+    page.get_by_text("calibrate colours").wait_for(**wait)
+    switch = page.get_by_label("show picture")
+    # Folders are drawn open before they are closed.
+    until(page, lambda: not switch.is_visible())
+    page.get_by_text("calibrate colours").click()
+    switch.wait_for(**wait)
+    switch.click()
+    page.get_by_text("click the middle of the blue marker").wait_for(**wait)
+    page.get_by_text("still missing: blue, green").wait_for(**wait)
+    assert page.get_by_role("button", name="put in force").is_disabled()
+
+    # Grey is no paint, and says so.
+    green = until(page, lambda: where(page, "green"))
+    page.mouse.click(green[0], green[1] - 180)
+    page.get_by_text("is on something grey").wait_for(**wait)
+
+    page.mouse.click(*until(page, lambda: where(page, "blue")))
+    page.get_by_text("1 of 2 colours pointed at").wait_for(**wait)
+    page.get_by_text("click the middle of the green marker").wait_for(**wait)
+    page.mouse.click(*green)
+    page.get_by_text("2 of 2 colours pointed at").wait_for(**wait)
+    assert page.locator("table tr", has_text="green").last.inner_text().count("d'") == 2
+
+    assert not any(frame.markers for frame in camera)
+    page.get_by_role("button", name="put in force").click()
+    page.get_by_text("in force on camera left, and written on its machine").wait_for(**wait)
+    assert set(load_colors(tmp_path / "calibration", "left").colors) == {"green", "blue"}
+    until(page, lambda: {marker.color for marker in camera[-1].markers} == {"green", "blue"})
+    found = {marker.color: marker for marker in camera[-1].markers}
+    assert abs(found["green"].x_px - 120.0) < 6.0
+    assert abs(found["blue"].x_px - 200.0) < 6.0
+
+    # Masks are drawn over the markers, outlined in black and white.
+    page.screenshot(path=tmp_path / "calibrated.png")
+    x, y = (round(v) for v in green)
+    about = pixels(page)[y - 60 : y + 60, x - 60 : x + 60]
+    assert (about.max(axis=2) < 40).sum() + (about.min(axis=2) > 225).sum() > 60
+
+    # And back to the rig.
+    switch.click()
+    until(page, lambda: where(page, "green") is None)
+    assert errors == []
+    page.close()
