@@ -18,6 +18,7 @@ from services.calibrator.detect import Detection
 from services.calibrator.lens import LensResult
 from services.calibrator.model import CX, CY, FX, FY, K1, lens_vector
 from services.calibrator.stereo import RigResult
+from services.calibrator.wand import Refined
 
 
 def lens_file(size_px: tuple[int, int], lens: Array, date: str, tool: str, inputs: dict[str, Any], residuals: dict[str, Any]) -> Lens:
@@ -98,6 +99,16 @@ def rig_of(result: RigResult, date: str, source: str) -> RigGeometry:
         name: CameraPlace(T_rig_from_camera=rows(inverse(result.state.T_camera_from_rig[k]))) for k, name in enumerate(result.cameras)
     }
     return RigGeometry(date=date, tool="rhot calibrate stereo", inputs=inputs, residuals=_finite(residuals), cameras=cameras)
+
+
+def refined_of(result: Refined, date: str, source: str, wand: str) -> RigGeometry:
+    """rig.json of `rhot calibrate refine`."""
+    residuals = {"epipolar_before_px": result.epipolar_before_px, "epipolar_px": result.epipolar_px}
+    if result.wand_mm is not None:
+        residuals |= {"wand_before_mm": result.wand_mm[0], "wand_mm": result.wand_mm[1]}
+    inputs = {"markers_from": source, "wand": wand, "points": result.points, "seconds": round(result.seconds, 1)}
+    cameras = {name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera)) for name, camera in result.cameras.items()}
+    return RigGeometry(date=date, tool="rhot calibrate refine", inputs=inputs, residuals=_finite(residuals), cameras=cameras)
 
 
 def rows(T: Array) -> Matrix4:

@@ -25,6 +25,8 @@ _EXAMPLES = (
 )
 # More cameras than this are never one rig here: the varying part is then the number of the picture.
 _MAX_CAMERAS = 16
+# Two pictures of 4:3 side by side are 2.67 times as wide as high, one of 16:9 is 1.78.
+_WIDE = 2.2
 Key = tuple[str, ...]
 
 
@@ -100,6 +102,8 @@ def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
 def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
     """The pictures of a rig's cameras in a folder; cameras says which names to expect, if they are known.
 
+    Names that tell one series only, of pictures as wide as two, are taken for both views side by side.
+
     Raises CalibrationError if the names do not tell cameras and positions apart.
     """
     files = _pictures(folder)
@@ -112,12 +116,20 @@ def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
         found = _split(group, cameras)
         if found and (best is None or _worth(found) > _worth(best)):
             best = found
+    if best is None and _is_wide(files[0]):
+        return side_by_side(folder, cameras or ["left", "right"])
     if best is None:
         expected = f" of {' and '.join(cameras)}" if cameras else ""
         some = ", ".join(str(path.relative_to(folder)) for path in files[:4])
         raise CalibrationError(f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); {_EXAMPLES}")
     used = {path for pictures in best.files.values() for path in pictures.values()}
     return PictureSet(_in_step(best.files), tuple(path for path in files if path not in used))
+
+
+def _is_wide(path: Path) -> bool:
+    """Whether a picture is as wide as two; no if it cannot be read."""
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    return image is not None and image.shape[1] >= _WIDE * image.shape[0]
 
 
 def split_side_by_side(image: np.ndarray, count: int) -> list[np.ndarray]:
@@ -192,6 +204,9 @@ def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str
         files[parts[place]][key] = path
     named = {_camera_name(group, place, value): pictures for value, pictures in files.items() if cameras is None or value in cameras}
     if len(named) < 2 or not all(_NAME.match(name) for name in named):
+        return None
+    # One picture of each is a series of one camera, or pictures side by side, whose numbers are positions.
+    if len(group) > 2 and all(len(pictures) == 1 for pictures in named.values()):
         return None
     order = cameras or sorted(named, key=lambda name: (_side(name), natural(name)))
     return _Reading({name: named[name] for name in order}, all(value.isdigit() for value in files))

@@ -12,6 +12,7 @@ from services.calibrator.lens import LensResult
 from services.calibrator.model import FX, FY, K1
 from services.calibrator.stereo import RigResult
 from services.calibrator.views import LeftOut
+from services.calibrator.wand import Refined
 
 
 def lens_text(result: LensResult, board: Board) -> str:
@@ -64,6 +65,30 @@ def rig_text(result: RigResult) -> str:
         )
         lines.append(f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.hurts)}")
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
+
+
+def refined_text(result: Refined) -> str:
+    """The report of `rhot calibrate refine`."""
+    lines = [
+        f"rig of {', '.join(result.cameras)}, {result.points} marker points in {result.seconds:.0f} s",
+        f"  held-out epipolar    {result.epipolar_px:.3f} px, before {result.epipolar_before_px:.3f} px",
+    ]
+    if result.wand_mm is not None:
+        lines.append(f"  held-out wand        {result.wand_mm[1]:.2f} mm off, before {result.wand_mm[0]:.2f} mm")
+    else:
+        lines.append("  scale                kept: the distance of the first two cameras is taken as it was (a wand would measure it)")
+    for name, moved in result.moved.items():
+        turned, shifted = (
+            _three(*pair) for pair in ((moved.turned_deg, moved.turned_sigma_deg), (moved.shifted_mm, moved.shifted_sigma_mm))
+        )
+        lines.append(
+            f"  camera {name}: turned about its x, y, z by {turned} deg, shifted by {shifted} mm; stamps late by {moved.late_ms:.2f} ms"
+        )
+    return "\n".join(lines)
+
+
+def _three(values: Array, sigmas: Array) -> str:
+    return ", ".join(f"{value:.2f} +- {sigma:.2f}" for value, sigma in zip(values, sigmas, strict=True))
 
 
 def _lens(lens: Array, sigma: Array) -> str:

@@ -8,10 +8,11 @@ from services.cli.calibrate_depth import depth
 from services.cli.calibrate_eye import camera, colors
 from services.cli.calibrate_hand import hand
 from services.cli.calibrate_lens import lens
+from services.cli.calibrate_refine import refine
 from services.cli.calibrate_stereo import stereo
 from services.cli.calibrate_world import world
 
-COMMANDS = (camera, colors, lens, stereo, world, depth, hand)
+COMMANDS = (camera, colors, lens, stereo, refine, world, depth, hand)
 
 calibrate = typer.Typer(
     name="calibrate",

@@ -70,7 +70,10 @@ def _pictures(folder: Path, names: list[str] | None, side_by_side: bool) -> Pict
 
     if side_by_side:
         return pictures.side_by_side(folder, names or ["left", "right"])
-    return pictures.find_pictures(folder, names)
+    found = pictures.find_pictures(folder, names)
+    if found.side_by_side:
+        typer.echo(f"note: each picture is taken for the views of {' and '.join(found.cameras)} side by side (--side-by-side)", err=True)
+    return found
 
 
 def _write(result: RigResult, target: Path, folder: Path, as_json: bool) -> None:

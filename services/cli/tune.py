@@ -7,7 +7,6 @@ RECORDING is the folder that `rhot track` wrote, its points.jsonl, or an MCAP fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,9 +14,8 @@ import msgspec
 import typer
 
 from rhot import topics
-from rhot.capture import read_lines
-from rhot.errors import CaptureError
 from rhot.messages import HandPoints
+from services.cli.recordings import messages
 
 if TYPE_CHECKING:
     from services.fusion.tuning import Proposal
@@ -47,28 +45,8 @@ def tune_filter(
     # Not above: numba and scipy take longer to import than other commands take to run.
     from services.fusion import tuning
 
-    proposal = tuning.propose(tuning.tracks(points_of(recording)), jitter)
+    proposal = tuning.propose(tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter)
     typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
-
-
-def points_of(recording: Path) -> Iterator[HandPoints]:
-    """All HandPoints of a recording, in order.
-
-    Raises CaptureError if it is none, or is damaged.
-    """
-    path = recording / "points.jsonl" if recording.is_dir() else recording
-    if path.suffix != ".mcap":
-        yield from read_lines(path, HandPoints)
-        return
-    from services.recorder.reader import read
-
-    for record in read(path):
-        if topics.find(record.key) is not topics.POINTS:
-            continue
-        try:
-            yield msgspec.json.decode(record.payload, type=HandPoints)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None
 
 
 def _text(proposal: Proposal) -> str:

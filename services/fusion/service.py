@@ -85,6 +85,7 @@ class _Report:
         self._busy_s: list[float] = []
         self._said: set[str] = set()
         self._moved: set[tuple[str, str]] = set()
+        self._mirrored: set[tuple[str, str]] = set()
 
     def note(self, busy_s: float) -> None:
         """One frame took that long."""
@@ -104,6 +105,7 @@ class _Report:
         values["step_p50_us"] = 1e6 * sorted(self._busy_s)[len(self._busy_s) // 2]
         values["epipolar_px"] = step.clocks.epipolar_px
         self._tell_moved()
+        self._tell_mirrored()
         values |= {f"late_{name}_ms": 1e3 * late_s for name, late_s in step.clocks.late_s.items()}
         values |= {f"height_{pair}_px": height_px for pair, height_px in step.clocks.heights_px.items()}
         values |= {name: float(getattr(counts, name)) for name in ("gated", "late", "refused", "started", "dropped", "incoherent")}
@@ -121,3 +123,13 @@ class _Report:
             )
         self._moved = set(moved)
         self._service.values["moved_pairs"] = float(len(moved))
+
+    def _tell_mirrored(self) -> None:
+        mirrored = self._step.mirrors.mirrored
+        for pair in mirrored.keys() - self._mirrored:
+            self._service.error(
+                f"the views of cameras {pair[0]} and {pair[1]} are mirror images of each other, {mirrored[pair]}: one of them has hflip or "
+                f"vflip set, or lost it, since the calibration; set both as they were then"
+            )
+        self._mirrored = set(mirrored)
+        self._service.values["mirrored_pairs"] = float(len(mirrored))

@@ -24,6 +24,7 @@ from services.fusion.clocks import ClockTuner
 from services.fusion.coherence import coherent, reach_m
 from services.fusion.kalman import KalmanMethod
 from services.fusion.method import Estimates, Method
+from services.fusion.mirror import MirrorWatch
 from services.fusion.observations import Observer, Refusal
 from services.fusion.pace import Pace
 from services.fusion.paired import PairedMethod
@@ -62,6 +63,7 @@ class FusionStep:
         kind = KalmanMethod if config.fusion.method == "kalman" else PairedMethod
         self.method: Method = kind(len(self._slots), all_cameras, 1.0 / self._fps, config.fusion)
         self.clocks = ClockTuner(all_cameras, len(self._slots), 1.0 / self._fps, enabled=config.fusion.tune_clocks)
+        self.mirrors = MirrorWatch(all_cameras)
         self._wait = max(config.fusion.lag_frames, self.method.frames_after)
         self._timeline = Timeline(len(all_cameras))
         self._pace = Pace(self._fps, self._wait)
@@ -81,6 +83,7 @@ class FusionStep:
             return []
         if verdict is Verdict.RESTART:
             self._restart(view.instant_ns)
+        self.mirrors.observe(view)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s
         late_s, clock_sigma_s = self.clocks.observe(view, times_s)
         self.method.observe(dataclasses.replace(view, sigma=self._bias.note(view)), times_s - late_s, clock_sigma_s)

@@ -34,8 +34,11 @@ from services.fusion.triangulation import extrinsics
 
 # What is left along the viewing ray and along each axis across it, in radii of the paint, from the figures above.
 SIGMA_UNKNOWN = (0.29, 0.16)
-# With the solver's directions (3-5 deg off): .1-.2 mm of model error on rendered tips, the rest for tips that are partly hidden.
-SIGMA_KNOWN = (0.06, 0.04)
+# With the solver's directions (7 deg off), along and across: SIDE of a finger seen from the side, and END times a power of the cosine
+# between finger and viewing ray beside it. Errors of rendered tips at .5-.7 m, all causes: .4-.6 and .13 mm from the side, .7 and .25 at a
+# cosine of -.6, 1.4-2.2 and .4-.5 pointing at the cameras, where the visible end depends on the direction most. Speed makes no difference.
+SIGMA_SIDE = (0.02, 0.012)
+SIGMA_END, _END_POWER = (0.25, 0.10), (4, 2)
 # Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.3 mm deep, of which their sag explains .76.
 SIGMA_DAB = 0.025
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
@@ -105,7 +108,8 @@ class Surface:
             by = seen_by[row] if np.count_nonzero(seen_by[row]) >= 2 else np.ones_like(seen_by[row])
             if located_shift(self._tables[row], positions_m[row], self._directions[row], self._R[by], self._t[by], shift):
                 positions[row] -= shift
-                sigmas[row] = SIGMA_KNOWN
+                cosine = float(away[row] @ self._directions[row])
+                sigmas[row] = [np.hypot(a, b * cosine**n) for a, b, n in zip(SIGMA_SIDE, SIGMA_END, _END_POWER, strict=True)]
         along = away[:, :, None] * away[:, None, :]  # (S, 3, 3)
         variances = (sigmas * self._radii_m[:, None]) ** 2 + (SIGMA_DAB * self._dabs_m[:, None]) ** 2  # (S, 2)
         blur = variances[:, 0, None, None] * along + variances[:, 1, None, None] * (np.eye(3) - along)

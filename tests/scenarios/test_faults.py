@@ -128,6 +128,7 @@ def test_scenario(scenario, tell):
             assert told.share(BEGIN_S, BEGIN_S + 0.5) > 0.9
     if plan.expected.during is not During.FEW:
         assert told.lies() < 0.005
+    assert not step.mirrors.mirrored
     if plan.expected.refusal:
         assert step.refusals[plan.expected.refusal] > 20
 

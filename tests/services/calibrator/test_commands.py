@@ -11,11 +11,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rhot.calibration import load_cameras, load_lens
+from rhot.calibration import CameraPlace, Lens, RigGeometry, load_cameras, load_lens, save
+from rhot.capture import write_lines
 from rhot.errors import CalibrationError
 from rhot.transforms import rotation_x, transform
 from services.cli.calibrate import calibrate
 from services.cli.print_board import board
+from services.fusion.synthetic import Path, Setup, frames
 
 RIG_TOML = '[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
 
@@ -137,3 +139,35 @@ def test_board_writes_a_pdf_and_says_how_to_use_it(tmp_path):
     result = CliRunner().invoke(app, ["--kind", "charuco", "--cols", "7", "--rows", "5", "--square-mm", "30", "--out", str(path)])
     assert path.read_bytes().startswith(b"%PDF")
     assert "--board 7x5 --square 0.03 --kind charuco" in result.stdout
+
+
+def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
+    """The right camera stands half a degree and 2 mm off its rig.json; the report says so, and services read the new file."""
+    setup = Setup(sigma_px=0.15)
+    true = setup.rig()
+    (tmp_path / "rig.toml").write_text(RIG_TOML)
+    turn = transform(rotation_x(np.radians(0.5)), (0.0, 0.002, 0.0))
+    places = {}
+    for name, camera in true.items():
+        rows = tuple(tuple(row) for row in camera.matrix.tolist())
+        save(
+            tmp_path / "calibration" / f"{name}.lens.json",
+            Lens(size_px=camera.size_px, matrix=rows, distortion=tuple(camera.distortion.tolist())),
+        )
+        T = camera.T_rig_from_camera @ turn if name == "right" else camera.T_rig_from_camera
+        places[name] = CameraPlace(T_rig_from_camera=tuple(tuple(row) for row in T.tolist()))
+    save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
+    write_lines(tmp_path / "markers.jsonl", frames(setup, Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6)), 8.0))
+    result = run("refine", tmp_path, "--config", tmp_path / "rig.toml")
+    assert result.exit_code == 0
+    assert "held-out epipolar" in result.stdout
+    assert "camera right: turned about its x, y, z by -0.50" in result.stdout
+    found = load_cameras(tmp_path / "calibration", ["left", "right"])["right"].T_rig_from_camera
+    np.testing.assert_allclose(found[:3, :3], true["right"].T_rig_from_camera[:3, :3], atol=1e-3)
+    assert json.loads((tmp_path / "calibration" / "rig.json").read_text())["residuals"]["epipolar_before_px"] > 3.0
+
+
+def test_refine_explains_a_wand_it_does_not_understand(run, tmp_path):
+    (tmp_path / "rig.toml").write_text(RIG_TOML)
+    with pytest.raises(CalibrationError, match="write two colours"):
+        run("refine", tmp_path, "--config", tmp_path / "rig.toml", "--wand", "blue-green")

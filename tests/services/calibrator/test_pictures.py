@@ -111,6 +111,23 @@ def test_pictures_side_by_side_are_cut(tmp_path):
         side_by_side(tmp_path, ["left"])
 
 
+def test_pictures_as_wide_as_two_need_no_option(tmp_path):
+    for n in range(1, 4):
+        cv2.imwrite(str(tmp_path / f"scene_1280x480_{n}.png"), np.full((48, 128), n, dtype=np.uint8))
+    pictures = find_pictures(tmp_path)
+    assert pictures.side_by_side
+    assert pictures.cameras == ["left", "right"]
+    assert len(pictures.positions()) == 3
+    assert pictures.read("right", pictures.positions()[0]).shape == (48, 64)
+
+
+def test_a_series_of_one_camera_is_no_rig(tmp_path):
+    for n in range(1, 6):
+        cv2.imwrite(str(tmp_path / f"left_{n}.png"), np.full((48, 64), n, dtype=np.uint8))
+    with pytest.raises(CalibrationError, match="cannot tell pictures apart"):
+        find_pictures(tmp_path)
+
+
 def test_a_file_that_is_no_picture_is_named(tmp_path):
     (tmp_path / "left1.png").write_text("not a picture")
     with pytest.raises(CalibrationError, match=r"left1\.png: is not a picture"):

@@ -13,7 +13,8 @@ from rhot import topics
 from rhot.capture import write_lines
 from rhot.errors import CaptureError
 from rhot.messages import HandPoint, HandPoints
-from services.cli.tune import points_of, tune
+from services.cli import recordings
+from services.cli.tune import tune
 from services.fusion.synthetic import START_NS, Path
 from services.recorder.writer import RecordingWriter
 
@@ -58,10 +59,10 @@ def test_reads_recordings(tmp_path):
         for message in given:
             writer.add(topics.POINTS, topics.POINTS.key("desk", hand="right"), msgspec.json.encode(message), message.stamp_ns)
             writer.add(topics.SESSION, topics.SESSION.key("desk"), b"{}", message.stamp_ns)
-    assert list(points_of(path)) == given
+    assert list(recordings.messages(path, topics.POINTS, HandPoints, "points")) == given
 
 
 @pytest.mark.parametrize("name", ["nothing.jsonl", "nothing.mcap"])
 def test_a_missing_recording_is_an_error(tmp_path, name):
     with pytest.raises(CaptureError, match="cannot be read"):
-        list(points_of(tmp_path / name))
+        list(recordings.messages(tmp_path / name, topics.POINTS, HandPoints, "points"))
