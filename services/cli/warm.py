@@ -1,6 +1,7 @@
 """`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast as all later ones.
 
-Part of `make install`. Kernels are cached beside their source, or in $NUMBA_CACHE_DIR; running it again costs a second.
+Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or ~/.cache/rhot (rhot.kernels); running it again
+costs a second.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from typing import Annotated
 
 import typer
 
+import services
 from rhot.calibration import load_hand, load_rig_cameras
 from rhot.config import load_rig
+from rhot.kernels import clear_old
 from services.cli.defaults import sim_toml
 
 
@@ -36,4 +39,5 @@ def warm(
         scene = load_scene(rig)
         for name in names:
             FrameSource(scene, name).take(0)
+    clear_old(Path(services.__file__).parent)
     typer.echo(f"kernels compiled in {time.monotonic() - started_s:.1f} s")

@@ -1,0 +1,8 @@
+"""Fusion: markers of all cameras and instants become 3D points."""
+
+from pathlib import Path
+
+from rhot.kernels import use_cache
+
+# Before any module of this package imports numba.
+use_cache(Path(__file__).parents[1])

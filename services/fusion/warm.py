@@ -1,6 +1,6 @@
 """Compiles (or loads from numba's cache) everything fusion calls, before the first frame is there.
 
-With a cache (NUMBA_CACHE_DIR, or __pycache__ beside the modules) this takes .3 s, without one 12 s;
+With a cache (rhot.kernels) this takes .3 s, without one 12 s;
 a service that did it at its first frame would stand still for that long.
 """
 

@@ -1,0 +1,8 @@
+"""Simulator: a rig of virtual cameras with its truth."""
+
+from pathlib import Path
+
+from rhot.kernels import use_cache
+
+# Before any module of this package imports numba.
+use_cache(Path(__file__).parents[1])

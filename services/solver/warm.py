@@ -1,6 +1,6 @@
 """Run every kernel once, so that compiling is over before the first message counts.
 
-With a warm numba cache (NUMBA_CACHE_DIR, or __pycache__ beside the modules) this takes under a second, without one about a minute
+With a warm numba cache (rhot.kernels) this takes under a second, without one about a minute
 on a small machine. Needs no input.
 """
 
