@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 from typer.testing import CliRunner
 
+from rhot import topics
+from rhot.config import RigConfig
 from rhot.errors import CalibrationError, CaptureError
 from rhot.guided import EXERCISES
+from rhot.messages import HandPoints
 from services.cli.calibrate import calibrate
 from services.cli.calibrate_hand import lengths_of, recorded
+from services.recorder.recorder import Recorder
 
 
 def test_the_exercises_are_listed() -> None:
@@ -36,3 +41,14 @@ def test_what_is_no_recording(tmp_path: Path) -> None:
     assert isinstance(result.exception, CalibrationError)
     assert "no points of a right hand" in str(result.exception)
     assert not list(tmp_path.glob("hand.*"))
+
+
+def test_a_recording_of_the_rig(tmp_path: Path) -> None:
+    points = HandPoints(hand="right", seq=1, stamp_ns=10**18, points=[])
+    recorder = Recorder(RigConfig(), tmp_path)
+    path = recorder.start(10**18)
+    for hand in ("right", "left"):
+        message = msgspec.structs.replace(points, hand=hand)
+        recorder.add(topics.POINTS, topics.POINTS.key("sim", hand=hand), msgspec.json.encode(message), 10**18)
+    recorder.stop()
+    assert recorded(path, "right", None) == [points]
