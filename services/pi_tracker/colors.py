@@ -39,25 +39,9 @@ class ColorTable:
     def __init__(self, names: tuple[str, ...], layers: tuple[npt.NDArray[np.uint32], ...]) -> None:
         self.names = names
         self.layers = layers
-        parts = [layer.view(np.uint8).reshape(-1, 4) for layer in layers]
-        self._classes = [np.ascontiguousarray(part[:, 0]) for part in parts]
-        # No class, no luma: low above high.
-        bounds = [np.where(part[:, :1] > 0, part[:, 1:3], np.array([[255, 0]], np.uint8)) for part in parts]
-        self._bounds = [_lookup(np.ascontiguousarray(pairs).view(np.uint16).ravel()) for pairs in bounds]
         # OpenCV looks up signed integers only.
         self._packed = [_lookup(layer.view(np.int32)) for layer in layers]
         self._buffer = np.empty((4, 0), np.uint8)
-
-    def mask(self, luma: Image, chroma: Image) -> Image:
-        """255 where any colour is; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
-        low, high, mask, more = self._planes(luma)
-        index = chroma.view(np.uint16)[:, :, 0]
-        for number, bounds in enumerate(self._bounds):
-            cv2.split(bounds(index).view(np.uint8).reshape(*luma.shape, 2), (low, high))
-            cv2.inRange(luma, low, high, more if number else mask)
-            if number:
-                cv2.bitwise_or(mask, more, mask)
-        return mask
 
     def classify(self, luma: Image, chroma: Image) -> Image:
         """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
@@ -78,12 +62,6 @@ class ColorTable:
             labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
         return labels, seen
 
-    def classes_at(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell that the mask shows, of others any; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
-        if len(self.layers) == 1:
-            return self._classes[0].take(chroma.view(np.uint16)[:, :, 0])
-        return self.classify(np.ascontiguousarray(luma), chroma)
-
     def _planes(self, luma: Image) -> list[Image]:
         """Four images to work in: fresh memory would cost four times what splitting into it costs."""
         if self._buffer.shape[1] < luma.size:
@@ -91,8 +69,8 @@ class ColorTable:
         return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
 
 
-def _lookup(table: npt.NDArray[np.uint16] | npt.NDArray[np.int32]) -> Callable[[Image], Image]:
-    """A table (65536,) of uint16 or int32 to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
+def _lookup(table: npt.NDArray[np.int32]) -> Callable[[Image], Image]:
+    """A table (65536,) to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
     try:
         cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
     except cv2.error:

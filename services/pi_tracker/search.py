@@ -22,8 +22,6 @@ from services.pi_tracker.planes import Picture, Rect
 _MAX_CONTOURS = 64
 # What is left of a marker among others after a cell of its width is taken away, at least; of a seam next to nothing is.
 _SEAM_CELLS, _SEAM_SHARE = 3, 0.25
-# In rectangles of up to so many cells all classes are looked up at once; in a whole image those of each blob cost less.
-_AT_ONCE_CELLS = 20_000
 
 
 class Blob(NamedTuple):
@@ -54,11 +52,7 @@ class Searcher:
     def blobs(self, picture: Picture, rect: Rect) -> list[Blob]:
         """All blobs of at least min_area_px, in no order."""
         luma, chroma = picture.cells(rect)
-        labels = None
-        if luma.size <= _AT_ONCE_CELLS:
-            labels, mask = self._table.classes_and_mask(luma, chroma)
-        else:
-            mask = self._table.mask(luma, chroma)
+        labels, mask = self._table.classes_and_mask(luma, chroma)
         mask = self._filtered(mask)
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         if len(contours) > _MAX_CONTOURS:
@@ -70,7 +64,7 @@ class Searcher:
             if w * h < self._min_cells:
                 continue
             part = (slice(y, y + h), slice(x, x + w))
-            inside = self._table.classes_at(luma[part], chroma[part]) & mask[part] if labels is None else labels[part]
+            inside = labels[part]
             # Counting in bytes is five times faster than numpy's bincount on as few.
             inner = inside.tobytes()
             k = inner[h // 2 * w + w // 2] or max(inner)

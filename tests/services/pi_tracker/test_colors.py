@@ -53,22 +53,20 @@ def test_the_mask_is_where_a_class_is(gamut):
     }
     for names in (["c"], ["a", "b", "c"]):
         table = compile_colors(Colors(colors=ranges), names)
-        classes = table.classify(luma, chroma).copy()
-        mask = table.mask(luma, chroma).copy()
+        classes, mask = table.classes_and_mask(luma, chroma)
         assert np.array_equal(mask > 0, classes > 0)
-        assert np.array_equal(table.classes_at(luma, chroma)[mask > 0], classes[mask > 0])
 
 
 def test_numpy_looks_up_what_opencv_does(gamut, monkeypatch):
     luma, chroma, _, _ = gamut
     colors = Colors(colors={"a": span((100, 100, 60), (130, 255, 255))})
-    expected = compile_colors(colors, ["a"]).mask(luma, chroma).copy()
+    expected = compile_colors(colors, ["a"]).classify(luma, chroma).copy()
 
     def refuse(*_):
         raise cv2.error("an OpenCV before 5 takes bytes only")
 
     monkeypatch.setattr(cv2, "LUT", refuse)
-    assert np.array_equal(compile_colors(colors, ["a"]).mask(luma, chroma), expected)
+    assert np.array_equal(compile_colors(colors, ["a"]).classify(luma, chroma), expected)
 
 
 def test_a_range_that_is_empty_in_itself_finds_nothing(gamut):
