@@ -94,10 +94,18 @@ def detect(config: RigConfig, scene: Scene, seconds: float) -> list[MarkerFrame]
 class Pictures:
     """One motion at one distance, rendered and detected for every seed; each method then runs on the same markers."""
 
-    def __init__(self, config: RigConfig, motion: str, distance_m: float, travel_m: tuple[float, float, float], seconds: float) -> None:
+    def __init__(
+        self,
+        config: RigConfig,
+        motion: str,
+        distance_m: float,
+        travel_m: tuple[float, float, float],
+        seconds: float,
+        seeds: tuple[int, ...] = RENDERED_SEEDS,
+    ) -> None:
         self._config = config
         self.distance_m = distance_m
-        self._scenes = [make_scene(config, motion, distance_m, travel_m, seed) for seed in RENDERED_SEEDS]
+        self._scenes = [make_scene(config, motion, distance_m, travel_m, seed) for seed in seeds]
         self._given = [detect(config, scene, seconds) for scene in self._scenes]
         self._hands: dict[HandName, Any] = {
             hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()
