@@ -106,16 +106,15 @@ async def test_garbage_is_rejected_counted_and_passed_over(pair):
         msgspec.json.encode(points(1, hand="left")),  # another hand's message on this key
         b" " * (topics.POINTS.max_bytes + 1),
     ]
-    for payload in garbage:
-        sender.put_raw(key, payload)
-    publisher.put(points(7))
-    assert [message.seq for message in await take(subscription, 1)] == [7]
-    # Poses travel at a higher priority and may have overtaken: a second message flushes what came before it is read.
     async with asyncio.timeout(DEADLINE_S):
-        while subscription.stats.rejected < len(garbage):
-            publisher.put(points(8))
-            assert (await take(subscription, 1))[0].seq == 8
-    assert subscription.stats.rejected == len(garbage)
+        for payload in garbage:
+            rejected = subscription.stats.rejected
+            # Zenoh may drop on a busy machine, and poses, at a higher priority, overtake: sent again until it is counted.
+            while subscription.stats.rejected == rejected:
+                sender.put_raw(key, payload)
+                publisher.put(points(8))
+                assert (await take(subscription, 1))[0].seq == 8
+    assert subscription.stats.rejected >= len(garbage)
 
 
 async def test_what_is_not_finite_is_not_sent(pair):
