@@ -1,7 +1,7 @@
 """What one more painted knuckle brings, and which gestures wrist and tips cannot tell: `python benchmarks/solver_markers.py [--json FILE]`.
 
 Simulated hands with 1 mm of noise on every marker; mean errors in degrees: flexion of the fingers, orientation, thumb, abduction.
-Gestures are formed from the open hand and left again by a hand at rest; none of the solver's constants was chosen on them.
+Gestures are formed from the open hand and left again by a hand at rest; hardly any of the solver's constants was tuned on them.
 """
 
 from __future__ import annotations
