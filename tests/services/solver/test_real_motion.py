@@ -152,14 +152,15 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
     """Tips within 0.1 mm wherever the joints allow it, and no jump of its own.
 
     The recording has no wrist, so the palm's centre stands in for it: 3 to 4 cm from the knuckles instead of 9, and the knuckles move
-    by millimetres about it, which costs orientation (14 deg on average) and, for 1 tip in 40, up to 0.9 mm at a joint's limit.
+    by millimetres about it, which costs orientation (14 deg on average) and, for 1 tip in 50, up to 0.22 mm at a joint's limit.
     """
     model = _leap_hand(fist)
     step, found, gaps, turns = SolverStep(RigConfig(), {"right": model}), [], [], []
     for frame, joints in enumerate(fist.joints_m):
         places = {"wrist": fist.palm_m[frame], **{f"{d}_tip": joints[row, 3] for row, d in enumerate(DIGITS)}}
+        # The stand-in moves by millimetres in the hand; the sensor's tips are exact by definition.
         points = [
-            HandPoint(name=name, position_m=tuple(p.tolist()), sigma_m=(3e-4,) * 3, cameras=[], source="measured")
+            HandPoint(name=name, position_m=tuple(p.tolist()), sigma_m=(1e-3 if name == "wrist" else 3e-4,) * 3, cameras=[], source="measured")
             for name, p in places.items()
         ]
         pose = step.step(HandPoints(hand="right", seq=frame, stamp_ns=fist.stamps_ns[frame], points=points))
@@ -169,8 +170,8 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
         turns.append(np.arccos(np.clip(0.5 * (np.trace(R.T @ fist.axes[frame]) - 1.0), -1.0, 1.0)))
     own = np.stack([_own_angles(fist, row, _base(fist, row)) for row in range(1, 5)], axis=1)
     off = _compare("dls, whole hand", np.array(found)[:, 1:], own, np.array(gaps))
-    assert np.mean(np.array(gaps) <= 1e-4) > 0.97
-    assert np.max(gaps) < 1e-3
+    assert np.mean(np.array(gaps) <= 1e-4) > 0.975
+    assert np.max(gaps) < 3e-4
     assert np.rad2deg(np.mean(turns)) < 18.0
     assert off.mean() < 9.0
 
