@@ -160,7 +160,9 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
         places = {"wrist": fist.palm_m[frame], **{f"{d}_tip": joints[row, 3] for row, d in enumerate(DIGITS)}}
         # The stand-in moves by millimetres in the hand; the sensor's tips are exact by definition.
         points = [
-            HandPoint(name=name, position_m=tuple(p.tolist()), sigma_m=(1e-3 if name == "wrist" else 3e-4,) * 3, cameras=[], source="measured")
+            HandPoint(
+                name=name, position_m=tuple(p.tolist()), sigma_m=(1e-3 if name == "wrist" else 3e-4,) * 3, cameras=[], source="measured"
+            )
             for name, p in places.items()
         ]
         pose = step.step(HandPoints(hand="right", seq=frame, stamp_ns=fist.stamps_ns[frame], points=points))
