@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 # Sources that are real cameras, which want a fixed exposure.
 _REAL = ("picamera2", "v4l2")
-# Depth error grows as 1 / baseline: at 20 mm and 0.6 m, 34 mm per pixel, which no filter mends (FACTS: 9.1 mm at 75 mm).
+# Depth error grows as 1 / baseline: at 20 mm and 0.6 m, 34 mm per pixel, which no filter mends (9.1 mm at 75 mm).
 _MIN_BASELINE_M = 0.020
 
 

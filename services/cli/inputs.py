@@ -21,7 +21,7 @@ from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.video import VideoReader
 
-# Stamps in a csv are on one clock, to what synchronised clocks of a rig keep (FACTS); separate videos share none.
+# Stamps in a csv are on one clock, to what synchronised clocks of a rig keep; separate videos share none.
 _CSV_SIGMA_NS, _UNKNOWN_SIGMA_NS = 500_000, -1
 
 

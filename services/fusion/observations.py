@@ -23,7 +23,7 @@ from rhot.messages import Marker, MarkerFrame
 from rhot.transforms import Array
 from services.fusion import lens
 
-# No blob's centre is known better than this (FACTS: .036 px is the best method's noise in the best picture) nor useful beyond 20 px.
+# No blob's centre is known better than this (measured: .036 px is the best method's noise in the best picture) nor useful beyond 20 px.
 SIGMA_MIN_PX, SIGMA_MAX_PX = 0.03, 20.0
 # A clock off by more than this is as good as unknown; while it is unknown (-1) the estimate must not trust motion either.
 CLOCK_SIGMA_MAX_S = 0.02

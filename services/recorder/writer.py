@@ -21,7 +21,7 @@ from services.recorder.schemas import SCHEMA_ENCODING, json_schema, schema_name
 
 # How readers know one of ours.
 PROFILE = "rhot"
-# Measured (FACTS, "Edges"): loses at most 0.8 s at 200 messages/s, and still compresses to 2 MB/min.
+# Measured: loses at most 0.8 s at 200 messages/s, and still compresses to 2 MB/min.
 CHUNK_BYTES = 65_536
 # A rig has some dozen keys; MCAP has room for 65,535. Names come from the network.
 MAX_CHANNELS = 4096

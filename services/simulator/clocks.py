@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647 (18.9 and 33.7 us, FACTS).
+# The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647 (18.9 and 33.7 us).
 _READOUT_S = 14.4e-3
 # A sensor needs part of each period for blanking.
 _MAX_READOUT = 0.85

@@ -30,7 +30,7 @@ _ACROSS_M, _THUMB_BASE_M = 0.0007, 0.002
 # show it, and a finger whose roll is wrong by 6 deg doubles the solver's error, so that guessing is worse than the table.
 _TURN_SD, _THUMB_TURN_SD = np.deg2rad([1.5, 1.0]), np.deg2rad([3.0, 3.0])
 # Where a dab of paint is put; the wrist's is part of the convention above. A dipped tip is painted all round:
-# its middle is on the bone's axis (first two coordinates) but for cameras' views, FACTS "0.3 radii" in the worst case.
+# its middle is on the bone's axis (first two coordinates) but for cameras' views, 0.3 radii in the worst case.
 _WRIST_PAINT_M, _PAINT_M, _TIP_PAINT_M = (0.001, 0.001, 0.001), (0.002, 0.002, 0.002), (0.0005, 0.0005, 0.002)
 # DIP/PIP of real hands: .68-.74 in strong flexion, less when relaxed (finger study, Fig. 7).
 _COUPLING_SD = 0.05
