@@ -36,6 +36,8 @@ __all__ = ["Alive", "Bus", "Publisher", "Sample", "Subscription", "client_config
 
 # Between attempts to reach a router that is not there yet: short, so that services are up as soon as it is.
 _RETRY_S = 0.25
+# A router that starts together with its clients takes a second or two, which is no news; one that is late is.
+_SILENT_ATTEMPTS = 10
 # A session that does not close in this time belongs to a wedged link; the process goes on without it.
 _CLOSE_S = 3.0
 
@@ -59,14 +61,14 @@ async def open_bus(rig: str, connect: Sequence[str]) -> AsyncIterator[Bus]:
 
 async def _connect(connect: Sequence[str]) -> zenoh.Session:
     config = client_config(connect)
-    said = False
+    attempts = 0
     while True:
         try:
             return await asyncio.to_thread(zenoh.open, config)
         except zenoh.ZError as error:
-            if not said:
+            attempts += 1
+            if attempts == _SILENT_ATTEMPTS:
                 log.warning("no router at %s yet, waiting for it: %s", ", ".join(connect), str(error).split(" at /")[0])
-                said = True
             await asyncio.sleep(_RETRY_S)
 
 
