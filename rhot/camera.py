@@ -62,7 +62,7 @@ class Camera:
     def pixels_from_rays(self, rays: npt.ArrayLike) -> Array:
         """Distorted pixels (n, 2) of normalised image points (x/z, y/z) (n, 2)."""
         xy = np.asarray(rays, dtype=np.float64).reshape(-1, 2)
-        distorted = _distort(xy, self.distortion)
+        distorted = distort(xy, self.distortion)
         m = self.matrix
         return np.stack(
             [m[0, 0] * distorted[:, 0] + m[0, 1] * distorted[:, 1] + m[0, 2], m[1, 1] * distorted[:, 1] + m[1, 2]],
@@ -88,24 +88,24 @@ def undistort(target: Array, distortion: Array) -> Array:
     xy = target.copy()
     # Damped steps at most: quadratic convergence needs 5 for |k1| = 0.4.
     for _ in range(30):
-        miss = target - _distort(xy, distortion)
+        miss = target - distort(xy, distortion)
         if not np.nanmax(np.abs(miss), initial=0.0) > 1e-13:
             break
-        (a, b), (c, d) = _distortion_derivatives(xy, distortion)
+        (a, b), (c, d) = distortion_derivatives(xy, distortion)
         determinant = a * d - b * c
         safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
         step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
         # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
         length = np.linalg.norm(step, axis=1, keepdims=True)
         xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))
-    off = np.abs(_distort(xy, distortion) - target).max(axis=1)
-    (a, b), (c, d) = _distortion_derivatives(xy, distortion)
+    off = np.abs(distort(xy, distortion) - target).max(axis=1)
+    (a, b), (c, d) = distortion_derivatives(xy, distortion)
     good = (off < 1e-9) & (a * d - b * c > 0.0)
     return np.where(good[:, None], xy, np.nan)
 
 
-def _distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """The 2x2 derivative (n,) each of the distorted by the undistorted image point, by rows."""
+def distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """The 2x2 derivative, (n,) each, of the distorted by the undistorted image point (n, 2), by rows; distortion as for `distort`."""
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y
@@ -118,8 +118,8 @@ def _distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, 
     )
 
 
-def _distort(xy: Array, distortion: Array) -> Array:
-    """Brown-Conrady distortion of normalised points; (n, 2) -> (n, 2)."""
+def distort(xy: Array, distortion: Array) -> Array:
+    """Brown-Conrady distortion of normalised points; (n, 2) -> (n, 2). distortion is (5,), or (5, n) for a lens of each point's own."""
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y

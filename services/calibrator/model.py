@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot.camera import Camera, undistort
+from rhot.camera import Camera, distort, distortion_derivatives, undistort
 from rhot.transforms import Array
 
 # Order of a lens vector.
@@ -30,7 +30,7 @@ def lens_vector(matrix: Array, distortion: Array) -> Array:
 def project(lens: Array, p_camera: Array) -> Array:
     """Pixels (n, 2) of points (n, 3) in the camera frame, of one lens (9,) or a lens for each point (n, 9)."""
     z = np.where(p_camera[:, 2] > 0.0, p_camera[:, 2], np.nan)
-    return _pixels(lens, _distort(lens, p_camera[:, 0] / z, p_camera[:, 1] / z))
+    return _pixels(lens, distort(p_camera[:, :2] / z[:, None], lens[..., K1:].T))
 
 
 def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array, Array]:
@@ -41,14 +41,15 @@ def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array
     z = np.where(p_camera[:, 2] > 0.0, p_camera[:, 2], np.nan)
     x, y = p_camera[:, 0] / z, p_camera[:, 1] / z
     fx, fy = lens[:, FX], lens[:, FY]
-    distorted = _distort(lens, x, y)
-    (a, b), (c, d) = _distortion_derivatives(lens, x, y)
+    xy = np.stack([x, y], axis=1)
+    distorted = distort(xy, lens[:, K1:].T)
+    (a, b), (c, d) = distortion_derivatives(xy, lens[:, K1:].T)
     by_point = np.empty((len(z), 2, 3))
     by_point[:, 0] = np.stack([fx * a, fx * b, -fx * (a * x + b * y)], axis=1) / z[:, None]
     by_point[:, 1] = np.stack([fy * c, fy * d, -fy * (c * x + d * y)], axis=1) / z[:, None]
     r2 = x * x + y * y
     by_lens = np.zeros((len(z), 2, LENS_SIZE))
-    by_lens[:, 0, FX], by_lens[:, 1, FY] = distorted
+    by_lens[:, 0, FX], by_lens[:, 1, FY] = distorted.T
     by_lens[:, 0, CX] = by_lens[:, 1, CY] = 1.0
     for power, name in ((r2, K1), (r2 * r2, K2), (r2 * r2 * r2, K3)):
         by_lens[:, 0, name], by_lens[:, 1, name] = fx * x * power, fy * y * power
@@ -62,29 +63,6 @@ def rays(lens: Array, pixels: Array) -> Array:
     return undistort((pixels - lens[[CX, CY]]) / lens[[FX, FY]], lens[K1:])
 
 
-def _pixels(lens: Array, distorted: tuple[Array, Array]) -> Array:
-    x, y = distorted
+def _pixels(lens: Array, distorted: Array) -> Array:
+    x, y = distorted.T
     return np.stack([lens[..., FX] * x + lens[..., CX], lens[..., FY] * y + lens[..., CY]], axis=1)
-
-
-def _distort(lens: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    k1, k2, p1, p2, k3 = (lens[..., name] for name in (K1, K2, P1, P2, K3))
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return (
-        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-    )
-
-
-def _distortion_derivatives(lens: Array, x: Array, y: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """The 2x2 derivative of the distorted by the undistorted image point, by rows."""
-    k1, k2, p1, p2, k3 = (lens[..., name] for name in (K1, K2, P1, P2, K3))
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
-    mixed = x * y * slope + 2.0 * (p1 * x + p2 * y)
-    return (
-        (radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, mixed),
-        (mixed, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
-    )
