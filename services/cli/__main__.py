@@ -24,6 +24,7 @@ from services.cli.live.warm import warm
 from services.cli.offline.simulate import simulate
 from services.cli.offline.track import track
 from services.cli.offline.tune import tune
+from services.cli.options import menu
 from services.cli.record.record import record
 from services.cli.record.replay import replay
 
@@ -38,14 +39,7 @@ def _version(wanted: bool) -> None:
 
 def application() -> typer.Typer:
     """The command with all its subcommands."""
-    app = typer.Typer(
-        name="rhot",
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,
-        help="Real-time hand and object tracking from low-cost parts.",
-    )
+    app = menu("rhot", "Real-time hand and object tracking from low-cost parts.")
 
     @app.callback()
     def options(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="print the version")) -> None:

@@ -17,10 +17,10 @@ from rhot.client import RigClient
 from rhot.config import RigConfig
 from rhot.errors import CalibrationError
 from services.cli.calibrate import options
+from services.cli.options import ConnectOption
 from services.cli.reach import reach, rig_and_endpoints
 
 Name = Annotated[str, typer.Argument(help="the camera's name in rig.toml")]
-Connect = Annotated[str | None, typer.Option("--connect", help="router endpoint, instead of rig.toml's")]
 # Ways of saying what is paint; all may be repeated.
 Boxes = Annotated[list[str] | None, typer.Option("--box", metavar="COLOR=X,Y,W,H", help="a marker in the pictures; repeatable")]
 Clicks = Annotated[list[str] | None, typer.Option("--click", metavar="COLOR=X,Y", help="the middle of a marker; repeatable")]
@@ -37,7 +37,7 @@ def camera(
     gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="analogue gain")] = None,
     red_gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of red")] = None,
     blue_gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of blue")] = None,
-    connect: Connect = None,
+    connect: ConnectOption = None,
 ) -> None:
     """Set exposure, gain and white balance of a running camera; without options, show and judge what is in force."""
     by_hand = ExposureControl(exposure_us=exposure_us or 0.0, gain=gain or 0.0, red_gain=red_gain or 0.0, blue_gain=blue_gain or 0.0)
@@ -83,7 +83,7 @@ def colors(
     out: options.OutOption = None,
     picture: Annotated[Path | None, typer.Option(help="write a picture of what was taken for paint")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="only report; put nothing in force, write no calibration")] = False,
-    connect: Connect = None,
+    connect: ConnectOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Fit colour ranges to painted markers: in the page (rhot-viewer), or by boxes, clicks or --auto here."""

@@ -26,6 +26,7 @@ from rhot.guided import CYCLE_S, EXERCISE_S, EXERCISES
 from rhot.hand import BASIC_LANDMARKS, DIGITS, HANDS, HandName, default_hand
 from rhot.messages import HandPoints
 from services.cli.calibrate import options
+from services.cli.options import ConnectOption
 from services.cli.reach import reach, rig_and_endpoints
 from services.cli.say import Teller
 
@@ -42,7 +43,7 @@ def hand(
     recording: Annotated[Path | None, typer.Option("--from", help="a capture, a result of rhot track, points.jsonl or .mcap")] = None,
     config: options.ConfigOption = None,
     out: options.OutOption = None,
-    connect: options.ConnectOption = None,
+    connect: ConnectOption = None,
     start: Annotated[float | None, typer.Option(min=0.0, help="with --from: second at which the exercises begin; default: found")] = None,
     length: Annotated[list[str] | None, typer.Option(metavar="DIGIT:BONE=MM", help="measured by hand; repeatable")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="only report, write nothing")] = False,

@@ -11,6 +11,7 @@ import typer
 
 from services.cli.calibrate import options
 from services.cli.calibrate.options import Kind
+from services.cli.options import ConnectOption, ProgressOption
 
 
 def lens(
@@ -24,9 +25,9 @@ def lens(
     out: options.OutOption = None,
     config: options.ConfigOption = None,
     live: options.LiveOption = False,
-    connect: options.ConnectOption = None,
+    connect: ConnectOption = None,
     count: options.CountOption = 15,
-    progress: options.ProgressOption = None,
+    progress: ProgressOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Find a camera's focal length, centre and distortion from pictures of a board."""

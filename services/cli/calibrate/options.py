@@ -38,9 +38,7 @@ DictionaryOption = Annotated[str, typer.Option("--dictionary", help="ChArUco: Op
 OutOption = Annotated[Path | None, typer.Option("--out", "-o", help="folder for the result; default: rig.toml's, or `calibration`")]
 ConfigOption = Annotated[Path | None, typer.Option("--config", help="rig.toml of the rig")]
 LiveOption = Annotated[bool, typer.Option("--live", help="take the pictures now, from the running cameras, into the folder")]
-ConnectOption = Annotated[str | None, typer.Option("--connect", help="router endpoint, instead of rig.toml's")]
 CountOption = Annotated[int, typer.Option("--count", min=5, max=200, help="with --live: how many positions of the board to collect")]
-ProgressOption = Annotated[bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 

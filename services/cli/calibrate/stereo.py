@@ -13,6 +13,7 @@ from rhot.calibration import load_lens, save
 from rhot.config import RigConfig
 from services.cli.calibrate import options
 from services.cli.calibrate.options import Kind
+from services.cli.options import ConnectOption, ProgressOption
 
 if TYPE_CHECKING:
     from services.calibrator.pictures import PictureSet
@@ -32,9 +33,9 @@ def stereo(
     out: options.OutOption = None,
     config: options.ConfigOption = None,
     live: options.LiveOption = False,
-    connect: options.ConnectOption = None,
+    connect: ConnectOption = None,
     count: options.CountOption = 15,
-    progress: options.ProgressOption = None,
+    progress: ProgressOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Find where the cameras stand to each other, and their lenses, from pictures of a board that all of them see."""

@@ -11,6 +11,7 @@ from rhot.calibration import load_cameras
 from rhot.errors import CalibrationError
 from services.cli.calibrate import options
 from services.cli.calibrate.options import Kind
+from services.cli.options import ConnectOption
 
 
 def world(
@@ -22,7 +23,7 @@ def world(
     marker: options.MarkerOption = 0.7,
     dictionary: options.DictionaryOption = "DICT_4X4_50",
     live: options.LiveOption = False,
-    connect: options.ConnectOption = None,
+    connect: ConnectOption = None,
 ) -> None:
     """Put the rig's frame on the desk (z up): prints [rig.world] for rig.toml."""
     from services.calibrator.pictures import PictureSet, picture_of

@@ -19,6 +19,7 @@ from services.cli.defaults import sim_toml
 from services.cli.live.figures import LiveFigures, Summary
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
+from services.cli.options import VerboseOption
 from services.cli.say import Teller
 
 # Without a pose by then something is wrong: numba's first compilation takes most of a minute on a slow machine.
@@ -30,7 +31,7 @@ def demo(
     seconds: Annotated[float | None, typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary")] = None,
     viewer: Annotated[bool, typer.Option(help="show the hand in a browser")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="show everything the services log")] = False,
+    verbose: VerboseOption = False,
 ) -> None:
     """Run the whole rig, simulated: a moving hand and an object, live in the browser."""
     path = config or sim_toml()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,6 +11,7 @@ import uvloop
 from rhot.client import RigClient
 from rhot.config import RigConfig
 from rhot.errors import BusError
+from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.reach import reach, rig_and_endpoints
 
 
@@ -25,8 +25,8 @@ class Action(StrEnum):
 
 def session(
     action: Annotated[Action, typer.Argument(help="start or stop all trackers, or show whether they run")] = Action.SHOW,
-    config: Annotated[Path | None, typer.Option(help="rig.toml of the rig; default: the simulated rig's")] = None,
-    connect: Annotated[str | None, typer.Option(help="router endpoint, instead of rig.toml's")] = None,
+    config: RunningRigOption = None,
+    connect: ConnectOption = None,
 ) -> None:
     """Start or stop tracking on every Pi, or show the session's state."""
     typer.echo(uvloop.run(_session(action, *rig_and_endpoints(config, connect))))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -16,6 +15,7 @@ from rhot.bus import Bus
 from rhot.config import RigConfig
 from rhot.lifecycle import cancelled_by, stop_on_signals
 from services.cli.live.board import Board, Watcher, expected_services, text
+from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.reach import reach, rig_and_endpoints
 
 # A beat comes once a second: after two, every living service has been heard.
@@ -23,8 +23,8 @@ _LISTEN_S = 2.2
 
 
 def top(
-    config: Annotated[Path | None, typer.Option(help="rig.toml of the rig; default: the simulated rig's")] = None,
-    connect: Annotated[str | None, typer.Option(help="router endpoint, instead of rig.toml's")] = None,
+    config: RunningRigOption = None,
+    connect: ConnectOption = None,
     once: Annotated[bool, typer.Option(help="print one table and end; exit code 1 if something is missing or slow")] = False,
     seconds: Annotated[float | None, typer.Option(min=1.0, help="end after so long")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object a table")] = False,

@@ -16,6 +16,7 @@ import uvloop
 from rhot.config import RigConfig, load_rig
 from rhot.lifecycle import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
+from services.cli.options import VerboseOption
 from services.cli.say import Teller
 
 
@@ -41,7 +42,7 @@ def children_of(config: RigConfig, path: Path, *, viewer: bool, endpoint: Sequen
 def up(
     config: Annotated[Path, typer.Argument(help="rig.toml of the rig")],
     viewer: Annotated[bool, typer.Option(help="show the rig in a browser")] = True,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="show everything the services log")] = False,
+    verbose: VerboseOption = False,
 ) -> None:
     """Run the master's services of a real rig until Ctrl-C."""
     uvloop.run(_up(load_rig(config), config, viewer, Teller(verbose=verbose)))

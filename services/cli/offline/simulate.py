@@ -14,6 +14,7 @@ import typer
 from rhot.config import RigConfig, load_rig
 from rhot.errors import ConfigError
 from services.cli.defaults import sim_toml
+from services.cli.options import ProgressOption
 from services.cli.progress import Progress
 from services.simulator.scenes import SCENES
 
@@ -37,7 +38,7 @@ def simulate(
     fps: Annotated[float | None, typer.Option(min=1.0, max=240.0, help="frame rate of all cameras; default: of rig.toml")] = None,
     speed: Annotated[float | None, typer.Option(min=0.05, max=10.0, help="of the motion; default: of rig.toml")] = None,
     scenes: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
-    progress: Annotated[bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")] = None,
+    progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print what was written, or the scenes, as JSON")] = False,
 ) -> None:
     """Render a scene through the virtual cameras and write a capture with its truth."""

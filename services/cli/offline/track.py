@@ -12,12 +12,14 @@ from typing import Annotated
 import msgspec
 import typer
 
+from services.cli.options import ProgressOption
+
 
 def track(
     sources: Annotated[list[str], typer.Argument(metavar="CAPTURE | CAM=VIDEO...", help="a capture folder, or a video per camera")],
     out: Annotated[Path, typer.Option("--out", "-o", help="folder for markers, points, poses and objects as .jsonl")],
     config: Annotated[Path | None, typer.Option(help="rig.toml; default: the capture's own")] = None,
-    progress: Annotated[bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")] = None,
+    progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:
     """Track recordings offline: markers, 3D points, hand poses and objects."""

@@ -15,19 +15,13 @@ import typer
 
 from rhot import topics
 from rhot.messages import HandPoints
+from services.cli.options import menu
 from services.cli.recordings import messages
 
 if TYPE_CHECKING:
     from services.fusion.tuning import Proposal
 
-tune = typer.Typer(
-    name="tune",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    help="Propose settings from recordings.",
-)
+tune = menu("tune", "Propose settings from recordings.")
 
 
 @tune.callback()

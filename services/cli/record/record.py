@@ -16,6 +16,7 @@ from rhot.config import RigConfig
 from rhot.errors import CaptureError
 from rhot.lifecycle import cancelled_by, stop_on_signals
 from rhot.service import rhot_version
+from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.reach import reach, rig_and_endpoints
 from services.cli.say import Teller
 from services.recorder.recorder import Recorder
@@ -25,10 +26,10 @@ _TELL_S = 1.0
 
 
 def record(
-    config: Annotated[Path | None, typer.Option(help="rig.toml of the rig; default: the simulated rig's")] = None,
+    config: RunningRigOption = None,
     out: Annotated[Path | None, typer.Option(help="file (*.mcap) or folder; default: [recorder] folder of rig.toml")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="end after so long")] = None,
-    connect: Annotated[str | None, typer.Option(help="router endpoint, instead of rig.toml's")] = None,
+    connect: ConnectOption = None,
 ) -> None:
     """Record a running rig; the recording plays back with `rhot replay FILE`."""
     rig, endpoints = rig_and_endpoints(config, connect)

@@ -9,6 +9,7 @@ import typer
 import uvloop
 
 from rhot.lifecycle import cancelled_by, stop_on_signals
+from services.cli.options import ConnectOption
 from services.cli.reach import reach, rig_and_endpoints
 from services.cli.say import Teller
 from services.recorder.reader import Record, Summary, summarize
@@ -28,7 +29,7 @@ def replay(
     only: Annotated[list[str] | None, typer.Option(help="a topic to replay, e.g. camera/markers; may be given again; default: all")] = None,
     info: Annotated[bool, typer.Option("--info", help="show what is in the file and end")] = False,
     recover: Annotated[bool, typer.Option("--recover", help="make a whole *.recovered.mcap of a file that was cut off and end")] = False,
-    connect: Annotated[str | None, typer.Option(help="router endpoint, instead of rig.toml's")] = None,
+    connect: ConnectOption = None,
 ) -> None:
     """Publish a recording on its keys again, with its original stamps."""
     if recover:
