@@ -1,4 +1,4 @@
-"""The `rhot` command. Every subcommand is one function in the file of its name; here they are only gathered."""
+"""The `rhot` command. Every subcommand is one function in the file of its name, in a room of this folder; here they are only gathered."""
 
 from __future__ import annotations
 
