@@ -11,6 +11,7 @@ from statistics import median
 import pytest
 
 ROOT = Path(__file__).parents[1]
+CLI = ROOT / "services" / "cli"
 CODE = sorted([*(ROOT / "rhot").rglob("*.py"), *(ROOT / "services").rglob("*.py")])
 
 MAX_FILE_LINES, MAX_MEDIAN_LINES, MAX_FUNCTION_LINES, MAX_MAIN_LINES = 300, 120, 50, 40
@@ -23,6 +24,10 @@ IMPURE_FOLDERS = {"sources", "sinks", "cli"}
 
 # services/cli is the one place that knows all services: it composes their pure steps offline.
 COMPOSERS = {"cli"}
+# Rooms of the command that work on files alone: what they find must not depend on when they run.
+PURE_CLI_ROOMS = {"check", "evaluate", "offline"}
+# Which rooms of the command may use which others. No circles: keep it so.
+CLI_ROOM_USES = {"calibrate": {"offline"}, "evaluate": {"offline"}}
 
 
 def relative(path: Path) -> str:
@@ -52,6 +57,8 @@ def may_be_impure(path: Path) -> bool:
     parts = path.relative_to(ROOT).parts
     if parts[0] == "rhot":
         return path.name in IMPURE_RHOT
+    if parts[1] == "cli" and parts[2] in PURE_CLI_ROOMS:
+        return False
     return path.name in IMPURE_SERVICE_FILES or bool(set(parts[1:-1]) & IMPURE_FOLDERS) or path.stem in IMPURE_FOLDERS
 
 
@@ -71,6 +78,19 @@ def test_rhot_imports_no_service_and_services_not_each_other(path):
             continue
         assert parts[0] == "services", f"{relative(path)} imports {name}: the shared vocabulary must not know its users"
         assert parts[1] in {name.split(".")[1], *COMPOSERS}, f"{relative(path)} imports {name}: services meet on the bus only"
+
+
+@pytest.mark.parametrize("path", [path for path in CODE if path.is_relative_to(CLI) and path.name != "__main__.py"], ids=relative)
+def test_rooms_of_the_command_use_no_others_but_those_named(path):
+    rooms = {folder.parent.name for folder in CLI.glob("*/__init__.py")}
+    own = path.parent.name if path.parent != CLI else None
+    used = {
+        parts[2]
+        for name in imports_of(ast.parse(path.read_text()))
+        if len(parts := name.split(".")) > 2 and name.startswith("services.cli.")
+    }
+    foreign = (used & rooms) - {own} - CLI_ROOM_USES.get(own, set())
+    assert not foreign, f"{relative(path)} imports from {sorted(foreign)}: what rooms share belongs beside them in services/cli"
 
 
 @pytest.mark.parametrize("path", [path for path in CODE if not may_be_impure(path)], ids=relative)

@@ -1,4 +1,4 @@
-"""The `rhot` command. Every subcommand is one function in the file of its name; here they are only gathered."""
+"""The `rhot` command. Every subcommand is one function in the file of its name, in a room of this folder; here they are only gathered."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ import typer
 from rhot.errors import RhotError, leaves
 from rhot.lifecycle import EXIT_USER
 from rhot.service import rhot_version
-from services.cli.calibrate import calibrate
-from services.cli.check import check
-from services.cli.demo import demo
-from services.cli.plot import plot
-from services.cli.print_board import board
-from services.cli.record import record
-from services.cli.replay import replay
-from services.cli.router import router
-from services.cli.score import score
-from services.cli.session import session
-from services.cli.simulate import simulate
-from services.cli.top import top
-from services.cli.track import track
-from services.cli.tune import tune
-from services.cli.up import up
-from services.cli.warm import warm
+from services.cli.calibrate.board import board
+from services.cli.calibrate.calibrate import calibrate
+from services.cli.check.check import check
+from services.cli.evaluate.plot import plot
+from services.cli.evaluate.score import score
+from services.cli.live.demo import demo
+from services.cli.live.router import router
+from services.cli.live.session import session
+from services.cli.live.top import top
+from services.cli.live.up import up
+from services.cli.live.warm import warm
+from services.cli.offline.simulate import simulate
+from services.cli.offline.track import track
+from services.cli.offline.tune import tune
+from services.cli.options import menu
+from services.cli.record.record import record
+from services.cli.record.replay import replay
 
 COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check, board, warm)
 
@@ -38,14 +39,7 @@ def _version(wanted: bool) -> None:
 
 def application() -> typer.Typer:
     """The command with all its subcommands."""
-    app = typer.Typer(
-        name="rhot",
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,
-        help="Real-time hand and object tracking from low-cost parts.",
-    )
+    app = menu("rhot", "Real-time hand and object tracking from low-cost parts.")
 
     @app.callback()
     def options(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="print the version")) -> None:

@@ -15,8 +15,8 @@ import pytest_asyncio
 
 from rhot.bus import Bus, open_bus
 from rhot.config import load_rig
-from services.cli.supervisor import Supervisor
-from services.cli.up import children_of
+from services.cli.live.supervisor import Supervisor
+from services.cli.live.up import children_of
 
 # numba's first compilation on a loaded machine takes most of it.
 START_S = 180.0

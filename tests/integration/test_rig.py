@@ -15,7 +15,7 @@ import pytest
 from rhot import clock, topics
 from rhot.hand import default_hand
 from rhot.transforms import angle_between, rotation_from_quaternion
-from services.cli.live import LiveFigures
+from services.cli.live.figures import LiveFigures
 
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 

@@ -15,8 +15,8 @@ from rhot.calibration import CameraPlace, Lens, RigGeometry, load_cameras, load_
 from rhot.capture import write_lines
 from rhot.errors import CalibrationError
 from rhot.transforms import rotation_x, transform
-from services.cli.calibrate import calibrate
-from services.cli.print_board import board
+from services.cli.calibrate.board import board
+from services.cli.calibrate.calibrate import calibrate
 from services.fusion.synthetic import Path, Setup, frames
 
 RIG_TOML = '[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'

@@ -14,8 +14,8 @@ from rhot.bus import open_bus
 from rhot.config import RigConfig, load_rig
 from rhot.errors import BusError, CalibrationError
 from services.calibrator.boards import Board
-from services.cli import calibrate_live
-from services.cli.calibrate_live import collect, one_each
+from services.cli.calibrate import live as calibrate_live
+from services.cli.calibrate.live import collect, one_each
 
 
 @pytest.fixture

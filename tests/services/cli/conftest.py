@@ -14,8 +14,8 @@ from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, for
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, ObjectTruth, Truth, WristPose
 from rhot.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from services.cli.defaults import sim_toml
-from services.cli.inputs import job_of
-from services.cli.track_run import run
+from services.cli.offline.inputs import job_of
+from services.cli.offline.run import run
 from services.simulator.capture import write_capture
 from services.simulator.scene import load_scene
 

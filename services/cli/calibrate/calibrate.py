@@ -1,0 +1,18 @@
+"""`rhot calibrate ...`: everything a rig must know about itself, each command in the file of its name (camera and colors: eye.py)."""
+
+from __future__ import annotations
+
+from services.cli.calibrate.depth import depth
+from services.cli.calibrate.eye import camera, colors
+from services.cli.calibrate.hand import hand
+from services.cli.calibrate.lens import lens
+from services.cli.calibrate.refine import refine
+from services.cli.calibrate.stereo import stereo
+from services.cli.calibrate.world import world
+from services.cli.options import menu
+
+COMMANDS = (camera, colors, lens, stereo, refine, world, depth, hand)
+
+calibrate = menu("calibrate", "Measure lenses, the rig, the desk, ... and write calibration files.")
+for _command in COMMANDS:
+    calibrate.command(name=_command.__name__)(_command)

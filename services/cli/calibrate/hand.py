@@ -1,0 +1,178 @@
+"""`rhot calibrate hand right`: a person's bone lengths from a short guided recording, live from the rig or from a recording.
+
+Live, it says which exercise is due and which markers are missing. A recording that cannot support a calibration is refused with the
+reason, and nothing is written. Lengths measured by hand stay possible (--length) and are kept as given.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+import uvloop
+
+from rhot import topics
+from rhot.calibration import save
+from rhot.capture import read_lines
+from rhot.client import RigClient
+from rhot.config import RigConfig
+from rhot.errors import CalibrationError, CaptureError
+from rhot.guided import CYCLE_S, EXERCISE_S, EXERCISES
+from rhot.hand import BASIC_LANDMARKS, DIGITS, HANDS, HandName, default_hand
+from rhot.messages import HandPoints
+from services.cli.calibrate import options
+from services.cli.options import ConnectOption
+from services.cli.reach import reach, rig_and_endpoints
+from services.cli.say import Teller
+
+_BONES = {"proximal": 0, "middle": 1, "distal": 2}
+_THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
+# Time to read the first exercise and bring the hand into view.
+_READY_S = 3.0
+# So long without a message from fusion nobody need go on.
+_SILENT_S = 5.0
+
+
+def hand(
+    which: Annotated[HandName, typer.Argument(metavar="HAND", help="left or right")] = "right",
+    recording: Annotated[Path | None, typer.Option("--from", help="a capture, a result of rhot track, points.jsonl or .mcap")] = None,
+    config: options.ConfigOption = None,
+    out: options.OutOption = None,
+    connect: ConnectOption = None,
+    start: Annotated[float | None, typer.Option(min=0.0, help="with --from: second at which the exercises begin; default: found")] = None,
+    length: Annotated[list[str] | None, typer.Option(metavar="DIGIT:BONE=MM", help="measured by hand; repeatable")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only report, write nothing")] = False,
+    exercises: Annotated[bool, typer.Option("--list", help="show the exercises")] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Measure a hand from a guided recording: follow the exercises, live, or give a recording of them."""
+    if exercises:
+        typer.echo("\n".join(f"{EXERCISE_S * n:3.0f} s  {exercise.prompt}" for n, exercise in enumerate(EXERCISES)))
+        return
+    known = lengths_of(length or [])
+    if recording is None:
+        rig, endpoints = rig_and_endpoints(config, connect)
+        messages, source = uvloop.run(_live(rig, endpoints, which)), f"live, rig {rig.rig.name}"
+    else:
+        rig, _ = rig_and_endpoints(config, connect)
+        messages, source = recorded(recording, which, config), str(recording)
+    target = options.out_folder(out, rig if config else None) / f"hand.{which}.json"
+    _fit(messages, which, start, known, target, source, dry_run=dry_run, as_json=as_json)
+
+
+def _fit(
+    messages: list[HandPoints],
+    which: HandName,
+    start: float | None,
+    known: dict[tuple[int, int], float],
+    target: Path,
+    source: str,
+    *,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    from services.solver.person.fit import fit_person
+    from services.solver.person.recording import recording_of
+    from services.solver.person.report import hand_file, report_text
+
+    if not messages:
+        raise CalibrationError(f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?")
+    table = default_hand(which)
+    problem, found = fit_person(recording_of(messages, table, start_s=start), table, known)
+    made = hand_file(problem, found, table, date=options.now_text(), inputs=source)
+    if not dry_run:
+        save(target, made)
+    if as_json:
+        typer.echo(msgspec.json.format(msgspec.json.encode(made), indent=1).decode())
+        return
+    typer.echo(report_text(made))
+    if not dry_run:
+        typer.echo(f"written: {target}; running services read it when they start: restart rhot-fusion and rhot-solver")
+
+
+def lengths_of(texts: list[str]) -> dict[tuple[int, int], float]:
+    """--length index:proximal=39.5 as (digit, bone) -> metres.
+
+    Raises CalibrationError naming what is valid.
+    """
+    known = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        digit, _, bone = name.partition(":")
+        bones = _THUMB_BONES if digit == "thumb" else _BONES
+        try:
+            millimetres = float(value)
+        except ValueError:
+            millimetres = -1.0
+        if digit not in DIGITS or bone not in bones or not 1.0 <= millimetres <= 150.0:
+            raise CalibrationError(
+                f"--length {text!r}: give DIGIT:BONE=MM, e.g. index:proximal=39.5; bones: {', '.join(bones)}; 1 to 150 mm"
+            )
+        known[DIGITS.index(digit), bones[bone]] = 1e-3 * millimetres
+    return known
+
+
+def recorded(path: Path, which: HandName, config: Path | None) -> list[HandPoints]:
+    """The points of one hand in a recording of any kind.
+
+    Raises CaptureError if there is none, and what reading it raises.
+    """
+    if path.suffix == ".mcap":
+        from services.recorder.reader import read
+
+        messages = [
+            msgspec.json.decode(record.payload, type=HandPoints) for record in read(path) if record.encoding == topics.POINTS.encoding
+        ]
+    elif path.is_file():
+        messages = list(read_lines(path, HandPoints))
+    elif (path / "points.jsonl").is_file():
+        messages = list(read_lines(path / "points.jsonl", HandPoints))
+    elif (path / "rig.toml").is_file():
+        from services.cli.offline.inputs import job_of
+        from services.cli.offline.run import run
+
+        with tempfile.TemporaryDirectory() as folder:
+            run(job_of([str(path)], config), Path(folder) / "out", None)
+            messages = list(read_lines(Path(folder) / "out" / "points.jsonl", HandPoints))
+    else:
+        raise CaptureError(f"{path}: is no capture, result of `rhot track`, points.jsonl or .mcap")
+    return [message for message in messages if message.hand == which]
+
+
+async def _live(rig: RigConfig, endpoints: list[str], which: HandName) -> list[HandPoints]:
+    """One pass through the exercises, with what to do now and what is missing on standard error."""
+    if which not in rig.hand:
+        raise CalibrationError(
+            f"rig.toml has no [hand.{which}.markers]; it has {', '.join(h for h in HANDS if h in rig.hand) or 'no hand'}"
+        )
+    teller, messages, shown = Teller(), [], -1
+    async with reach(rig.rig.name, endpoints) as bus:
+        stream = RigClient(bus).hand_points(which, queue=256)
+        teller.line(f"{CYCLE_S:.0f} s of exercises begin in {_READY_S:.0f} s: {EXERCISES[0].prompt}")
+        await asyncio.sleep(_READY_S)
+        began_s = time.monotonic()
+        while (passed_s := time.monotonic() - began_s) < CYCLE_S:
+            try:
+                message = await asyncio.wait_for(anext(stream), _SILENT_S)
+            except TimeoutError:
+                raise CalibrationError(
+                    f"no points of the {which} hand for {_SILENT_S:.0f} s: is fusion running and the hand in view? `rhot top` shows it"
+                ) from None
+            messages.append(message)
+            number = min(int(passed_s // EXERCISE_S), len(EXERCISES) - 1)
+            if number != shown:
+                shown = number
+                missing = _missing(message)
+                note = f"  (not seen: {missing})" if missing else ""
+                teller.line(f"{number + 1:2}/{len(EXERCISES)}  {EXERCISES[number].prompt}{note}")
+    return messages
+
+
+def _missing(message: HandPoints) -> str:
+    seen = {point.name for point in message.points if point.source == "measured"}
+    return ", ".join(name for name in BASIC_LANDMARKS if name not in seen)

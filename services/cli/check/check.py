@@ -1,0 +1,46 @@
+"""`rhot check CONFIG`: every problem of a rig.toml and of all it refers to, before anything runs.
+
+Exit code 0 if nothing stands in the way (warnings and notes do not), 1 if there is an error; --strict counts warnings too.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from services.cli.check.problems import Report, report
+
+
+def check(
+    config: Annotated[Path, typer.Argument(help="rig.toml to look at")],
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="exit with 1 on warnings too")] = False,
+) -> None:
+    """List every problem of a rig.toml: keys, colours, calibrations, sources, network."""
+    found = check_config(config)
+    typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode() if as_json else report_text(found))
+    if found.count("error") or (strict and found.count("warning")):
+        raise typer.Exit(1)
+
+
+def check_config(config: Path) -> Report:
+    """All findings on one rig.toml."""
+    from services.cli.check.calibration import check_calibration
+    from services.cli.check.rig import check_rig
+    from services.cli.check.toml import read_rig
+
+    rig, problems = read_rig(config)
+    if rig is not None:
+        problems = problems + check_rig(rig, config) + check_calibration(rig)
+    return report(str(config), problems)
+
+
+def report_text(found: Report) -> str:
+    """One line per finding, and a sum."""
+    width = max((len(problem.severity) for problem in found.problems), default=0)
+    lines = [f"{problem.severity.ljust(width)}  {problem.where}: {problem.what}" for problem in found.problems]
+    counts = [f"{found.count(severity)} {severity}{'' if found.count(severity) == 1 else 's'}" for severity in ("error", "warning", "note")]
+    return "\n".join([*lines, f"{found.config}: {', '.join(counts)}"])

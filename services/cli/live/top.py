@@ -1,0 +1,75 @@
+"""`rhot top`: services alive, rates against the topics table, drops, and latencies of each hop and from glass to pose."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from typing import Annotated
+
+import msgspec
+import typer
+import uvloop
+
+from rhot import clock, topics
+from rhot.bus import Bus
+from rhot.config import RigConfig
+from rhot.lifecycle import cancelled_by, stop_on_signals
+from services.cli.live.board import Board, Watcher, expected_services, text
+from services.cli.options import ConnectOption, RunningRigOption
+from services.cli.reach import reach, rig_and_endpoints
+
+# A beat comes once a second: after two, every living service has been heard.
+_LISTEN_S = 2.2
+
+
+def top(
+    config: RunningRigOption = None,
+    connect: ConnectOption = None,
+    once: Annotated[bool, typer.Option(help="print one table and end; exit code 1 if something is missing or slow")] = False,
+    seconds: Annotated[float | None, typer.Option(min=1.0, help="end after so long")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a table")] = False,
+) -> None:
+    """Show every service, its rates and latencies, live."""
+    rig, endpoints = rig_and_endpoints(config, connect)
+    board = uvloop.run(_top(rig, endpoints, once, seconds, as_json))
+    if once and (board is None or not board.healthy):
+        raise typer.Exit(1)
+
+
+async def _top(rig: RigConfig, endpoints: list[str], once: bool, seconds: float | None, as_json: bool) -> Board | None:
+    stopping = stop_on_signals()
+    watcher, board = Watcher(rig.rig.name, expected_services(rig)), None
+    with cancelled_by(stopping):
+        async with reach(rig.rig.name, endpoints) as bus, asyncio.TaskGroup() as tasks:
+            listeners = [tasks.create_task(_beats(bus, watcher)), tasks.create_task(_tokens(bus, watcher))]
+            left_s = _LISTEN_S if once else seconds
+            await asyncio.sleep(_LISTEN_S)
+            while True:
+                board = watcher.board(clock.now_ns())
+                _show(board, as_json)
+                left_s = None if left_s is None else left_s - (_LISTEN_S if once else 1.0)
+                if left_s is not None and left_s <= 0.0:
+                    break
+                await asyncio.sleep(1.0)
+            for task in listeners:
+                task.cancel()
+    return board
+
+
+async def _beats(bus: Bus, watcher: Watcher) -> None:
+    async for health in bus.every(topics.HEALTH, 1024):
+        watcher.beat(health, clock.now_ns())
+
+
+async def _tokens(bus: Bus, watcher: Watcher) -> None:
+    async for change in bus.watch_alive():
+        watcher.token(change.service, change.instance, change.alive)
+
+
+def _show(board: Board, as_json: bool) -> None:
+    if as_json:
+        typer.echo(msgspec.json.encode(board).decode())
+        return
+    if sys.stdout.isatty():
+        typer.echo("\033[H\033[2J", nl=False)
+    typer.echo(text(board))

@@ -1,0 +1,63 @@
+"""`rhot up CONFIG`: the master's processes of a real rig, supervised: router, fusion, solver, objects, viewer, recorder.
+
+Cameras whose `host` is empty are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvloop
+
+from rhot.config import RigConfig, load_rig
+from rhot.lifecycle import cancelled_by, stop_on_signals
+from services.cli.live.supervisor import Child, Supervisor, service_argv
+from services.cli.options import VerboseOption
+from services.cli.say import Teller
+
+
+def children_of(config: RigConfig, path: Path, *, viewer: bool, endpoint: Sequence[str] = ()) -> list[Child]:
+    """Everything that `rhot up` and `rhot demo` run for a rig. endpoint replaces the endpoints of rig.toml."""
+    common = ["--config", str(path), *(option for e in endpoint for option in ("--connect", e))]
+    listen = [option for e in (endpoint or config.bus.listen) for option in ("--listen", e)]
+    children = [Child("router", service_argv("cli", "router", *listen))]
+    local = [camera for camera in config.camera if not camera.host]
+    if any(camera.source == "simulator" for camera in local):
+        children.append(Child("simulator", service_argv("simulator", *common)))
+    children += [Child(f"pi_tracker/{c.name}", service_argv("pi_tracker", *common, "--camera", c.name)) for c in local]
+    children += [Child(name, service_argv(name, *common)) for name in ("fusion", "solver")]
+    if config.object:
+        children.append(Child("object_tracker", service_argv("object_tracker", *common)))
+    if viewer:
+        children.append(Child("viewer", service_argv("viewer", *common)))
+    if config.recorder.autostart:
+        children.append(Child("recorder", service_argv("recorder", *common)))
+    return children
+
+
+def up(
+    config: Annotated[Path, typer.Argument(help="rig.toml of the rig")],
+    viewer: Annotated[bool, typer.Option(help="show the rig in a browser")] = True,
+    verbose: VerboseOption = False,
+) -> None:
+    """Run the master's services of a real rig until Ctrl-C."""
+    uvloop.run(_up(load_rig(config), config, viewer, Teller(verbose=verbose)))
+
+
+async def _up(config: RigConfig, path: Path, viewer: bool, teller: Teller) -> None:
+    stopping = stop_on_signals()
+    supervisor = Supervisor(teller.child)
+    with cancelled_by(stopping):
+        async with asyncio.TaskGroup() as tasks:
+            for child in children_of(config, path, viewer=viewer):
+                tasks.create_task(supervisor.keep(child))
+            remote = sorted({camera.host for camera in config.camera if camera.host})
+            teller.line(
+                f"rig {config.rig.name!r} is up at {', '.join(config.bus.listen)}; Ctrl-C ends it, `rhot top --config {path}` shows it"
+            )
+            if remote:
+                teller.line(f"cameras expected from {', '.join(remote)}")

@@ -1,0 +1,38 @@
+"""`rhot track CAPTURE --out DIR` or `rhot track left=l.mp4 right=r.mp4 --config rig.toml --out DIR`: the whole rig, offline.
+
+As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off is tracked up to there, and
+the summary says so; if no frame at all can be read, the command fails.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from services.cli.options import ProgressOption
+
+
+def track(
+    sources: Annotated[list[str], typer.Argument(metavar="CAPTURE | CAM=VIDEO...", help="a capture folder, or a video per camera")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder for markers, points, poses and objects as .jsonl")],
+    config: Annotated[Path | None, typer.Option(help="rig.toml; default: the capture's own")] = None,
+    progress: ProgressOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
+) -> None:
+    """Track recordings offline: markers, 3D points, hand poses and objects."""
+    # Not above: OpenCV and numba take longer to import than other commands take to run.
+    from services.cli.offline.inputs import job_of
+    from services.cli.offline.run import run, summary_text
+
+    summary = run(job_of(sources, config), out, progress)
+    if as_json:
+        typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
+        return
+    for note in summary.notes:
+        typer.echo(f"note: {note}", err=True)
+    for warning in summary.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    typer.echo(summary_text(summary, out))

@@ -1,0 +1,75 @@
+"""`rhot plot` draws what a result holds, and says what is missing."""
+
+from __future__ import annotations
+
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rhot.errors import CaptureError, ConfigError
+from services.cli.__main__ import application
+from services.cli.evaluate import plot as plot_module
+from services.cli.evaluate.plot_result import plot_result
+
+pytest.importorskip("matplotlib", reason="matplotlib is of the extra `study`")
+
+
+def test_every_kind_of_picture_is_drawn(capture, result, tmp_path):
+    names = [path.name for path in plot_result(result, tmp_path, capture)]
+    assert names == [
+        "markers_left.png",
+        "markers_right.png",
+        "points_right.png",
+        "angles_right.png",
+        "residuals_right.png",
+        "objects.png",
+    ]
+    for name in names:
+        image = cv2.imread(str(tmp_path / name))
+        assert min(image.shape[:2]) > 500
+        # Some ink beside axes and text: coloured pixels.
+        assert np.count_nonzero(np.ptp(image.astype(int), axis=2) > 60) > 300, name
+
+
+def test_the_truth_changes_the_angles_picture(capture, result, tmp_path):
+    plot_result(result, tmp_path / "without", None)
+    plot_result(result, tmp_path / "with", capture)
+    pictures = [(tmp_path / folder / "angles_right.png").read_bytes() for folder in ("without", "with")]
+    assert pictures[0] != pictures[1]
+
+
+def test_pictures_go_beside_the_result_and_it_can_still_be_tracked_into(result, tmp_path):
+    shutil.copytree(result, tmp_path / "result")
+    ran = CliRunner().invoke(application(), ["plot", str(tmp_path / "result")])
+    assert ran.exit_code == 0
+    assert "angles_right.png" in ran.stdout
+    from services.cli.offline.results import ResultWriter
+
+    ResultWriter(tmp_path / "result")
+
+
+def test_a_result_of_markers_alone_gives_marker_pictures_only(result, tmp_path):
+    shutil.copytree(result, tmp_path / "result")
+    for name in ("points", "poses", "objects"):
+        (tmp_path / "result" / f"{name}.jsonl").write_text("")
+    assert [path.name for path in plot_result(tmp_path / "result", tmp_path, None)] == ["markers_left.png", "markers_right.png"]
+
+
+def test_an_empty_or_missing_result_or_truth(result, tmp_path):
+    with pytest.raises(CaptureError, match="no such folder"):
+        plot_result(tmp_path / "gone", tmp_path, None)
+    with pytest.raises(CaptureError, match=r"no truth\.jsonl"):
+        plot_result(result, tmp_path, tmp_path)
+    shutil.copytree(result, tmp_path / "result")
+    (tmp_path / "result" / "markers.jsonl").write_text("")
+    with pytest.raises(CaptureError, match="nothing to draw"):
+        plot_result(tmp_path / "result", tmp_path, None)
+
+
+def test_without_matplotlib_the_error_names_the_extra(result, monkeypatch):
+    monkeypatch.setattr(plot_module, "find_spec", lambda _: None)
+    with pytest.raises(ConfigError, match=r"pip install 'rhot\[study\]'"):
+        plot_module.plot(result)

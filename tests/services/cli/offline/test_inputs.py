@@ -1,0 +1,134 @@
+"""What `rhot track` takes, and what it says of everything else."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from rhot.capture import FrameStamp, write_stamps
+from rhot.errors import CaptureError, ConfigError
+from services.cli.offline.inputs import job_of
+
+RIG = '[rig]\nname = "r"\n[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
+
+
+@pytest.fixture
+def rig(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG)
+    return path
+
+
+def video(path, frames=12):
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), 20.0, (64, 48))
+    for value in range(frames):
+        writer.write(np.full((48, 64, 3), 5 * value, np.uint8))
+    writer.release()
+    return path
+
+
+def test_a_capture_gives_its_cameras_in_the_order_of_its_rig(short_capture):
+    job = job_of([str(short_capture)], None)
+    assert [one.camera for one in job.inputs] == ["left", "right"]
+    assert [one.total > 10 for one in job.inputs] == [True, True]
+    assert job.objects == short_capture / "objects.jsonl"
+    frames = list(job.inputs[0].frames())
+    assert len(frames) == job.inputs[0].total
+    assert not job.inputs[0].warnings
+
+
+def test_videos_come_in_the_order_of_the_rig_with_stamps_from_their_frame_rate(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    job = job_of([f"right={v}", f"left={v}"], rig)
+    assert [one.camera for one in job.inputs] == ["left", "right"]
+    assert [one.clock_sigma_ns for one in job.inputs] == [-1, -1]
+    assert [frame.stamp_ns for frame in job.inputs[1].frames()][:3] == [0, 50_000_000, 100_000_000]
+
+
+def test_a_csv_beside_the_video_has_its_stamps(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    write_stamps(tmp_path / "v.csv", [FrameStamp(i, 1000 + 40 * i, 30.0) for i in range(12)])
+    (one,) = job_of([f"left={v}"], rig).inputs
+    assert [(f.stamp_ns, f.row_time_ns) for f in one.frames()][1] == (1040, 30.0)
+    assert one.clock_sigma_ns > 0
+
+
+def test_a_csv_of_something_else_is_told_and_not_used(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    (tmp_path / "v.csv").write_text("name,age\nx,3\n")
+    (one,) = job_of([f"left={v}"], rig).inputs
+    assert "no list of stamps" in one.notes[0]
+
+
+def test_a_csv_with_fewer_rows_than_the_video_ends_it_with_a_warning(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    write_stamps(tmp_path / "v.csv", [FrameStamp(i, 40 * i, 30.0) for i in range(5)])
+    (one,) = job_of([f"left={v}"], rig).inputs
+    assert len(list(one.frames())) == 5
+    assert "5 frames" in one.warnings[0]
+
+
+def test_stamps_that_run_backwards_end_the_camera_with_a_warning(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    write_stamps(tmp_path / "v.csv", [FrameStamp(i, 40 * (i % 7), 30.0) for i in range(12)])
+    (one,) = job_of([f"left={v}"], rig).inputs
+    assert len(list(one.frames())) == 7
+    assert "stamps are damaged" in one.warnings[0]
+
+
+def test_a_rig_without_cameras_takes_any_name(tmp_path):
+    (tmp_path / "rig.toml").write_text('[rig]\nname = "r"\n')
+    job = job_of([f"cam={video(tmp_path / 'v.mkv')}"], tmp_path / "rig.toml")
+    assert [camera.name for camera in job.config.camera] == ["cam"]
+
+
+@pytest.mark.parametrize(
+    ("sources", "error", "text"),
+    [
+        (["middle=v.mkv"], ConfigError, r"no camera 'middle'; it has \['left', 'right'\]"),
+        (["left=a.mkv", "left=b.mkv"], ConfigError, "given twice"),
+        (["left="], ConfigError, "not CAM=VIDEO"),
+        (["=a.mkv"], ConfigError, "not CAM=VIDEO"),
+        (["le/ft=a.mkv"], ConfigError, "cannot name a camera"),
+        (["left=a.mkv", "b.mkv"], ConfigError, "not CAM=VIDEO"),
+        (["a", "b"], ConfigError, "one CAPTURE folder or CAM=VIDEO"),
+        (["nowhere"], CaptureError, "no such folder"),
+    ],
+)
+def test_arguments_that_make_no_sense(rig, sources, error, text):
+    with pytest.raises(error, match=text):
+        job_of(sources, rig)
+
+
+def test_a_video_needs_a_configuration_and_a_capture_brings_its_own(tmp_path):
+    with pytest.raises(ConfigError, match="--config"):
+        job_of(["left=a.mkv"], None)
+    with pytest.raises(CaptureError, match=r"no rig\.toml"):
+        job_of([str(tmp_path)], None)
+    with pytest.raises(CaptureError, match=r"is a file; .*CAM="):
+        job_of([str(video(tmp_path / "v.mkv"))], None)
+
+
+def test_a_missing_video_is_an_error_with_its_name(tmp_path, rig):
+    (one,) = job_of([f"left={tmp_path / 'gone.mkv'}"], rig).inputs
+    with pytest.raises(CaptureError, match=r"gone\.mkv"):
+        list(one.frames())
+
+
+def test_a_truncated_video_gives_its_frames_and_a_warning(copy):
+    data = (copy / "left.mkv").read_bytes()
+    (copy / "left.mkv").write_bytes(data[: len(data) // 2])
+    left, right = job_of([str(copy)], None).inputs
+    assert 3 < len(list(left.frames())) < left.total
+    assert "left.mkv" in left.warnings[0]
+    assert len(list(right.frames())) == right.total
+
+
+def test_a_broken_row_of_stamps_names_file_and_line(copy):
+    rows = (copy / "right.csv").read_text().splitlines()
+    rows[4] = "3,soon,30000"
+    (copy / "right.csv").write_text("\n".join(rows))
+    right = job_of([str(copy)], None).inputs[1]
+    with pytest.raises(CaptureError, match=r"right\.csv: line 5"):
+        list(right.frames())

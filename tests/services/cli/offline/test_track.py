@@ -1,0 +1,166 @@
+"""`rhot track` over a short simulated capture and a real video: results, determinism, bad input."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from rhot.capture import read_lines
+from rhot.errors import CalibrationError, CaptureError, ConfigError
+from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
+from services.cli.__main__ import application
+from services.cli.offline.inputs import job_of
+from services.cli.offline.results import STREAMS
+from services.cli.offline.run import run
+
+FILES = (*(f"{name}.jsonl" for name in STREAMS), "summary.json")
+
+
+def track(sources, out, config=None):
+    return run(job_of([str(source) for source in sources], config), out)
+
+
+def test_a_capture_becomes_markers_points_poses_and_objects_in_wire_format(capture, result):
+    frames = list(read_lines(result / "markers.jsonl", MarkerFrame))
+    points = list(read_lines(result / "points.jsonl", HandPoints))
+    poses = list(read_lines(result / "poses.jsonl", HandPose))
+    objects = list(read_lines(result / "objects.jsonl", ObjectPose))
+    summary = json.loads((result / "summary.json").read_text())
+    assert summary["complete"]
+    assert summary["warnings"] == []
+    assert [summary[name] for name in STREAMS] == [len(frames), len(points), len(poses), len(objects)]
+    assert len(frames) == sum(one.total for one in job_of([str(capture)], None).inputs)
+    assert 50 < len(poses) <= 62
+    assert len(objects) == 180
+    assert all(one.sent_ns == 0 for one in (*frames, *points, *poses, *objects))
+    assert [(f.stamp_ns, f.camera) for f in frames] == sorted((f.stamp_ns, f.camera) for f in frames)
+
+
+def test_the_same_capture_gives_the_same_bytes(capture, result, tmp_path):
+    track([capture], tmp_path / "again")
+    for name in FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (result / name).read_bytes(), name
+
+
+def test_videos_with_their_stamps_give_what_the_capture_gives(capture, result, tmp_path):
+    """Colour videos are read as they are, so that only the pictures' way in differs."""
+    track([f"left={capture / 'left.mkv'}", f"right={capture / 'right.mkv'}"], tmp_path / "videos", capture / "rig.toml")
+    for name in ("markers.jsonl", "poses.jsonl"):
+        assert (tmp_path / "videos" / name).read_bytes() == (result / name).read_bytes()
+
+
+def test_one_camera_of_two_gives_markers_and_says_why_nothing_more(short_capture, tmp_path):
+    summary = track([f"left={short_capture / 'left.mkv'}"], tmp_path / "out", short_capture / "rig.toml")
+    assert summary.markers > 10
+    assert (summary.points, summary.poses) == (0, 0)
+    assert "needs two cameras" in summary.notes[0]
+
+
+def test_without_a_hand_all_calibrated_colours_are_tracked(copy, tmp_path):
+    text = (copy / "rig.toml").read_text()
+    (copy / "rig.toml").write_text(text[: text.index("[hand]")] + text[text.index("[fusion]") :])
+    summary = track([copy], tmp_path / "out")
+    assert set(summary.cameras["left"].colors) == {"violet", "magenta", "blue", "cyan", "green", "lime"}
+    assert "no [hand.right.markers]" in summary.notes[0]
+
+
+def test_a_truncated_video_is_tracked_up_to_there_and_told(copy, tmp_path):
+    data = (copy / "right.mkv").read_bytes()
+    (copy / "right.mkv").write_bytes(data[: len(data) // 2])
+    summary = track([copy], tmp_path / "out")
+    assert not summary.complete
+    assert "right.mkv" in summary.warnings[0]
+    assert 3 < summary.cameras["right"].frames < summary.cameras["left"].frames
+    assert summary.poses > 3
+
+
+def test_a_video_without_a_single_frame_fails_and_leaves_nothing(copy, tmp_path):
+    (copy / "right.mkv").write_bytes(b"no video")
+    with pytest.raises(CaptureError, match=r"right\.mkv"):
+        track([copy], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_camera_without_its_video(copy, tmp_path):
+    (copy / "right.mkv").unlink()
+    with pytest.raises(CaptureError, match=r"no video of camera 'right'; it has left"):
+        track([copy], tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("rig.json", "rhot calibrate stereo"),
+        ("left.lens.json", "rhot calibrate lens left"),
+        ("left.colors.json", "rhot calibrate colors left"),
+    ],
+)
+def test_a_missing_calibration_names_the_command_that_makes_it(copy, tmp_path, name, text):
+    (copy / "calibration" / name).unlink()
+    with pytest.raises(CalibrationError, match=text):
+        track([copy], tmp_path / "out")
+
+
+def test_pictures_of_another_size_than_the_lens(copy, tmp_path):
+    path = copy / "calibration" / "left.lens.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"size_px": [1280, 960]}))
+    with pytest.raises(CalibrationError, match="640 x 480, its lens was calibrated at 1280 x 960"):
+        track([copy], tmp_path / "out")
+
+
+def test_a_marker_colour_that_is_not_calibrated(copy, tmp_path):
+    path = copy / "calibration" / "left.colors.json"
+    colors = json.loads(path.read_text())
+    del colors["colors"]["blue"]
+    path.write_text(json.dumps(colors))
+    with pytest.raises(CalibrationError, match="'blue'"):
+        track([copy], tmp_path / "out")
+
+
+def test_objects_without_registration_stay_where_they_are_and_it_is_told(copy, tmp_path):
+    (copy / "calibration" / "objects.json").unlink()
+    summary = track([copy], tmp_path / "out")
+    assert any("lighthouse frame" in note for note in summary.notes)
+    assert not any(pose.registered for pose in read_lines(tmp_path / "out" / "objects.jsonl", ObjectPose))
+
+
+def test_a_broken_line_of_objects_is_an_error_with_its_number(copy, tmp_path):
+    lines = (copy / "objects.jsonl").read_bytes().splitlines()
+    lines[6] = b'{"v": "one"}'
+    (copy / "objects.jsonl").write_bytes(b"\n".join(lines))
+    with pytest.raises(CaptureError, match=r"objects\.jsonl: line 7"):
+        track([copy], tmp_path / "out")
+
+
+def test_a_broken_rig_toml(copy, tmp_path):
+    (copy / "rig.toml").write_text('[fusion]\nmethod = "magic"\n')
+    with pytest.raises(ConfigError, match="'magic'; valid"):
+        track([copy], tmp_path / "out")
+
+
+def test_a_real_ball_is_found_where_it_is_and_nowhere_else(rhot_data, tmp_path):
+    """1004 frames of a webcam; frame numbers read off the video by eye: the ball is out of sight four times."""
+    (tmp_path / "calibration").mkdir()
+    (tmp_path / "rig.toml").write_text('[rig]\nname = "ball"\n')
+    # The range the recording's README gives.
+    colors = '{"colors": {"green": {"hsv_low": [35, 60, 40], "hsv_high": [85, 255, 255]}}}'
+    (tmp_path / "calibration" / "cam.colors.json").write_text(colors)
+    summary = track([f"cam={rhot_data / 'color_video' / 'ball2.mp4'}"], tmp_path / "out", tmp_path / "rig.toml")
+    assert summary.cameras["cam"].frames == 1004
+    assert summary.cameras["cam"].frames_with_markers >= 865
+    seen = {frame.seq for frame in read_lines(tmp_path / "out" / "markers.jsonl", MarkerFrame) if frame.markers}
+    for first, last in ((0, 26), (466, 486), (790, 822), (964, 1003)):
+        assert not seen & set(range(first, last + 1))
+
+
+def test_the_command_prints_a_summary_and_notes_and_nothing_else_on_a_pipe(short_capture, tmp_path):
+    sources = [f"left={short_capture / 'left.mkv'}", "--config", str(short_capture / "rig.toml")]
+    text = CliRunner().invoke(application(), ["track", *sources, "--out", str(tmp_path / "a")])
+    assert text.exit_code == 0
+    assert "note: markers only" in text.stderr
+    assert "\r" not in text.stderr
+    assert text.stdout.startswith("left: ")
+    found = CliRunner().invoke(application(), ["track", *sources, "--out", str(tmp_path / "b"), "--json"])
+    assert json.loads(found.stdout)["cameras"]["left"]["frames"] > 10
