@@ -11,6 +11,7 @@ light blue), the second goes to another layer. Pure; a colour that is missing in
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,8 @@ class ColorTable:
         # OpenCV looks up signed integers of this size only.
         self._packed = [_lookup(layer.view(np.int32)) for layer in layers]
         self._ceiling = _lookup(np.max([layer.view(np.uint8).reshape(-1, 4)[:, 2] for layer in layers], axis=0))
-        self._found, self._bytes = np.empty(0, np.int32), np.empty((4, 0), np.uint8)
+        self._memory = np.empty(0, np.uint8)
+        self._lay_out((0, 0))
 
     def classify(self, luma: Image, chroma: Image) -> Image:
         """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
@@ -66,21 +68,28 @@ class ColorTable:
 
     def _looked_up(self, luma: Image, index: Image) -> tuple[Image, Image]:
         """The class by chroma of every cell, and 255 where luma agrees; good until the next call."""
-        if self._found.size < luma.size:
-            # Fresh memory would cost four times what is done in it.
-            self._found, self._bytes = np.empty(luma.size, np.int32), np.empty((4, luma.size), np.uint8)
-        into = self._found[: luma.size].reshape(luma.shape)
-        classes, low, high, mask = planes = list(self._bytes[:, : luma.size].reshape(4, *luma.shape))
+        if luma.shape != self._planes[0].shape:
+            self._lay_out(luma.shape)
+        classes, low, high, mask = self._planes
         labels, seen = classes, mask
         for number, packed in enumerate(self._packed):
-            packed(index, into)
-            cv2.split(into.view(np.uint8).reshape(*luma.shape, 4), planes)
+            packed(index, self._found)
+            cv2.split(self._entries, self._planes)
             cv2.inRange(luma, low, high, mask)
             if len(self.layers) > 1:
                 found = cv2.bitwise_and(classes, mask)
                 # Layers never claim the same cell: they share chromas, not lumas.
                 labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
         return labels, seen
+
+    def _lay_out(self, shape: tuple[int, ...]) -> None:
+        """Images of a shape in memory that is kept: fresh memory would cost four times what is done in it."""
+        size = math.prod(shape)
+        if self._memory.size < 8 * size:
+            self._memory = np.empty(8 * size, np.uint8)
+        entries = self._memory[: 4 * size]
+        self._found, self._entries = entries.view(np.int32).reshape(shape), entries.reshape(*shape, 4)
+        self._planes = list(self._memory[4 * size : 8 * size].reshape(4, *shape))
 
 
 def _index(chroma: Image) -> Image:

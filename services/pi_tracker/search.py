@@ -63,10 +63,12 @@ class Searcher:
     def blobs(self, picture: Picture, rect: Rect, thin: bool = False) -> list[Blob]:
         """All blobs of at least min_area_px, in no order; thin ones beside another colour only if asked for: they may be its edge."""
         whole = (rect[2] - rect[0]) * (rect[3] - rect[1])
-        if whole >= _LARGE_CELLS and self._step > 1 and self._sparse:
+        large = whole >= _LARGE_CELLS
+        if large and self._step > 1 and self._sparse:
             rect = self._narrowed(picture, rect)
         x0, y0, labels, mask = self._table.patch(*picture.cells(rect), self._margin)
-        self._sparse = mask.size <= _SPARSE * whole
+        if large:
+            self._sparse = mask.size <= _SPARSE * whole
         if not mask.size:
             return []
         mask = self._filtered(mask)
@@ -88,7 +90,7 @@ class Searcher:
                 found += self._parted(contour, inside, (x, y), (left + x, top + y), thin)
             elif k and mine >= self._min_cells:
                 # One colour only, as a rule.
-                found.append(_blob(k, mask[y : y + h, x : x + w], mine, (left + x, top + y)))
+                found.append(_blob(k, mask[y : y + h, x : x + w], mine, left + x, top + y, w, h))
         return found
 
     def _narrowed(self, picture: Picture, rect: Rect) -> Rect:
@@ -114,7 +116,7 @@ class Searcher:
         classes = [k for k, count in enumerate(counts) if k and count >= self._min_cells]
         if len(classes) == 1:
             # A few cells of other colours are noise.
-            return [_blob(classes[0], inside, counts[classes[0]], origin)]
+            return [_blob(classes[0], inside, counts[classes[0]], *origin, labels.shape[1], labels.shape[0])]
         masks = {k: (labels == k).view(np.uint8) & inside for k in classes}
         return [blob for k in classes if not _is_seam(masks, k, thin) for blob in self._of_class(masks[k], k, origin)]
 
@@ -125,7 +127,7 @@ class Searcher:
             part = mask[y : y + h, x : x + w]
             cells = cv2.countNonZero(part)
             if cells >= self._min_cells:
-                found.append(_blob(k, part, cells, (origin[0] + x, origin[1] + y)))
+                found.append(_blob(k, part, cells, origin[0] + x, origin[1] + y, w, h))
         return found
 
 
@@ -139,7 +141,5 @@ def _is_seam(masks: dict[int, Image], k: int, thin: bool) -> bool:
     return not thin or sum(cv2.countNonZero(around & other) >= _SEAM_CELLS for number, other in masks.items() if number != k) > 1
 
 
-def _blob(k: int, mask: Image, cells: int, origin: tuple[int, int]) -> Blob:
-    h, w = mask.shape
-    x, y = origin
+def _blob(k: int, mask: Image, cells: int, x: int, y: int, w: int, h: int) -> Blob:
     return Blob(k - 1, (x, y, x + w, y + h), mask, cells, 4.0 * cells, x + x + w - 0.5, y + y + h - 0.5)
