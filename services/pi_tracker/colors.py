@@ -11,8 +11,10 @@ light blue), the second goes to another layer. Pure; a colour that is missing in
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,43 +41,68 @@ class ColorTable:
     def __init__(self, names: tuple[str, ...], layers: tuple[npt.NDArray[np.uint32], ...]) -> None:
         self.names = names
         self.layers = layers
-        # OpenCV looks up signed integers only.
+        # OpenCV looks up signed integers of this size only.
         self._packed = [_lookup(layer.view(np.int32)) for layer in layers]
-        self._buffer = np.empty((4, 0), np.uint8)
+        self._ceiling = _lookup(np.max([layer.view(np.uint8).reshape(-1, 4)[:, 2] for layer in layers], axis=0))
+        self._memory = np.empty(0, np.uint8)
+        self._lay_out((0, 0))
 
     def classify(self, luma: Image, chroma: Image) -> Image:
-        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w), good until the next call."""
-        return self.classes_and_mask(luma, chroma)[0]
+        """The class of every cell, 0 for none; luma (h, w), chroma u, v (h, w, 2) -> (h, w)."""
+        return cv2.bitwise_and(*self._looked_up(luma, _index(chroma)))
 
-    def classes_and_mask(self, luma: Image, chroma: Image) -> tuple[Image, Image]:
-        """Class of every cell, and 255 where there is one; good until the next call."""
-        classes, low, high, mask = planes = self._planes(luma)
-        index = chroma.view(np.uint16)[:, :, 0]
+    def likely(self, luma: Image, chroma: Image) -> Image:
+        """255 where there may be a colour, 0 where there is none; (h, w). Half the work of classifying: darkness is not asked for."""
+        return cv2.compare(luma, self._ceiling(_index(chroma), None), cv2.CMP_LE)
+
+    def patch(self, luma: Image, chroma: Image, margin: int = 0) -> tuple[int, int, Image, Image]:
+        """The smallest rectangle with all cells that have a colour, and `margin` more: its left and top, the class of every cell, and 255
+        where there is one, both (h, w) of the rectangle, the caller's own. Without any colour the rectangle is empty."""
+        classes, mask = self._looked_up(luma, _index(chroma))
+        x, y, w, h = cv2.boundingRect(mask)
+        margin = margin if w else 0
+        left, top = max(x - margin, 0), max(y - margin, 0)
+        part = (slice(top, y + h + margin), slice(left, x + w + margin))
+        kept = mask[part].copy()
+        return left, top, cv2.bitwise_and(classes[part], kept) if w else kept, kept
+
+    def _looked_up(self, luma: Image, index: Image) -> tuple[Image, Image]:
+        """The class by chroma of every cell, and 255 where luma agrees; good until the next call."""
+        if luma.shape != self._planes[0].shape:
+            self._lay_out(luma.shape)
+        classes, low, high, mask = self._planes
         labels, seen = classes, mask
         for number, packed in enumerate(self._packed):
-            cv2.split(packed(index).view(np.uint8).reshape(*luma.shape, 4), planes)
+            packed(index, self._found)
+            cv2.split(self._entries, self._planes)
             cv2.inRange(luma, low, high, mask)
-            if len(self.layers) == 1:
-                return cv2.bitwise_and(classes, mask, classes), mask
-            found = cv2.bitwise_and(classes, mask)
-            # Layers never claim the same cell: they share chromas, not lumas.
-            labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
+            if len(self.layers) > 1:
+                found = cv2.bitwise_and(classes, mask)
+                # Layers never claim the same cell: they share chromas, not lumas.
+                labels, seen = (cv2.max(labels, found), cv2.max(seen, mask)) if number else (found, mask.copy())
         return labels, seen
 
-    def _planes(self, luma: Image) -> list[Image]:
-        """Four images to work in: fresh memory would cost four times what splitting into it costs."""
-        if self._buffer.shape[1] < luma.size:
-            self._buffer = np.empty((4, luma.size), np.uint8)
-        return list(self._buffer[:, : luma.size].reshape(4, *luma.shape))
+    def _lay_out(self, shape: tuple[int, ...]) -> None:
+        """Images of a shape in memory that is kept: fresh memory would cost four times what is done in it."""
+        size = math.prod(shape)
+        if self._memory.size < 8 * size:
+            self._memory = np.empty(8 * size, np.uint8)
+        entries = self._memory[: 4 * size]
+        self._found, self._entries = entries.view(np.int32).reshape(shape), entries.reshape(*shape, 4)
+        self._planes = list(self._memory[4 * size : 8 * size].reshape(4, *shape))
 
 
-def _lookup(table: npt.NDArray[np.int32]) -> Callable[[Image], Image]:
-    """A table (65536,) to apply to uint16, by OpenCV where it can (5; twice as fast), else by numpy."""
+def _index(chroma: Image) -> Image:
+    return chroma.view(np.uint16)[:, :, 0]
+
+
+def _lookup(table: npt.NDArray[np.integer[Any]]) -> Callable[[Image, Image | None], Image]:
+    """A table (65536,) to apply to uint16, into an image if there is one: by OpenCV where it can (5; twice as fast), else by numpy."""
     try:
         cv2.LUT(np.zeros((1, 1), np.uint16), table[None])
     except cv2.error:
-        return table.take
-    return lambda index: cv2.LUT(index, table[None])
+        return lambda index, into: table.take(index, out=into, mode="wrap")
+    return lambda index, into: cv2.LUT(index, table[None], into)
 
 
 def compile_colors(colors: Colors, wanted: Sequence[str], path: Path | str = "colors.json") -> ColorTable:

@@ -165,6 +165,11 @@ class Identity:
         track = self._tracks[color]
         return track.predicted(stamp_ns) if track is not None and track.is_recent(stamp_ns) else None
 
+    def area_px2(self, color: int) -> float:
+        """How large a marker was when it was seen, 0 if it never was."""
+        track = self._tracks[color]
+        return 0.0 if track is None else track.area_px
+
     def _carry(self, chosen: list[Choice | None], stamp_ns: int) -> None:
         """Markers that are not seen move as the others do."""
         moved = [

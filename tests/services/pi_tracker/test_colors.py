@@ -53,8 +53,14 @@ def test_the_mask_is_where_a_class_is(gamut):
     }
     for names in (["c"], ["a", "b", "c"]):
         table = compile_colors(Colors(colors=ranges), names)
-        classes, mask = table.classes_and_mask(luma, chroma)
-        assert np.array_equal(mask > 0, classes > 0)
+        classes = table.classify(luma, chroma)
+        assert not np.any((classes > 0) & (table.likely(luma, chroma) == 0))
+        for margin in (0, 2):
+            left, top, inside, mask = table.patch(luma, chroma, margin)
+            assert np.array_equal(mask > 0, inside > 0)
+            placed = np.zeros_like(classes)
+            placed[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
+            assert np.array_equal(placed, classes)
 
 
 def test_numpy_looks_up_what_opencv_does(gamut, monkeypatch):

@@ -22,6 +22,9 @@ def test_bgr_and_i420_agree(studio, tip):
     for a, b in zip(planar.cells(rect), packed.cells(rect), strict=True):
         assert a.shape == b.shape
         assert np.abs(a.astype(int) - b.astype(int)).max() <= 1
+    for image in (planar, packed):
+        for every, third in zip(image.cells(rect), image.cells(rect, 3), strict=True):
+            assert np.array_equal(every[::3], third)
     buffers = [(np.zeros((50, 44), np.uint8), np.zeros((2, 25, 22), np.uint8)) for _ in range(2)]
     for image, (luma, chroma) in zip((planar, packed), buffers, strict=True):
         image.copy_to(rect, luma, chroma)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rhot.config import Tracker
+from services.pi_tracker import search
 from services.pi_tracker.colors import compile_colors
 from services.pi_tracker.planes import picture
 from services.pi_tracker.roi import whole
@@ -47,6 +48,37 @@ def test_a_rectangle_limits_the_search(studio, tip, searcher):
 def test_an_empty_picture_has_no_blobs(studio, searcher):
     frame, _ = studio.frame([])
     assert blobs_of(searcher, frame) == []
+
+
+@pytest.mark.parametrize("erode", [1, 2])
+def test_the_quick_look_at_some_rows_misses_nothing(studio, colors, monkeypatch, erode):
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        wall = np.full((240, 320, 3), 120, np.uint8)
+        for _ in range(12):
+            x, y, w, h = (int(n) for n in rng.integers((4, 0, 1, 1), (290, 220, 16, 16)))
+            wall[y : y + h, x : x + w] = studio.paints[list(studio.paints)[rng.integers(6)]]
+        frame, found = studio.of(wall), []
+        for large in (0, 1 << 30):
+            monkeypatch.setattr(search, "_LARGE_CELLS", large)
+            searcher = Searcher(compile_colors(colors, list(studio.paints)), Tracker(erode=erode, dilate=1))
+            found.append({(blob.color, blob.rect, blob.cells, blob.mask.tobytes()) for blob in blobs_of(searcher, frame)})
+        assert found[0] == found[1] != set()
+
+
+def test_a_crescent_beside_another_paint_is_found_when_asked_for_and_a_seam_between_two_never(studio, colors):
+    names = ["green", "cyan", "blue"]
+    searcher = Searcher(compile_colors(colors, names), Tracker(erode=0, dilate=0))
+    paints = [np.array(studio.paints[name], np.uint8) for name in names]
+    for right, thin, expected in ((1, False, {1}), (1, True, {0, 1}), (2, True, {1, 2})):
+        # A column of cells of one paint beside, or between, larger patches of others.
+        wall = np.full((64, 64, 3), 120, np.uint8)
+        wall[20:40, 30:32] = paints[0]
+        wall[20:40, 32:48] = paints[right]
+        if right == 2:
+            wall[20:40, 14:30] = paints[1]
+        image = picture(studio.of(wall))
+        assert {blob.color for blob in searcher.blobs(image, whole(image.size), thin)} == expected
 
 
 @pytest.mark.parametrize(("min_area", "seen"), [(12.0, True), (600.0, False)])
