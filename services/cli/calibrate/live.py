@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
 _ANSWER_S = 5.0
+# Asked again this often, a fifth of a second later, then two: a router knows of a tracker that has just come up by then.
+_ATTEMPTS = 3
 # Without anything new for so long, nobody is there or the board cannot be seen.
 _PATIENCE_S = 120.0
 # Takes of a fast camera would otherwise saturate its Pi with encoding PNGs.
@@ -70,8 +72,13 @@ def one_each(rig: RigConfig, names: list[str], folder: Path, connect: str | None
 
 
 async def _one_each(rig: RigConfig, names: list[str], endpoints: list[str]) -> dict[str, bytes]:
+    pictures: dict[str, bytes] = {}
     async with reach(rig.rig.name, endpoints) as bus:
-        pictures = await _ask(bus, names)
+        for attempt in range(_ATTEMPTS):
+            await asyncio.sleep(0.2 * attempt)
+            pictures |= await _ask(bus, [name for name in names if name not in pictures])
+            if len(pictures) == len(names):
+                break
     if not pictures:
         raise BusError(f"no camera of {', '.join(names)} answers; are their trackers running? `rhot top` shows them")
     return pictures
