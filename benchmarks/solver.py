@@ -30,8 +30,7 @@ from solver_hands import Motion, anywhere, grasp, messages, moving
 
 from rhot.config import RigConfig
 from rhot.hand import BASIC_LANDMARKS, HANDS, HandModel, default_hand
-from rhot.messages import HandPose
-from rhot.transforms import Array, angle_between, rotation_from_quaternion
+from rhot.transforms import angle_between, rotation_from_quaternion
 from services.solver import dls, dls_paper, fabrik
 from services.solver import kinematics as k
 from services.solver.rotor import BOX
@@ -216,19 +215,11 @@ def errors_of(
     for frame, line in enumerate(messages(painted or model, motion, names, rng, 1e-3)):
         pose = step.step(line)
         if pose is not None and frame >= 5:
-            off = np.abs(_angles(pose) - motion.angles_rad[frame])
+            off = np.abs(np.array([f.model_angles_rad for f in pose.fingers]) - motion.angles_rad[frame])
             turn = angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), motion.rotations[frame])
             rows.append((off[1:, 1:].mean(), turn, off[0].mean(), off[[1, 3, 4], 0].mean()))
     flexion, turn, thumb, abduction = np.rad2deg(np.mean(rows, axis=0)).tolist()
     return flexion, turn, thumb, abduction
-
-
-def _angles(pose: HandPose) -> Array:
-    rows = []
-    for finger in pose.fingers:
-        a = finger.angles_rad
-        rows.append((a.abduction, a.cmc, a.mcp, a.dip) if finger.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip))
-    return np.array(rows)
 
 
 def main() -> int:

@@ -133,6 +133,12 @@ class FingerPose(Message, frozen=True, kw_only=True):
     status: FingerStatus
     sigma_rad: NonNegative | None = None
 
+    @property
+    def model_angles_rad(self) -> tuple[float, float, float, float]:
+        """In the order of a HandModel's limits_rad: abduction, cmc, mcp, dip of the thumb; abduction, mcp, pip, dip of a finger."""
+        a = self.angles_rad
+        return (a.abduction, a.cmc, a.mcp, a.dip) if self.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip)
+
 
 class HandPose(Message, frozen=True, kw_only=True):
     """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from thumb to little.
@@ -283,10 +289,7 @@ class Truth(Message, frozen=True, kw_only=True):
 
 
 class SimFrame(Message, frozen=True, kw_only=True):
-    """The attachment of a simulated camera's image (I420 bytes), standing for what a camera driver tells.
-
-    clock_skew_ns is what the simulated camera computer's clock reads more than the real one at this instant.
-    """
+    """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far its computer's clock is ahead now."""
 
     camera: Name
     seq: Count

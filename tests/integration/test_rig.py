@@ -61,10 +61,8 @@ async def test_every_pose_is_a_possible_hand(rig):
     for pose in await some(rig.bus.every(topics.POSE, 64), 30):
         assert [finger.name for finger in pose.fingers] == ["thumb", "index", "middle", "ring", "little"]
         for row, finger in enumerate(pose.fingers):
-            a = finger.angles_rad
-            values = (a.abduction, a.cmc, a.mcp, a.dip) if row == 0 else (a.abduction, a.mcp, a.pip, a.dip)
-            assert np.all(values >= limits[row, :, 0] - 1e-5)
-            assert np.all(values <= limits[row, :, 1] + 1e-5)
+            assert np.all(finger.model_angles_rad >= limits[row, :, 0] - 1e-5)
+            assert np.all(finger.model_angles_rad <= limits[row, :, 1] + 1e-5)
 
 
 async def test_objects_are_right(rig):

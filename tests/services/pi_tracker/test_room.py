@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from rhot.config import Tracker
+from services.pi_tracker.frame import Frame
 from services.pi_tracker.noise import Noise
+from services.pi_tracker.planes import picture
 from services.pi_tracker.room import Room
 from services.pi_tracker.search import Blob
 from services.pi_tracker.step import TrackerStep
@@ -17,33 +17,17 @@ FRAME_NS = 33_333_333
 THING, MARKER, WALL = (110, 150, 180), (160, 150, 190), (140, 128, 128)
 
 
-@dataclass
-class Shot:
-    """A picture of cells, noisy."""
-
-    yuv: np.ndarray
-
-    @property
-    def size(self):
-        return (self.yuv.shape[1], self.yuv.shape[0])
-
-    def cells(self, rect):
-        x0, y0, x1, y1 = rect
-        part = self.yuv[y0:y1, x0:x1]
-        return part[..., 0], np.ascontiguousarray(part[..., 1:])
-
-    def copy_to(self, rect, luma, chroma):
-        raise NotImplementedError
-
-
 def shot(seq, *patches, size=(120, 90)):
-    """A wall with patches (rect, Y U V)."""
+    """A wall with patches (rect in cells, Y U V), noisy."""
     rng = np.random.default_rng(seq)
-    yuv = np.empty((size[1], size[0], 3))
-    yuv[:] = WALL
+    cells = np.empty((size[1], size[0], 3))
+    cells[:] = WALL
     for (x0, y0, x1, y1), color in patches:
-        yuv[y0:y1, x0:x1] = color
-    return Shot(np.clip(np.rint(yuv + rng.normal(0, 1.4, yuv.shape)), 0, 255).astype(np.uint8))
+        cells[y0:y1, x0:x1] = color
+    y, u, v = np.moveaxis(np.clip(np.rint(cells + rng.normal(0, 1.4, cells.shape)), 0, 255).astype(np.uint8), 2, 0)
+    size_px = (2 * size[0], 2 * size[1])
+    i420 = np.concatenate([y.repeat(2, 0).repeat(2, 1).ravel(), u.ravel(), v.ravel()]).reshape(3 * size[1], size_px[0])
+    return picture(Frame("left", seq, 0, 0.0, size_px, i420, "i420"))
 
 
 def blob(rect, mask=None):

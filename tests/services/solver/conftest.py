@@ -82,11 +82,7 @@ def _waves(rng: np.random.Generator, frames: int, count: int, hz: float) -> Arra
 
 
 def _angles_of(pose: HandPose) -> Array:
-    rows = []
-    for finger in pose.fingers:
-        a = finger.angles_rad
-        rows.append((a.abduction, a.cmc, a.mcp, a.dip) if finger.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip))
-    return np.array(rows)
+    return np.array([finger.model_angles_rad for finger in pose.fingers])
 
 
 @pytest.fixture(scope="session")

@@ -154,8 +154,7 @@ def test_any_hand_that_a_file_may_describe(model: HandModel, found: list, method
         if pose is not None:
             assert b"null" not in msgspec.json.encode(pose)
             for finger, limits in zip(pose.fingers, model.limits_rad, strict=True):
-                a = finger.angles_rad
-                q = (a.abduction, a.cmc, a.mcp, a.dip) if finger.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip)
+                q = finger.model_angles_rad
                 assert np.all((np.array(q) >= limits[:, 0]) & (np.array(q) <= limits[:, 1]))
             assert len(pose.joints) == len(JOINTS)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import queue
 import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -113,13 +113,12 @@ def test_no_router(endpoint: str, rig_toml: Path, recording: Path, invoke: Invok
 
 
 def test_replay(router: str, rig_toml: Path, recording: Path, invoke: Invoke) -> None:
-    heard: list[str] = []
-    with zenoh.open(client_config([router])) as session, session.declare_subscriber("rhot/**", lambda s: heard.append(str(s.key_expr))):
+    heard: queue.Queue[str] = queue.Queue()
+    with zenoh.open(client_config([router])) as session, session.declare_subscriber("rhot/**", lambda s: heard.put(str(s.key_expr))):
         assert "replayed 20 messages" in invoke("replay", recording, "--config", rig_toml, "--connect", router, "--rate", 0)
-        deadline = time.monotonic() + 5.0
-        while len(heard) < 20 and time.monotonic() < deadline:
-            time.sleep(0.01)
-    assert heard == ["rhot/desk/camera/left/markers"] * 20
+        keys = [heard.get(timeout=5.0) for _ in range(20)]
+    assert keys == ["rhot/desk/camera/left/markers"] * 20
+    assert heard.empty()
 
 
 def test_replay_info(recording: Path, invoke: Invoke) -> None:

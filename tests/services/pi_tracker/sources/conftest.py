@@ -1,0 +1,172 @@
+"""Stand-ins of the cameras' libraries: what picamera2 and cv2.VideoCapture do and check, as far as the sources use it."""
+
+from __future__ import annotations
+
+import sys
+import time
+import types
+from concurrent.futures import Future
+from typing import ClassVar
+
+import cv2
+import numpy as np
+import pytest
+
+
+class FakeRequest:
+    """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name, to be released once."""
+
+    def __init__(self, camera):
+        self._camera = camera
+        self.released = 0
+
+    def make_buffer(self, name):
+        assert name == "main"
+        main = self._camera.camera_configuration()["main"]
+        (width, height), stride = main["size"], main["stride"]
+        luma = np.full((height, stride), 255, np.uint8)
+        luma[:, :width] = np.arange(height)[:, None] % 200
+        chroma = np.full((2, height // 2, stride // 2), 255, np.uint8)
+        chroma[0, :, : width // 2], chroma[1, :, : width // 2] = 90, 160
+        # libcamera's frame sizes are rounded up: there is something behind the last row.
+        return np.concatenate([luma.ravel(), chroma.ravel(), np.zeros(64, np.uint8)])
+
+    def get_metadata(self):
+        return dict(self._camera.metadata)
+
+    def release(self):
+        self.released += 1
+
+
+class FakeJob:
+    """picamera2's Job: a future."""
+
+    def __init__(self, result):
+        self._future = Future()
+        if result is not None:
+            self._future.set_result(result)
+
+    def get_result(self, timeout=None):
+        return self._future.result(timeout=min(timeout, 0.01) if not self._future.done() else timeout)
+
+
+class FakePicamera2:
+    """picamera2.Picamera2 as far as it is used, with its checks; controls that were set while it ran are in `set`."""
+
+    WALL_NS = 1_700_000_000_123_456_789
+    made: ClassVar[list[FakePicamera2]] = []
+    cameras: ClassVar = [{"Model": "ov5647", "Num": 0}]
+    padding = 0
+
+    @staticmethod
+    def global_camera_info():
+        return FakePicamera2.cameras
+
+    def __init__(self, camera_num=0):
+        self.camera_properties = {"Model": FakePicamera2.cameras[camera_num]["Model"]}
+        self.metadata = {"FrameWallClock": self.WALL_NS, "ExposureTime": 8000, "AnalogueGain": 2.5, "ColourGains": (1.7, 1.4)}
+        self.set = []
+        self.started = self.closed = self.silent = False
+        self.requests = []
+        self._config = None
+        FakePicamera2.made.append(self)
+
+    @property
+    def sensor_modes(self):
+        mode = {"format": "SGBRG10", "unpacked": "SGBRG10", "bit_depth": 10, "exposure_limits": (134, 1_000_000)}
+        return [
+            {**mode, "size": (640, 480), "fps": 58.92, "crop_limits": (16, 0, 2560, 1920)},
+            {**mode, "size": (1296, 972), "fps": 46.34, "crop_limits": (0, 0, 2592, 1944)},
+            {**mode, "size": (2592, 1944), "fps": 15.63, "crop_limits": (0, 0, 2592, 1944)},
+            {"format": "MJPEG"},
+        ]
+
+    def create_video_configuration(self, main=None, colour_space=None, buffer_count=6, controls=None, queue=True, sensor=None):
+        assert main["format"] == "YUV420"
+        assert set(sensor) <= {"bit_depth", "output_size"}
+        return {
+            "main": dict(main),
+            "colour_space": colour_space,
+            "buffer_count": buffer_count,
+            "controls": controls,
+            "queue": queue,
+            "sensor": sensor,
+        }
+
+    def configure(self, config):
+        assert not self.started
+        width, _ = config["main"]["size"]
+        self._config = {**config, "main": {**config["main"], "stride": width + FakePicamera2.padding}}
+
+    def camera_configuration(self):
+        return self._config
+
+    def start(self):
+        if self._config is None:
+            raise RuntimeError("Camera not configured")
+        self.started = True
+
+    def set_controls(self, controls):
+        assert self.started
+        self.set.append(controls)
+
+    def capture_request(self, wait=None):
+        assert wait is False
+        self.requests.append(FakeRequest(self))
+        return FakeJob(None if self.silent else self.requests[-1])
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.fixture
+def picamera2(monkeypatch):
+    """The stand-in where the package would be."""
+    FakePicamera2.made = []
+    monkeypatch.setattr(FakePicamera2, "padding", 0)
+    monkeypatch.setitem(sys.modules, "picamera2", types.SimpleNamespace(Picamera2=FakePicamera2))
+    space = types.SimpleNamespace(Smpte170m=lambda: "smpte170m")
+    monkeypatch.setitem(sys.modules, "libcamera", types.SimpleNamespace(ColorSpace=space))
+    return FakePicamera2
+
+
+class FakeCapture:
+    """cv2.VideoCapture of a V4L2 camera, as far as it is used; controls in `refused` cannot be set, device 9 is not there."""
+
+    def __init__(self, device=0, api=cv2.CAP_V4L2, refused=()):
+        self.device, self.api, self.refused = device, api, refused
+        self.values: dict[int, float] = {
+            cv2.CAP_PROP_EXPOSURE: 80.0,
+            cv2.CAP_PROP_GAIN: 3.0,
+            cv2.CAP_PROP_WHITE_BALANCE_RED_V: 1.0,
+            cv2.CAP_PROP_WHITE_BALANCE_BLUE_U: 1.0,
+        }
+        self.opened = device != 9
+        self.images = [np.full((480, 640, 3), n, np.uint8) for n in range(3)]
+        self.position_ms: float | None = None
+
+    def isOpened(self):  # noqa: N802 - OpenCV's name
+        return self.opened
+
+    def set(self, key, value):
+        if key in self.refused:
+            return False
+        self.values[key] = value
+        return True
+
+    def get(self, key):
+        if key != cv2.CAP_PROP_POS_MSEC:
+            return self.values.get(key, -1.0)
+        return time.monotonic_ns() * 1e-6 - 12.0 if self.position_ms is None else self.position_ms
+
+    def read(self):
+        return (True, self.images.pop(0)) if self.images else (False, None)
+
+    def release(self):
+        self.opened = False
+
+
+@pytest.fixture
+def video_capture():
+    """The stand-in's class."""
+    return FakeCapture
