@@ -9,14 +9,16 @@ is carried on with growing sigma as `predicted`, and dropped when no second came
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from rhot.camera import Camera
 from rhot.config import Fusion
 from rhot.transforms import Array
+from services.fusion.body import Ints, empty_rest
+from services.fusion.intake import NO_TRACK, drop, no_looks, take_in
 from services.fusion.method import Counts, Estimates
 from services.fusion.observations import View
-from services.fusion.ring import ACCEPTED, GATED, LATE, empty_ring, insert_all, query_all, start
+from services.fusion.rest import blend
+from services.fusion.ring import ACCEPTED, GATED, LATE, empty_ring, query_all, start
 from services.fusion.triangulation import TriangulationStatus, extrinsics, triangulate
 
 # Jerk densities (m^2/s^5) of the models from a resting hand to a fast finger. Squared error over variance stays within .82 and 1.19 for
@@ -43,59 +45,56 @@ class KalmanMethod:
 
     frames_after = 0
 
-    def __init__(self, slots: int, cameras: tuple[Camera, ...], periods_s: Array, settings: Fusion) -> None:
-        """periods_s (C,) are the frame times of the cameras."""
+    def __init__(self, hands: list[Ints], cameras: tuple[Camera, ...], periods_s: Array, settings: Fusion) -> None:
+        """hands: the indices of each hand's landmarks; periods_s (C,) are the frame times of the cameras."""
         self.counts = Counts()
+        self._hands = hands
         self._R, self._t = extrinsics(cameras)
         self._periods_s = periods_s
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._reach_m = settings.max_distance_m
-        self._shape = (slots, len(cameras))
+        self._shape = (sum(map(len, hands)), len(cameras))
         self.reset()
 
     def reset(self) -> None:
         """Forget all observations."""
         slots = self._shape[0]
         self._ring = empty_ring(slots, len(DENSITIES))
-        # Last accepted look of each camera at each landmark, and the last look of all for beginning a track.
-        self._seen_s = np.full(self._shape, -np.inf)
-        self._look_s = np.full(self._shape, -np.inf)
-        self._look = np.zeros((*self._shape, 3))  # ray and sigma
+        self._rest = empty_rest(self._hands)
+        self._looks = no_looks(*self._shape)
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
         if len(view.slots) == 0:
             return
         self._drop(float(times_s.max()))
-        self._look_s[view.slots, view.camera] = times_s
-        self._look[view.slots, view.camera, :2] = view.rays
-        self._look[view.slots, view.camera, 2] = view.sigma
-        running = self._ring.filled[view.slots] > 0
-        for slot in view.slots[~running].tolist():
-            self._start(slot, view.camera, clock_sigma_s)
-        if running.any():
-            self._insert(view, np.flatnonzero(running), times_s, clock_sigma_s)
-
-    def _insert(self, view: View, rows: npt.NDArray[np.intp], times_s: Array, clock_sigma_s: float) -> None:
-        slots, times_s = view.slots[rows], times_s[rows]
-        variances = np.stack([view.sigma[rows] ** 2, np.full(len(rows), clock_sigma_s**2)], axis=1)
-        codes = insert_all(self._ring, slots, times_s, view.camera, view.rays[rows], variances, GATE, self._R, self._t, DENSITIES)
-        taken = codes == ACCEPTED
-        self._seen_s[slots[taken], view.camera] = np.maximum(self._seen_s[slots[taken], view.camera], times_s[taken])
-        accepted, gated, late = (int(np.count_nonzero(codes == code)) for code in (ACCEPTED, GATED, LATE))
+        codes = self._take_in(view.slots, times_s, view.camera, view.rays, view.sigma, clock_sigma_s, GATE)
+        accepted, gated, late, new = (codes.count(code) for code in (ACCEPTED, GATED, LATE, NO_TRACK))
         self.counts.accepted += accepted
         self.counts.gated += gated
         self.counts.late += late
-        self.counts.refused += len(rows) - accepted - gated - late
+        self.counts.refused += len(codes) - accepted - gated - late - new
+        if new:
+            for slot, code in zip(view.slots.tolist(), codes, strict=True):
+                if code == NO_TRACK:
+                    self._start(slot, view.camera, clock_sigma_s)
+
+    def _take_in(
+        self, slots: Ints, times_s: Array, camera: int, rays: Array, sigmas: Array, clock_sigma_s: float, gate: float
+    ) -> list[int]:
+        codes: Ints = take_in(
+            self._ring, self._rest, self._looks, slots, times_s, camera, rays, sigmas, clock_sigma_s, gate, self._R, self._t, DENSITIES
+        )
+        return codes.tolist()
 
     def _start(self, slot: int, camera: int, clock_sigma_s: float) -> None:
         """Begin a track from the newest looks of the cameras, if their rays meet."""
-        now_s = self._look_s[slot, camera]
-        cameras = np.flatnonzero(np.abs(self._look_s[slot] - now_s) <= START_WINDOW_S)
+        now_s = self._looks.look_s[slot, camera]
+        cameras = np.flatnonzero(np.abs(self._looks.look_s[slot] - now_s) <= START_WINDOW_S)
         if len(cameras) < 2:
             return
-        cameras = cameras[np.argsort(self._look_s[slot, cameras], kind="stable")]
-        times_s, looks = self._look_s[slot, cameras], self._look[slot, cameras]
+        cameras = cameras[np.argsort(self._looks.look_s[slot, cameras], kind="stable")]
+        times_s, looks = self._looks.look_s[slot, cameras], self._looks.look[slot, cameras]
         # At half a metre a hand of START_SIGMAS' speed moves this far in the picture between the looks.
         moved = START_SIGMAS[1] * (np.ptp(times_s) + clock_sigma_s) / 0.5
         met = triangulate(looks[:, :2], np.hypot(looks[:, 2], moved), self._R[cameras], self._t[cameras], self._reach_m)
@@ -103,22 +102,15 @@ class KalmanMethod:
             self.counts.refused += 1
             return
         start(self._ring, slot, times_s[0], met.position_m, START_SIGMAS)
-        self._seen_s[slot] = -np.inf
+        self._looks.seen_s[slot] = -np.inf
         for c, time_s, look in zip(cameras.tolist(), times_s, looks, strict=True):
-            variances = np.array([[look[2] ** 2, clock_sigma_s**2]])
-            insert_all(
-                self._ring, np.array([slot]), np.array([time_s]), c, look[None, :2].copy(), variances, np.inf, self._R, self._t, DENSITIES
-            )
-            self._seen_s[slot, c] = time_s
+            ray, sigma = look[None, :2].copy(), look[2:].copy()
+            self._take_in(np.array([slot]), np.array([time_s]), c, ray, sigma, clock_sigma_s, np.inf)
         self.counts.started += 1
 
     def _drop(self, now_s: float) -> None:
         """End the tracks that no two cameras have seen for hold_s."""
-        second_s = np.sort(self._seen_s, axis=1)[:, -2] if self._shape[1] > 1 else np.full(self._shape[0], -np.inf)
-        lost = (self._ring.filled > 0) & (now_s - second_s > self._hold_s)
-        if lost.any():
-            self._ring.filled[lost] = 0
-            self.counts.dropped += int(np.count_nonzero(lost))
+        self.counts.dropped += drop(self._ring.filled, self._rest.belief, self._looks.seen_s, now_s - self._hold_s)
 
     def estimate(self, time_s: float) -> Estimates:
         """All landmarks at an instant."""
@@ -126,7 +118,12 @@ class KalmanMethod:
         slots = self._shape[0]
         means, covs = np.zeros((slots, 6)), np.zeros((slots, 6, 6))
         found = query_all(self._ring, time_s, DENSITIES, means, covs)
+        blend(self._rest, time_s, found, means, covs)
         largest = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1) & (largest > 0.0) & (largest <= SHOW_SIGMA_M)
-        seen, looked = (time_s - last_s <= SEEN_FRAMES * self._periods_s for last_s in (self._seen_s, self._look_s))
+        seen, looked = (time_s - last_s <= SEEN_FRAMES * self._periods_s for last_s in (self._looks.seen_s, self._looks.look_s))
         return Estimates(found, means[:, :3], covs[:, :3, :3], seen, seen.sum(axis=1) >= 2, looked.sum(axis=1) >= 2)
+
+    def rest_beliefs(self) -> Array:
+        """How likely each landmark (S,) rests in its hand, 0 to 1; rest.py."""
+        return self._rest.belief.copy()

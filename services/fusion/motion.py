@@ -56,18 +56,25 @@ def predict(state: Array, cov: Array, dt_s: float, density: float, noise: Array,
     for i in range(3):
         p, v, a = state[i], state[i + 3], state[i + 6]
         out_state[i], out_state[i + 3], out_state[i + 6] = p + f01 * v + f02 * a, v + f12 * a, f22 * a
-    for i in range(3):
-        for j in range(9):
-            p, v, a = cov[i, j], cov[i + 3, j], cov[i + 6, j]
-            out_cov[i, j], out_cov[i + 3, j], out_cov[i + 6, j] = p + f01 * v + f02 * a, v + f12 * a, f22 * a
-    for i in range(9):
-        for j in range(3):
-            p, v, a = out_cov[i, j], out_cov[i, j + 3], out_cov[i, j + 6]
-            out_cov[i, j], out_cov[i, j + 3], out_cov[i, j + 6] = p + f01 * v + f02 * a, v + f12 * a, f22 * a
+    propagate(cov, 3, dt_s, out_cov)
     for i in range(3):
         for j in range(3):
             for axis in range(3):
                 out_cov[3 * i + axis, 3 * j + axis] += density * noise[i, j]
+
+
+@njit(cache=True)
+def propagate(cov: Array, axes: int, dt_s: float, out: Array) -> None:
+    """F P F^T for a covariance (3 axes, 3 axes) of positions, velocities and accelerations along `axes` directions, to out."""
+    f01, f02, f12, f22 = transition(dt_s)
+    for i in range(axes):
+        for j in range(3 * axes):
+            p, v, a = cov[i, j], cov[i + axes, j], cov[i + 2 * axes, j]
+            out[i, j], out[i + axes, j], out[i + 2 * axes, j] = p + f01 * v + f02 * a, v + f12 * a, f22 * a
+    for i in range(3 * axes):
+        for j in range(axes):
+            p, v, a = out[i, j], out[i, j + axes], out[i, j + 2 * axes]
+            out[i, j], out[i, j + axes], out[i, j + 2 * axes] = p + f01 * v + f02 * a, v + f12 * a, f22 * a
 
 
 @njit(cache=True)

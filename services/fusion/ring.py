@@ -48,6 +48,7 @@ class Ring(NamedTuple):
     nu: Array  # (S, NODES, M, 2)
     Si: Array  # (S, NODES, M, 2, 2)
     gain: Array  # (S, NODES, M, 9, 2)
+    evidence: Array  # (S,) log-likelihood of the observation taken in last, by all models as they were believed
 
 
 def empty_ring(slots: int, models: int) -> Ring:
@@ -67,6 +68,7 @@ def empty_ring(slots: int, models: int) -> Ring:
         np.zeros((*shape, models, 2)),
         np.zeros((*shape, models, 2, 2)),
         np.zeros((*shape, models, 9, 2)),
+        np.zeros(slots),
     )
 
 
@@ -97,8 +99,8 @@ def _place(ring: Ring, slot: int, time_s: float) -> int:
 
 
 @njit(cache=True)
-def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Array, noise: Array) -> float:
-    """Estimate after node `place` from the node before it; returns the smallest normalised innovation squared of all models.
+def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Array, noise: Array) -> tuple[float, float]:
+    """Estimate after node `place` from the node before it: smallest normalised innovation squared of all models, and log-likelihood.
 
     R (C, 3, 3) and t (C, 3) are every camera's T_camera_from_rig. Infinite when no model has the landmark in front of the camera.
     """
@@ -124,7 +126,7 @@ def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Ar
         ring.belief[slot, node, m] = prior * math.exp(max(ring.belief[slot, node, m] - best, -700.0))
         total += ring.belief[slot, node, m]
     ring.belief[slot, node] /= total
-    return nearest
+    return nearest, best + math.log(total)
 
 
 @njit(cache=True)
@@ -212,7 +214,7 @@ def insert(
     order[place] = node
     ring.time_s[slot, node], ring.camera[slot, node] = time_s, camera
     ring.seen[slot, node], ring.variance[slot, node] = seen, variances
-    nearest = _filter(ring, slot, place, R, t, densities, noise)
+    nearest, ring.evidence[slot] = _filter(ring, slot, place, R, t, densities, noise)
     if nearest > gate:
         for k in range(place, count):
             order[k] = order[k + 1]
@@ -224,17 +226,6 @@ def insert(
     if count + 1 in _YOUNG:
         _begin_again(ring, slot, R, t, densities)
     return ACCEPTED
-
-
-@njit(cache=True)
-def insert_all(
-    ring: Ring, slots: Ints, times_s: Array, camera: int, rays: Array, variances: Array, gate: float, R: Array, t: Array, densities: Array
-) -> Ints:
-    """One frame's observations (n,) into their tracks: the codes of `insert` (n,)."""
-    codes = np.empty(slots.shape[0], dtype=np.int64)
-    for n in range(slots.shape[0]):
-        codes[n] = insert(ring, slots[n], times_s[n], camera, rays[n], variances[n], gate, R, t, densities)
-    return codes
 
 
 @njit(cache=True)

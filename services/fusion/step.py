@@ -60,8 +60,12 @@ class FusionStep:
         self._reach_m = {hand: reach_m(hands[hand]) for hand in self._hands}
         self._rows = {hand: np.array([row for row, slot in enumerate(self._slots) if slot.hand == hand]) for hand in self._hands}
         all_cameras = self._observer.cameras
-        kind = KalmanMethod if config.fusion.method == "kalman" else PairedMethod
-        self.method: Method = kind(len(self._slots), all_cameras, 1.0 / self._fps, config.fusion)
+        periods_s = 1.0 / self._fps
+        self.method: Method = (
+            KalmanMethod(list(self._rows.values()), all_cameras, periods_s, config.fusion)
+            if config.fusion.method == "kalman"
+            else PairedMethod(len(self._slots), all_cameras, periods_s, config.fusion)
+        )
         self.clocks = ClockTuner(all_cameras, len(self._slots), 1.0 / self._fps, enabled=config.fusion.tune_clocks)
         self.mirrors = MirrorWatch(all_cameras)
         self._wait = max(config.fusion.lag_frames, self.method.frames_after)

@@ -13,6 +13,8 @@ from rhot.config import Fusion
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoints, MarkerFrame
 from rhot.transforms import Array
+from services.fusion.kalman import KalmanMethod
+from services.fusion.observations import Observer
 from services.fusion.step import FusionStep
 from services.fusion.synthetic import START_NS, Path, Setup, frames, point_hands
 
@@ -93,3 +95,63 @@ def pair() -> tuple[Camera, Camera]:
     tilted = right.T_rig_from_camera.copy()
     tilted[:3, 3] += [0.0, 0.004, -0.01]
     return left, Camera("right", right.size_px, right.matrix * np.array([[1.1], [1.1], [1.0]]), right.distortion, tilted)
+
+
+class Bench:
+    """A KalmanMethod fed with frames, without the rest of fusion."""
+
+    def __init__(self, setup: Setup, fusion: Fusion | None = None, hands: Iterable[Iterable[int]] = (range(6),)) -> None:
+        self.cameras = setup.rig()
+        self.observer = Observer(setup.config(), self.cameras)
+        periods_s = np.full(len(self.cameras), 1.0 / setup.fps)
+        groups = [np.array(list(hand), dtype=np.int64) for hand in hands]
+        self.method = KalmanMethod(groups, tuple(self.cameras.values()), periods_s, fusion or Fusion())
+
+    def see(self, frame: MarkerFrame) -> float:
+        """Take in a frame; its instant in s."""
+        view = self.observer.view(frame)
+        instant_s = (view.instant_ns - START_NS) * 1e-9
+        self.method.observe(view, instant_s + view.delay_s, view.clock_sigma_s)
+        return instant_s
+
+
+@pytest.fixture(scope="session")
+def bench_of() -> type[Bench]:
+    """The filter alone."""
+    return Bench
+
+
+@dataclass(frozen=True)
+class Sway:
+    """A hand at rest at a distance, as the simulator's hands rest: it shifts by 1.2 mm and turns by .4 deg a wave at .1-.7 Hz.
+
+    The finger `plays` (a landmark's index) moves by `stroke_m` at 2 Hz; until `still_from_s` the whole hand moves as `before` does.
+    """
+
+    distance_m: float = 1.0
+    plays: int | None = None
+    stroke_m: float = 0.01
+    still_from_s: float = 0.0
+    seed: int = 1
+
+    def __call__(self, times_s: Array) -> Array:
+        """Landmarks (n, 6, 3) at times (n,) or (n, 6), as Path."""
+        random = np.random.default_rng(self.seed)
+        hz, phase = random.uniform(0.1, 0.7, (2, 3, 3)), random.uniform(0.0, 2.0 * np.pi, (2, 3, 3))
+        times = np.broadcast_to(np.asarray(times_s, dtype=np.float64).reshape(len(times_s), -1), (len(times_s), 6))
+        waves = np.sum(np.sin(2.0 * np.pi * hz * times[:, :, None, None, None] + phase), axis=-1)  # (n, 6, 2, 3)
+        shape = Path(distance_m=self.distance_m, speed_m_s=0.0)(np.zeros(1))[0]
+        arms = shape - shape[0]
+        points = shape + 1.2e-3 * waves[:, :, 0] + np.cross(0.007 * waves[:, :, 1], arms)
+        if self.plays is not None:
+            points[:, self.plays, 1] += self.stroke_m * np.sin(4.0 * np.pi * times[:, self.plays])
+        # A sweep of .2 m in a second and a half that ends without a jerk.
+        left = np.clip(self.still_from_s - times, 0.0, None) / 1.5
+        points[:, :, 0] += 0.06 * np.sin(4.0 * left) * np.clip(left, 0.0, 1.0) ** 2
+        return points
+
+
+@pytest.fixture(scope="session")
+def sway() -> type[Sway]:
+    """Hands at rest."""
+    return Sway

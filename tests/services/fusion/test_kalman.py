@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-import time
-
 import msgspec
 import numpy as np
 import pytest
 
 from rhot.config import Fusion
-from services.fusion.kalman import SHOW_SIGMA_M, KalmanMethod
-from services.fusion.observations import Observer
+from services.fusion.kalman import SHOW_SIGMA_M
 from services.fusion.synthetic import START_NS, Path, Setup, frames
 
 EXACT = Setup(clock_error_s=0.0, clock_sigma_s=2e-5, loss=0.0)
 
 
-class Bench:
-    """A KalmanMethod fed with frames, without the rest of fusion."""
-
-    def __init__(self, setup: Setup, fusion: Fusion | None = None) -> None:
-        self.cameras = setup.rig()
-        self.observer = Observer(setup.config(), self.cameras)
-        periods_s = np.full(len(self.cameras), 1.0 / setup.fps)
-        self.method = KalmanMethod(6, tuple(self.cameras.values()), periods_s, fusion or Fusion())
-
-    def see(self, frame) -> float:
-        """Take in a frame; its instant in s."""
-        view = self.observer.view(frame)
-        instant_s = (view.instant_ns - START_NS) * 1e-9
-        self.method.observe(view, instant_s + view.delay_s, view.clock_sigma_s)
-        return instant_s
-
-
-def test_the_first_points_of_a_track_are_honest():
+def test_the_first_points_of_a_track_are_honest(bench_of):
     """Test: 30 hands come into view at 0.5 m/s. Expected: the second to tenth instants are within their sigmas, bar a little."""
     squared = []
     for seed in range(30):
-        path, bench = Path(seed=seed), Bench(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5))
+        path, bench = Path(seed=seed), bench_of(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5))
         for frame in frames(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5), path, 0.4):
             instant_s = bench.see(frame)
             found = bench.method.estimate(instant_s)
@@ -47,8 +27,8 @@ def test_the_first_points_of_a_track_are_honest():
     assert np.concatenate(squared).mean() < 1.3
 
 
-def test_nothing_is_shown_before_it_is_of_use():
-    bench, path = Bench(EXACT), Path()
+def test_nothing_is_shown_before_it_is_of_use(bench_of):
+    bench, path = bench_of(EXACT), Path()
     shown = []
     for frame in frames(EXACT, path, 0.2):
         found = bench.method.estimate(bench.see(frame))
@@ -59,16 +39,16 @@ def test_nothing_is_shown_before_it_is_of_use():
     assert all(shown[4:])
 
 
-def test_one_camera_alone_begins_nothing():
-    bench = Bench(EXACT)
+def test_one_camera_alone_begins_nothing(bench_of):
+    bench = bench_of(EXACT)
     for frame in frames(EXACT, Path(), 1.0):
         if frame.camera == "left":
             assert not bench.method.estimate(bench.see(frame)).found.any()
     assert bench.method.counts.started == 0
 
 
-def test_a_wild_observation_is_gated_and_the_track_goes_on():
-    bench, path = Bench(EXACT), Path()
+def test_a_wild_observation_is_gated_and_the_track_goes_on(bench_of):
+    bench, path = bench_of(EXACT), Path()
     given = frames(EXACT, path, 2.0)
     given[100] = msgspec.structs.replace(given[100], markers=[msgspec.structs.replace(m, x_px=m.x_px * 0.9) for m in given[100].markers])
     for frame in given:
@@ -79,8 +59,8 @@ def test_a_wild_observation_is_gated_and_the_track_goes_on():
     assert np.abs(error).max() < 0.02
 
 
-def test_a_marker_that_jumps_for_good_is_found_again():
-    bench = Bench(EXACT)
+def test_a_marker_that_jumps_for_good_is_found_again(bench_of):
+    bench = bench_of(EXACT)
     for frame in frames(EXACT, Path(), 1.0):
         bench.see(frame)
     elsewhere = Path(distance_m=0.5, seed=9)
@@ -92,28 +72,14 @@ def test_a_marker_that_jumps_for_good_is_found_again():
     assert bench.method.counts.dropped == 6
 
 
-def test_hold_is_at_least_the_gap_between_two_frames():
-    bench = Bench(EXACT, Fusion(hold_s=0.0))
+def test_hold_is_at_least_the_gap_between_two_frames(bench_of):
+    bench = bench_of(EXACT, Fusion(hold_s=0.0))
     found = [bench.method.estimate(bench.see(frame)).found.all() for frame in frames(EXACT, Path(), 1.0)]
     assert all(found[10:])
 
 
-def test_an_update_of_six_markers_takes_less_than_100_us():
-    setup = Setup()
-    bench = Bench(setup)
-    views = [bench.observer.view(frame) for frame in frames(setup, Path(), 6.0)]
-    took = []
-    for view in views:
-        times_s = (view.instant_ns - START_NS) * 1e-9 + view.delay_s
-        begin_s = time.perf_counter()
-        bench.method.observe(view, times_s, view.clock_sigma_s)
-        took.append(time.perf_counter() - begin_s)
-    # The 30th percentile: other work on the machine only ever adds.
-    assert np.percentile(took, 30) < 100e-6
-
-
-def test_cameras_that_were_never_there_do_not_matter():
-    bench = Bench(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5))
+def test_cameras_that_were_never_there_do_not_matter(bench_of):
+    bench = bench_of(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5))
     for frame in frames(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5), Path(), 1.0):
         if frame.camera in ("right", "camera4"):
             instant_s = bench.see(frame)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from services.fusion.motion import transition, unit_noise
-from services.fusion.ring import ACCEPTED, GATED, LATE, NODES, empty_ring, insert_all, query_all, start
+from services.fusion.ring import ACCEPTED, GATED, LATE, NODES, empty_ring, insert, query_all, start
 from services.fusion.synthetic import Setup
 from services.fusion.triangulation import extrinsics
 
@@ -33,9 +33,7 @@ def world():
 
 def put(ring, look, R, t, gate=np.inf, densities=DENSITIES) -> int:
     time_s, camera, ray = look
-    return int(
-        insert_all(ring, np.array([0]), np.array([time_s]), camera, ray[None], np.array([[SIGMA**2, 0.0]]), gate, R, t, densities)[0]
-    )
+    return int(insert(ring, 0, time_s, camera, ray, np.array([SIGMA**2, 0.0]), gate, R, t, densities))
 
 
 def ask(ring, time_s, densities=DENSITIES):
@@ -143,3 +141,16 @@ def test_belief_goes_to_the_model_that_fits(world):
         belief = ring.belief[0, ring.order[0, ring.filled[0] - 1]]
         assert belief.sum() == pytest.approx(1.0)
         assert np.argmax(belief) == int(lively)
+
+
+def test_evidence_is_how_likely_the_latest_observation_was(world):
+    """Test: one model; its innovation is Gaussian. Expected: the log-density of the textbook, and less of it for what fits less."""
+    R, t, looks = world
+    ring = filled(world)
+    node = ring.order[0, ring.filled[0] - 1]
+    nu, Si = ring.nu[0, node, 0], ring.Si[0, node, 0]
+    expected = -0.5 * (nu @ Si @ nu) + 0.5 * np.log(np.linalg.det(Si)) - np.log(2.0 * np.pi)
+    assert ring.evidence[0] == pytest.approx(expected)
+    time_s, camera, ray = looks[-1]
+    put(ring, (time_s + 1 / 60, camera, ray + 0.002), R, t)
+    assert ring.evidence[0] < expected
