@@ -28,8 +28,8 @@ Ints = npt.NDArray[np.int64]
 SHIFT_DENSITY, TURN_DENSITY = 0.003, 0.03
 # How a marker wanders in its hand (m^2/s): .1 mm within a second. With 1e-7 still depth is 5 % worse at .5 and 1.0 m, with 1e-6 25 %.
 WANDER = 1e-9
-# Sigmas of a new body's rates and accelerations: m/s and rad/s, m/s^2 and rad/s^2.
-START_RATE, START_ACCELERATION = (0.1, 1.0), (0.5, 5.0)
+# Sigmas of a new body's rates and accelerations (m/s and rad/s, m/s^2 and rad/s^2): slow, or it does not rest.
+START_RATE, START_ACCELERATION = (0.02, 0.1), (0.1, 0.5)
 # A body is lost beyond these: sigmas of displacement, m and rad (turns are taken to first order), and rates, m/s and rad/s.
 LOST, FASTEST = (0.03, 0.3), (5.0, 30.0)
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -48,6 +48,7 @@ class Rest(NamedTuple):
     centre: Array  # (H, 3) what the body turns about
     motion: Array  # (H, 3, 6): displacement since the anchors were moved, rate, acceleration; of each shift and turn
     cov: Array  # (H, 18, 18)
+    trial_s: Array  # (H,) when markers were anchored anew
     first: Ints  # (H,) counts frames
 
 
@@ -68,6 +69,7 @@ def empty_rest(hands: list[Ints]) -> Rest:
         np.zeros((count, 3)),
         np.zeros((count, 3, 6)),
         np.zeros((count, 18, 18)),
+        np.full(count, -np.inf),
         np.zeros(count, dtype=np.int64),
     )
 
@@ -85,21 +87,13 @@ def begin(rest: Rest, hand: int, time_s: float, centre: Array) -> None:
 
 
 @njit(cache=True)
-def vague(rest: Rest, hand: int, order: int, sigmas: tuple[float, float]) -> bool:
-    """Whether displacement (order 0), rate (1) or acceleration (2) is less known than by sigmas of shift and turn along some axis."""
-    known = 0
-    for axis in range(6):
-        known += rest.cov[hand, 6 * order + axis, 6 * order + axis] < sigmas[axis // 3] ** 2
-    return known < 6
-
-
-@njit(cache=True)
 def lost(rest: Rest, hand: int) -> bool:
     """Whether a body's state says nothing any more."""
     sane = 0
     for axis in range(6):
-        sane += abs(rest.motion[hand, 1, axis]) < FASTEST[axis // 3]
-    return sane < 6 or vague(rest, hand, 0, LOST)
+        known = rest.cov[hand, axis, axis] < LOST[axis // 3] ** 2
+        sane += known and abs(rest.motion[hand, 1, axis]) < FASTEST[axis // 3]
+    return sane < 6
 
 
 @njit(cache=True)

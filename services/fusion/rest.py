@@ -20,13 +20,15 @@ import numpy.typing as npt
 from numba import njit
 
 from rhot.transforms import Array
-from services.fusion.body import START_ACCELERATION, START_RATE, Ints, Rest, advance, begin, look, lost, moved, vague
+from services.fusion.body import Ints, Rest, advance, begin, look, lost, moved
 from services.fusion.ring import ACCEPTED, Ring
 
-# While fewer than BODY markers rest, the body's covariance grows by this factor with every frame, up to that of a new body.
-BODY, FORGET = 3, 1.2
-# A marker less likely at rest than this is anchored anew at every look, and does not steer the body of others.
+# So many markers tell how a body moves and turns.
+BODY = 3
+# A marker likelier at rest than this steers the body and profits from it.
 RESTS = 0.3
+# Markers that do not rest are anchored anew so often, and a body with fewer than BODY that rest begins anew: a trial.
+TRIAL_S = 0.5
 # Belief in a marker met for the first time, and the share of belief that goes back there at each look.
 FIRST, LEAK = 0.1, 0.003
 # One look speaks against rest by no more than this (log-likelihood): what background and light do to a centre is no motion. Three in a
@@ -55,21 +57,38 @@ def _anchor(rest: Rest, ring: Ring, slot: int) -> None:
 
 
 @njit(cache=True)
-def _judge(
-    rest: Rest, ring: Ring, slot: int, time_s: float, seen: Array, variances: Array, R: Array, t: Array, steers: bool, gate: float
-) -> None:
+def _judge(rest: Rest, ring: Ring, slot: int, time_s: float, seen: Array, variances: Array, R: Array, t: Array, steers: bool) -> None:
     """Take one observation in, and weigh anew whether its marker rests."""
     if rest.belief[slot] == 0.0:
+        _anchor(rest, ring, slot)
         rest.belief[slot], rest.trust[slot] = FIRST, 0.0
     else:
-        likelihood = look(rest, slot, time_s - rest.time_s[rest.hand[slot]], seen, variances, R, t, steers, gate)
+        likelihood = look(rest, slot, time_s - rest.time_s[rest.hand[slot]], seen, variances, R, t, steers, GATE)
         before = (1.0 - LEAK) * rest.belief[slot] + LEAK * FIRST
         odds = before / (1.0 - before) * math.exp(min(max(likelihood - ring.evidence[slot], -DOUBT), 50.0))
         rest.belief[slot] = odds / (1.0 + odds)
         rest.trust[slot] = min(rest.belief[slot], rest.trust[slot] + max(time_s - rest.seen_s[slot], 0.0) / RISE_S)
-    if rest.belief[slot] < RESTS:
-        _anchor(rest, ring, slot)
     rest.seen_s[slot] = max(time_s, rest.seen_s[slot])
+
+
+@njit(cache=True)
+def _resting(rest: Rest, hand: int) -> int:
+    """How many markers of a hand are taken to rest."""
+    count = 0
+    for slot in range(rest.hand.shape[0]):
+        count += rest.hand[slot] == hand and rest.belief[slot] >= RESTS
+    return count
+
+
+@njit(cache=True)
+def _try_again(rest: Rest, hand: int, time_s: float, centre: Array) -> None:
+    """Begin a trial: new anchors for those that do not rest, and a new body about a point (3,) where too few do."""
+    rest.trial_s[hand] = time_s
+    if _resting(rest, hand) < BODY:
+        begin(rest, hand, time_s, centre)
+    for slot in range(rest.hand.shape[0]):
+        if rest.hand[slot] == hand and rest.belief[slot] < RESTS:
+            rest.belief[slot] = 0.0
 
 
 @njit(cache=True)
@@ -86,8 +105,11 @@ def _ready(rest: Rest, ring: Ring, hand: int, slots: Ints, times_s: Array, codes
     time_s /= count
     if time_s > rest.time_s[hand] + REACH_S or lost(rest, hand):
         begin(rest, hand, time_s, middle / count)
+        rest.trial_s[hand] = time_s
     elif time_s > rest.time_s[hand]:
         advance(rest, hand, time_s)
+        if time_s > rest.trial_s[hand] + TRIAL_S:
+            _try_again(rest, hand, time_s, middle / count)
     return bool(time_s >= rest.time_s[hand] - REACH_S)
 
 
@@ -100,21 +122,17 @@ def weigh(
     for hand in range(rest.time_s.shape[0]):
         if not _ready(rest, ring, hand, slots, times_s, codes):
             continue
-        resting, gate = 0, GATE
+        # In a trial, those that have not been found to move.
+        enough = RESTS if _resting(rest, hand) >= BODY else 0.5 * FIRST
         for n in range(count):
-            steers[n] = rest.belief[slots[n]] >= RESTS
-            resting += steers[n] and rest.hand[slots[n]] == hand and codes[n] == ACCEPTED
-        if resting < BODY:
-            steers[:], gate = True, np.inf
-            if not (vague(rest, hand, 1, START_RATE) or vague(rest, hand, 2, START_ACCELERATION)):
-                rest.cov[hand] *= FORGET
+            steers[n] = rest.belief[slots[n]] >= enough
         # The first to steer is predicted worst and the others profit from it, so it is another one each time; those that do not come last.
         rest.first[hand] += 1
         for steering in (True, False):
             for k in range(count):
                 n = (k + rest.first[hand]) % count
                 if rest.hand[slots[n]] == hand and codes[n] == ACCEPTED and steers[n] == steering:
-                    _judge(rest, ring, slots[n], times_s[n], rays[n], variances[n], R[camera], t[camera], steering, gate)
+                    _judge(rest, ring, slots[n], times_s[n], rays[n], variances[n], R[camera], t[camera], steering)
 
 
 @njit(cache=True)
