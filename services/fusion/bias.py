@@ -32,9 +32,9 @@ Ints = npt.NDArray[np.int64]
 WHITE_PX, WHITE_SHARE = 0.1, 0.2
 # Steady, each camera's own: depths of resting hands were .4 mm off on average at .5 m and 1.65 at 1.0 m, .047 px of each view (twice that
 # before the tracker took the background of each side). With it, squared error over variance in depth is .74 and .98 for resting hands.
-OWN_PX = 0.045
+OWN_PX = 0.026
 # Steady, shared by all cameras, as a share of sigma_px: resting hands, seen from the side, lie .13-.2 mm off across the ray.
-SHARED_SHARE = 0.3
+SHARED_SHARE = 0.27
 # Share of a new frame's sigma in the running one.
 _NEW = 0.1
 
