@@ -30,11 +30,12 @@ Ints = npt.NDArray[np.int64]
 # At sensor noise 5 a resting centre scatters by .10 px at 1.0 m and .16 px at 0.5 m; sigma_px is .08 and .15-.3 there, much of it light.
 # Taking all of it for noise made playing fingers at half a metre 1.95 mm RMS without lag, this 1.49, and nothing worse.
 WHITE_PX, WHITE_SHARE = 0.1, 0.2
-# Steady, each camera's own: depths of resting hands were .4 mm off on average at .5 m and 1.65 at 1.0 m, .047 px of each view (twice that
-# before the tracker took the background of each side). With it, squared error over variance in depth is .74 and .98 for resting hands.
-OWN_PX = 0.045
-# Steady, shared by all cameras, as a share of sigma_px: resting hands, seen from the side, lie .13-.2 mm off across the ray.
-SHARED_SHARE = 0.3
+# Steady, each camera's own: depths of resting hands are .38 mm off on average at .5 m and .87-1.1 at 1.0 m (seeds 1-4, 5-10), .024-.03 px
+# of each view there. Squared error over variance in depth is then about .8 and .9-1.0 for resting hands, 1.1 for moving ones.
+OWN_PX = 0.022
+# Steady, shared by all cameras, as a share of sigma_px: with more than this, resting hands' errors across the ray (.15-.18 mm RMS at .5 m,
+# .19-.23 at 1.0 m) are smaller than told.
+SHARED_SHARE = 0.14
 # Share of a new frame's sigma in the running one.
 _NEW = 0.1
 

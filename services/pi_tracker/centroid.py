@@ -1,15 +1,11 @@
 """Where the blobs' paint is, to a few hundredths of a pixel, and how sure that is.
 
-Each pixel near a blob is a mixture of paint under some light and of what lies behind. With chroma C = (U, V) and luma Y linear in
-the mixture, the paint's chroma per luma p and the background's s (both free of shading), the luma that the paint contributes is
-    a = (C - s Y) . (p - s) / |p - s|^2,
-what is left, Y - a, comes from behind. With the lumas of pure paint Yp and pure background Yb, the share of paint that fits both
-best is
-    (a Yp + (Yb - (Y - a)) Yb) / (Yp^2 + Yb^2).
-The centroid is weighted with that share: it is not pulled to the lit side of a finger, and skin, wall and neighbouring fingers
-cancel. s and Yb are those of the nearest cells of the ring around the blob, each side of the edge its own: skin lies on one side and
-the room, which is another one in each camera, on the others. Yp is carried outwards from the core over a short distance, as light
-falls off across a finger. Only the blob, one cell larger, counts: weights over the whole ROI pick up neighbouring fingers (.76 px).
+Each pixel near a blob is a mixture of paint under some light and of what lies behind (mixture.py). The centroid is weighted with the
+share of paint: it is not pulled to the lit side of a finger, and skin, wall and neighbouring fingers cancel. What paint and background
+look like is read twice: first inside the blob's mask and in a ring around it, then where the share found so says that there is nothing
+else. A mask's rim holds some background, and a ring leaves out what lies next to the edge: both bias a centre, in each camera
+differently, since the background is another one there. Only the blob, one cell larger, counts: weights over the whole ROI pick up
+neighbouring fingers (.76 px).
 
 All blobs of a frame are measured in one stack of tiles: the cost is in the calls, not in the pixels. Pure. A blob cut off by the
 image's edge, one of a paint that hardly differs from what is around it, and one of a few cells are measured all the same, and
@@ -19,41 +15,36 @@ their sigma and quality say so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from services.pi_tracker.frame import Image
+from services.pi_tracker.mixture import Light, Mixture
 from services.pi_tracker.noise import Noise
 from services.pi_tracker.planes import Picture
 from services.pi_tracker.search import Blob
 from services.pi_tracker.tiles import Tiles, doubled, flat, halved, moments, stacked
 
 _SQUARE = np.ones((3, 3), np.uint8)
-# The background beside a pixel is that of the ring's cells weighted with a Gaussian of so many cells: the nearest count. (Error of
-# disparity, simulated hands at 1.0, 0.5 and moving at 0.7 m: mean of a ring's 5 x 5 cells .110, .082, .165 px; this .086, .076, .150.
-# Even the true background, known in every pixel, would hardly be better: .069 against .076 without noise at 1.0 m.)
-_NEAR_CELLS, _BACKGROUND_CELLS = 0.8, 5
-# Paint luma is that of the next neighbours (absolute error with one value for all .36 px, with 5 cells .21, with 3 .18).
-_PAINT_CELLS = 3
+# In the second round, cells count as background the more the further their share of paint lies below the first; as paint from the
+# second to the third. (Error of disparity without noise, simulated hands resting at 1.0 and 0.5 m, moving at 0.7 m, seeds 1-10: one round
+# .072, .056, .137 px; two rounds .063, .048, .121; with the mask's core no longer taken for paint as such .056, .048, .117.)
+_BARE, _PURE = 0.2, (0.85, 0.95)
+# Weight of a cell that only the mask takes for background or for paint, where the share of paint finds none.
+_HARDLY = 1e-3
 # The share of paint is noisy about 0 and 1; this slope about 1/2 lets clipping remove most of that noise at little loss of
 # sub-pixel position (disparity RMS at sigma 5: slope 1.5 .052, 2 .053, 3 .056 px; absolute error .237, .223, .209).
 _SLOPE = 2.0
-# Weight of the mean of all known cells beside that of near ones: nothing where there are any (a Gaussian two cells off is .0005),
-# everything where there are none.
-_FAINT = 1e-5
 # Cores smaller than this hold no pure paint; then the whole mask must do.
 _MIN_CORE = 3
-# Luma below which a ratio of chroma to luma is noise.
-_DARKEST = 8.0
 # What noise does not explain, px: light, shade and what lies behind move the centre by this much, near or far; and more, the vaguer its
-# edge is, i.e. the wider than 1.85 px the band in which the share of paint is neither 0 nor 1 (blur, coloured light, dark sides). Fitted
-# to the simulator's hands (noise taken off): .08-.11 still at 0.5 and 1.0 m, .14-.17 moving at 0.7 m, .57 and .78 where the band is 2.3
-# and 2.8 px, in coloured light. Error over sigma is then .8-.9 still, 1.2 moving and in coloured light.
-_MISFIT_PX, _MISFIT_PER_PX, _SHARP_PX = 0.12, 1.0, 1.85
+# edge is, i.e. the wider than 1.75 px the band in which the share of paint is neither 0 nor 1 (blur, coloured light, dark sides). RMS of
+# the simulator's hands, seeds 1-10: .09 px resting at 0.5 and 1.0 m, .14 moving at 0.7 m (.2 where the band is wider than 1.8 px), .47 and
+# .65 in coloured light where it is 2.1 and 2.4 px. Error over sigma is then .7-.8 resting, 1.1 moving, 1.25 in coloured light.
+_MISFIT_PX, _MISFIT_PER_PX, _SHARP_PX = 0.1, 1.0, 1.75
 # Paint this far from its surroundings in chroma per luma is told from them without doubt; the paints of the simulator lie at .4 to .7.
 _CONTRAST = 0.25
 # Of a blob without any paint when looked at closely.
@@ -91,8 +82,10 @@ def _size(blob: Blob) -> int:
 
 def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
     reach = _dilated(tiles.mask, _SQUARE)
-    paint = _paint(tiles, reach)
-    share = doubled(paint.offset) - tiles.luma * doubled(paint.slope)
+    light = Light(tiles.cells)
+    mixture = _mixture(tiles, light, reach)
+    share, by_luma, variance = mixture.share(noise)
+    share = doubled(share - by_luma * tiles.cells[:, 0]) + doubled(by_luma) * tiles.luma
     weight = _SLOPE * share + (0.5 - 0.5 * _SLOPE)
     np.minimum(weight, 1.0, out=weight)
     np.maximum(weight, 0.0, out=weight)
@@ -100,42 +93,22 @@ def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid
     # Where clipping holds the weight, noise does not move it.
     moving = halved(np.logical_and(weight > 0.0, weight < 1.0).astype(np.float32))
     sums = moments(weight, 1).swapaxes(0, 1).tolist()
-    spreads = moments(moving * paint.variance(noise), 2).swapaxes(0, 1).tolist()
+    spreads = moments(moving * variance, 2).swapaxes(0, 1).tolist()
     moved = (4.0 * moments(moving, 0).ravel()).tolist()
-    contrast = paint.contrast.tolist()
+    contrast = mixture.contrast().tolist()
     return [_centroid(tiles, k, blob, sums[k], spreads[k], moved[k], contrast[k]) for k, blob in enumerate(blobs)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Paint:
-    """The share of paint of a pixel as offset - slope * Y, per cell, (h, n, w)."""
-
-    offset: Image
-    slope: Image
-    # The share's derivative by the cell's chroma, squared.
-    by_chroma2: Image
-    # How far the paint's chroma per luma lies from what is around the blob, on average; (n,).
-    contrast: Image
-
-    def variance(self, noise: Noise) -> Image:
-        """Of the share, for the mean of a cell's four pixels; (h, n, w)."""
-        return (self.slope * noise.luma) ** 2 + self.by_chroma2 * noise.chroma**2
-
-
-def _paint(tiles: Tiles, reach: Image) -> _Paint:
-    ring = (_dilated(reach, _SQUARE) - reach) & tiles.inside
-    (y_b, u_b, v_b), around = _carried(tiles.cells, ring, _near)
-    (y_p, *_), paint = _carried(tiles.cells, _cores(tiles.mask), _next)
-    y_b, y_p = np.maximum(y_b, _DARKEST), np.maximum(y_p, _DARKEST)
-    s_u, s_v = u_b / y_b, v_b / y_b
-    p_uv, s_uv = paint[1:3] / np.maximum(paint[0], _DARKEST), around[1:3] / np.maximum(around[0], _DARKEST)  # (2, n)
-    d_u, d_v = p_uv[0, :, None] - s_u, p_uv[1, :, None] - s_v
-    norm = np.maximum(d_u * d_u + d_v * d_v, 1e-6)
-    scale = 1.0 / (y_p * y_p + y_b * y_b)
-    p_norm, q = (y_p + y_b) * scale / norm, y_b * scale
-    g_u, g_v = d_u * p_norm, d_v * p_norm
-    offset = tiles.cells[:, 1] * g_u + tiles.cells[:, 2] * g_v + y_b * q
-    return _Paint(offset, s_u * g_u + s_v * g_v + q, p_norm * p_norm * norm, np.hypot(*(p_uv - s_uv)))
+def _mixture(tiles: Tiles, light: Light, reach: Image) -> Mixture:
+    """Paint and background of every cell: first as the mask has them, then as the share of paint does that follows from those."""
+    band: Image = np.bitwise_and(_dilated(reach, _SQUARE), tiles.inside)
+    # Floats of 32 bits: a mask of bytes times a number has 64.
+    ring = np.bitwise_and(band, 1 - reach).astype(np.float32)
+    core = _cores(tiles.mask).astype(np.float32)
+    share = Mixture(light, ring, core, rough=True).ratio()
+    behind = np.maximum(np.minimum(1.0 - share / _BARE, band), _HARDLY * ring)
+    paint = np.maximum(np.minimum((share - _PURE[0]) / (_PURE[1] - _PURE[0]), tiles.mask), _HARDLY * core)
+    return Mixture(light, behind, paint)
 
 
 def _cores(mask: Image) -> Image:
@@ -149,28 +122,6 @@ def _cores(mask: Image) -> Image:
 
 def _dilated(masks: Image, element: Image) -> Image:
     return cv2.dilate(flat(masks), element).reshape(masks.shape)
-
-
-def _near(image: Image) -> Image:
-    return cv2.GaussianBlur(image, (_BACKGROUND_CELLS, _BACKGROUND_CELLS), _NEAR_CELLS, borderType=cv2.BORDER_CONSTANT)
-
-
-def _next(image: Image) -> Image:
-    return cv2.blur(image, (_PAINT_CELLS, _PAINT_CELLS), borderType=cv2.BORDER_CONSTANT)
-
-
-def _carried(cells: Image, known: Image, spread: Callable[[Image], Image]) -> tuple[Image, Image]:
-    """Y, U, V where they are known, spread by a filter, and their mean where that does not reach.
-
-    cells (h, 4, n, w), known (h, n, w) -> (3, h, n, w), and the means (3, n).
-    """
-    h, _, n, w = cells.shape
-    kept = cells * known[:, None]
-    total = moments(kept.reshape(h, 4 * n, w), 0).reshape(4, n)
-    mean = total[:3] / np.maximum(total[3], 1.0)
-    window = spread(flat(kept)).reshape(kept.shape)
-    window[:, :3] += _FAINT * mean[:, :, None]
-    return (window[:, :3] / (window[:, 3:] + _FAINT)).swapaxes(0, 1), mean
 
 
 def _centroid(

@@ -55,9 +55,11 @@ def clean(
     shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of the lens.
     """
     image = np.empty((size_px[1], size_px[0], 3), np.float32)
-    image[:] = wall
+    image[:] = _light(wall)
     truth = {tip.color: _draw(image, tip, shading) for tip in tips}
-    return cv2.GaussianBlur(image, (0, 0), blur_px), truth
+    # A lens blurs light, not grey levels.
+    light = cv2.GaussianBlur(image, (0, 0), blur_px)
+    return np.float32(255.0) * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055), truth
 
 
 def noisy(image: Image, sigma: float, seed: int) -> Image:
@@ -92,8 +94,14 @@ def _range(bgr: Bgr) -> ColorRange:
     return ColorRange(hsv_low=((hue - 10) % 180, 90, 30), hsv_high=((hue + 10) % 180, 255, 255))
 
 
+def _light(bgr: Bgr) -> Image:
+    """Linear light 0..1 of grey levels (3,), by the sRGB curve (IEC 61966-2-1)."""
+    levels = np.array(bgr) / 255.0
+    return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
+
+
 def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
-    """Draw a tip, sharp but anti-aliased; returns the centre of its paint."""
+    """Draw a tip in linear light, sharp but anti-aliased; returns the centre of its paint."""
     reach = int(3.2 * tip.length_px + tip.width_px)
     x0, y0 = max(int(tip.x_px) - reach, 0), max(int(tip.y_px) - reach, 0)
     window = image[y0 : int(tip.y_px) + reach, x0 : int(tip.x_px) + reach]
@@ -110,7 +118,7 @@ def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
     paint = finger & (along < tip.length_px / 2)
     facing = np.sqrt(np.clip(1 - (away / radius) ** 2, 0, 1)) * np.cos(tip.light_rad) + across / radius * np.sin(tip.light_rad)
     light = np.clip(1 - shading + shading * facing, _DARKEST, 1.0)[..., None]
-    fine[finger] = (np.array(SKIN) * light)[finger]
-    fine[paint] = (np.array(PAINTS[tip.color]) * light)[paint]
+    fine[finger] = (_light(SKIN) * light)[finger]
+    fine[paint] = (_light(PAINTS[tip.color]) * light)[paint]
     window[:] = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     return float(x[paint].mean() + tip.x_px), float(y[paint].mean() + tip.y_px)

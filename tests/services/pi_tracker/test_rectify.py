@@ -23,7 +23,8 @@ def lens():
 @pytest.fixture
 def frame(studio, tip):
     """Tips in the middle and in a corner, at any layout."""
-    return lambda layout="i420": studio.frame([tip("green", 160.0, 120.0), tip("blue", 40.0, 35.0)], 1, layout, size_px=SIZE, sigma=1.0)[0]
+    tips = [tip("green", 160.0, 120.0, 10.0), tip("blue", 40.0, 35.0, 10.0)]
+    return lambda layout="i420": studio.frame(tips, 1, layout, size_px=SIZE, sigma=1.0)[0]
 
 
 @pytest.mark.parametrize("layout", ["i420", "bgr"])

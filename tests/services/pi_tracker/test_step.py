@@ -46,7 +46,7 @@ def test_markers_are_where_the_paint_is(moving, colors, layout, method, toleranc
         assert set(found) == set(truth)
         for name, marker in found.items():
             assert (marker.x_px, marker.y_px) == pytest.approx(truth[name], abs=tolerance_px)
-            assert 40 < marker.area_px < 160
+            assert 35 < marker.area_px < 160
             assert 0.0 < marker.sigma_px < 0.6
             assert marker.quality > 0.5
 
