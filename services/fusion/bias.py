@@ -32,7 +32,7 @@ Ints = npt.NDArray[np.int64]
 WHITE_PX, WHITE_SHARE = 0.1, 0.2
 # Steady, each camera's own: depths of resting hands are .38 mm off on average at .5 m and .87-1.1 at 1.0 m (seeds 1-4, 5-10), .024-.03 px
 # of each view there. Squared error over variance in depth is then about .8 and .9-1.0 for resting hands, 1.1 for moving ones.
-OWN_PX = 0.022
+OWN_PX = 0.032
 # Steady, shared by all cameras, as a share of sigma_px: with more than this, resting hands' errors across the ray (.15-.18 mm RMS at .5 m,
 # .19-.23 at 1.0 m) are smaller than told.
 SHARED_SHARE = 0.14

@@ -19,6 +19,7 @@ centre is bias.py's matter.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -39,18 +40,20 @@ SIGMA_UNKNOWN = (0.29, 0.16)
 # cosine of -.6, 1.4-2.2 and .4-.5 pointing at the cameras, where the visible end depends on the direction most. Speed makes no difference.
 SIGMA_SIDE = (0.02, 0.012)
 SIGMA_END, _END_POWER = (0.25, 0.10), (4, 2)
-# Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.3 mm deep, of which their sag explains .76.
+# Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.45 mm deep, of which their sag explains 1.58.
 SIGMA_DAB = 0.025
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
 
 
 def dab_sag_m(radius_m: float, limb_m: float) -> float:
-    """How deep the middle of a dab of radius_m lies under its highest point, on skin that curves both ways with limb_m as at a joint.
+    """How deep under its highest point two cameras locate a dab of radius_m, on skin that curves both ways with limb_m as at a joint.
 
-    A sphere falls by r^2 / 2R at r from the top; over a disc the mean of r^2 is half its edge's. 0 for a limb of no thickness.
+    Each camera weighs the skin by how much it faces it, so the centre of a cap moves from view to view as the middle of its *rim* does:
+    from a direction t off the axis, a cap of half-angle p on a ball R has its centre at R cos(p) sin(t) beside the ball's. On a
+    cylinder it is 3/4 of that deep. 0 for a limb of no thickness.
     """
-    return radius_m**2 / (4.0 * limb_m) if limb_m > radius_m else 0.0
+    return limb_m - math.sqrt(limb_m**2 - radius_m**2) if limb_m > radius_m else 0.0
 
 
 class Surface:

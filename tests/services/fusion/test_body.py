@@ -91,7 +91,7 @@ def test_a_look_that_does_not_steer_moves_the_anchor_only(rest):
     look(rest, 2, 0.0, q[:2] / q[2] + 1e-3, np.array([4e-8, 0.0]), R[0], t[0], False, 30.0)
     np.testing.assert_array_equal(rest.motion, motion)
     np.testing.assert_array_equal(rest.cov, cov)
-    assert np.linalg.norm(rest.anchor[2] - ANCHORS[2]) > 1e-5
+    assert np.linalg.norm(rest.anchor[2] - ANCHORS[2]) > 1e-7
 
 
 def test_what_contradicts_or_cannot_be_seen_changes_nothing(rest):
