@@ -13,6 +13,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path as File
 from typing import Any
 
@@ -24,7 +25,7 @@ from rhot.config import Fusion, HandTable, RigConfig, load_rig
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import Marker
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import Path, Setup, frames, point_hands
+from services.fusion.synthetic import Motion, Path, Setup, Sway, frames, point_hands
 from services.fusion.triangulation import extrinsics, triangulate
 
 SEEDS = (1, 2, 3)
@@ -39,14 +40,14 @@ OTHERS = {
 }
 
 
-def synthetic(fusion: Fusion, distance_m: float = 0.7, speed_m_s: float = 0.5, **setup: Any) -> dict[str, float]:
-    """Figures of one method over all seeds."""
+def synthetic(fusion: Fusion, path: Callable[[int], Motion] = lambda seed: Path(seed=seed), **setup: Any) -> dict[str, float]:
+    """Figures of one method over all seeds; path makes the motion of a seed."""
     found = Score()
     for seed in SEEDS:
-        rig, path = Setup(seed=seed, **setup), Path(distance_m=distance_m, speed_m_s=speed_m_s, seed=seed)
+        rig, motion = Setup(seed=seed, **setup), path(seed)
         step = FusionStep(rig.config(fusion), rig.rig(), point_hands())
-        told = [points for frame in frames(rig, path, SECONDS) for points in step.step(frame)] + step.flush()
-        found.add(told, lambda at_s, path=path: dict(zip(BASIC_LANDMARKS, path(np.array([at_s]))[0], strict=True)))  # type: ignore[misc]
+        told = [points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)] + step.flush()
+        found.add(told, lambda at_s, motion=motion: dict(zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True)))  # type: ignore[misc]
     return found.figures()
 
 
@@ -137,7 +138,7 @@ def rendered_figures(config: RigConfig, seconds: float, seeds: tuple[int, ...]) 
 
 def synthetic_figures() -> dict[str, Any]:
     """Everything from synthetic observations, under the names of the requirements."""
-    still = {str(distance_m): synthetic(Fusion(), distance_m, 0.0) for distance_m in (0.5, 1.0)}
+    still = {str(z_m): synthetic(Fusion(), lambda seed, z_m=z_m: Sway(distance_m=z_m, seed=seed)) for z_m in (0.5, 1.0)}  # type: ignore[misc]
     moving = {str(lag): synthetic(Fusion(lag_frames=lag)) for lag in (0, 1, 2)}
     others = {name: synthetic(fusion) for name, fusion in OTHERS.items()}
     noisy = {str(lag): synthetic(Fusion(lag_frames=lag), sigma_px=0.2) for lag in (0, 1, 2)}

@@ -7,6 +7,7 @@ for.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import msgspec
@@ -24,6 +25,8 @@ SIZE_PX = (640, 480)
 START_NS = 1_720_000_000_000_000_000
 # Rounds of t = t_frame + y(t) * row_time: motion over a frame's readout changes y by a few rows, then by a few hundredths.
 _SHUTTER_ROUNDS = 4
+# Landmarks (n, 6, 3) in the rig frame at times (n,) or, one for each landmark, (n, 6).
+Motion = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,36 @@ class Path:
         return points
 
 
-def frames(setup: Setup, path: Path, seconds: float) -> list[MarkerFrame]:
+@dataclass(frozen=True)
+class Sway:
+    """A hand at rest, which no hand is entirely: it sways as the simulator's do, three waves of 1.2 mm and .4 deg at .1-.7 Hz an axis.
+
+    The landmark `plays` moves by itself, by stroke_m at 2 Hz. Until still_from_s the whole hand sweeps to and fro.
+    """
+
+    distance_m: float = 1.0
+    plays: int | None = None
+    stroke_m: float = 0.01
+    still_from_s: float = 0.0
+    seed: int = 1
+
+    def __call__(self, times_s: Array) -> Array:
+        """As Path."""
+        random = np.random.default_rng(self.seed)
+        omega, phase = 2.0 * np.pi * random.uniform(0.1, 0.7, (2, 3, 3)), random.uniform(0.0, 2.0 * np.pi, (2, 3, 3))
+        times = np.broadcast_to(np.asarray(times_s, dtype=np.float64).reshape(len(times_s), -1), (len(times_s), 6))
+        waves = np.sum(np.sin(omega * times[:, :, None, None, None] + phase), axis=-1)  # (n, 6, shift and turn, axis)
+        shape = Path(distance_m=self.distance_m, speed_m_s=0.0)(np.zeros(1))[0]
+        points = shape + 1.2e-3 * waves[:, :, 0] + np.cross(0.007 * waves[:, :, 1], shape - shape[0])
+        if self.plays is not None:
+            points[:, self.plays, 1] += self.stroke_m * np.sin(4.0 * np.pi * times[:, self.plays])
+        # The sweep ends without a jerk.
+        left = np.clip(self.still_from_s - times, 0.0, None) / 1.5
+        points[:, :, 0] += 0.06 * np.sin(4.0 * left) * np.clip(left, 0.0, 1.0) ** 2
+        return np.asarray(points)
+
+
+def frames(setup: Setup, path: Motion, seconds: float) -> list[MarkerFrame]:
     """All cameras' frames in order of exposure."""
     found: list[tuple[float, MarkerFrame]] = []
     for n, camera in enumerate(setup.rig().values()):
@@ -135,7 +167,7 @@ def frames(setup: Setup, path: Path, seconds: float) -> list[MarkerFrame]:
     return [frame for _, frame in found]
 
 
-def _expose(camera: Camera, path: Path, times_s: Array, row_time_s: float) -> Array:
+def _expose(camera: Camera, path: Motion, times_s: Array, row_time_s: float) -> Array:
     """Each landmark's pixel (n, 6, 2), seen at its own instant by a rolling shutter whose first row is exposed at times_s (n,)."""
     instants = np.repeat(times_s[:, None], 6, axis=1) + 0.5 * SIZE_PX[1] * row_time_s
     pixels = np.zeros((*instants.shape, 2))

@@ -119,39 +119,3 @@ class Bench:
 def bench_of() -> type[Bench]:
     """The filter alone."""
     return Bench
-
-
-@dataclass(frozen=True)
-class Sway:
-    """A hand at rest at a distance, as the simulator's hands rest: it shifts by 1.2 mm and turns by .4 deg a wave at .1-.7 Hz.
-
-    The finger `plays` (a landmark's index) moves by `stroke_m` at 2 Hz; until `still_from_s` the whole hand moves as `before` does.
-    """
-
-    distance_m: float = 1.0
-    plays: int | None = None
-    stroke_m: float = 0.01
-    still_from_s: float = 0.0
-    seed: int = 1
-
-    def __call__(self, times_s: Array) -> Array:
-        """Landmarks (n, 6, 3) at times (n,) or (n, 6), as Path."""
-        random = np.random.default_rng(self.seed)
-        hz, phase = random.uniform(0.1, 0.7, (2, 3, 3)), random.uniform(0.0, 2.0 * np.pi, (2, 3, 3))
-        times = np.broadcast_to(np.asarray(times_s, dtype=np.float64).reshape(len(times_s), -1), (len(times_s), 6))
-        waves = np.sum(np.sin(2.0 * np.pi * hz * times[:, :, None, None, None] + phase), axis=-1)  # (n, 6, 2, 3)
-        shape = Path(distance_m=self.distance_m, speed_m_s=0.0)(np.zeros(1))[0]
-        arms = shape - shape[0]
-        points = shape + 1.2e-3 * waves[:, :, 0] + np.cross(0.007 * waves[:, :, 1], arms)
-        if self.plays is not None:
-            points[:, self.plays, 1] += self.stroke_m * np.sin(4.0 * np.pi * times[:, self.plays])
-        # A sweep of .2 m in a second and a half that ends without a jerk.
-        left = np.clip(self.still_from_s - times, 0.0, None) / 1.5
-        points[:, :, 0] += 0.06 * np.sin(4.0 * left) * np.clip(left, 0.0, 1.0) ** 2
-        return points
-
-
-@pytest.fixture(scope="session")
-def sway() -> type[Sway]:
-    """Hands at rest."""
-    return Sway

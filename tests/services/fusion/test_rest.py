@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from services.fusion.rest import RESTS
-from services.fusion.synthetic import COLORS, START_NS, Path, Setup, frames
+from services.fusion.synthetic import COLORS, START_NS, Path, Setup, Sway, frames
 
 RIG = Setup(clock_error_s=0.0, clock_sigma_s=2e-5, sigma_px=0.1)
 ALONE = [[landmark] for landmark in range(6)]
@@ -32,9 +32,9 @@ def rms_mm(errors) -> float:
 
 
 @pytest.mark.parametrize("distance_m", [0.5, 1.0])
-def test_a_resting_hand_is_known_better_than_its_markers_alone(bench_of, sway, distance_m):
+def test_a_resting_hand_is_known_better_than_its_markers_alone(bench_of, distance_m):
     """Test: a hand that sways by millimetres. Expected: half the error in depth, less error sideways, and sigmas that say so."""
-    path = sway(distance_m=distance_m)
+    path = Sway(distance_m=distance_m)
     together, sigmas, _ = follow(bench_of(RIG), path, 8.0)
     alone, _, _ = follow(bench_of(RIG, hands=ALONE), path, 8.0)
     assert rms_mm(together[..., 2]) < 0.55 * rms_mm(alone[..., 2])
@@ -42,9 +42,9 @@ def test_a_resting_hand_is_known_better_than_its_markers_alone(bench_of, sway, d
     assert 0.5 < np.mean((together / sigmas) ** 2) < 1.4
 
 
-def test_a_finger_that_plays_is_left_to_itself(bench_of, sway):
+def test_a_finger_that_plays_is_left_to_itself(bench_of):
     """Test: one of six moves by a centimetre. Expected: it is as exact as alone, the others go on sharing their motion."""
-    path = sway(plays=3)
+    path = Sway(plays=3)
     together, _, beliefs = follow(bench_of(RIG), path, 6.0)
     alone, _, _ = follow(bench_of(RIG, hands=ALONE), path, 6.0)
     others = [0, 1, 2, 4, 5]
@@ -62,9 +62,9 @@ def test_a_moving_hand_is_what_it_is_without_sharing(bench_of):
     assert rms_mm(together) < 1.02 * rms_mm(alone)
 
 
-def test_rest_is_noticed_within_a_second_and_left_at_once(bench_of, sway):
+def test_rest_is_noticed_within_a_second_and_left_at_once(bench_of):
     """Test: a hand sweeps, rests from the third second on; then it sweeps again. Expected: shared when at rest, no error when it starts."""
-    coming = sway(still_from_s=3.0)
+    coming = Sway(still_from_s=3.0)
     _, _, beliefs = follow(bench_of(RIG), coming, 5.0)
     assert beliefs[-30:].mean() > 0.85
 
@@ -78,9 +78,9 @@ def test_rest_is_noticed_within_a_second_and_left_at_once(bench_of, sway):
     assert np.mean((together / sigmas) ** 2) < 1.5
 
 
-def test_late_frames_have_their_share(bench_of, sway):
+def test_late_frames_have_their_share(bench_of):
     """Test: one camera's frames arrive two frames late. Expected: depth as good as in order, but for what the newest would add."""
-    path = sway()
+    path = Sway()
     given = frames(RIG, path, 8.0)
     late_s = {"left": 0.0, "right": 0.066}
     given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
@@ -95,10 +95,10 @@ def test_late_frames_have_their_share(bench_of, sway):
     assert rms_mm(np.array(errors)[..., 2]) < 1.5
 
 
-def test_a_hidden_marker_grows_uncertain_in_a_resting_hand(bench_of, sway):
+def test_a_hidden_marker_grows_uncertain_in_a_resting_hand(bench_of):
     """Test: nobody sees one marker of six any more. Expected: its sigma grows until it is dropped; it may have moved."""
     bench, depths = bench_of(RIG), []
-    for frame in frames(RIG, sway(), 4.0):
+    for frame in frames(RIG, Sway(), 4.0):
         instant_s = (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9
         if instant_s > 3.0:
             frame = msgspec.structs.replace(frame, markers=[marker for marker in frame.markers if marker.color != COLORS[3]])
@@ -110,9 +110,9 @@ def test_a_hidden_marker_grows_uncertain_in_a_resting_hand(bench_of, sway):
     assert bench.method.rest_beliefs()[3] == 0.0
 
 
-def test_each_hand_rests_by_itself(bench_of, sway):
+def test_each_hand_rests_by_itself(bench_of):
     """Test: the three last landmarks, a hand of their own, move; the first three rest."""
-    rest, move = sway(), Path(distance_m=1.0, speed_m_s=0.3)
+    rest, move = Sway(), Path(distance_m=1.0, speed_m_s=0.3)
 
     def both(times_s):
         return np.concatenate([rest(times_s)[:, :3], move(times_s)[:, 3:]], axis=1)
@@ -123,8 +123,8 @@ def test_each_hand_rests_by_itself(bench_of, sway):
     assert late[:, 3:].mean() < 0.1
 
 
-def test_a_body_that_went_mad_begins_anew(bench_of, sway):
-    bench, path, beliefs = bench_of(RIG), sway(), []
+def test_a_body_that_went_mad_begins_anew(bench_of):
+    bench, path, beliefs = bench_of(RIG), Sway(), []
     for number, frame in enumerate(frames(RIG, path, 6.0)):
         instant_s = bench.see(frame)
         beliefs.append(bench.method.rest_beliefs())

@@ -16,7 +16,7 @@ from rhot.errors import CalibrationError
 from rhot.messages import Marker, MarkerFrame
 from rhot.transforms import apply, rotation_from_vector, transform
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import START_NS, Path, Setup, frames, point_hands
+from services.fusion.synthetic import START_NS, Path, Setup, Sway, frames, point_hands
 
 MOVING, SETUP = Path(), Setup()
 
@@ -34,11 +34,20 @@ def test_moving_hand_is_accurate_and_sigma_honest(run, lag, limit_mm):
     assert found.measured.mean() > 0.98
 
 
-@pytest.mark.parametrize(("distance_m", "limit_mm"), [(0.5, 0.6), (1.0, 2.0)])
+# Issue 4's bounds are .6 and 2 mm; measured .2 and .6.
+@pytest.mark.parametrize(("distance_m", "limit_mm"), [(0.5, 0.3), (1.0, 0.9)])
 def test_still_hand_is_accurate_and_sigma_honest(run, distance_m, limit_mm):
-    _, found = run(SETUP, Path(distance_m=distance_m, speed_m_s=0.0), seconds=10.0)
+    _, found = run(SETUP, Sway(distance_m=distance_m), seconds=10.0)
     assert found.depth_rms_mm < limit_mm
     assert 0.7 < found.nees < 1.2
+
+
+def test_a_plaster_hand_is_known_better_than_is_told(run):
+    """Test: no motion at all. Expected: a smaller error than of a hand that sways, within a sigma that allows for sway."""
+    _, plaster = run(SETUP, Path(distance_m=1.0, speed_m_s=0.0), seconds=10.0)
+    _, alive = run(SETUP, Sway(), seconds=10.0)
+    assert plaster.depth_rms_mm < alive.depth_rms_mm
+    assert 0.5 < plaster.nees < 1.0
 
 
 @pytest.mark.parametrize("cameras", [3, 4])
