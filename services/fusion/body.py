@@ -22,12 +22,12 @@ from services.fusion.motion import propagate, transition, unit_noise
 
 Ints = npt.NDArray[np.int64]
 
-# Jerk densities of a resting hand's shift (m^2/s^5) and turn (rad^2/s^5): a sway of a millimetre and half a degree below 1 Hz. A tenth or
-# ten times as much make a known resting hand 3 to 8 % worse; but ten times as much turn is livelier at the end of a hand's lever than the
-# quietest model of the ring, and the wrist is then never believed to rest.
+# Jerk densities of a resting hand's shift (m^2/s^5) and turn (rad^2/s^5): a sway of millimetres and half a degree below 1 Hz. Still depth is
+# up to 11 % worse with ten times as much, and 30 % with a tenth.
 SHIFT_DENSITY, TURN_DENSITY = 0.003, 0.03
-# How a marker wanders in its hand (m^2/s): .1 mm within a second. With 1e-7 still depth is 5 % worse at .5 and 1.0 m, with 1e-6 25 %.
-WANDER = 1e-9
+# How a marker wanders in its hand (m^2/s): .3 mm within a second. Fingers that keep still to a hundredth of a millimetre are known half
+# again as well with 1e-9, but such that wander by a tenth are then off by 1.25 of their sigmas, in a synthetic hand; so by .97.
+WANDER = 1e-7
 # Sigmas of a new body's rates and accelerations (m/s and rad/s, m/s^2 and rad/s^2): slow, or it does not rest.
 START_RATE, START_ACCELERATION = (0.02, 0.1), (0.1, 0.5)
 # A body is lost beyond these: sigmas of displacement, m and rad (turns are taken to first order), and rates, m/s and rad/s.

@@ -3,7 +3,8 @@
 Each landmark is a track in the ring (ring.py): extended Kalman filters over position, velocity and acceleration. A track begins
 where the rays of two cameras meet; observations that contradict it are gated by their innovation; one that a single camera sees
 is carried on with growing sigma as `predicted`, and dropped when no second camera has seen it for hold_s. Views may come from
-2..N cameras in any order; late ones are put in their place as long as the ring reaches back.
+2..N cameras in any order; late ones are put in their place as long as the ring reaches back. Landmarks of a hand at rest share its
+motion (rest.py).
 """
 
 from __future__ import annotations

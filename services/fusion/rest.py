@@ -2,8 +2,8 @@
 
 Nobody holds a hand still: it sways by millimetres within a second, so a landmark by itself cannot be averaged for longer. But the sway
 is common: six markers tell a body's six degrees of freedom several times better than any of them tells its own motion, and what is left,
-the hand's shape, is constant and averages over seconds. Rendered hands at rest at 1.0 m, without lag: depth scatters by 1.75 mm if every
-landmark is filtered by itself, by 0.7 so; a common shift without turn gives 1.4, as a hand sways about its wrist.
+the hand's shape, hardly changes. Rendered hands at rest at 1.0 m, without lag: depth scatters by 1.7 mm if every landmark is filtered by
+itself, by .9 so. A common shift without turn does little, as a hand sways about its wrist.
 
 Whether a marker rests is decided by likelihood against the ring's models (ring.py), marker by marker: one that moves by itself is
 anchored anew at every look and tells nothing of the body. While fewer than three rest, all of them steer the body, and it forgets fast:
@@ -32,9 +32,9 @@ TRIAL_S = 0.5
 # Belief in a marker met for the first time, and the share of belief that goes back there at each look.
 FIRST, LEAK = 0.1, 0.003
 # One look speaks against rest by no more than this (log-likelihood): what background and light do to a centre is no motion. Three in a
-# row outweigh all before. Without a limit two of 24 resting markers at 1.0 m are never believed; with 1.5, playing fingers are 5 % worse.
+# row outweigh all before. Without a limit still depth is up to 5 % worse; with 1.5, playing fingers are 3 % worse.
 DOUBT = 2.0
-# Belief counts once it has lasted: a hand that turns back rests for an instant. Moving hands are 4 % worse without (two frames of lag).
+# Belief counts once it has lasted: a hand that turns back rests for an instant.
 RISE_S = 0.3
 # Innovations beyond this (2 degrees of freedom) do not steer the body.
 GATE = 30.0

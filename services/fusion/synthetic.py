@@ -125,13 +125,14 @@ class Path:
 class Sway:
     """A hand at rest, which no hand is entirely: it sways as the simulator's do, three waves of 1.2 mm and .4 deg at .1-.7 Hz an axis.
 
-    The landmark `plays` moves by itself, by stroke_m at 2 Hz. Until still_from_s the whole hand sweeps to and fro.
+    Each landmark wanders in it by wander_m a wave and trembles at 8-12 Hz by a third of that. The landmark `plays` moves by itself, by stroke_m at 2 Hz. Until still_from_s the whole hand sweeps to and fro.
     """
 
     distance_m: float = 1.0
     plays: int | None = None
     stroke_m: float = 0.01
     still_from_s: float = 0.0
+    wander_m: float = 1e-4
     seed: int = 1
 
     def __call__(self, times_s: Array) -> Array:
@@ -142,6 +143,9 @@ class Sway:
         waves = np.sum(np.sin(omega * times[:, :, None, None, None] + phase), axis=-1)  # (n, 6, shift and turn, axis)
         shape = Path(distance_m=self.distance_m, speed_m_s=0.0)(np.zeros(1))[0]
         points = shape + 1.2e-3 * waves[:, :, 0] + np.cross(0.007 * waves[:, :, 1], shape - shape[0])
+        own = 2.0 * np.pi * np.concatenate([random.uniform(0.1, 0.7, (6, 3, 3)), random.uniform(8.0, 12.0, (6, 3, 1))], axis=2)
+        wanders = np.sin(own * times[:, :, None, None] + random.uniform(0.0, 2.0 * np.pi, (6, 3, 4)))  # (n, 6, axis, wave)
+        points = points + self.wander_m * (wanders[..., :3].sum(axis=-1) + wanders[..., 3] / 3.0)
         if self.plays is not None:
             points[:, self.plays, 1] += self.stroke_m * np.sin(4.0 * np.pi * times[:, self.plays])
         # The sweep ends without a jerk.

@@ -80,7 +80,8 @@ class Hand:
         travel = stage.travel_axes @ (stage.travel_m * np.sin(phase))
         rotation = stage.rotation @ rotation_from_vector(gesture.turn_rad) @ rotation_from_vector(turn)
         wrist = stage.wrist_m + travel + stage.rotation @ (gesture.shift_m + shift)
-        return HandState(rotation, wrist, stage.arm_rotation, gesture.angles_rad, gesture.grip)
+        angles = self.unrest.fingers(t_s, gesture.angles_rad, self.model)
+        return HandState(rotation, wrist, stage.arm_rotation, angles, gesture.grip)
 
     def joints(self, state: HandState) -> tuple[Array, Array]:
         """All joints in the rig frame: positions (26, 3), rotations (26, 3, 3)."""

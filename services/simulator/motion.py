@@ -191,7 +191,7 @@ class _Waves:
 
 
 class Unrest:
-    """What no hand can help: a slow sway of millimetres and the physiological tremor.
+    """What no hand can help: a slow sway of millimetres, fingers that wander by tenths of one, and the physiological tremor.
 
     Tremor: 8-12 Hz, about 0.1 mm at the outstretched hand (Elble & Randall, Electroenceph. clin. Neurophysiol. 44, 1978).
     """
@@ -204,11 +204,29 @@ class Unrest:
         self._phase = rng.uniform(0.0, TAU, (2, 3, 4))
         # Sway of 0.4 deg and 1.2 mm a wave, tremor of 0.05 deg and 0.1 mm.
         self._weight = np.array([[0.007, 0.007, 0.007, 0.0009], [1.2e-3, 1.2e-3, 1.2e-3, 1e-4]])[:, None, :]
+        slow, fast = rng.uniform(0.1, 0.7, (5, 4, 3)), rng.uniform(8.0, 12.0, (5, 4, 1))
+        self._finger_omega = TAU * np.concatenate([slow, fast], axis=2)  # (digit, joint, wave)
+        self._finger_phase = rng.uniform(0.0, TAU, (5, 4, 4))
 
     def __call__(self, t_s: float) -> tuple[Array, Array]:
         """(rotation vector (3,) rad, shift (3,) m) at t_s."""
         turn, shift = np.sum(self._weight * np.sin(self._omega * t_s + self._phase), axis=2)
         return turn, shift
+
+    def fingers(self, t_s: float, angles_rad: Array, model: HandModel) -> Array:
+        """Joint angles (5, 4) that are meant, as they come out at t_s: inside the limits, DIP coupled to PIP as it was."""
+        waves = np.sum(_FINGER_WEIGHT * np.sin(self._finger_omega * t_s + self._finger_phase), axis=2)
+        low, high = model.limits_rad[..., 0], model.limits_rad[..., 1]
+        room = np.maximum(np.minimum(angles_rad - low, high - angles_rad), 0.0)
+        # Smoothly less towards a limit, and never beyond: waves stay below the constant.
+        angles = angles_rad + waves * room / (room + 0.02)
+        coupling = np.array([digit.coupling for digit in model.digits])
+        angles[:, 3] = np.clip(angles_rad[:, 3] + coupling * (angles[:, 2] - angles_rad[:, 2]), low[:, 3], high[:, 3])
+        return np.asarray(angles)
+
+
+# Each joint wanders by .11 deg a wave and trembles by .02 deg: .3 and .03 mm at the tip of a stretched finger, a fifth of what sway does.
+_FINGER_WEIGHT = np.array([0.002, 0.002, 0.002, 0.0004])
 
 
 MOTIONS: dict[str, Callable[[HandModel, int], Motion]] = {

@@ -34,8 +34,8 @@ def test_moving_hand_is_accurate_and_sigma_honest(run, lag, limit_mm):
     assert found.measured.mean() > 0.98
 
 
-# Issue 4's bounds are .6 and 2 mm; measured .2 and .6.
-@pytest.mark.parametrize(("distance_m", "limit_mm"), [(0.5, 0.3), (1.0, 0.9)])
+# Issue 4's bounds are .6 and 2 mm; measured .27 and .65.
+@pytest.mark.parametrize(("distance_m", "limit_mm"), [(0.5, 0.35), (1.0, 0.9)])
 def test_still_hand_is_accurate_and_sigma_honest(run, distance_m, limit_mm):
     _, found = run(SETUP, Sway(distance_m=distance_m), seconds=10.0)
     assert found.depth_rms_mm < limit_mm
