@@ -30,8 +30,8 @@ Ints = npt.NDArray[np.int64]
 # At sensor noise 5 a resting centre scatters by .10 px at 1.0 m and .16 px at 0.5 m; sigma_px is .08 and .15-.3 there, much of it light.
 # Taking all of it for noise made playing fingers at half a metre 1.95 mm RMS without lag, this 1.49, and nothing worse.
 WHITE_PX, WHITE_SHARE = 0.1, 0.2
-# Steady, each camera's own: depths of resting hands are .27-.34 mm off on average at .5 m and 1.06-1.15 at 1.0 m (seeds 1-4, 5-8), .026-.03 px
-# of each view. Squared error over variance is then .85-.97 and .81-.88 for resting hands, .88-1.0 for moving ones.
+# Steady, each camera's own: depths of resting hands are .27-.34 mm off on average at .5 m and 1.06-1.15 at 1.0 m (seeds 1-4, 5-8),
+# .026-.03 px of each view. Squared error over variance is then .85-.97 and .81-.88 for resting hands, .88-1.0 for moving ones.
 OWN_PX = 0.028
 # Steady, shared by all cameras, as a share of sigma_px: with more than this, resting hands' errors across the ray (.15-.18 mm RMS at .5 m,
 # .19-.23 at 1.0 m) are smaller than told.

@@ -22,8 +22,8 @@ from services.fusion.motion import propagate, transition, unit_noise
 
 Ints = npt.NDArray[np.int64]
 
-# Jerk densities of a resting hand's shift (m^2/s^5) and turn (rad^2/s^5): a sway of millimetres and half a degree below 1 Hz. Still depth is
-# up to 11 % worse with ten times as much, and 30 % with a tenth.
+# Jerk densities of a resting hand's shift (m^2/s^5) and turn (rad^2/s^5): a sway of millimetres and half a degree below 1 Hz. Still depth
+# is up to 11 % worse with ten times as much, and 30 % with a tenth.
 SHIFT_DENSITY, TURN_DENSITY = 0.003, 0.03
 # How a marker wanders in its hand (m^2/s): .3 mm within a second. Fingers that keep still to a hundredth of a millimetre are known half
 # again as well with 1e-9, but such that wander by a tenth are then off by 1.25 of their sigmas, in a synthetic hand; so by .97.

@@ -5,10 +5,10 @@ is common: six markers tell a body's six degrees of freedom several times better
 the hand's shape, hardly changes. Rendered hands at rest at 1.0 m, without lag: depth scatters by 1.7 mm if every landmark is filtered by
 itself, by .9 so. A common shift without turn does little, as a hand sways about its wrist.
 
-Whether a marker rests is decided by likelihood against the ring's models (ring.py), marker by marker: one that moves by itself is
-anchored anew at every look and tells nothing of the body. While fewer than three rest, all of them steer the body, and it forgets fast:
-so it is there when the hand comes to rest. Observations may be late by REACH_S, and estimates may be asked for so long before and after
-the latest one. Compiled with numba; the arrays live in a Rest, which kalman.py owns. Nothing here raises.
+Whether a marker rests is decided by likelihood against the ring's models (ring.py), marker by marker. One that moves by itself does not
+steer the body. Every TRIAL_S it is anchored anew and given another chance; and where fewer than three rest, the body begins anew with all
+of them, so that rest is found soon after it comes. Observations may be late by REACH_S, and estimates may be asked for so long before
+and after the latest one. Compiled with numba; the arrays live in a Rest, which kalman.py owns. Nothing here raises.
 """
 
 from __future__ import annotations

@@ -125,7 +125,8 @@ class Path:
 class Sway:
     """A hand at rest, which no hand is entirely: it sways as the simulator's do, three waves of 1.2 mm and .4 deg at .1-.7 Hz an axis.
 
-    Each landmark wanders in it by wander_m a wave and trembles at 8-12 Hz by a third of that. The landmark `plays` moves by itself, by stroke_m at 2 Hz. Until still_from_s the whole hand sweeps to and fro.
+    Each landmark wanders in it by wander_m a wave and trembles at 8-12 Hz by a third of that. The landmark `plays` moves by itself, by
+    stroke_m at 2 Hz. Until still_from_s the whole hand sweeps to and fro.
     """
 
     distance_m: float = 1.0

@@ -93,6 +93,23 @@ def test_unrest_is_small_and_never_rests():
     assert 1e-3 < speed.mean() < 30e-3
 
 
+@pytest.mark.parametrize("name", ["still", "fist"])
+def test_resting_fingers_wander_a_little_inside_their_limits(name):
+    """Test: an open hand, and one that closes to near its limits. Expected: tenths of a degree, coupled, the same every time."""
+    model = default_hand("right")
+    meant, unrest = MOTIONS[name](model, 1), Unrest(1)
+    times_s = np.arange(0.0, 20.0, 0.02)
+    angles = np.array([unrest.fingers(t, meant(t).angles_rad, model) for t in times_s])
+    off = angles - np.array([meant(t).angles_rad for t in times_s])
+    movable = np.ptp(model.limits_rad, axis=-1) > 0.0
+    assert (angles >= model.limits_rad[..., 0]).all()
+    assert (angles <= model.limits_rad[..., 1]).all()
+    assert np.rad2deg(off[..., movable].std(axis=0)).min() > 0.02
+    assert np.rad2deg(np.abs(off).max()) < 0.5
+    np.testing.assert_allclose(off[:, 1:, 3], off[:, 1:, 2] * model.digits[1].coupling, atol=2e-3)
+    np.testing.assert_array_equal(angles[7], Unrest(1).fingers(times_s[7], meant(times_s[7]).angles_rad, model))
+
+
 def test_ramps_begin_and_end_where_they_should():
     assert [smooth(u) for u in (-1.0, 0.0, 0.5, 1.0, 2.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
     assert [bump(u) for u in (0.0, 0.5, 1.0, 3.0)] == [0.0, 1.0, 0.0, 0.0]
