@@ -19,17 +19,38 @@ from services.fusion.ring import ACCEPTED, Ring, insert
 NO_TRACK = -1
 
 
+# Looks of each camera that are kept for beginning a track: half a second at 30 fps, so that a camera may be that much later than another.
+KEPT = 16
+
+
 class Looks(NamedTuple):
-    """What each of C cameras saw last of each of S landmarks."""
+    """What each of C cameras saw of each of S landmarks lately."""
 
     seen_s: Array  # (S, C) of the last observation a track accepted
-    look_s: Array  # (S, C) of the last one of all, for beginning a track
-    look: Array  # (S, C, 3) its ray and sigma
+    looked_s: Array  # (S, C) of the last one of all
+    number: Ints  # (S, C) how many there were
+    look_s: Array  # (S, C, KEPT) of the latest, in any order
+    look: Array  # (S, C, KEPT, 3) their rays and sigmas
 
 
 def no_looks(slots: int, cameras: int) -> Looks:
     """Nothing seen yet."""
-    return Looks(np.full((slots, cameras), -np.inf), np.full((slots, cameras), -np.inf), np.zeros((slots, cameras, 3)))
+    shape = (slots, cameras)
+    return Looks(
+        np.full(shape, -np.inf),
+        np.full(shape, -np.inf),
+        np.zeros(shape, dtype=np.int64),
+        np.full((*shape, KEPT), -np.inf),
+        np.zeros((*shape, KEPT, 3)),
+    )
+
+
+@njit(cache=True)
+def _remember(looks: Looks, slot: int, camera: int, time_s: float, ray: Array, sigma: float) -> None:
+    k = looks.number[slot, camera] % KEPT
+    looks.look_s[slot, camera, k], looks.look[slot, camera, k, :2], looks.look[slot, camera, k, 2] = time_s, ray, sigma
+    looks.number[slot, camera] += 1
+    looks.looked_s[slot, camera] = max(looks.looked_s[slot, camera], time_s)
 
 
 @njit(cache=True)
@@ -47,15 +68,18 @@ def take_in(
     R: Array,
     t: Array,
     densities: Array,
+    fresh: bool,
 ) -> Ints:
     """A frame's observations (n,), rays (n, 2) with sigmas (n,): the codes (n,) of ring.insert, NO_TRACK where there is none.
 
+    fresh: looks to remember, not remembered ones.
     R (C, 3, 3), t (C, 3) are every camera's T_camera_from_rig.
     """
     codes, variances = np.empty(slots.shape[0], dtype=np.int64), np.empty((slots.shape[0], 2))
     for n in range(slots.shape[0]):
         slot = slots[n]
-        looks.look_s[slot, camera], looks.look[slot, camera, :2], looks.look[slot, camera, 2] = times_s[n], rays[n], sigmas[n]
+        if fresh:
+            _remember(looks, slot, camera, times_s[n], rays[n], sigmas[n])
         variances[n, 0], variances[n, 1] = sigmas[n] ** 2, clock_sigma_s**2
         codes[n] = NO_TRACK
         if ring.filled[slot] > 0:

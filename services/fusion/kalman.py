@@ -76,26 +76,28 @@ class KalmanMethod:
         self.counts.late += late
         self.counts.refused += len(codes) - accepted - gated - late - new
         if new:
-            for slot, code in zip(view.slots.tolist(), codes, strict=True):
+            for slot, code, time_s in zip(view.slots.tolist(), codes, times_s.tolist(), strict=True):
                 if code == NO_TRACK:
-                    self._start(slot, view.camera, clock_sigma_s)
+                    self._start(slot, time_s, clock_sigma_s)
 
     def _take_in(
-        self, slots: Ints, times_s: Array, camera: int, rays: Array, sigmas: Array, clock_sigma_s: float, gate: float
+        self, slots: Ints, times_s: Array, camera: int, rays: Array, sigmas: Array, clock_sigma_s: float, gate: float, *, fresh: bool = True
     ) -> list[int]:
+        ring, rest, looks = self._ring, self._rest, self._looks
         codes: Ints = take_in(
-            self._ring, self._rest, self._looks, slots, times_s, camera, rays, sigmas, clock_sigma_s, gate, self._R, self._t, DENSITIES
+            ring, rest, looks, slots, times_s, camera, rays, sigmas, clock_sigma_s, gate, self._R, self._t, DENSITIES, fresh
         )
         return codes.tolist()
 
-    def _start(self, slot: int, camera: int, clock_sigma_s: float) -> None:
-        """Begin a track from the newest looks of the cameras, if their rays meet."""
-        now_s = self._looks.look_s[slot, camera]
-        cameras = np.flatnonzero(np.abs(self._looks.look_s[slot] - now_s) <= START_WINDOW_S)
+    def _start(self, slot: int, now_s: float, clock_sigma_s: float) -> None:
+        """Begin a track from the looks of the cameras nearest to an instant, if their rays meet."""
+        apart_s = np.abs(self._looks.look_s[slot] - now_s)
+        nearest = apart_s.argmin(axis=1)
+        cameras = np.flatnonzero(apart_s.min(axis=1) <= START_WINDOW_S)
         if len(cameras) < 2:
             return
-        cameras = cameras[np.argsort(self._looks.look_s[slot, cameras], kind="stable")]
-        times_s, looks = self._looks.look_s[slot, cameras], self._looks.look[slot, cameras]
+        cameras = cameras[np.argsort(self._looks.look_s[slot, cameras, nearest[cameras]], kind="stable")]
+        times_s, looks = (kept[slot, cameras, nearest[cameras]] for kept in (self._looks.look_s, self._looks.look))
         # At half a metre a hand of START_SIGMAS' speed moves this far in the picture between the looks.
         moved = START_SIGMAS[1] * (np.ptp(times_s) + clock_sigma_s) / 0.5
         met = triangulate(looks[:, :2], np.hypot(looks[:, 2], moved), self._R[cameras], self._t[cameras], self._reach_m)
@@ -106,7 +108,7 @@ class KalmanMethod:
         self._looks.seen_s[slot] = -np.inf
         for c, time_s, look in zip(cameras.tolist(), times_s, looks, strict=True):
             ray, sigma = look[None, :2].copy(), look[2:].copy()
-            self._take_in(np.array([slot]), np.array([time_s]), c, ray, sigma, clock_sigma_s, np.inf)
+            self._take_in(np.array([slot]), np.array([time_s]), c, ray, sigma, clock_sigma_s, np.inf, fresh=False)
         self.counts.started += 1
 
     def _drop(self, now_s: float) -> None:
@@ -122,7 +124,7 @@ class KalmanMethod:
         blend(self._rest, time_s, found, means, covs)
         largest = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1) & (largest > 0.0) & (largest <= SHOW_SIGMA_M)
-        seen, looked = (time_s - last_s <= SEEN_FRAMES * self._periods_s for last_s in (self._looks.seen_s, self._looks.look_s))
+        seen, looked = (time_s - last_s <= SEEN_FRAMES * self._periods_s for last_s in (self._looks.seen_s, self._looks.looked_s))
         return Estimates(found, means[:, :3], covs[:, :3, :3], seen, seen.sum(axis=1) >= 2, looked.sum(axis=1) >= 2)
 
     def rest_beliefs(self) -> Array:

@@ -121,6 +121,10 @@ def weigh(
     count, steers = slots.shape[0], np.zeros(slots.shape[0], dtype=np.bool_)
     for hand in range(rest.time_s.shape[0]):
         if not _ready(rest, ring, hand, slots, times_s, codes):
+            # What comes too late for the body is in the ring, which then knows better.
+            for n in range(count):
+                if rest.hand[slots[n]] == hand:
+                    rest.trust[slots[n]] = 0.0
             continue
         # In a trial, those that have not been found to move.
         enough = RESTS if _resting(rest, hand) >= BODY else 0.5 * FIRST

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.body import empty_rest
-from services.fusion.intake import NO_TRACK, drop, no_looks, take_in
+from services.fusion.intake import KEPT, NO_TRACK, drop, no_looks, take_in
 from services.fusion.ring import ACCEPTED, GATED, empty_ring, start
 from services.fusion.synthetic import Setup
 from services.fusion.triangulation import extrinsics
@@ -24,10 +24,12 @@ def test_every_observation_is_remembered_and_told_of():
     rays = q[:, :2] / q[:, 2:]
     rays[1] += 0.3
     times_s, sigmas = np.array([0.010, 0.011, 0.012]), np.array([1e-4, 2e-4, 3e-4])
-    codes = take_in(ring, rest, looks, np.arange(3), times_s, 1, rays, sigmas, 1e-4, 30.0, R, t, DENSITIES)
+    codes = take_in(ring, rest, looks, np.arange(3), times_s, 1, rays, sigmas, 1e-4, 30.0, R, t, DENSITIES, True)
     assert codes.tolist() == [ACCEPTED, GATED, NO_TRACK]
-    np.testing.assert_array_equal(looks.look_s[:, 1], times_s)
-    np.testing.assert_array_equal(looks.look[:, 1], np.column_stack([rays, sigmas]))
+    np.testing.assert_array_equal(looks.look_s[:, 1, 0], times_s)
+    np.testing.assert_array_equal(looks.looked_s[:, 1], times_s)
+    np.testing.assert_array_equal(looks.look[:, 1, 0], np.column_stack([rays, sigmas]))
+    assert looks.number.tolist() == [[0, 1]] * 3
     np.testing.assert_array_equal(looks.seen_s[:, 1], [0.010, -np.inf, -np.inf])
     assert np.isinf(looks.seen_s[:, 0]).all()
     assert (rest.belief > 0.0).tolist() == [True, False, False]
@@ -39,3 +41,15 @@ def test_a_track_that_two_cameras_have_not_seen_lately_ends():
     assert drop(filled, belief, seen_s, 0.5) == 1
     assert filled.tolist() == [3, 0, 0, 5]
     assert belief.tolist() == [0.9, 0.0, 0.0, 0.9]
+
+
+def test_the_latest_looks_are_kept_and_remembered_ones_are_not_kept_twice():
+    R, t = extrinsics(tuple(Setup().rig().values()))
+    ring, rest, looks = empty_ring(1, 2), empty_rest([np.arange(1)]), no_looks(1, 2)
+    for k in range(KEPT + 3):
+        take_in(
+            ring, rest, looks, np.zeros(1, int), np.array([k / 30]), 0, np.zeros((1, 2)), np.full(1, 1e-4), 0.0, 30.0, R, t, DENSITIES, True
+        )
+    take_in(ring, rest, looks, np.zeros(1, int), np.array([9.0]), 0, np.zeros((1, 2)), np.full(1, 1e-4), 0.0, 30.0, R, t, DENSITIES, False)
+    np.testing.assert_allclose(np.sort(looks.look_s[0, 0]), np.arange(3, KEPT + 3) / 30)
+    assert looks.looked_s[0, 0] == (KEPT + 2) / 30

@@ -87,3 +87,19 @@ def test_cameras_that_were_never_there_do_not_matter(bench_of):
     assert found.measured.all()
     assert found.cameras.sum(axis=0).tolist() == [0, 6, 0, 6]
     assert found.positions_m[:, 2] == pytest.approx(Path()(np.array([instant_s]))[0][:, 2], abs=0.01)
+
+
+def test_a_camera_far_later_than_the_other_takes_part(bench_of):
+    """Test: one camera's frames arrive .2 s after the other's. Expected: tracks begin, and where both have looked, they are as exact."""
+    bench, path = bench_of(EXACT, Fusion(hold_s=0.5)), Path()
+    late_s, errors = {"left": 0.0, "right": 0.2}, []
+    given = frames(EXACT, path, 3.0)
+    given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
+    for frame in given:
+        instant_s = bench.see(frame)
+        if instant_s > 1.0 and frame.camera == "right":
+            found = bench.method.estimate(instant_s)
+            assert found.found.all()
+            errors.append(found.positions_m - path(np.array([instant_s]))[0])
+    assert bench.method.counts.dropped == 0
+    assert 1e3 * np.sqrt(np.mean(np.sum(np.array(errors) ** 2, axis=2))) < 2.0

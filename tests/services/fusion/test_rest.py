@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot.config import Fusion
 from services.fusion.rest import RESTS
 from services.fusion.synthetic import COLORS, START_NS, Path, Setup, Sway, frames
 
@@ -93,6 +94,22 @@ def test_late_frames_have_their_share(bench_of):
             errors.append(bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0])
     assert np.mean(beliefs[120:], axis=0).min() > 0.7
     assert rms_mm(np.array(errors)[..., 2]) < 1.5
+
+
+def test_frames_too_late_for_the_body_leave_the_landmarks_to_themselves(bench_of):
+    """Test: one camera's frames come .15 s late, later than REACH_S. Expected: as without sharing, not a body that one camera steers."""
+    path, rms = Sway(), []
+    given = frames(RIG, path, 6.0)
+    late_s = {"left": 0.0, "right": 0.15}
+    given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
+    for hands in ((range(6),), ALONE):
+        bench, errors = bench_of(RIG, Fusion(hold_s=0.5), hands), []
+        for frame in given:
+            instant_s = bench.see(frame)
+            if instant_s > 2.0 and frame.camera == "left":
+                errors.append(bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0])
+        rms.append(rms_mm(np.array(errors)))
+    assert rms[0] < 1.05 * rms[1]
 
 
 def test_a_hidden_marker_grows_uncertain_in_a_resting_hand(bench_of):
