@@ -22,8 +22,8 @@ def lens():
 
 @pytest.fixture
 def frame(studio, tip):
-    """Tips in the middle and in a corner, at any layout."""
-    tips = [tip("green", 160.0, 120.0, 10.0), tip("blue", 40.0, 35.0, 10.0)]
+    """Two tips of a hand in a corner, at any layout; no further from each other than fingers are, lest they be told apart from a hand."""
+    tips = [tip("green", 95.0, 70.0), tip("blue", 40.0, 35.0)]
     return lambda layout="i420": studio.frame(tips, 1, layout, size_px=SIZE, sigma=1.0)[0]
 
 
