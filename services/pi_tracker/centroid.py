@@ -88,16 +88,17 @@ def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid
     mixture = _mixture(tiles, reach)
     share, by_luma, variance = mixture.share(noise)
     # The weight of a pixel, not clipped yet, is the sum of the first and of its luma times the second.
-    ramp = np.empty_like(tiles.cells[:, :2])
+    h, n, w = share.shape
+    ramp = np.empty((h, 2, n, w), np.float32)
     np.multiply(by_luma, _SLOPE, out=ramp[:, 1])
     share *= _SLOPE
     share += 0.5 - 0.5 * _SLOPE
-    np.subtract(share, ramp[:, 1] * tiles.cells[:, 0], out=ramp[:, 0])
+    np.subtract(share, ramp[:, 1] * tiles.cells[0], out=ramp[:, 0])
     ramp = doubled(ramp)
     weight = ramp[:, 1] * tiles.luma
     weight += ramp[:, 0]
-    weight.clip(0.0, 1.0, out=weight)
-    weight *= doubled(reach, cv2.INTER_NEAREST)
+    np.minimum(weight, doubled(reach.astype(np.float32), cv2.INTER_NEAREST), out=weight)
+    np.maximum(weight, 0.0, out=weight)
     # Where clipping holds the weight at 0 or 1, noise does not move it.
     moving = halved(np.ceil(weight) - np.floor(weight))
     centres = moments(weight, 1).swapaxes(0, 1).tolist()

@@ -43,20 +43,21 @@ _DARKEST = 1.0
 
 
 class Light:
-    """Cells in linear light: Y, U, V of it, 0..255 from black to white, and 1; (h, 4, n, w)."""
+    """Cells in linear light: Y, U, V of it, 0..255 from black to white, and 1; (4, h, n, w), and beside each other: rows, (h, 4, n, w)."""
 
     def __init__(self, cells: Image) -> None:
-        """Cells as cameras encode them: Y - 16, U - 128, V - 128 and 1, float32 (h, 4, n, w)."""
-        rgb = _RGB1 @ cells.reshape(cells.shape[0], 4, -1)
+        """Cells as cameras encode them: Y - 16, U - 128, V - 128 and 1, float32 (4, h, n, w)."""
+        rgb = _RGB1 @ cells.reshape(4, -1)
         # Noise may be negative.
         root = np.sqrt(np.abs(rgb))
         rgb *= root
         self.cells = np.asarray(_YUV1_FROM_POWER @ rgb).reshape(cells.shape)
-        self._root = root[:, :3]
+        self.rows = np.ascontiguousarray(self.cells.swapaxes(0, 1))
+        self._root = root[:3]
 
     def encoded(self, slopes: Image) -> Image:
-        """Derivatives (h, 3, n, w) by Y, U and V of light as those by Y, U and V as encoded."""
-        by_rgb = _POWER_SLOPES @ slopes.reshape(slopes.shape[0], 3, -1)
+        """Derivatives (3, h, n, w) by Y, U and V of light as those by Y, U and V as encoded."""
+        by_rgb = _POWER_SLOPES @ slopes.reshape(3, -1)
         by_rgb *= self._root
         return np.asarray(_RGB.T @ by_rgb).reshape(slopes.shape)
 
@@ -67,30 +68,30 @@ class Mixture:
     def __init__(self, light: Light, alone: Image, *, rough: bool = False) -> None:
         """alone: weights (2, h, n, w) of the cells that show nothing but background, nothing but paint; rough: shade less local."""
         self._light = light
-        known, self._means = _known(light.cells, alone)
-        behind, paint = _near(known[0]), _wide(known[1])
-        s, self._y_b = _seen(behind)
-        d, self._y_p = _seen(paint)
+        known, self._means = _known(light.rows, alone)
+        s, self._y_b = _seen(_near(known[0]))
+        d, self._y_p = _seen(_wide(known[1]))
         if not rough:
             shade = _next(known[1][:, ::3])
             self._y_p = np.maximum(shade[:, 0], shade[:, 1]) / shade[:, 1]
         d -= s
         norm = d * d
-        norm = norm[:, 0] + norm[:, 1]
-        np.maximum(norm, 1e-6, out=norm)
-        d /= norm[:, None]
+        norm[0] += norm[1]
+        np.maximum(norm[0], 1e-6, out=norm[0])
+        d /= norm[0]
         s *= d
         # The paint's luma is that sum of U and V less this times Y.
-        self._by_chroma, self._by_luma = d, s[:, 0] + s[:, 1]
-        parts = light.cells[:, 1:3] * d
-        self._luma = parts[:, 0] + parts[:, 1]
-        self._luma -= light.cells[:, 0] * self._by_luma
+        self._by_chroma, self._by_luma = d, s[0] + s[1]
+        parts = light.cells[1:3] * d
+        self._luma = parts[0]
+        self._luma += parts[1]
+        self._luma -= light.cells[0] * self._by_luma
 
     def ratio(self) -> Image:
         """The share of paint, 0..1, for paint and background in the same shade, which may be another one than where they are seen alone."""
         paint = np.maximum(self._luma, 0.0)
         paint /= self._y_p
-        behind = self._light.cells[:, 0] - self._luma
+        behind = self._light.cells[0] - self._luma
         np.maximum(behind, 0.0, out=behind)
         behind /= self._y_b
         behind += paint
@@ -106,19 +107,19 @@ class Mixture:
         both = self._y_p / norm
         both += behind
         share = both * self._luma
-        share += behind * (self._y_b - self._light.cells[:, 0])
-        slopes = np.empty_like(self._light.cells[:, :3])
-        np.multiply(self._by_chroma, both[:, None], out=slopes[:, 1:])
+        share += behind * (self._y_b - self._light.cells[0])
+        slopes = np.empty_like(self._light.cells[:3])
+        np.multiply(self._by_chroma, both, out=slopes[1:])
         both *= self._by_luma
         both += behind
-        np.negative(both, out=slopes[:, 0])
+        np.negative(both, out=slopes[0])
         slopes = self._light.encoded(slopes)
-        by_luma = slopes[:, 0].copy()
-        slopes *= slopes
-        variance = slopes[:, 1] + slopes[:, 2]
+        squares = slopes * slopes
+        variance = squares[1]
+        variance += squares[2]
         variance *= noise.chroma**2
-        variance += slopes[:, 0] * noise.luma**2
-        return share, by_luma, variance
+        variance += squares[0] * noise.luma**2
+        return share, slopes[0], variance
 
     def contrast(self) -> Image:
         """How far the paint's chroma per luma lies from what is around the blob, on average, in light; (n,)."""
@@ -138,18 +139,26 @@ def _wide(image: Image) -> Image:
     return cv2.blur(flat(image), (_COLOR_CELLS, _COLOR_CELLS), borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
 
 
-def _known(cells: Image, weights: Image) -> tuple[Image, Image]:
+def _known(rows: Image, weights: Image) -> tuple[Image, Image]:
     """Cells (h, 4, n, w) times each weight (2, h, n, w), with their weighted mean faintly everywhere, (2, h, 4, n, w), and those means, of
     which the last is 1, (2, 4, n)."""
-    known = cells * weights[:, :, None]
+    h, c, n, w = rows.shape
+    known = rows * weights[:, :, None]
     mean = sums(known)
     mean /= np.maximum(mean[:, 3:], 1e-6)
     mean[:, 3] = 1.0
-    known += (_FAINT * mean)[:, None, :, :, None]
+    # In runs as long as rows: half the time of short ones.
+    runs = known.reshape(2, h, c * n * w)
+    runs += (_FAINT * mean).reshape(2, 1, c * n).repeat(w, 2)
     return known, mean
 
 
 def _seen(spread: Image) -> tuple[Image, Image]:
-    """Chroma per luma (h, 2, n, w) and luma (h, n, w) of what a window carries on from where it is known: Y, U, V and weight, summed."""
+    """Chroma per luma (2, h, n, w) and luma (h, n, w) of what a window carries on from where it is known: Y, U, V and weight, summed,
+    (h, 4, n, w)."""
+    h, _, n, w = spread.shape
     luma = np.maximum(spread[:, 0], spread[:, 3])
-    return np.asarray(spread[:, 1:3] / luma[:, None]), np.asarray(luma / spread[:, 3])
+    chroma = np.empty((2, h, n, w), np.float32)
+    np.divide(spread[:, 1:3].swapaxes(0, 1), luma, out=chroma)
+    luma /= spread[:, 3]
+    return chroma, luma

@@ -32,7 +32,7 @@ class Tiles:
     mask: Image  # (h, n, w) 0/1: the blobs
     inside: Image  # (h, n, w) 0/1: the image, as far as MARGIN reaches
     luma: Image  # Y - 16 of every pixel, float32 (2h, n, 2w)
-    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (h, 4, n, w)
+    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (4, h, n, w)
 
 
 def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
@@ -51,12 +51,12 @@ def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
         if x1 < right + MARGIN or y1 < bottom + MARGIN:
             inside[y1 - y0 :, k], inside[:, k, x1 - x0 :] = 0, 0
     np.minimum(mask, 1, out=mask)
-    pixels = luma.astype(np.float32)
-    pixels -= 16.0
-    cells = np.ones((h, 4, n, w), np.float32)
-    cells[:, 0] = halved(pixels)
-    np.subtract(chroma.swapaxes(0, 1), np.float32(128.0), out=cells[:, 1:3])
-    return Tiles(picture.size, [rect[:2] for rect in rects], mask, inside, pixels, cells)
+    fine = luma.astype(np.float32)
+    fine -= 16.0
+    cells = np.ones((4, h, n, w), np.float32)
+    cells[0] = halved(fine)
+    np.subtract(chroma, np.float32(128.0), out=cells[1:3])
+    return Tiles(picture.size, [rect[:2] for rect in rects], mask, inside, fine, cells)
 
 
 def flat(images: Image) -> Image:
