@@ -20,7 +20,7 @@ import numpy as np
 
 from services.pi_tracker.frame import Image
 from services.pi_tracker.noise import Noise
-from services.pi_tracker.tiles import flat, sums
+from services.pi_tracker.tiles import flat, own, sums
 
 # BT.601 in limited range: Y - 16, U - 128, V - 128 to R, G, B in 0..255, and back.
 _RGB = np.array([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]], np.float32)
@@ -147,9 +147,9 @@ def _known(rows: Image, weights: Image) -> tuple[Image, Image]:
     mean = sums(known)
     mean /= np.maximum(mean[:, 3:], 1e-6)
     mean[:, 3] = 1.0
-    # In runs as long as rows: half the time of short ones.
+    # Nothing between tiles, lest windows see the next one's; in runs as long as rows: half the time of short ones.
     runs = known.reshape(2, h, c * n * w)
-    runs += (_FAINT * mean).reshape(2, 1, c * n).repeat(w, 2)
+    runs += ((_FAINT * mean)[..., None] * own(w)).reshape(2, 1, c * n * w)
     return known, mean
 
 
