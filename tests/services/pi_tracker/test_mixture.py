@@ -88,6 +88,7 @@ class Grey:
 
     def __init__(self, cells):
         self.cells = cells
+        self.rows = np.ascontiguousarray(cells.swapaxes(0, 1))
 
     @staticmethod
     def encoded(slopes):

@@ -22,7 +22,7 @@ def lens():
 
 @pytest.fixture
 def frame(studio, tip):
-    """Two tips of a hand in a corner, at any layout; no further from each other than fingers are, or they would not be taken for a hand's."""
+    """Two tips of one hand in a corner, at any layout: no further from each other than a hand reaches."""
     tips = [tip("green", 95.0, 70.0), tip("blue", 40.0, 35.0)]
     return lambda layout="i420": studio.frame(tips, 1, layout, size_px=SIZE, sigma=1.0)[0]
 
