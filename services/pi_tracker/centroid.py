@@ -34,8 +34,8 @@ _SQUARE = np.ones((3, 3), np.uint8)
 # .072, .056, .137 px; two rounds .063, .048, .121; with the mask's core no longer taken for paint as such .056, .048, .117.)
 _BARE, _PURE = 0.2, (0.85, 0.95)
 # As factors of the share and summands: 1 - share / _BARE, (share - _PURE[0]) / (_PURE[1] - _PURE[0]).
-_SLOPES = np.array([-1.0 / _BARE, 1.0 / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
-_OFFSETS = np.array([1.0, -_PURE[0] / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
+_ALONE_BY = np.array([-1.0 / _BARE, 1.0 / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
+_ALONE_AT = np.array([1.0, -_PURE[0] / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
 # Weight of a cell that only the mask takes for background or for paint, where the share of paint finds none.
 _HARDLY = 1e-3
 # The share of paint is noisy about 0 and 1; this slope about 1/2 lets clipping remove most of that noise at little loss of
@@ -121,8 +121,8 @@ def _mixture(tiles: Tiles, reach: Image) -> Mixture:
     if few.any():
         do[1][:, few] = may[1][:, few]
     share = Mixture(light, do, rough=True).ratio()
-    alone = share * _SLOPES
-    alone += _OFFSETS
+    alone = share * _ALONE_BY
+    alone += _ALONE_AT
     np.minimum(alone, may, out=alone)
     do *= _HARDLY
     np.maximum(alone, do, out=alone)

@@ -35,7 +35,7 @@ _RGB1[:3, :3], _YUV1_FROM_POWER[:3, :3] = _RGB, _YUV_FROM_POWER
 _POWER_SLOPES = 1.5 * _YUV_FROM_POWER.T
 # The background of a cell is that of its next neighbours (Gaussian of so many cells). Its paint's luma, which falls off across a finger,
 # is the mean of 3 x 3 cells, its colour that of 5 x 5: with 3 there is more noise, with all of a large marker's cells its highlight.
-_NEAR_CELLS, _LUMA_CELLS, _COLOR_CELLS = 0.6, 3, 5
+_NEAR_CELLS, _LUMA, _COLOR = 0.6, np.full(3, 1 / 3, np.float32), np.full(5, 1 / 5, np.float32)
 # Weight of the mean of all known cells beside that of near ones: nothing where there are any, everything where there are none.
 _FAINT = 1e-5
 # Luma, of 255, below which a ratio of chroma to luma is noise. (1, so that a sum of weighted lumas may be compared with that of weights.)
@@ -132,11 +132,16 @@ def _near(image: Image) -> Image:
 
 
 def _next(image: Image) -> Image:
-    return cv2.blur(flat(image), (_LUMA_CELLS, _LUMA_CELLS), borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
+    return _mean(image, _LUMA)
 
 
 def _wide(image: Image) -> Image:
-    return cv2.blur(flat(image), (_COLOR_CELLS, _COLOR_CELLS), borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
+    return _mean(image, _COLOR)
+
+
+def _mean(image: Image, row: Image) -> Image:
+    # Not cv2.blur, whose running sums leave rounding errors where there is next to nothing: weights would not stay above 0.
+    return cv2.sepFilter2D(flat(image), -1, row, row, borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
 
 
 def _known(rows: Image, weights: Image) -> tuple[Image, Image]:
