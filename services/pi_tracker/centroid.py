@@ -33,6 +33,9 @@ _SQUARE = np.ones((3, 3), np.uint8)
 # second to the third. (Error of disparity without noise, simulated hands resting at 1.0 and 0.5 m, moving at 0.7 m, seeds 1-10: one round
 # .072, .056, .137 px; two rounds .063, .048, .121; with the mask's core no longer taken for paint as such .056, .048, .117.)
 _BARE, _PURE = 0.2, (0.85, 0.95)
+# As factors of the share and summands: 1 - share / _BARE, (share - _PURE[0]) / (_PURE[1] - _PURE[0]).
+_ALONE_BY = np.array([-1.0 / _BARE, 1.0 / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
+_ALONE_AT = np.array([1.0, -_PURE[0] / (_PURE[1] - _PURE[0])], np.float32)[:, None, None, None]
 # Weight of a cell that only the mask takes for background or for paint, where the share of paint finds none.
 _HARDLY = 1e-3
 # The share of paint is noisy about 0 and 1; this slope about 1/2 lets clipping remove most of that noise at little loss of
@@ -81,43 +84,49 @@ def _size(blob: Blob) -> int:
 
 
 def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-    reach = _dilated(tiles.mask, _SQUARE)
-    light = Light(tiles.cells)
-    mixture = _mixture(tiles, light, reach)
+    reach = np.bitwise_and(_dilated(tiles.mask, _SQUARE), tiles.inside)
+    mixture = _mixture(tiles, reach)
     share, by_luma, variance = mixture.share(noise)
-    share = doubled(share - by_luma * tiles.cells[:, 0]) + doubled(by_luma) * tiles.luma
-    weight = _SLOPE * share + (0.5 - 0.5 * _SLOPE)
-    np.minimum(weight, 1.0, out=weight)
+    # The weight of a pixel, not clipped yet, is the sum of the first and of its luma times the second.
+    h, n, w = share.shape
+    ramp = np.empty((h, 2, n, w), np.float32)
+    np.multiply(by_luma, _SLOPE, out=ramp[:, 1])
+    share *= _SLOPE
+    share += 0.5 - 0.5 * _SLOPE
+    np.subtract(share, ramp[:, 1] * tiles.cells[0], out=ramp[:, 0])
+    ramp = doubled(ramp)
+    weight = ramp[:, 1] * tiles.luma
+    weight += ramp[:, 0]
+    np.minimum(weight, doubled(reach.astype(np.float32), cv2.INTER_NEAREST), out=weight)
     np.maximum(weight, 0.0, out=weight)
-    weight *= doubled(reach, cv2.INTER_NEAREST)
-    # Where clipping holds the weight, noise does not move it.
-    moving = halved(np.logical_and(weight > 0.0, weight < 1.0).astype(np.float32))
-    sums = moments(weight, 1).swapaxes(0, 1).tolist()
+    # Where clipping holds the weight at 0 or 1, noise does not move it.
+    moving = halved(np.ceil(weight) - np.floor(weight))
+    centres = moments(weight, 1).swapaxes(0, 1).tolist()
     spreads = moments(moving * variance, 2).swapaxes(0, 1).tolist()
     moved = (4.0 * moments(moving, 0).ravel()).tolist()
     contrast = mixture.contrast().tolist()
-    return [_centroid(tiles, k, blob, sums[k], spreads[k], moved[k], contrast[k]) for k, blob in enumerate(blobs)]
+    return [_centroid(tiles, k, blob, centres[k], spreads[k], moved[k], contrast[k]) for k, blob in enumerate(blobs)]
 
 
-def _mixture(tiles: Tiles, light: Light, reach: Image) -> Mixture:
+def _mixture(tiles: Tiles, reach: Image) -> Mixture:
     """Paint and background of every cell: first as the mask has them, then as the share of paint does that follows from those."""
-    band: Image = np.bitwise_and(_dilated(reach, _SQUARE), tiles.inside)
-    # Floats of 32 bits: a mask of bytes times a number has 64.
-    ring = np.bitwise_and(band, 1 - reach).astype(np.float32)
-    core = _cores(tiles.mask).astype(np.float32)
-    share = Mixture(light, ring, core, rough=True).ratio()
-    behind = np.maximum(np.minimum(1.0 - share / _BARE, band), _HARDLY * ring)
-    paint = np.maximum(np.minimum((share - _PURE[0]) / (_PURE[1] - _PURE[0]), tiles.mask), _HARDLY * core)
-    return Mixture(light, behind, paint)
-
-
-def _cores(mask: Image) -> Image:
-    """The masks without their edges, where anything is left of them."""
-    core = cv2.erode(flat(mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0).reshape(mask.shape)
-    few = core.sum((0, 2)) < _MIN_CORE
+    light = Light(tiles.cells)
+    # Of background and of paint: cells that may show it, and those that do as the mask has it.
+    may, do = np.empty((2, 2, *reach.shape), np.float32)
+    band = np.bitwise_and(_dilated(reach, _SQUARE), tiles.inside)
+    may[0], may[1] = band, tiles.mask
+    core = cv2.erode(flat(tiles.mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    do[0], do[1] = np.bitwise_xor(band, reach), core.reshape(reach.shape)
+    few = moments(do[1], 0).ravel() < _MIN_CORE
     if few.any():
-        core[:, few] = mask[:, few]
-    return core
+        do[1][:, few] = may[1][:, few]
+    share = Mixture(light, do, rough=True).ratio()
+    alone = share * _ALONE_BY
+    alone += _ALONE_AT
+    np.minimum(alone, may, out=alone)
+    do *= _HARDLY
+    np.maximum(alone, do, out=alone)
+    return Mixture(light, alone)
 
 
 def _dilated(masks: Image, element: Image) -> Image:

@@ -47,8 +47,8 @@ class _Planar:
         half_w, half_h = width // 2, height // 2
         self.size = (half_w, half_h)
         self._y = image[:height]
-        chroma = image[height:].reshape(2, half_h, half_w)
-        self._u, self._v = chroma[0], chroma[1]
+        self._chroma = image[height:].reshape(2, half_h, half_w)
+        self._u, self._v = self._chroma
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
@@ -61,8 +61,7 @@ class _Planar:
         x0, y0, x1, y1 = rect
         w, h = x1 - x0, y1 - y0
         luma[: 2 * h, : 2 * w] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
-        chroma[0, :h, :w] = self._u[y0:y1, x0:x1]
-        chroma[1, :h, :w] = self._v[y0:y1, x0:x1]
+        chroma[:, :h, :w] = self._chroma[:, y0:y1, x0:x1]
 
 
 class _Packed:

@@ -48,11 +48,12 @@ class Tip:
 
 
 def clean(
-    tips: Sequence[Tip], size_px: tuple[int, int] = (64, 64), shading: float = 0.5, blur_px: float = 0.8, wall: Bgr = WALL
+    tips: Sequence[Tip], size_px: tuple[int, int] = (64, 64), shading: float = 0.5, blur_px: float = 0.8, wall: Bgr | Image = WALL
 ) -> tuple[Image, dict[str, tuple[float, float]]]:
     """The picture without noise, float32 BGR (h, w, 3), and the centre of the visible paint of each colour, as if no other tip hid it.
 
-    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of the lens.
+    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of the lens; a wall of several colours is an
+    image (h, w, 3).
     """
     image = np.empty((size_px[1], size_px[0], 3), np.float32)
     image[:] = _light(wall)
@@ -94,8 +95,8 @@ def _range(bgr: Bgr) -> ColorRange:
     return ColorRange(hsv_low=((hue - 10) % 180, 90, 30), hsv_high=((hue + 10) % 180, 255, 255))
 
 
-def _light(bgr: Bgr) -> Image:
-    """Linear light 0..1 of grey levels (3,), by the sRGB curve (IEC 61966-2-1)."""
+def _light(bgr: Bgr | Image) -> Image:
+    """Linear light 0..1 of grey levels (..., 3), by the sRGB curve (IEC 61966-2-1)."""
     levels = np.array(bgr) / 255.0
     return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
 

