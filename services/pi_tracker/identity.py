@@ -27,6 +27,8 @@ _AREA_KEEP_TOUCHED = 0.98
 # Areas vary by less than this; what is missing beyond it is hidden where another colour touches. Where none does, it may be a finger that
 # turns, but not by so much between two frames: then something without paint is in front.
 _AREA_NOISE, _AREA_STEP = 0.15, 0.35
+# So many blobs of a colour are compared with those of the others; the cost grows with the square. More is a room full of that colour.
+_MOST = 16
 # What company counts against having none at all.
 _ALONE = 0.1
 # A blob as like its own track as this, and the only one of its colour, is the marker without asking the others.
@@ -145,6 +147,7 @@ class Identity:
 
     def choose(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Choice | None]:
         """Each colour's marker, None where there is none."""
+        blobs = [self._likely(color, own, stamp_ns) for color, own in enumerate(blobs)]
         candidates = [self._candidates(color, blobs, stamp_ns) for color in range(len(blobs))]
         chosen: list[Choice | None]
         if all(len(own) == 1 and own[0].prior >= _SURE and self._tracks[color] is not None for color, own in enumerate(candidates)):
@@ -159,6 +162,14 @@ class Identity:
             )
         self._carry(chosen, stamp_ns)
         return chosen
+
+    def _likely(self, color: int, own: list[Blob], stamp_ns: int) -> list[Blob]:
+        """The blobs of a colour that are worth comparing with all others: those most like its track, or else the largest."""
+        if len(own) <= _MOST:
+            return own
+        track = self._tracks[color]
+        rank = (lambda blob: blob.cells) if track is None else (lambda blob: track.likeness(blob, stamp_ns, self._margin_px))
+        return sorted(own, key=rank, reverse=True)[:_MOST]
 
     def expected(self, color: int, stamp_ns: int) -> tuple[float, float] | None:
         """Where a marker must be that was seen a moment ago, px."""

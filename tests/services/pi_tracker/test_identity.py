@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from services.pi_tracker import company
 from services.pi_tracker.company import Candidate, best_set, support
 from services.pi_tracker.identity import Identity, Track, shape_fits
 from services.pi_tracker.search import Blob
@@ -191,3 +192,25 @@ def test_the_best_set_of_nothing_is_nothing():
     assert best_set([[], []]) == [None, None]
     only = Candidate(blob(1, 50, 50), 0.5)
     assert best_set([[], [only]]) == [None, (only, 1.0)]
+
+
+def test_of_a_room_full_of_colour_only_the_likeliest_are_compared(monkeypatch):
+    """Test: a followed hand among 400 specks of each colour. Expected: it goes on being followed, at a bounded number of comparisons."""
+    compared = []
+    monkeypatch.setattr(company, "_fit", lambda a, b, fit=company._fit: compared.append(a) or fit(a, b))
+    identity, random = Identity(6, 40), np.random.default_rng(4)
+    tips = hand(300, 250)
+    for seq in range(3):
+        chosen(identity, [[tip] for tip in tips], seq)
+    specks = [[blob(color, x, y, 6) for x, y in random.uniform(20, 460, (400, 2)).tolist()] for color in range(6)]
+    assert chosen(identity, [[*own, tip] for own, tip in zip(specks, tips, strict=True)], 3) == tips
+    # 96 candidates gather 80 others each, and 15 pairs of what they gathered are summed; of all specks it would be 6 million.
+    assert 0 < len(compared) < 10_000
+
+
+def test_at_first_the_largest_of_many_are_compared():
+    """Test: nothing is known yet. Expected: a hand among 400 specks of each colour that are smaller than it is found."""
+    random = np.random.default_rng(5)
+    specks = [[blob(color, x, y, 4) for x, y in random.uniform(20, 460, (400, 2)).tolist()] for color in range(6)]
+    tips = hand(300, 250)
+    assert chosen(Identity(6, 40), [[*own, tip] for own, tip in zip(specks, tips, strict=True)], 0) == tips
