@@ -14,17 +14,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from rhot.camera import Camera
 from rhot.transforms import Array
 from services.fusion.measure import project
-from services.fusion.method import Bools
+from services.fusion.method import Bools, Ints
 from services.fusion.observations import View
 from services.fusion.triangulation import extrinsics, invert_symmetric
-
-Ints = npt.NDArray[np.int64]
 
 # What changes from frame to frame: this much of every marker, and this share of a large sigma (never more than sigma itself).
 # At sensor noise 5 a resting centre scatters by .10 px at 1.0 m and .16 px at 0.5 m; sigma_px is .08 and .15-.3 there, much of it light.

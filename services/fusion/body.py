@@ -13,14 +13,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from rhot.transforms import Array
 from services.fusion.measure import NOT_VISIBLE, project
+from services.fusion.method import Ints
 from services.fusion.motion import propagate, transition, unit_noise
-
-Ints = npt.NDArray[np.int64]
 
 # Jerk densities of a resting hand's shift (m^2/s^5) and turn (rad^2/s^5): a sway of millimetres and half a degree below 1 Hz. Still depth
 # is up to 11 % worse with ten times as much, and 30 % with a tenth.
@@ -36,20 +34,20 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 
 class Rest(NamedTuple):
-    """H hands, S landmarks."""
+    """H hands, S landmarks; places, shifts and turns are in the rig frame (m, rad, s)."""
 
     hand: Ints  # (S,) whose the landmark is
     belief: Array  # (S,) that it rests; 0: it has no anchor
     trust: Array  # (S,) belief that has lasted
     seen_s: Array  # (S,)
-    anchor: Array  # (S, 3)
-    loose: Array  # (S, 3, 3) the anchor's covariance
+    anchor: Array  # (S, 3) the place in the body
+    anchor_cov: Array  # (S, 3, 3)
     time_s: Array  # (H,) of bodies and anchors; -inf: no look yet
-    centre: Array  # (H, 3) what the body turns about
+    centre: Array  # (H, 3) the point the body turns about
     motion: Array  # (H, 3, 6): displacement since the anchors were moved, rate, acceleration; of each shift and turn
     cov: Array  # (H, 18, 18)
-    trial_s: Array  # (H,) when markers were anchored anew
-    first: Ints  # (H,) counts frames
+    trial_s: Array  # (H,) when the latest trial began (rest.py)
+    frames: Ints  # (H,) how many were taken in
 
 
 def empty_rest(hands: list[Ints]) -> Rest:
@@ -77,6 +75,7 @@ def empty_rest(hands: list[Ints]) -> Rest:
 @njit(cache=True)
 def begin(rest: Rest, hand: int, time_s: float, centre: Array) -> None:
     """A body without motion about a point (3,), and without anchors."""
+    rest.trial_s[hand] = time_s
     rest.time_s[hand], rest.centre[hand], rest.motion[hand], rest.cov[hand] = time_s, centre, 0.0, 0.0
     for axis in range(6):
         rest.cov[hand, 6 + axis, 6 + axis] = START_RATE[axis // 3] ** 2
@@ -139,19 +138,10 @@ def advance(rest: Rest, hand: int, time_s: float) -> None:
             moved(rest, slot, 0.0, place, J)
             for i in range(3):
                 rest.anchor[slot, i] = place[i]
-                rest.loose[slot, i, i] += WANDER * dt
+                rest.anchor_cov[slot, i, i] += WANDER * dt
     for i in range(3):
         rest.centre[hand, i] += motion[0, i]
     motion[0], rest.time_s[hand] = 0.0, time_s
-
-
-@njit(cache=True)
-def _shrink(cov: Array, gain: Array, PH: Array) -> None:
-    """P -= K (P H^T)^T in place, kept symmetric."""
-    for i in range(cov.shape[0]):
-        for j in range(i, cov.shape[0]):
-            cov[i, j] -= gain[i, 0] * PH[j, 0] + gain[i, 1] * PH[j, 1]
-            cov[j, i] = cov[i, j]
 
 
 @njit(cache=True)
@@ -162,7 +152,10 @@ def _correct(mean: Array, cov: Array, PH: Array, Si: Array, nu: Array) -> None:
         gain[i, 0] = PH[i, 0] * Si[0, 0] + PH[i, 1] * Si[1, 0]
         gain[i, 1] = PH[i, 0] * Si[0, 1] + PH[i, 1] * Si[1, 1]
         mean[i] += gain[i, 0] * nu[0] + gain[i, 1] * nu[1]
-    _shrink(cov, gain, PH)
+    for i in range(mean.shape[0]):
+        for j in range(i, mean.shape[0]):
+            cov[i, j] -= gain[i, 0] * PH[j, 0] + gain[i, 1] * PH[j, 1]
+            cov[j, i] = cov[i, j]
 
 
 @njit(cache=True)
@@ -171,7 +164,7 @@ def look(rest: Rest, slot: int, later_s: float, seen: Array, variances: Array, R
 
     seen (2,) and variances (2,) as in measure.innovate; the motion's clock error is that of the body's rate.
     """
-    motion, cov, loose = rest.motion[rest.hand[slot]], rest.cov[rest.hand[slot]], rest.loose[slot]
+    motion, cov, anchor_cov = rest.motion[rest.hand[slot]], rest.cov[rest.hand[slot]], rest.anchor_cov[slot]
     J, place, ray, H, HJ = np.empty((3, 6)), np.empty(3), np.empty(2), np.empty((2, 3)), np.zeros((2, 6))
     moved(rest, slot, later_s, place, J)
     if not project(place, R, t, ray, H):
@@ -189,7 +182,7 @@ def look(rest: Rest, slot: int, later_s: float, seen: Array, variances: Array, R
             PH[i, 1] += weight * HJ[1, axis]
     for i in range(3):
         for k in range(2):
-            DH[i, k] = loose[i, 0] * H[k, 0] + loose[i, 1] * H[k, 1] + loose[i, 2] * H[k, 2]
+            DH[i, k] = anchor_cov[i, 0] * H[k, 0] + anchor_cov[i, 1] * H[k, 1] + anchor_cov[i, 2] * H[k, 2]
     for k in range(2):
         for n in range(2):
             S[k, n] = variances[1] * drift[k] * drift[n] + H[k, 0] * DH[0, n] + H[k, 1] * DH[1, n] + H[k, 2] * DH[2, n]
@@ -202,7 +195,7 @@ def look(rest: Rest, slot: int, later_s: float, seen: Array, variances: Array, R
     Si, nu = np.array([[S[1, 1], -S[0, 1]], [-S[1, 0], S[0, 0]]]) / determinant, seen - ray
     away = nu[0] * (Si[0, 0] * nu[0] + Si[0, 1] * nu[1]) + nu[1] * (Si[1, 0] * nu[0] + Si[1, 1] * nu[1])
     if away <= gate:
-        _correct(rest.anchor[slot], loose, DH, Si, nu)
+        _correct(rest.anchor[slot], anchor_cov, DH, Si, nu)
         if steers:
             _correct(motion.reshape(18), cov, PH, Si, nu)
     return -0.5 * (away + math.log(determinant)) - _LOG_2PI

@@ -11,14 +11,13 @@ import numpy as np
 from numba import njit
 
 from rhot.transforms import Array
-from services.fusion.body import Ints, Rest
+from services.fusion.body import Rest
+from services.fusion.method import Ints
 from services.fusion.rest import weigh
 from services.fusion.ring import ACCEPTED, Ring, insert
 
 # What `take_in` tells of a landmark without a track, beside the codes of ring.insert.
 NO_TRACK = -1
-
-
 # Looks of each camera that are kept for beginning a track: half a second at 30 fps, so that a camera may be that much later than another.
 KEPT = 16
 

@@ -14,9 +14,9 @@ import numpy as np
 from rhot.camera import Camera
 from rhot.config import Fusion
 from rhot.transforms import Array
-from services.fusion.body import Ints, empty_rest
+from services.fusion.body import empty_rest
 from services.fusion.intake import NO_TRACK, drop, no_looks, take_in
-from services.fusion.method import Counts, Estimates
+from services.fusion.method import Counts, Estimates, Ints
 from services.fusion.observations import View
 from services.fusion.rest import blend
 from services.fusion.ring import ACCEPTED, GATED, LATE, empty_ring, query_all, start

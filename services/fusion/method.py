@@ -15,6 +15,7 @@ from rhot.transforms import Array
 from services.fusion.observations import View
 
 Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

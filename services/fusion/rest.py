@@ -20,7 +20,8 @@ import numpy.typing as npt
 from numba import njit
 
 from rhot.transforms import Array
-from services.fusion.body import Ints, Rest, advance, begin, look, lost, moved
+from services.fusion.body import Rest, advance, begin, look, lost, moved
+from services.fusion.method import Ints
 from services.fusion.ring import ACCEPTED, Ring
 
 # So many markers tell how a body moves and turns.
@@ -53,7 +54,7 @@ def _anchor(rest: Rest, ring: Ring, slot: int) -> None:
     for i in range(3):
         rest.anchor[slot, i] = ring.state[slot, node, m, i] - since_s * ring.state[slot, node, m, 3 + i]
         for j in range(3):
-            rest.loose[slot, i, j] = ring.cov[slot, node, m, i, j]
+            rest.anchor_cov[slot, i, j] = ring.cov[slot, node, m, i, j]
 
 
 @njit(cache=True)
@@ -105,7 +106,6 @@ def _ready(rest: Rest, ring: Ring, hand: int, slots: Ints, times_s: Array, codes
     time_s /= count
     if time_s > rest.time_s[hand] + REACH_S or lost(rest, hand):
         begin(rest, hand, time_s, middle / count)
-        rest.trial_s[hand] = time_s
     elif time_s > rest.time_s[hand]:
         advance(rest, hand, time_s)
         if time_s > rest.trial_s[hand] + TRIAL_S:
@@ -123,7 +123,7 @@ def weigh(
         if not _ready(rest, ring, hand, slots, times_s, codes):
             # What comes too late for the body is in the ring, which then knows better.
             for n in range(count):
-                if rest.hand[slots[n]] == hand:
+                if rest.hand[slots[n]] == hand and codes[n] == ACCEPTED:
                     rest.trust[slots[n]] = 0.0
             continue
         # In a trial, those that have not been found to move.
@@ -131,10 +131,10 @@ def weigh(
         for n in range(count):
             steers[n] = rest.belief[slots[n]] >= enough
         # The first to steer is predicted worst and the others profit from it, so it is another one each time; those that do not come last.
-        rest.first[hand] += 1
+        rest.frames[hand] += 1
         for steering in (True, False):
             for k in range(count):
-                n = (k + rest.first[hand]) % count
+                n = (k + rest.frames[hand]) % count
                 if rest.hand[slots[n]] == hand and codes[n] == ACCEPTED and steers[n] == steering:
                     _judge(rest, ring, slots[n], times_s[n], rays[n], variances[n], R[camera], t[camera], steering)
 
@@ -151,7 +151,7 @@ def blend(rest: Rest, time_s: float, found: npt.NDArray[np.bool_], means: Array,
         share = (rest.trust[slot] - RESTS) / (1.0 - RESTS) * math.exp(-max(time_s - rest.seen_s[slot] - FRESH_S, 0.0) / FADE_S)
         moved(rest, slot, later_s, place, J)
         D[:, :6], D[:, 6:12], D[:, 12:] = J, later_s * J, 0.5 * later_s * later_s * J
-        cov = D @ rest.cov[rest.hand[slot]] @ D.T + rest.loose[slot]
+        cov = D @ rest.cov[rest.hand[slot]] @ D.T + rest.anchor_cov[slot]
         for i in range(3):
             for j in range(3):
                 apart = (place[i] - means[slot, i]) * (place[j] - means[slot, j])

@@ -18,9 +18,8 @@ from numba import njit
 
 from rhot.transforms import Array
 from services.fusion.measure import NOT_VISIBLE, correct, distance_squared, innovate, retract
+from services.fusion.method import Ints
 from services.fusion.motion import predict, retreat, unit_noise
-
-Ints = npt.NDArray[np.int64]
 
 # 32 observations are .53 s of two cameras at 30 fps and 90 ms of four at 90 fps: room for two frames of lag and for latency.
 NODES = 32

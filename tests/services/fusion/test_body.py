@@ -20,7 +20,7 @@ def rest():
     """Three anchors about a centre, slowly moving."""
     made = empty_rest([np.arange(3)])
     begin(made, 0, 1.0, CENTRE)
-    made.anchor[:], made.loose[:], made.belief[:] = ANCHORS, np.eye(3) * 1e-6, 0.9
+    made.anchor[:], made.anchor_cov[:], made.belief[:] = ANCHORS, np.eye(3) * 1e-6, 0.9
     random = np.random.default_rng(2)
     made.motion[0, 1:] = random.normal(0.0, [[0.02], [0.1]], (2, 6))
     root = random.normal(0.0, 1e-2, (18, 18))
@@ -57,7 +57,7 @@ def test_advancing_is_the_textbook_prediction(rest):
     np.testing.assert_allclose(rest.anchor[1], place, atol=1e-6)
     np.testing.assert_array_equal(rest.motion[0, 0], 0.0)
     np.testing.assert_allclose(rest.motion[0, 1:], expected[1:])
-    np.testing.assert_allclose(rest.loose[1], np.eye(3) * (1e-6 + WANDER * 0.02))
+    np.testing.assert_allclose(rest.anchor_cov[1], np.eye(3) * (1e-6 + WANDER * 0.02))
 
 
 @pytest.mark.parametrize("later_s", [0.0, -0.03, 0.002])
@@ -70,7 +70,7 @@ def test_a_look_is_a_kalman_update_of_body_and_anchor(rest, later_s):
     Hp = (R[1][:2] - np.outer(q[:2] / q[2], R[1][2])) / q[2]
     H = np.hstack([Hp @ J, later_s * Hp @ J, 0.5 * later_s**2 * Hp @ J, Hp])
     P = np.zeros((21, 21))
-    P[:18, :18], P[18:, 18:] = rest.cov[0], rest.loose[0]
+    P[:18, :18], P[18:, 18:] = rest.cov[0], rest.anchor_cov[0]
     variances, nu = np.array([4e-8, 1e-6]), np.array([3e-4, -2e-4])
     drift = Hp @ J @ rest.motion[0, 1]
     S = H @ P @ H.T + variances[0] * np.eye(2) + variances[1] * np.outer(drift, drift)
@@ -81,7 +81,7 @@ def test_a_look_is_a_kalman_update_of_body_and_anchor(rest, later_s):
     assert likelihood == pytest.approx(-0.5 * (nu @ np.linalg.solve(S, nu) + np.log(np.linalg.det(S))) - np.log(2.0 * np.pi))
     np.testing.assert_allclose(np.concatenate([rest.motion[0].ravel(), rest.anchor[0]]), expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(rest.cov[0], after[:18, :18], rtol=1e-7, atol=1e-14)
-    np.testing.assert_allclose(rest.loose[0], after[18:, 18:], rtol=1e-7, atol=1e-16)
+    np.testing.assert_allclose(rest.anchor_cov[0], after[18:, 18:], rtol=1e-7, atol=1e-16)
 
 
 def test_a_look_that_does_not_steer_moves_the_anchor_only(rest):
