@@ -2,7 +2,7 @@
 
 The figures under the names of issue 4 are from pictures: hands as the simulator's cameras see them (sensor noise of 5 grey levels), through
 the tracker and fusion, with the solver's finger directions fed back, against the landmarks of the truth; four seeds each. Those under
-`synthetic` are from points (services/fusion/synthetic.py) with 0.06 px of white noise: fusion's own errors. In mm; *_rms_mm is about the
+`synthetic` are from points (testing/synthetic_points.py) with 0.06 px of white noise: fusion's own errors. In mm; *_rms_mm is about the
 truth, *_precision_mm about each landmark's own mean, *_bias_mm that mean's. nees is squared error over predicted variance: 1 if sigma is
 honest. *_over_crb is the precision against one frame of each camera at the detector's measured noise.
 """
@@ -21,12 +21,12 @@ import msgspec
 import numpy as np
 from accuracy_pictures import RENDERED_SEEDS, Pictures, Score
 
-from rhot.config import Fusion, HandTable, RigConfig, load_rig
+from rhot.files.config import Fusion, HandTable, RigConfig, load_rig
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import Marker
+from services.fusion.geometry.triangulation import extrinsics, triangulate
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import Motion, Path, Setup, Sway, frames, point_hands
-from services.fusion.triangulation import extrinsics, triangulate
+from testing.synthetic_points import Motion, Path, Setup, Sway, frames, point_hands
 
 SEEDS = (1, 2, 3)
 SECONDS = 15.0

@@ -10,19 +10,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rhot.calibration import load_colors, load_hand
-from rhot.config import Fusion, RigConfig
+from rhot.files.calibration import load_colors, load_hand
+from rhot.files.config import Fusion, RigConfig
+from rhot.geometry.transforms import Array
 from rhot.hand import HandName, landmark_point
 from rhot.messages import HandPoints, MarkerFrame
-from rhot.transforms import Array
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import START_NS
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
-from services.simulator.frames import FrameSource
-from services.simulator.scene import Scene, build_scene
-from services.simulator.scenes import SCENES
+from services.simulator.camera.frame_source import FrameSource
+from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.scene import Scene, build_scene
 from services.solver.step import SolverStep
+from testing.synthetic_points import START_NS
 
 RENDERED_SEEDS = (1, 2, 3, 4)
 # Tracks have begun and clocks are learned by then.

@@ -21,7 +21,7 @@ import uvloop
 import zenoh
 
 from rhot import topics
-from rhot.bus import client_config, open_bus, router_config
+from rhot.bus.bus import client_config, open_bus, router_config
 from rhot.messages import Marker, MarkerFrame
 
 MESSAGES, WARM_UP = 1000, 100

@@ -16,15 +16,15 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from rhot.config import RigConfig
-from rhot.guided import CYCLE_S
+from rhot.files.config import RigConfig
+from rhot.geometry.transforms import Array, angle_between, rotation_from_quaternion, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand, forward, landmark_point
+from rhot.hand_exercises import CYCLE_S
 from rhot.messages import HandPoint, HandPoints, HandPose
-from rhot.transforms import Array, angle_between, rotation_from_quaternion, rotation_from_vector
-from services.simulator.guided import guided
-from services.simulator.motion import MOTIONS, Motion, Unrest
-from services.solver.person.fit import fit_person
-from services.solver.person.recording import recording_of
+from services.calibrator.hand.fit import fit_person
+from services.calibrator.hand.recording import recording_of
+from services.simulator.scene.calibration_exercises import guided
+from services.simulator.scene.gestures import MOTIONS, Motion, Unrest
 from services.solver.step import SolverStep
 
 _NOISE_M, _FPS = 1e-3, 30.0

@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from rhot.transforms import Array
-from services.fusion.motion import transition, unit_noise
-from services.fusion.one_euro import OneEuroFilter
-from services.fusion.synthetic import Path
+from rhot.geometry.transforms import Array
+from services.fusion.kalman.motion_model import transition, unit_noise
+from services.fusion.paired.one_euro import OneEuroFilter
+from testing.synthetic_points import Path
 
 NOISE_M = 1e-3
 # Jitter at rest that each filter must reach, as a share of the noise.
@@ -66,7 +66,7 @@ def double_exponential(path: Array, rate_hz: float, alpha: float, trend: float) 
 
 
 def kalman(path: Array, rate_hz: float, density: float) -> Array:
-    """Fusion's motion model (services/fusion/motion.py) with one jerk density, position measured; its gain is the same for all axes."""
+    """Fusion's motion model (services/fusion/kalman/motion_model.py) with one jerk density, position measured; its gain is the same for all axes."""
     f01, f02, f12, f22 = transition(1.0 / rate_hz)
     F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))
     unit_noise(1.0 / rate_hz, Q)
@@ -82,7 +82,7 @@ def kalman(path: Array, rate_hz: float, density: float) -> Array:
 
 
 def adaptive_kalman(path: Array, rate_hz: float, calmest: float) -> Array:
-    """Four of these side by side, weighed by their likelihoods as in services/fusion/ring.py; densities from `calmest` to 5000."""
+    """Four of these side by side, weighed by their likelihoods as in services/fusion/kalman/track_history.py; densities from `calmest` to 5000."""
     densities = np.geomspace(calmest, 5000.0, 4)
     f01, f02, f12, f22 = transition(1.0 / rate_hz)
     F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))

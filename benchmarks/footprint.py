@@ -31,11 +31,11 @@ from typing import Any, NamedTuple
 import zenoh
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
-from rhot.bus_config import router_config
-from rhot.calibration import save
+from rhot.bus.bus import Bus, open_bus
+from rhot.bus.zenoh_config import router_config
+from rhot.files.calibration import save
 from rhot.messages import Session, SimFrame
-from services.pi_tracker import synthetic
+from testing import synthetic_images
 
 RIG, CAMERA, SIZE, FPS = "footprint", "left", (640, 480), 30.0
 FORBIDDEN = ("scipy", "numba", "llvmlite", "viser")
@@ -56,11 +56,11 @@ class Run(NamedTuple):
 
 def write_rig(folder: Path) -> Path:
     """rig.toml and the colours of a simulated camera; the path of the former."""
-    markers = "\n".join(f'{landmark} = "{color}"' for landmark, color in zip(LANDMARKS, synthetic.PAINTS, strict=True))
+    markers = "\n".join(f'{landmark} = "{color}"' for landmark, color in zip(LANDMARKS, synthetic_images.PAINTS, strict=True))
     path = folder / "rig.toml"
     path.write_text(f'[rig]\nname = "{RIG}"\n[[camera]]\nname = "{CAMERA}"\nsource = "simulator"\n[hand.right.markers]\n{markers}\n')
     (folder / "calibration").mkdir()
-    save(folder / "calibration" / f"{CAMERA}.colors.json", synthetic.ranges())
+    save(folder / "calibration" / f"{CAMERA}.colors.json", synthetic_images.ranges())
     return path
 
 
@@ -68,8 +68,8 @@ def pictures() -> list[bytes]:
     """A hand's worth of painted tips that move a little."""
     images = []
     for n in range(8):
-        tips = [synthetic.Tip(color, 200.0 + 45 * i + 2 * n, 200.0 + 30 * (i % 3) + n) for i, color in enumerate(synthetic.PAINTS)]
-        images.append(synthetic.i420(synthetic.noisy(synthetic.clean(tips, SIZE)[0], 5.0, n)).tobytes())
+        tips = [synthetic_images.Tip(color, 200.0 + 45 * i + 2 * n, 200.0 + 30 * (i % 3) + n) for i, color in enumerate(synthetic_images.PAINTS)]
+        images.append(synthetic_images.i420(synthetic_images.noisy(synthetic_images.clean(tips, SIZE)[0], 5.0, n)).tobytes())
     return images
 
 
@@ -121,7 +121,7 @@ async def one_run(bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports
                 break
         start_s, start_cpu_s = time.monotonic() - begun_s, cpu_seconds(process.pid)
         async for frame in markers:
-            if len(frame.markers) == len(synthetic.PAINTS):
+            if len(frame.markers) == len(synthetic_images.PAINTS):
                 break
         first_s, cpu_s, since_s = time.monotonic() - begun_s, cpu_seconds(process.pid), time.monotonic()
         await asyncio.sleep(seconds)

@@ -2,7 +2,7 @@
 
 Fast motion, blur, things of the paints' own colours in the room, coloured light on the skin. Both cameras, one after the other, each with
 the colour ranges of config/calibration; rendering takes nearly all of the time (0.1 s a frame; the whole run 20 minutes). Against the
-renderer's own account of what each pixel shows (services/simulator/visibility.py):
+renderer's own account of what each pixel shows (services/simulator/camera/visibility.py):
     recall              of the frames in which at least half of a patch is visible - of what would be seen of it if no other part of the
                         hand were there -, the share in which its marker is reported on it; the worst marker's
     wrong_identity      share of all reported markers that are not on their paint: more than 3 px from every pixel that shows it
@@ -23,14 +23,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rhot.calibration import load_colors
-from rhot.config import RigConfig, load_rig
+from rhot.files.calibration import load_colors
+from rhot.files.config import RigConfig, load_rig
 from rhot.messages import Marker
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
-from services.simulator.frames import FrameSource, TakenFrame
-from services.simulator.scene import load_scene
-from services.simulator.visibility import Sight, sights
+from services.simulator.camera.frame_source import FrameSource, TakenFrame
+from services.simulator.camera.visibility import Sight, sights
+from services.simulator.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
 SCENE = "hard"

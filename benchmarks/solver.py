@@ -28,15 +28,15 @@ import numpy as np
 import solver_peers
 from solver_hands import Motion, anywhere, grasp, messages, moving
 
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
+from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import BASIC_LANDMARKS, HANDS, HandModel, default_hand
-from rhot.transforms import angle_between, rotation_from_quaternion
-from services.solver import dls, dls_paper, fabrik
-from services.solver import kinematics as k
-from services.solver.rotor import BOX
-from services.solver.screen import places, usable
+from services.solver.finger import dls, dls_paper, fabrik
+from services.solver.finger.swing_limits import BOX
+from services.solver.maths import kinematics as k
 from services.solver.step import SolverStep
-from services.solver.tracker import HandTracker
+from services.solver.whole_hand.hand_tracker import HandTracker
+from services.solver.whole_hand.point_check import places, usable
 
 MODEL = default_hand()
 CHAINS = k.hand_chains(MODEL)
@@ -152,7 +152,7 @@ def start_up() -> dict[str, Any]:
     """Seconds from nothing to the first pose in a new process, once the cache is warm: the least of five."""
     code = (
         "import time; began = time.perf_counter()\n"
-        "from rhot.config import RigConfig\nfrom rhot.hand import default_hand\nfrom services.solver.warm import warm_up\n"
+        "from rhot.files.config import RigConfig\nfrom rhot.hand import default_hand\nfrom services.solver.warm import warm_up\n"
         "warm_up(RigConfig(), {'right': default_hand()}); print(time.perf_counter() - began)"
     )
     # The first run fills the cache where it was cold.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhot.geometry.transforms import Array, rotation_from_quaternion, rotation_from_vector
 from rhot.hand import HandModel, forward, landmark_point
 from rhot.messages import HandPoint, HandPoints
-from rhot.transforms import Array, rotation_from_quaternion, rotation_from_vector
-from services.solver import kinematics as k
+from services.solver.maths import kinematics as k
 
 FRAMES, RATE_HZ = 150, 30.0
 

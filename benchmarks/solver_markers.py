@@ -16,9 +16,9 @@ import numpy as np
 from solver import errors_of, with_painted
 from solver_hands import FRAMES, RATE_HZ, Motion, moving
 
+from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
-from rhot.transforms import Array, rotation_from_vector
-from services.simulator.motion import CURVED, FIST, OPEN, Fitted, bump
+from services.simulator.scene.gestures import CURVED, FIST, OPEN, Fitted, bump
 
 _JOINTS = ("proximal", "intermediate")
 CANDIDATES = (

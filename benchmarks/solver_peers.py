@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from rhot.transforms import Array, vector_from_rotation
-from services.solver import kinematics as k
-from services.solver.turns import rotation_vector
+from rhot.geometry.transforms import Array, vector_from_rotation
+from services.solver.maths import kinematics as k
+from services.solver.maths.rotation_vectors import rotation_vector
 
 NEAR_M, NEAR_RAD, MOST = 1e-9, 1e-8, 100
 # One frame: tip position (3,), axes of the last bone (3, 3) -> angles (4,).

@@ -1,6 +1,6 @@
 """The eye beside the seed's: how fast and how exact, in one process: `python benchmarks/tracker.py [--frames N] [--json FILE]`.
 
-The seed's pipeline is re-created (services/pi_tracker/seed.py): per colour HSV, Gaussian, threshold, erosion, dilation, contours,
+The seed's pipeline is re-created (services/pi_tracker/detect/paper_finder.py): per colour HSV, Gaussian, threshold, erosion, dilation, contours,
 largest, centroid. Both see the same simulated pictures, six colours, 640 x 480, stage by stage in turns of thirty frames so that the
 machine's moods hit both; ours as the camera's YUV420, the seed's as BGR (whose conversion is not counted). The pictures make five rounds.
 A round's times are medians and its ratios theirs; told are the median of the rounds, and for ratios the least and the most of them
@@ -39,18 +39,19 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from rhot.calibration import ColorRange, Colors, load_colors
-from rhot.config import RigConfig, Tracker, load_rig
-from services.pi_tracker import roi, synthetic
-from services.pi_tracker.colors import compile_colors
-from services.pi_tracker.frame import Frame
-from services.pi_tracker.planes import Rect, picture
-from services.pi_tracker.search import Blob, Searcher
-from services.pi_tracker.seed import SeedFinder
+from rhot.files.calibration import ColorRange, Colors, load_colors
+from rhot.files.config import RigConfig, Tracker, load_rig
+from services.pi_tracker.detect import search_region
+from services.pi_tracker.detect.blob_search import Blob, Searcher
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.detect.paper_finder import SeedFinder
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.yuv_planes import Rect, picture
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
-from services.simulator.frames import FrameSource
-from services.simulator.scene import load_scene
+from services.simulator.camera.frame_source import FrameSource
+from services.simulator.scene.scene import load_scene
+from testing import synthetic_images
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("RHOT_DATA", ROOT.parent / "shared" / "data"))
@@ -104,7 +105,7 @@ def speed(frames: list[Frame], colors: Colors, wanted: Sequence[str]) -> Rounds:
         ours = frames[start : start + TURN]
         theirs = [as_bgr(frame) for frame in ours]
         found = [timed(times, "search", partial(everywhere, searcher, frame)) for frame in map(in_hand, ours)]
-        hulls = [roi.hull(blob.rect for blob in blobs) if blobs else None for blobs in found]
+        hulls = [search_region.hull(blob.rect for blob in blobs) if blobs else None for blobs in found]
         for frame, before, last in zip(map(in_hand, ours[2:]), hulls, hulls[1:], strict=False):
             if last:
                 timed(times, "roi", partial(nearby, searcher, frame, before, last))
@@ -150,13 +151,13 @@ def keep_memory() -> None:
 def everywhere(searcher: Searcher, frame: Frame) -> list[Blob]:
     """Our search of a whole image."""
     image = picture(frame)
-    return searcher.blobs(image, roi.whole(image.size))
+    return searcher.blobs(image, search_region.whole(image.size))
 
 
 def nearby(searcher: Searcher, frame: Frame, before: Rect | None, last: Rect) -> list[Blob]:
     """Our search around the markers' hull in the last frame, given that in the one before, too."""
     image = picture(frame)
-    return searcher.blobs(image, roi.around(last, roi.margin(before, last, Tracker().roi_margin_px), image.size))
+    return searcher.blobs(image, search_region.around(last, search_region.margin(before, last, Tracker().roi_margin_px), image.size))
 
 
 def precision() -> dict[str, float]:
@@ -164,18 +165,18 @@ def precision() -> dict[str, float]:
     rng = np.random.default_rng(1)
     errors: dict[str, list[list[float]]] = {"ours": [], "seed": []}
     normalised: list[float] = []
-    colors, settings, size = synthetic.ranges(), Tracker(), (64, 64)
+    colors, settings, size = synthetic_images.ranges(), Tracker(), (64, 64)
     for n in range(VIEWS):
-        name = list(synthetic.PAINTS)[n % len(synthetic.PAINTS)]
+        name = list(synthetic_images.PAINTS)[n % len(synthetic_images.PAINTS)]
         x, y, apart = (*(32 + rng.uniform(-1, 1, 2)), rng.uniform(-1, 1))
         shape = {"length_px": 9 * rng.uniform(0.9, 1.3), "turn_rad": rng.uniform(0, 2 * np.pi), "light_rad": rng.uniform(-1, 1)}
         wall = tuple(rng.uniform(60, 200) + rng.uniform(-10, 10, 3))
         pair: dict[str, list[float]] = {"ours": [], "seed": []}
         for side in range(2):
-            clean, truth = synthetic.clean([synthetic.Tip(name, x + side * apart, y, 9.0, **shape)], size, wall=wall)
-            bgr = synthetic.noisy(clean, NOISE, 2 * n + side)
-            (ours,) = TrackerStep("left", colors, settings, size, [name]).step(synthetic.frame_of(bgr)).markers or (None,)
-            (seed,) = SeedFinder(colors, settings, [name]).find(synthetic.frame_of(bgr, layout="bgr")) or (None,)
+            clean, truth = synthetic_images.clean([synthetic_images.Tip(name, x + side * apart, y, 9.0, **shape)], size, wall=wall)
+            bgr = synthetic_images.noisy(clean, NOISE, 2 * n + side)
+            (ours,) = TrackerStep("left", colors, settings, size, [name]).step(synthetic_images.frame_of(bgr)).markers or (None,)
+            (seed,) = SeedFinder(colors, settings, [name]).find(synthetic_images.frame_of(bgr, layout="bgr")) or (None,)
             for kind, marker in (("ours", ours), ("seed", seed)):
                 if marker is not None:
                     pair[kind] += [marker.x_px - truth[name][0], marker.y_px - truth[name][1]]
@@ -207,7 +208,7 @@ def real_video(path: Path, colors: Colors) -> dict[str, float]:
     reader, frames = VideoReader("cam", path, 30.0), []
     reader.open()
     while (frame := reader.read()) is not None:
-        frames.append(replace(frame, image=synthetic.i420(frame.image), layout="i420"))
+        frames.append(replace(frame, image=synthetic_images.i420(frame.image), layout="i420"))
         for method, step in steps.items():
             markers = step.step(frame).markers
             if markers:

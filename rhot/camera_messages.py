@@ -1,6 +1,6 @@
 """What is set on a camera from any machine: colour ranges, exposure, and patches of paint to fit ranges to.
 
-Colors and Exposure are calibration files (rhot/calibration.py) that travel as they are: what is put on the bus is what the tracker
+Colors and Exposure are calibration files (rhot/files/calibration.py) that travel as they are: what is put on the bus is what the tracker
 writes on its machine. Like all messages they are untrusted: what does not decode or cannot be is refused, and the old stays in force.
 """
 

@@ -18,8 +18,8 @@ from collections.abc import AsyncIterator
 from typing import TypeVar
 
 from rhot import clock, topics
-from rhot.bus import Bus, open_bus
-from rhot.bus_streams import AliveWatch, Subscription
+from rhot.bus.bus import Bus, open_bus
+from rhot.bus.streams import AliveWatch, Subscription
 from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError, CalibrationError
 from rhot.hand import HandName

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rhot.bus import Bus
+    from rhot.bus.bus import Bus
 
 # Exchanges kept: a minute at one a second, long enough to see 1 ppm of drift, short enough to follow a warming crystal.
 _WINDOW = 60

@@ -17,7 +17,7 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from rhot.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y, rotation_z
+from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y, rotation_z
 
 HandName = Literal["left", "right"]
 HANDS: tuple[HandName, ...] = ("left", "right")
@@ -82,7 +82,7 @@ class Paint(msgspec.Struct, frozen=True, kw_only=True):
     """A painted landmark: the point that stands for it, fixed to its joint's frame, and how the paint surrounds it.
 
     What cameras see is skin, yet two of them locate the centre of paint all round a finger (radius_m > 0) on the bone axis, within
-    .3 radii: its outline is what counts. A dab on one side (radius_m = 0) lies where it is seen. See services/fusion/surface.py.
+    .3 radii: its outline is what counts. A dab on one side (radius_m = 0) lies where it is seen. See services/fusion/output/paint_to_bone.py.
     """
 
     offset_m: Vec3

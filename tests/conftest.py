@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from rhot.bus import Bus, open_bus, router_config
-from rhot.config import RigConfig
-from rhot.lifecycle import Serve
-from rhot.service import Service
+from rhot.bus.bus import Bus, open_bus, router_config
+from rhot.files.config import RigConfig
+from rhot.process.lifecycle import Serve
+from rhot.process.service import Service
 
 REPOSITORY = Path(__file__).parents[1]
 

@@ -8,8 +8,8 @@ import sys
 import typer
 
 from rhot.errors import RhotError, leaves
-from rhot.lifecycle import EXIT_USER
-from rhot.service import rhot_version
+from rhot.process.lifecycle import EXIT_USER
+from rhot.process.service import rhot_version
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.check.check import check

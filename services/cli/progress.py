@@ -6,7 +6,7 @@ import sys
 import time
 from typing import TextIO
 
-from services.cli.say import Teller
+from services.cli.terminal import Teller
 
 # A reader cannot follow more than a few numbers a second; where every line stays, one each two seconds is enough.
 _TERMINAL_S, _LINES_S = 0.2, 2.0

@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rhot.transforms import Array
-from services.fusion.observations import View
+from rhot.geometry.transforms import Array
+from services.fusion.intake.observations import View
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]

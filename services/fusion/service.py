@@ -11,10 +11,10 @@ import asyncio
 import time
 
 from rhot import clock, topics
-from rhot.calibration import load_hand, load_rig_cameras
+from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.messages import ClockEcho
-from rhot.service import Service
-from services.fusion.session import SessionState
+from rhot.process.service import Service
+from services.fusion.session_state import SessionState
 from services.fusion.step import FusionStep
 from services.fusion.warm import warm_up
 

@@ -14,22 +14,22 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rhot.camera import Camera
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
-from services.fusion.bias import Bias
-from services.fusion.clocks import ClockTuner
-from services.fusion.coherence import coherent, reach_m
-from services.fusion.kalman import KalmanMethod
+from services.fusion.intake.admission import Timeline, Verdict
+from services.fusion.intake.observations import Observer, Refusal
+from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
-from services.fusion.mirror import MirrorWatch
-from services.fusion.observations import Observer, Refusal
-from services.fusion.pace import Pace
-from services.fusion.paired import PairedMethod
-from services.fusion.surface import Surface
-from services.fusion.timeline import Timeline, Verdict
+from services.fusion.monitors.clock_offsets import ClockTuner
+from services.fusion.monitors.mirrored_view import MirrorWatch
+from services.fusion.output.hand_plausibility import coherent, reach_m
+from services.fusion.output.paint_to_bone import Surface
+from services.fusion.output.schedule import Pace
+from services.fusion.output.systematic_error import Bias
+from services.fusion.paired.estimator import PairedMethod
 
 # Positions and sigmas are told to a micrometre: a hundredth of the smallest sigma of a hand at arm's length.
 _DIGITS = 6
@@ -39,7 +39,7 @@ class FusionStep:
     """The state of fusion between frames; deterministic in its input."""
 
     def __init__(self, config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]) -> None:
-        """cameras by name as rhot.calibration.load_cameras gives them; a model for every [hand.*] table of the rig.
+        """cameras by name as rhot.files.calibration.load_cameras gives them; a model for every [hand.*] table of the rig.
 
         Raises CalibrationError if there are fewer than two cameras or a hand's model is missing.
         """

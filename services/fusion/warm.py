@@ -1,6 +1,6 @@
 """Compiles (or loads from numba's cache) everything fusion calls, before the first frame is there.
 
-With a cache (rhot.kernels) this takes .3 s, without one 12 s;
+With a cache (rhot.process.numba_cache) this takes .3 s, without one 12 s;
 a service that did it at its first frame would stand still for that long.
 """
 
@@ -10,13 +10,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rhot.camera import Camera
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.patch import located_shift, shift_table
+from services.fusion.geometry.triangulation import extrinsics
+from services.fusion.output.paint_centroid import located_shift, shift_table
 from services.fusion.step import FusionStep
-from services.fusion.triangulation import extrinsics
 
 # Enough frames of each camera for a track to begin, to be filtered anew, smoothed, and for a lesson of the clocks.
 _FRAMES = 8

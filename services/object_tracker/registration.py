@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rhot.calibration import ObjectPlace, Objects, load_objects
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
-from rhot.transforms import Array, rotation_from_quaternion, transform
+from rhot.files.calibration import ObjectPlace, Objects, load_objects
+from rhot.files.config import RigConfig
+from rhot.geometry.transforms import Array, rotation_from_quaternion, transform
 
 # A matrix typed with five digits passes, a scaled or mirrored one does not.
 _RIGID_TOLERANCE = 1e-4

@@ -10,9 +10,9 @@ from __future__ import annotations
 import contextlib
 
 from rhot import topics
-from rhot.bus import Publisher
+from rhot.bus.bus import Publisher
 from rhot.messages import OpenVrPose
-from rhot.service import Service
+from rhot.process.service import Service
 from services.object_tracker.registration import load_registration
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.step import ObjectStep

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot.calibration import Objects
-from rhot.config import RigConfig
+from rhot.files.calibration import Objects
+from rhot.files.config import RigConfig
+from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, transform
 from rhot.messages import ObjectPose, ObjectTracking, OpenVrPose, Quat, Vec3
-from rhot.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, transform
 from services.object_tracker.registration import Placement, Registration, is_rotation, register
 
 # ETrackingResult of openvr.h; every other value (1 is Uninitialized) is "lost".

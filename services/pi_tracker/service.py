@@ -13,14 +13,14 @@ from collections.abc import Coroutine
 
 from rhot import topics
 from rhot.clock import OffsetEstimator, follow_master
-from rhot.service import Service
+from rhot.process.service import Service
 from services.pi_tracker import sources
-from services.pi_tracker.frame import Frame
-from services.pi_tracker.sinks.album import Album
-from services.pi_tracker.sinks.coloring import Coloring
-from services.pi_tracker.sinks.exposing import Exposing
-from services.pi_tracker.sinks.fitting import Fitting
-from services.pi_tracker.sources.session import SessionGate
+from services.pi_tracker.endpoints.color_fitting import Fitting
+from services.pi_tracker.endpoints.color_ranges import Coloring
+from services.pi_tracker.endpoints.exposure_control import Exposing
+from services.pi_tracker.endpoints.picture_cache import Album
+from services.pi_tracker.endpoints.session_gate import SessionGate
+from services.pi_tracker.image.frame import Frame
 
 
 async def serve(service: Service) -> None:

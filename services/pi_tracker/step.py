@@ -11,14 +11,14 @@ from pathlib import Path
 
 import cv2
 
-from rhot.calibration import Colors, Lens
-from rhot.config import Tracker
+from rhot.files.calibration import Colors, Lens
+from rhot.files.config import Tracker
 from rhot.messages import Marker, MarkerFrame
-from services.pi_tracker.colors import compile_colors
-from services.pi_tracker.frame import Frame
-from services.pi_tracker.lut import LutFinder
-from services.pi_tracker.rectify import Rectifier
-from services.pi_tracker.seed import SeedFinder
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.detect.marker_finder import LutFinder
+from services.pi_tracker.detect.paper_finder import SeedFinder
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.rectify import Rectifier
 
 Clock = Callable[[], int]
 

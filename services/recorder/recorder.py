@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from rhot import topics
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
 from rhot.messages import Session
 from rhot.topics import Topic
 from services.recorder.writer import RecordingWriter

@@ -10,11 +10,11 @@ import asyncio
 from pathlib import Path
 
 from rhot import clock, topics
-from rhot.bus import Bus
-from rhot.bus_streams import RawSubscription
-from rhot.config import RigConfig
+from rhot.bus.bus import Bus
+from rhot.bus.streams import RawSubscription
 from rhot.errors import CaptureError
-from rhot.service import Service, rhot_version
+from rhot.files.config import RigConfig
+from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
 from services.recorder.recorder import Recorder, recorded_topics
 from services.recorder.recover import recover, unfinished

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rhot.lifecycle import command
+from rhot.process.lifecycle import command
 from services.simulator.service import serve
 
 

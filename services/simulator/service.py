@@ -16,12 +16,12 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 
 from rhot import topics
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
 from rhot.messages import SimFrame
-from rhot.service import Service
-from services.simulator.frames import FrameSource
-from services.simulator.scene import Scene, load_scene
-from services.simulator.trackers import tracker_pose
+from rhot.process.service import Service
+from services.simulator.camera.frame_source import FrameSource
+from services.simulator.scene.scene import Scene, load_scene
+from services.simulator.scene.vive_trackers import tracker_pose
 
 # From the last row's exposure to the picture in memory: the image processor of a Raspberry Pi.
 _PROCESSING_S = 3e-3

@@ -10,12 +10,12 @@ import asyncio
 import time
 
 from rhot import topics
-from rhot.bus import Publisher, Subscription
-from rhot.calibration import load_hand
+from rhot.bus.bus import Publisher, Subscription
 from rhot.errors import ConfigError
+from rhot.files.calibration import load_hand
 from rhot.hand import HandModel, HandName
 from rhot.messages import HandPoints, HandPose
-from rhot.service import Service
+from rhot.process.service import Service
 from services.solver.step import SolverStep
 from services.solver.warm import warm_up
 

@@ -12,15 +12,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig
 from rhot.hand import DIGITS, TIPS, HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose
-from services.solver.fingers import Fingers, Tip, solve_fingers
-from services.solver.kinematics import hand_frames
-from services.solver.pose import Skeleton, hand_pose, rounded, rounded_inside, sources, spread_of
-from services.solver.screen import Seen, places, usable
-from services.solver.tracker import ENOUGH, HandTracker, Look
+from services.solver.finger.solve_fingers import Fingers, Tip, solve_fingers
+from services.solver.maths.kinematics import hand_frames
+from services.solver.pose_message import Skeleton, hand_pose, rounded, rounded_inside, sources, spread_of
+from services.solver.whole_hand.hand_tracker import ENOUGH, HandTracker, Look
+from services.solver.whole_hand.point_check import Seen, places, usable
 
 
 class SolverStep:

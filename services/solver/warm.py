@@ -1,6 +1,6 @@
 """Run every kernel once, so that compiling is over before the first message counts.
 
-With a warm numba cache (rhot.kernels) this takes under a second, without one about a minute
+With a warm numba cache (rhot.process.numba_cache) this takes under a second, without one about a minute
 on a small machine. Needs no input.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import msgspec
 import numpy as np
 
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
 from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, forward, landmark_point
 from rhot.messages import HandPoint, HandPoints
 from services.solver.step import SolverStep

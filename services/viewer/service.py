@@ -13,15 +13,15 @@ from collections.abc import Callable
 from typing import Any
 
 from rhot import clock, topics
-from rhot.bus import Bus
-from rhot.service import Service
+from rhot.bus.bus import Bus
+from rhot.process.service import Service
 from rhot.topics import Topic
-from services.viewer.gui import Gui
-from services.viewer.model import ViewModel
-from services.viewer.scene import Scene
+from services.viewer.calibration.page import Calibrate
+from services.viewer.live.gui import Gui
+from services.viewer.live.model import ViewModel
+from services.viewer.live.scene import Scene
 from services.viewer.server import Audience, open_server
 from services.viewer.setup import read_setup
-from services.viewer.sinks.calibrate import Calibrate
 
 log = logging.getLogger("rhot.viewer")
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rhot.calibration import Colors, load_colors, load_rig_cameras
-from rhot.camera import Camera
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.calibration import Colors, load_colors, load_rig_cameras
+from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
 from rhot.hand import HandName
-from services.viewer.colors import Rgb, paint_rgb
+from services.viewer.live.palette import Rgb, paint_rgb
 
 
 @dataclass(frozen=True)

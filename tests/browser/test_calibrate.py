@@ -20,10 +20,10 @@ import pytest
 import zenoh
 
 from rhot import topics
-from rhot.bus import client_config
-from rhot.calibration import load_colors
+from rhot.bus.bus import client_config
+from rhot.files.calibration import load_colors
 from rhot.messages import MarkerFrame, Session, SimFrame
-from services.pi_tracker.synthetic import PAINTS, Tip, clean, frame_of, noisy
+from testing.synthetic_images import PAINTS, Tip, clean, frame_of, noisy
 
 pytestmark = pytest.mark.browser
 DEADLINE_S = 30.0

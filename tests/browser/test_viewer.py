@@ -19,11 +19,11 @@ import pytest
 import zenoh
 
 from rhot import topics
-from rhot.bus import client_config
-from rhot.config import RigConfig, load_rig
+from rhot.bus.bus import client_config
+from rhot.files.config import RigConfig, load_rig
+from rhot.geometry.transforms import quaternion_from_rotation, rotation_x, rotation_z
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, ObjectPose, WristPose
-from rhot.transforms import quaternion_from_rotation, rotation_x, rotation_z
 
 pytestmark = pytest.mark.browser
 DEADLINE_S = 30.0

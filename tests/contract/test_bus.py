@@ -9,11 +9,11 @@ import pytest
 import zenoh
 
 from rhot import clock, topics
-from rhot.bus import open_bus, router_config
-from rhot.bus_streams import RawSubscription, Sample
+from rhot.bus.bus import open_bus, router_config
+from rhot.bus.stats import StreamStats
+from rhot.bus.streams import RawSubscription, Sample
 from rhot.errors import BusError
 from rhot.messages import ClockEcho, HandPoint, HandPoints, Session
-from rhot.stats import StreamStats
 
 DEADLINE_S = 10.0
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.bus import open_bus
+from rhot.bus.bus import open_bus
 from rhot.camera_messages import FitRequest, FitResult
 
 

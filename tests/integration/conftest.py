@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 
-from rhot.bus import Bus, open_bus
-from rhot.config import load_rig
+from rhot.bus.bus import Bus, open_bus
+from rhot.files.config import load_rig
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
 

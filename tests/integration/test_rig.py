@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from rhot import clock, topics
+from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import default_hand
-from rhot.transforms import angle_between, rotation_from_quaternion
-from services.cli.live.figures import LiveFigures
+from services.cli.live.demo_metrics import LiveFigures
 
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 

@@ -4,7 +4,7 @@ import asyncio
 
 import rhot
 from rhot import topics
-from rhot.bus import open_bus
+from rhot.bus.bus import open_bus
 from rhot.messages import HandPoints, Session
 
 DEADLINE_S = 10.0

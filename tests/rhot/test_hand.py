@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rhot import hand as h
-from rhot.transforms import rotation_from_vector
+from rhot.geometry.transforms import rotation_from_vector
 
 
 @pytest.fixture(params=["left", "right"])

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rhot.config import Fusion
+from rhot.files.config import Fusion
+from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import MarkerFrame
-from rhot.transforms import Array
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import START_NS, Path, Setup, point_hands
+from testing.synthetic_points import START_NS, Path, Setup, point_hands
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rhot.transforms import rotation_x, rotation_z, transform
+from rhot.geometry.transforms import rotation_x, rotation_z, transform
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import Path, Setup, frames, point_hands
+from testing.synthetic_points import Path, Setup, frames, point_hands
 
 # Pitch of .5 deg moves the whole view by 4.6 px; roll of 3 deg its left and right halves against each other.
 BUMPS = {"pitch": rotation_x(np.deg2rad(0.5)), "roll": rotation_z(np.deg2rad(3.0))}

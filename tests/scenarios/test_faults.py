@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rhot.messages import MarkerFrame
-from services.fusion.synthetic import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, Path, Setup, frames
 
 BEGIN_S, RECOVERY_S, AFTER_S = 2.0, 0.5, 2.0
 # Clocks as well known as a LAN allows, so that errors are the fault's.

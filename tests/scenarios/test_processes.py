@@ -14,9 +14,9 @@ import pytest
 import pytest_asyncio
 
 from rhot import clock, topics
-from rhot.bus import open_bus
-from rhot.calibration import CameraPlace, Lens, RigGeometry, save
-from services.fusion.synthetic import START_NS, Path, Setup, frames
+from rhot.bus.bus import open_bus
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
+from testing.synthetic_points import START_NS, Path, Setup, frames
 
 pytestmark = pytest.mark.integration
 # numba's first compilation on a loaded machine takes most of it.

@@ -10,16 +10,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.calibration import load_colors, load_hand
-from rhot.config import Fusion, HandTable, load_rig
+from rhot.files.calibration import load_colors, load_hand
+from rhot.files.config import Fusion, HandTable, load_rig
 from rhot.hand import BASIC_LANDMARKS, landmark_point
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import COLORS, START_NS, Path, Setup, frames, point_hands
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
-from services.simulator.frames import FrameSource
-from services.simulator.scene import build_scene
-from services.simulator.scenes import SCENES
+from services.simulator.camera.frame_source import FrameSource
+from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.scene import build_scene
+from testing.synthetic_points import COLORS, START_NS, Path, Setup, frames, point_hands
 
 OTHERS = ("yellow", "orange", "red", "pink", "white", "black")
 

@@ -22,8 +22,8 @@ def board(
 ) -> None:
     """Write a calibration board to print: without scaling, on flat and stiff material."""
     # Not above: OpenCV takes longer to import than other commands take to run.
-    from services.calibrator.board_pdf import board_pdf
-    from services.calibrator.boards import Board
+    from services.calibrator.board.board import Board
+    from services.calibrator.board.board_pdf import board_pdf
 
     made = Board(cols, rows, 1e-3 * square_mm, kind.value, dictionary, marker)
     document = board_pdf(made, paper.lower())

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from services.cli.calibrate.camera import camera, colors
 from services.cli.calibrate.depth import depth
-from services.cli.calibrate.eye import camera, colors
 from services.cli.calibrate.hand import hand
 from services.cli.calibrate.lens import lens
 from services.cli.calibrate.refine import refine

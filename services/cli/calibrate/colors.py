@@ -12,19 +12,19 @@ import cv2
 import msgspec
 import typer
 
-from rhot.calibration import ColorRange, Colors, load_colors, save
 from rhot.client import RigClient
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.calibration import ColorRange, Colors, load_colors, save
+from rhot.files.config import RigConfig
 from services.cli.calibrate import options, pictures
-from services.cli.calibrate.eye_text import overlay, proposals_text, report_text
-from services.cli.calibrate.pointers import at, everywhere, numbers_of
-from services.cli.reach import reach
-from services.pi_tracker.color_auto import boxes_of, propose
-from services.pi_tracker.color_fit import fit, gather
-from services.pi_tracker.color_report import colors_file, examine
-from services.pi_tracker.frame import Frame
-from services.pi_tracker.swatch import Pointer
+from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
+from services.cli.calibrate.pointing_options import at, everywhere, numbers_of
+from services.cli.router_session import reach
+from services.pi_tracker.colors.fit import fit, gather
+from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.propose import boxes_of, propose
+from services.pi_tracker.colors.report import colors_file, examine
+from services.pi_tracker.image.frame import Frame
 
 # Frames of a recording that --auto looks at unless told otherwise.
 _AUTO_FRAMES = 6

@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 import typer
 
-from rhot.calibration import load_rig_cameras
-from rhot.config import load_rig
 from rhot.errors import CalibrationError
+from rhot.files.calibration import load_rig_cameras
+from rhot.files.config import load_rig
 from services.cli.calibrate.options import JsonOption
 
 
@@ -28,7 +28,7 @@ def depth(
     as_json: JsonOption = False,
 ) -> None:
     """Fit the depth law D = k x^z of the RHOT paper to a bench of measured distances."""
-    from services.calibrator import depth as laws
+    from services.calibrator.depth_law import fit as laws
 
     if (table is None) == (not simulate):
         raise CalibrationError(f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench")
@@ -51,7 +51,7 @@ def depth(
 
 def _geometry(config: Path | None) -> tuple[float, float, int]:
     """Focal length px, baseline cm and picture width px of a rig's first two cameras, or of the seed's."""
-    from services.calibrator.depth import SEED_BASELINE_CM, SEED_FOCAL_PX, SEED_WIDTH_PX
+    from services.calibrator.depth_law.fit import SEED_BASELINE_CM, SEED_FOCAL_PX, SEED_WIDTH_PX
 
     if config is None:
         return SEED_FOCAL_PX, SEED_BASELINE_CM, SEED_WIDTH_PX

@@ -17,18 +17,18 @@ import typer
 import uvloop
 
 from rhot import topics
-from rhot.calibration import save
-from rhot.capture import read_lines
 from rhot.client import RigClient
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError, CaptureError
-from rhot.guided import CYCLE_S, EXERCISE_S, EXERCISES
+from rhot.files.calibration import save
+from rhot.files.capture import read_lines
+from rhot.files.config import RigConfig
 from rhot.hand import BASIC_LANDMARKS, DIGITS, HANDS, HandName, default_hand
+from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES
 from rhot.messages import HandPoints
 from services.cli.calibrate import options
 from services.cli.options import ConnectOption
-from services.cli.reach import reach, rig_and_endpoints
-from services.cli.say import Teller
+from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.terminal import Teller
 
 _BONES = {"proximal": 0, "middle": 1, "distal": 2}
 _THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
@@ -76,9 +76,9 @@ def _fit(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    from services.solver.person.fit import fit_person
-    from services.solver.person.recording import recording_of
-    from services.solver.person.report import hand_file, report_text
+    from services.calibrator.hand.fit import fit_person
+    from services.calibrator.hand.recording import recording_of
+    from services.calibrator.hand.report import hand_file, report_text
 
     if not messages:
         raise CalibrationError(f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?")

@@ -32,16 +32,16 @@ def lens(
 ) -> None:
     """Find a camera's focal length, centre and distortion from pictures of a board."""
     # Not above: OpenCV takes longer to import than other commands take to run.
-    from rhot.calibration import save
-    from services.calibrator.files import lens_of
-    from services.calibrator.lens import calibrate_camera
-    from services.calibrator.pictures import one_camera
-    from services.calibrator.report import lens_text
+    from rhot.files.calibration import save
+    from services.calibrator.board.picture_folder import one_camera
+    from services.calibrator.lens.calibrate import calibrate_camera
+    from services.calibrator.output.calibration_files import lens_of
+    from services.calibrator.output.report import lens_text
 
     rig = options.rig_if_named(config, needed=live)
     known = options.board_of(board, square, kind, marker, dictionary)
     if live and rig:
-        from services.cli.calibrate.live import collect
+        from services.cli.calibrate.live_pictures import collect
 
         known = collect(rig, [name], folder, known, square or options.SQUARE_M, count, connect)
     pictures = one_camera(folder, name)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rhot.config import RigConfig, load_rig
 from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig, load_rig
 from services.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from services.calibrator.boards import Board
-    from services.calibrator.gather import Found
-    from services.calibrator.pictures import PictureSet
-    from services.calibrator.views import LeftOut
+    from services.calibrator.board.board import Board
+    from services.calibrator.board.find_boards import Found
+    from services.calibrator.board.picture_folder import PictureSet
+    from services.calibrator.bundle.views import LeftOut
 
 # The side of the squares that `rhot board` prints unless told otherwise.
 SQUARE_M = 0.025
@@ -47,7 +47,7 @@ def board_of(corners: str | None, square_m: float | None, kind: Kind, marker: fl
 
     Raises CalibrationError for an impossible one.
     """
-    from services.calibrator.boards import Board, parse_corners
+    from services.calibrator.board.board import Board, parse_corners
 
     if corners is None:
         if kind is Kind.CHARUCO:
@@ -92,7 +92,7 @@ def detect_all(pictures: PictureSet, board: Board | None, square_m: float, progr
     """The board (counted if not given) and where each picture shows it, with a progress line."""
     import cv2
 
-    from services.calibrator.gather import find_boards, larger_board, the_board
+    from services.calibrator.board.find_boards import find_boards, larger_board, the_board
 
     # More threads than one gain nothing here, and change the order of sums.
     cv2.setNumThreads(1)

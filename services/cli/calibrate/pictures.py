@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 
 from rhot import topics
-from rhot.bus import Bus
+from rhot.bus.bus import Bus
 from rhot.errors import BusError, CaptureError
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.reader import Reader

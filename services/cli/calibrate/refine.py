@@ -13,14 +13,14 @@ import msgspec
 import typer
 
 from rhot import topics
-from rhot.calibration import load_cameras, save
 from rhot.errors import CalibrationError
+from rhot.files.calibration import load_cameras, save
 from rhot.messages import MarkerFrame
 from services.cli.calibrate import options
-from services.cli.recordings import messages
+from services.cli.recorded_messages import messages
 
 if TYPE_CHECKING:
-    from services.calibrator.wand import Wand
+    from services.calibrator.recalibrate.refine_rig import Wand
 
 
 def refine(
@@ -31,17 +31,17 @@ def refine(
     as_json: options.JsonOption = False,
 ) -> None:
     """Adjust the cameras' places to moving markers: a wand waved before all cameras, or a painted hand."""
-    from services.calibrator import tracks
-    from services.calibrator.files import refined_of
-    from services.calibrator.report import refined_text
-    from services.calibrator.wand import refine_rig
+    from services.calibrator.output.calibration_files import refined_of
+    from services.calibrator.output.report import refined_text
+    from services.calibrator.recalibrate import marker_tracks
+    from services.calibrator.recalibrate.refine_rig import refine_rig
 
     rig = options.rig_if_named(config)
     if rig is None or len(rig.camera) < 2:
         raise CalibrationError(f"{config}: two cameras or more are needed; it has {len(rig.camera) if rig else 0}")
     known = _wand(wand)
     cameras = load_cameras(rig.calibration_dir, [camera.name for camera in rig.camera])
-    result = refine_rig(tracks.recording(messages(recording, topics.MARKERS, MarkerFrame, "markers"), cameras), cameras, known)
+    result = refine_rig(marker_tracks.recording(messages(recording, topics.MARKERS, MarkerFrame, "markers"), cameras), cameras, known)
     geometry = refined_of(result, options.now_text(), str(recording), wand or "")
     path = options.out_folder(out, rig) / "rig.json"
     save(path, geometry)
@@ -53,7 +53,7 @@ def refine(
 
 
 def _wand(text: str | None) -> Wand | None:
-    from services.calibrator.wand import Wand
+    from services.calibrator.recalibrate.refine_rig import Wand
 
     if text is None:
         return None

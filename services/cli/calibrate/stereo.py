@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from rhot.calibration import load_lens, save
-from rhot.config import RigConfig
+from rhot.files.calibration import load_lens, save
+from rhot.files.config import RigConfig
 from services.cli.calibrate import options
 from services.cli.calibrate.options import Kind
 from services.cli.options import ConnectOption, ProgressOption
 
 if TYPE_CHECKING:
-    from services.calibrator.pictures import PictureSet
-    from services.calibrator.stereo import RigResult
+    from services.calibrator.board.picture_folder import PictureSet
+    from services.calibrator.rig.calibrate import RigResult
 
 
 def stereo(
@@ -39,15 +39,15 @@ def stereo(
     as_json: options.JsonOption = False,
 ) -> None:
     """Find where the cameras stand to each other, and their lenses, from pictures of a board that all of them see."""
-    from services.calibrator.files import given_lenses
-    from services.calibrator.stereo import calibrate_rig
+    from services.calibrator.output.calibration_files import given_lenses
+    from services.calibrator.rig.calibrate import calibrate_rig
 
     rig = options.rig_if_named(config, needed=live)
     names = _names(cameras, rig)
     known = options.board_of(board, square, kind, marker, dictionary)
     target = options.out_folder(out, rig)
     if live and rig:
-        from services.cli.calibrate.live import collect
+        from services.cli.calibrate.live_pictures import collect
 
         known = collect(rig, names or [], folder, known, square or options.SQUARE_M, count, connect)
     pictures = _pictures(folder, names, side_by_side)
@@ -67,19 +67,19 @@ def _names(cameras: str | None, rig: RigConfig | None) -> list[str] | None:
 
 
 def _pictures(folder: Path, names: list[str] | None, side_by_side: bool) -> PictureSet:
-    from services.calibrator import pictures
+    from services.calibrator.board import picture_folder
 
     if side_by_side:
-        return pictures.side_by_side(folder, names or ["left", "right"])
-    found = pictures.find_pictures(folder, names)
+        return picture_folder.side_by_side(folder, names or ["left", "right"])
+    found = picture_folder.find_pictures(folder, names)
     if found.side_by_side:
         typer.echo(f"note: each picture is taken for the views of {' and '.join(found.cameras)} side by side (--side-by-side)", err=True)
     return found
 
 
 def _write(result: RigResult, target: Path, folder: Path, as_json: bool) -> None:
-    from services.calibrator.files import lenses_of, rig_of
-    from services.calibrator.report import rig_text
+    from services.calibrator.output.calibration_files import lenses_of, rig_of
+    from services.calibrator.output.report import rig_text
 
     date = options.now_text()
     files = {f"{name}.lens.json": made for name, made in lenses_of(result, date, str(folder)).items()}

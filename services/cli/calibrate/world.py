@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rhot.calibration import load_cameras
 from rhot.errors import CalibrationError
+from rhot.files.calibration import load_cameras
 from services.cli.calibrate import options
 from services.cli.calibrate.options import Kind
 from services.cli.options import ConnectOption
@@ -26,8 +26,8 @@ def world(
     connect: ConnectOption = None,
 ) -> None:
     """Put the rig's frame on the desk (z up): prints [rig.world] for rig.toml."""
-    from services.calibrator.pictures import PictureSet, picture_of
-    from services.calibrator.world import desk_text, find_desk
+    from services.calibrator.board.picture_folder import PictureSet, picture_of
+    from services.calibrator.rig.world_frame import desk_text, find_desk
 
     rig = options.rig_if_named(config)
     if rig is None:
@@ -36,7 +36,7 @@ def world(
     cameras = load_cameras(rig.calibration_dir, names)
     known = options.board_of(board, square, kind, marker, dictionary)
     if live:
-        from services.cli.calibrate.live import one_each
+        from services.cli.calibrate.live_pictures import one_each
 
         one_each(rig, names, folder, connect)
     files = {name: {"desk": path} for name in names if (path := picture_of(folder, name))}

@@ -12,7 +12,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from rhot.calibration import (
+from rhot.errors import CalibrationError
+from rhot.files.calibration import (
     ColorRange,
     Objects,
     load_cameras,
@@ -23,9 +24,8 @@ from rhot.calibration import (
     load_lens,
     load_objects,
 )
-from rhot.camera import Camera
-from rhot.config import CameraTable, RigConfig
-from rhot.errors import CalibrationError
+from rhot.files.config import CameraTable, RigConfig
+from rhot.geometry.camera import Camera
 from services.cli.check.problems import Problem, error, note, warning
 
 T = TypeVar("T")

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rhot.config import CameraTable, RigConfig
 from rhot.errors import RhotError
+from rhot.files.config import CameraTable, RigConfig
 from services.cli.check.problems import Problem, error, note, warning
-from services.simulator.scenes import scene_spec
+from services.simulator.scene.catalog import scene_spec
 
 _CAMERA_SOURCES = "picamera2[:N], v4l2:N or v4l2:/dev/..., video:FILE, folder:DIR, capture:DIR, simulator"
 _OBJECT_SOURCES = "steamvr, libsurvive, replay:FILE, simulator, network"

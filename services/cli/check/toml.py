@@ -1,4 +1,4 @@
-"""Every mistake in a rig.toml, not only the first: what rhot.config would reject, key by key.
+"""Every mistake in a rig.toml, not only the first: what rhot.files.config would reject, key by key.
 
 Values that are wrong are taken out, so that the rest of the file can still be looked at. A file that is missing or is not TOML
 has one problem and no configuration.
@@ -14,9 +14,9 @@ from typing import Any, get_args, get_origin
 
 import msgspec
 
-from rhot.config import RigConfig, load_rig
-from rhot.config_errors import explain
 from rhot.errors import ConfigError
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.config_errors import explain
 from rhot.hand import LANDMARKS
 from services.cli.check.problems import Problem, error
 
@@ -86,7 +86,7 @@ def _clean_dict(value: dict[str, Any], keys: Any, values: Any, at: str, path: st
 
 
 def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]:
-    """What rhot.config._check says of one thing at a time, said of all; known are the problems so far."""
+    """What rhot.files.config._check says of one thing at a time, said of all; known are the problems so far."""
     problems = []
     colors: Counter[str] = Counter()
     for hand, table in config.hand.items():
@@ -109,7 +109,7 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
 
 
 def _leftover(path: Path) -> list[Problem]:
-    """What only rhot.config itself objects to: its word is the last."""
+    """What only rhot.files.config itself objects to: its word is the last."""
     try:
         load_rig(path)
     except ConfigError as broken:
@@ -118,7 +118,7 @@ def _leftover(path: Path) -> list[Problem]:
 
 
 def _wrong(value: Any, kind: Any) -> str | None:
-    """Why a value does not fit, in the words of rhot.config, or None."""
+    """Why a value does not fit, in the words of rhot.files.config, or None."""
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as wrong:

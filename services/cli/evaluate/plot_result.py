@@ -12,12 +12,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rhot.capture import Capture, read_lines
 from rhot.errors import CaptureError
+from rhot.files.capture import Capture, read_lines
 from rhot.hand import HANDS
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose, Truth
-from services.cli.evaluate.plots import Track, angles_figure, markers_figure, objects_figure, points_figure, residuals_figure
-from services.cli.evaluate.scoring import estimate_track
+from services.cli.evaluate.plot_figures import Track, angles_figure, markers_figure, objects_figure, points_figure, residuals_figure
+from services.cli.evaluate.score_math import estimate_track
 from services.cli.evaluate.truth_track import hand_track, object_track
 from services.cli.offline.results import check_result
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from rhot.capture import Capture
+from rhot.files.capture import Capture
 
 
 def score(
@@ -22,8 +22,8 @@ def score(
 ) -> None:
     """Compare tracked poses with the simulator's truth: tips, angles, orientation, dropouts, limits, delay."""
     # Not above: scipy takes longer to import than the other commands take to run.
-    from services.cli.evaluate.errors_table import score_text
     from services.cli.evaluate.score_result import score_result
+    from services.cli.evaluate.score_table import score_text
 
     found = score_result(Capture(capture), result, stages=stages)
     typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode() if as_json else score_text(found))

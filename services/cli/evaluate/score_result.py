@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rhot.calibration import load_hand, load_rig_cameras
-from rhot.capture import Capture, read_lines
-from rhot.config import RigConfig, load_rig
 from rhot.errors import CaptureError
+from rhot.files.calibration import load_hand, load_rig_cameras
+from rhot.files.capture import Capture, read_lines
+from rhot.files.config import RigConfig, load_rig
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose, Truth
 from rhot.topics import Rate
-from services.cli.evaluate.scores import Score, Stages
-from services.cli.evaluate.scoring import score_hand, score_object
+from services.cli.evaluate.score_math import score_hand, score_object
+from services.cli.evaluate.score_types import Score, Stages
 from services.cli.evaluate.stages import landmark_truth, marker_errors, point_errors
 from services.cli.evaluate.truth_track import HandTrack, hand_track, object_track
 from services.cli.offline.results import check_result

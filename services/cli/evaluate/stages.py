@@ -11,12 +11,12 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from rhot.camera import Camera
+from rhot.geometry.camera import Camera
+from rhot.geometry.transforms import Array, rotation_from_quaternion
 from rhot.hand import HandModel, forward, landmark_point
 from rhot.messages import HandPoints, MarkerFrame
-from rhot.transforms import Array, rotation_from_quaternion
-from services.cli.evaluate.scores import MarkerError, PointStage
-from services.cli.evaluate.scoring import point_error
+from services.cli.evaluate.score_math import point_error
+from services.cli.evaluate.score_types import MarkerError, PointStage
 from services.cli.evaluate.truth_track import HandTrack, Stamps, cubic
 
 # A blob further than this from where its landmark is (3 % of the image's width, two finger widths at 0.5 m) is another thing.

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from rhot.errors import CaptureError
+from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS, TIPS
 from rhot.messages import FingerAngles, HandTruth, ObjectTruth, Truth
-from rhot.transforms import Array
 
 Stamps = npt.NDArray[np.int64]
 

@@ -12,15 +12,15 @@ import typer
 import uvloop
 
 from rhot import clock, topics
-from rhot.bus import Bus, open_bus
-from rhot.config import RigConfig, load_rig
-from rhot.lifecycle import cancelled_by, stop_on_signals
+from rhot.bus.bus import Bus, open_bus
+from rhot.files.config import RigConfig, load_rig
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.defaults import sim_toml
-from services.cli.live.figures import LiveFigures, Summary
+from services.cli.live.demo_metrics import LiveFigures, Summary
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
 from services.cli.options import VerboseOption
-from services.cli.say import Teller
+from services.cli.terminal import Teller
 
 # Without a pose by then something is wrong: numba's first compilation takes most of a minute on a slow machine.
 _FIRST_POSE_S = 120.0

@@ -12,11 +12,11 @@ import typer
 import uvloop
 import zenoh
 
-from rhot import systemd
-from rhot.bus import router_config
-from rhot.config import load_rig
+from rhot.bus.bus import router_config
 from rhot.errors import BusError
-from rhot.lifecycle import cancelled_by, stop_on_signals
+from rhot.files.config import load_rig
+from rhot.process import systemd
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
 
 LOOPBACK = "tcp/127.0.0.1:7447"
 

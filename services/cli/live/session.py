@@ -9,10 +9,10 @@ import typer
 import uvloop
 
 from rhot.client import RigClient
-from rhot.config import RigConfig
 from rhot.errors import BusError
+from rhot.files.config import RigConfig
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.reach import reach, rig_and_endpoints
+from services.cli.router_session import reach, rig_and_endpoints
 
 
 class Action(StrEnum):

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rhot.lifecycle import EXIT_USER
+from rhot.process.lifecycle import EXIT_USER
 
 # As systemd's RestartSec of the installed units: poses are back within a second of a crash.
 _RESTART_S = 0.5

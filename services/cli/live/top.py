@@ -11,12 +11,12 @@ import typer
 import uvloop
 
 from rhot import clock, topics
-from rhot.bus import Bus
-from rhot.config import RigConfig
-from rhot.lifecycle import cancelled_by, stop_on_signals
-from services.cli.live.board import Board, Watcher, expected_services, text
+from rhot.bus.bus import Bus
+from rhot.files.config import RigConfig
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from services.cli.live.top_table import Board, Watcher, expected_services, text
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.reach import reach, rig_and_endpoints
+from services.cli.router_session import reach, rig_and_endpoints
 
 # A beat comes once a second: after two, every living service has been heard.
 _LISTEN_S = 2.2

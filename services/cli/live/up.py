@@ -13,11 +13,11 @@ from typing import Annotated
 import typer
 import uvloop
 
-from rhot.config import RigConfig, load_rig
-from rhot.lifecycle import cancelled_by, stop_on_signals
+from rhot.files.config import RigConfig, load_rig
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.options import VerboseOption
-from services.cli.say import Teller
+from services.cli.terminal import Teller
 
 
 def children_of(config: RigConfig, path: Path, *, viewer: bool, endpoint: Sequence[str] = ()) -> list[Child]:

@@ -1,6 +1,6 @@
 """`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast as all later ones.
 
-Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or ~/.cache/rhot (rhot.kernels); running it again
+Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or ~/.cache/rhot (rhot.process.numba_cache); running it again
 costs a second.
 """
 
@@ -13,9 +13,9 @@ from typing import Annotated
 import typer
 
 import services
-from rhot.calibration import load_hand, load_rig_cameras
-from rhot.config import load_rig
-from rhot.kernels import clear_old
+from rhot.files.calibration import load_hand, load_rig_cameras
+from rhot.files.config import load_rig
+from rhot.process.numba_cache import clear_old
 from services.cli.defaults import sim_toml
 
 
@@ -25,8 +25,8 @@ def warm(
     """Compile all kernels once, ahead of the first start."""
     # Only here: `rhot --help` must not wait for numba.
     from services.fusion.warm import warm_up as warm_fusion
-    from services.simulator.frames import FrameSource
-    from services.simulator.scene import load_scene
+    from services.simulator.camera.frame_source import FrameSource
+    from services.simulator.scene.scene import load_scene
     from services.solver.warm import warm_up as warm_solver
 
     started_s = time.monotonic()

@@ -13,10 +13,10 @@ from typing import Protocol
 
 import msgspec
 
-from rhot.capture import CSV_HEADER, Capture, FrameStamp, read_stamps
-from rhot.config import CameraTable, RigConfig, load_rig
 from rhot.errors import CaptureError, ConfigError, RhotError
-from services.pi_tracker.frame import Frame
+from rhot.files.capture import CSV_HEADER, Capture, FrameStamp, read_stamps
+from rhot.files.config import CameraTable, RigConfig, load_rig
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.video import VideoReader

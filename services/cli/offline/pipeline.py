@@ -11,14 +11,14 @@ import heapq
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from rhot.calibration import load_hand, load_rig_cameras
-from rhot.camera import Camera
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.calibration import load_hand, load_rig_cameras
+from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.step import FusionStep
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
 from services.solver.step import SolverStep
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from rhot.calibration import load_colors, load_lens, load_objects
-from rhot.capture import read_lines
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError
+from rhot.files.calibration import load_colors, load_lens, load_objects
+from rhot.files.capture import read_lines
+from rhot.files.config import RigConfig
 from rhot.messages import MarkerFrame, OpenVrPose
 from services.cli.offline.inputs import Job
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged

@@ -11,12 +11,12 @@ from typing import Annotated
 import msgspec
 import typer
 
-from rhot.config import RigConfig, load_rig
 from rhot.errors import ConfigError
+from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
 from services.cli.options import ProgressOption
 from services.cli.progress import Progress
-from services.simulator.scenes import SCENES
+from services.simulator.scene.catalog import SCENES
 
 
 class Simulated(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,8 +63,8 @@ def _write(
     config: RigConfig, name: str, seconds: float, seed: int | None, speed: float | None, out: Path, progress: bool | None
 ) -> Simulated:
     # Not above: the renderer's numba takes longer to import than other commands take to run.
-    from services.simulator.capture import write_capture
-    from services.simulator.scene import load_scene
+    from services.simulator.files.capture_writer import write_capture
+    from services.simulator.scene.scene import load_scene
 
     scene = load_scene(config, name, seed, speed)
     shown, done_before = Progress(f"rhot simulate {name}:", 0, progress), 0

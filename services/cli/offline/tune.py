@@ -16,10 +16,10 @@ import typer
 from rhot import topics
 from rhot.messages import HandPoints
 from services.cli.options import menu
-from services.cli.recordings import messages
+from services.cli.recorded_messages import messages
 
 if TYPE_CHECKING:
-    from services.fusion.tuning import Proposal
+    from services.fusion.paired.one_euro_tuning import Proposal
 
 tune = menu("tune", "Propose settings from recordings.")
 
@@ -37,9 +37,9 @@ def tune_filter(
 ) -> None:
     """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
     # Not above: numba and scipy take longer to import than other commands take to run.
-    from services.fusion import tuning
+    from services.fusion.paired import one_euro_tuning
 
-    proposal = tuning.propose(tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter)
+    proposal = one_euro_tuning.propose(one_euro_tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter)
     typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
 
 

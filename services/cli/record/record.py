@@ -11,14 +11,14 @@ import typer
 import uvloop
 
 from rhot import clock
-from rhot.bus import Bus
-from rhot.config import RigConfig
+from rhot.bus.bus import Bus
 from rhot.errors import CaptureError
-from rhot.lifecycle import cancelled_by, stop_on_signals
-from rhot.service import rhot_version
+from rhot.files.config import RigConfig
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.service import rhot_version
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.reach import reach, rig_and_endpoints
-from services.cli.say import Teller
+from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.terminal import Teller
 from services.recorder.recorder import Recorder
 from services.recorder.service import keep, subscribe
 

@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 import uvloop
 
-from rhot.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.options import ConnectOption
-from services.cli.reach import reach, rig_and_endpoints
-from services.cli.say import Teller
+from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.terminal import Teller
 from services.recorder.reader import Record, Summary, summarize
 from services.recorder.recover import recover as recover_file
 from services.recorder.sources.replay import check_names

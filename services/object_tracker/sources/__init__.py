@@ -10,8 +10,8 @@ from collections.abc import AsyncGenerator, Callable
 from pathlib import Path
 from typing import Protocol
 
-from rhot.config import RigConfig
 from rhot.errors import SourceError
+from rhot.files.config import RigConfig
 from rhot.messages import OpenVrPose
 from services.object_tracker.sources.libsurvive import LibSurvive
 from services.object_tracker.sources.replay import Replay

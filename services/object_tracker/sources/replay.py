@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import AsyncGenerator
 from pathlib import Path
 
-from rhot.capture import read_lines
+from rhot.files.capture import read_lines
 from rhot.messages import OpenVrPose
 
 # A longer gap is a pause of the recording, or a broken stamp: nobody wants to sit through it.

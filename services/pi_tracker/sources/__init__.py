@@ -15,10 +15,10 @@ from pathlib import Path
 
 import cv2
 
-from rhot.bus import Bus
-from rhot.calibration import Exposure, load_exposure
-from rhot.config import CameraTable, RigConfig
+from rhot.bus.bus import Bus
 from rhot.errors import ConfigError
+from rhot.files.calibration import Exposure, load_exposure
+from rhot.files.config import CameraTable, RigConfig
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.picamera import PiCamera

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rhot.capture import Capture, FrameStamp, read_stamps
 from rhot.errors import CaptureError
-from services.pi_tracker.frame import Frame, Image
+from rhot.files.capture import Capture, FrameStamp, read_stamps
+from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.sources.video import Decoder
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 
-from rhot.calibration import Exposure
+from rhot.files.calibration import Exposure
 
 
 @dataclass(frozen=True)

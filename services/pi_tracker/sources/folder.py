@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 
 from rhot.errors import CaptureError
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".webp")
 

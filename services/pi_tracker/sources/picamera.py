@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from rhot.calibration import Exposure
-from rhot.config import CameraTable
 from rhot.errors import SourceError
-from services.pi_tracker.frame import Frame, Image
+from rhot.files.calibration import Exposure
+from rhot.files.config import CameraTable
+from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.sources.controls import Controls
 
 # Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2) 18.9 us.

@@ -13,7 +13,7 @@ from collections.abc import AsyncGenerator, Callable
 from typing import Protocol
 
 from rhot import clock
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 
 # Frames of a file read ahead: enough to hide one slow decode.

@@ -12,9 +12,9 @@ import msgspec
 import numpy as np
 
 from rhot import clock, topics
-from rhot.bus import Bus, Sample
+from rhot.bus.bus import Bus, Sample
 from rhot.messages import SimFrame
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 
 # The frame in work and the next.

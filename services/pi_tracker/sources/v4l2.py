@@ -15,10 +15,10 @@ from typing import Any
 import cv2
 
 from rhot import clock
-from rhot.calibration import Exposure
-from rhot.config import CameraTable
 from rhot.errors import SourceError
-from services.pi_tracker.frame import Frame
+from rhot.files.calibration import Exposure
+from rhot.files.config import CameraTable
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 
 # V4L2_EXPOSURE_MANUAL and _APERTURE_PRIORITY of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us.

@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 
 from rhot.errors import CaptureError
-from services.pi_tracker.frame import Frame, Image
+from services.pi_tracker.image.frame import Frame, Image
 
 # Headers of several containers give the duration only, from which OpenCV estimates the count; two frames or 2 % off is still whole.
 _SLACK_FRAMES, _SLACK = 2, 0.02

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rhot import topics
-from rhot.bus import Bus
+from rhot.bus.bus import Bus
 from rhot.errors import BusError, CaptureError
 from services.recorder.reader import Record, read
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import RectBivariateSpline
 
-from rhot.camera import Camera
-from rhot.transforms import Array, apply, inverse, rotation_x, rotation_y, rotation_z, transform
-from services.calibrator.boards import Board
-from services.calibrator.detect import Detection
-from services.calibrator.model import lens_vector, rays
+from rhot.geometry.camera import Camera
+from rhot.geometry.transforms import Array, apply, inverse, rotation_x, rotation_y, rotation_z, transform
+from services.calibrator.board.board import Board
+from services.calibrator.board.detect import Detection
+from services.calibrator.bundle.lens_model import lens_vector, rays
 
 NAMES = ("left", "right", "third", "fourth")
 Detections = dict[str, dict[str, Detection]]

@@ -11,13 +11,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rhot.calibration import CameraPlace, Lens, RigGeometry, load_cameras, load_lens, save
-from rhot.capture import write_lines
 from rhot.errors import CalibrationError
-from rhot.transforms import rotation_x, transform
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, load_cameras, load_lens, save
+from rhot.files.capture import write_lines
+from rhot.geometry.transforms import rotation_x, transform
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
-from services.fusion.synthetic import Path, Setup, frames
+from testing.synthetic_points import Path, Setup, frames
 
 RIG_TOML = '[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
 

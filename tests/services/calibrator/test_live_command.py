@@ -10,12 +10,12 @@ import cv2
 import pytest
 
 from rhot import topics
-from rhot.bus import open_bus
-from rhot.config import RigConfig, load_rig
+from rhot.bus.bus import open_bus
 from rhot.errors import BusError, CalibrationError
-from services.calibrator.boards import Board
-from services.cli.calibrate import live as calibrate_live
-from services.cli.calibrate.live import collect, one_each
+from rhot.files.config import RigConfig, load_rig
+from services.calibrator.board.board import Board
+from services.cli.calibrate import live_pictures as calibrate_live
+from services.cli.calibrate.live_pictures import collect, one_each
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.calibrator.gather import find_boards, the_board
-from services.calibrator.pictures import PictureSet, find_pictures
-from services.calibrator.stereo import calibrate_rig
+from services.calibrator.board.find_boards import find_boards, the_board
+from services.calibrator.board.picture_folder import PictureSet, find_pictures
+from services.calibrator.rig.calibrate import calibrate_rig
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rhot.config import load_rig
+from rhot.files.config import load_rig
+from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, ObjectTruth, Truth, WristPose
-from rhot.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from services.cli.defaults import sim_toml
 from services.cli.offline.inputs import job_of
 from services.cli.offline.run import run
-from services.simulator.capture import write_capture
-from services.simulator.scene import load_scene
+from services.simulator.files.capture_writer import write_capture
+from services.simulator.scene.scene import load_scene
 
 START_NS = 1_700_000_000_000_000_000
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tomllib
 
-from rhot.config import load_rig
+from rhot.files.config import load_rig
 from services.cli.defaults import config_dir, sim_toml
 
 

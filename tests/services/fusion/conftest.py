@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rhot.camera import Camera
-from rhot.config import Fusion
+from rhot.files.config import Fusion
+from rhot.geometry.camera import Camera
+from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoints, MarkerFrame
-from rhot.transforms import Array
-from services.fusion.kalman import KalmanMethod
-from services.fusion.observations import Observer
+from services.fusion.intake.observations import Observer
+from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import START_NS, Path, Setup, frames, point_hands
+from testing.synthetic_points import START_NS, Path, Setup, frames, point_hands
 
 
 @dataclass(frozen=True, eq=False)

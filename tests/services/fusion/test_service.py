@@ -9,14 +9,14 @@ import msgspec
 import pytest
 
 from rhot import clock, topics
-from rhot.bus import open_bus
-from rhot.calibration import CameraPlace, Lens, RigGeometry, save
-from rhot.config import RigConfig
+from rhot.bus.bus import open_bus
 from rhot.errors import CalibrationError
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
+from rhot.files.config import RigConfig
 from rhot.messages import Session
-from rhot.service import Service
+from rhot.process.service import Service
 from services.fusion.service import serve
-from services.fusion.synthetic import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, Path, Setup, frames
 
 RIG = "bench"
 DEADLINE_S = 20.0
@@ -36,7 +36,7 @@ def config(tmp_path) -> RigConfig:
 
 @contextlib.asynccontextmanager
 async def running(config, bus):
-    """The service in its own TaskGroup, as rhot.lifecycle runs it, cancelled at the end."""
+    """The service in its own TaskGroup, as rhot.process.lifecycle runs it, cancelled at the end."""
     services: asyncio.Queue[Service] = asyncio.Queue()
 
     async def live() -> None:

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot.config import Fusion
 from rhot.errors import CalibrationError
+from rhot.files.config import Fusion
+from rhot.geometry.transforms import apply, rotation_from_vector, transform
 from rhot.messages import Marker, MarkerFrame
-from rhot.transforms import apply, rotation_from_vector, transform
 from services.fusion.step import FusionStep
-from services.fusion.synthetic import START_NS, Path, Setup, Sway, frames, point_hands
+from testing.synthetic_points import START_NS, Path, Setup, Sway, frames, point_hands
 
 MOVING, SETUP = Path(), Setup()
 

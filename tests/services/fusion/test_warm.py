@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from services.fusion import intake, patch, rest, ring
-from services.fusion.synthetic import Path, Setup, frames, point_hands
+from services.fusion.kalman import frame_update, rest_detection, track_history
+from services.fusion.output import paint_centroid
 from services.fusion.warm import warm_up
+from testing.synthetic_points import Path, Setup, frames, point_hands
 
-LIVE = (intake.take_in, intake.drop, rest.blend, ring.query_all, ring.start)
+LIVE = (frame_update.take_in, frame_update.drop, rest_detection.blend, track_history.query_all, track_history.start)
 
 
 def test_warming_up_exercises_the_whole_of_fusion():
     setup = Setup(cameras=3)
     assert warm_up(setup.config(), setup.rig(), point_hands()) == 8
-    for compiled in (*LIVE, patch.located_shift, patch._fill):
+    for compiled in (*LIVE, paint_centroid.located_shift, paint_centroid._fill):
         assert compiled.signatures, compiled
 
 

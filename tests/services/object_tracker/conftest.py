@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rhot.config import ObjectTable, RigConfig
+from rhot.files.config import ObjectTable, RigConfig
+from rhot.geometry.transforms import Array
 from rhot.messages import OpenVrDevice, OpenVrPose
-from rhot.transforms import Array
 
 
 @pytest.fixture

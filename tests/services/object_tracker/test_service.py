@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from rhot import topics
-from rhot.capture import write_lines
-from rhot.config import Objects, ObjectTable, RigConfig, RigTable
 from rhot.errors import SourceError
+from rhot.files.capture import write_lines
+from rhot.files.config import Objects, ObjectTable, RigConfig, RigTable
+from rhot.geometry.transforms import transform
 from rhot.messages import OpenVrPose
-from rhot.transforms import transform
 from services.object_tracker.service import serve
 
 MakePose = Callable[..., OpenVrPose]

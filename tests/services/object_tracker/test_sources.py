@@ -12,9 +12,9 @@ from types import SimpleNamespace
 import pytest
 
 from rhot import clock
-from rhot.capture import write_lines
-from rhot.config import Objects, RigConfig
 from rhot.errors import CaptureError, SourceError
+from rhot.files.capture import write_lines
+from rhot.files.config import Objects, RigConfig
 from rhot.messages import OpenVrPose
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.sources.libsurvive import LibSurvive

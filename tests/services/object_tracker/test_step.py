@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot.calibration import ObjectPlace, Objects, save
-from rhot.config import ObjectTable, RigConfig, RigTable
 from rhot.errors import CalibrationError
+from rhot.files.calibration import ObjectPlace, Objects, save
+from rhot.files.config import ObjectTable, RigConfig, RigTable
+from rhot.geometry.transforms import Array, angle_between, apply, rotation_from_quaternion, rotation_from_vector, transform
 from rhot.messages import ObjectPose, OpenVrDevice, OpenVrPose
-from rhot.transforms import Array, angle_between, apply, rotation_from_quaternion, rotation_from_vector, transform
 from services.object_tracker.registration import load_registration
 from services.object_tracker.step import ObjectStep
 

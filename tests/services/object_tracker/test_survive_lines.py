@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot.transforms import rotation_from_quaternion
+from rhot.geometry.transforms import rotation_from_quaternion
 from services.object_tracker.survive_lines import RunClock, SurviveLines, SurvivePose, openvr_pose
 
 

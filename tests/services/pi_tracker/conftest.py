@@ -1,30 +1,30 @@
-"""A studio that takes pictures with a known truth (services/pi_tracker/synthetic.py)."""
+"""A studio that takes pictures with a known truth (testing/synthetic_images.py)."""
 
 from __future__ import annotations
 
 import pytest
 
-from rhot.calibration import Colors
-from rhot.config import Tracker
-from services.pi_tracker import synthetic
-from services.pi_tracker.colors import compile_colors
-from services.pi_tracker.noise import Noise
-from services.pi_tracker.search import Searcher
+from rhot.files.calibration import Colors
+from rhot.files.config import Tracker
+from services.pi_tracker.detect.blob_search import Searcher
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.image.noise import Noise
+from testing import synthetic_images
 
 
 class Studio:
     """Takes pictures of finger tips."""
 
-    paints = synthetic.PAINTS
-    clean = staticmethod(synthetic.clean)
-    bgr = staticmethod(synthetic.noisy)
-    of = staticmethod(synthetic.frame_of)
+    paints = synthetic_images.PAINTS
+    clean = staticmethod(synthetic_images.clean)
+    bgr = staticmethod(synthetic_images.noisy)
+    of = staticmethod(synthetic_images.frame_of)
 
     @staticmethod
     def frame(tips, seq=0, layout="i420", sigma=5.0, size_px=(64, 64), **look):
         """A noisy frame and the truth."""
-        image, truth = synthetic.clean(tips, size_px, **look)
-        return synthetic.frame_of(synthetic.noisy(image, sigma, seq), seq, layout), truth
+        image, truth = synthetic_images.clean(tips, size_px, **look)
+        return synthetic_images.frame_of(synthetic_images.noisy(image, sigma, seq), seq, layout), truth
 
 
 @pytest.fixture(scope="session")
@@ -34,21 +34,21 @@ def studio() -> Studio:
 
 
 @pytest.fixture(scope="session")
-def tip() -> type[synthetic.Tip]:
+def tip() -> type[synthetic_images.Tip]:
     """The class of painted finger tips."""
-    return synthetic.Tip
+    return synthetic_images.Tip
 
 
 @pytest.fixture(scope="session")
 def colors() -> Colors:
     """Ranges of all paints."""
-    return synthetic.ranges()
+    return synthetic_images.ranges()
 
 
 @pytest.fixture
 def searcher(colors) -> Searcher:
     """A searcher for all paints, in the order of PAINTS, with the default settings."""
-    return Searcher(compile_colors(colors, list(synthetic.PAINTS)), Tracker())
+    return Searcher(compile_colors(colors, list(synthetic_images.PAINTS)), Tracker())
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.calibration import ColorRange, Colors
-from rhot.config import Tracker
+from rhot.files.calibration import ColorRange, Colors
+from rhot.files.config import Tracker
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
-from rhot.calibration import save
-from rhot.config import CameraTable, HandTable, RigConfig, RigTable
+from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CalibrationError, CaptureError, ConfigError
+from rhot.files.calibration import save
+from rhot.files.config import CameraTable, HandTable, RigConfig, RigTable
 from rhot.messages import Session, SimFrame
-from rhot.service import Service
+from rhot.process.service import Service
 from services.pi_tracker.service import serve
 
 DEADLINE_S = 15.0

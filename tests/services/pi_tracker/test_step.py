@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.calibration import Colors
-from rhot.config import Tracker
 from rhot.errors import CalibrationError
+from rhot.files.calibration import Colors
+from rhot.files.config import Tracker
 from rhot.messages import MarkerFrame
 from services.pi_tracker.step import TrackerStep
 
@@ -83,7 +83,7 @@ def test_a_reflection_of_the_colour_does_not_win(studio, tip, colors):
 
 
 def test_noise_alone_is_no_marker(colors):
-    from services.pi_tracker.frame import Frame
+    from services.pi_tracker.image.frame import Frame
 
     rng = np.random.default_rng(5)
     step = tracker(colors)

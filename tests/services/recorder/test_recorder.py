@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.config import CameraTable, Objects, RigConfig, RigTable
-from rhot.config import Recorder as RecorderTable
+from rhot.files.config import CameraTable, Objects, RigConfig, RigTable
+from rhot.files.config import Recorder as RecorderTable
 from rhot.messages import Session
 from services.recorder.reader import read, read_attachments
 from services.recorder.recorder import Recorder, attachments, recorded_topics, recording_path

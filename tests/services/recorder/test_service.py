@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
-from rhot.config import Recorder as RecorderTable
-from rhot.config import RigConfig
+from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CaptureError
+from rhot.files.config import Recorder as RecorderTable
+from rhot.files.config import RigConfig
 from rhot.messages import Session
 from services.recorder.reader import Record, read
 from services.recorder.service import serve

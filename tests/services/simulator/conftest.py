@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot.config import RigConfig, load_rig
-from services.simulator.render import Renderer
-from services.simulator.scene import Scene, build_scene, load_scene
-from services.simulator.scenes import SCENES
+from rhot.files.config import RigConfig, load_rig
+from services.simulator.render.renderer import Renderer
+from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.scene import Scene, build_scene, load_scene
 
 
 @pytest.fixture(scope="session")

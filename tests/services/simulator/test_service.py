@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from rhot import topics
-from rhot.bus import open_bus
-from rhot.config import CameraTable, Objects
+from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError
+from rhot.files.config import CameraTable, Objects
 from rhot.messages import OpenVrPose, SimFrame, Truth
-from rhot.service import Service
-from services.simulator.scene import load_scene
+from rhot.process.service import Service
+from services.simulator.scene.scene import load_scene
 from services.simulator.service import StageClock, serve
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from rhot.geometry.transforms import Array, rotation_from_quaternion, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand, forward, landmark_point
 from rhot.messages import HandPoint, HandPoints, HandPose
-from rhot.transforms import Array, rotation_from_quaternion, rotation_from_vector
 
 FRAME_NS = 33_333_333
 

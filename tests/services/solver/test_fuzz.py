@@ -8,22 +8,22 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rhot.config import RigConfig, Solver
 from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig, Solver
+from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, HandModel, default_hand
 from rhot.messages import HandPoint, HandPoints
-from rhot.transforms import Array
-from services.solver import dls, dls_paper
-from services.solver import kinematics as k
-from services.solver.belief import unknown
-from services.solver.box_qp import box_qp
-from services.solver.constraints import habit
-from services.solver.fingers import Tip, solve_fingers
-from services.solver.screen import Seen, places
-from services.solver.start import begin
+from services.solver.finger import dls, dls_paper
+from services.solver.finger.solve_fingers import Tip, solve_fingers
+from services.solver.maths import kinematics as k
+from services.solver.maths.box_qp import box_qp
 from services.solver.step import SolverStep
-from services.solver.tracker import HandTracker
-from services.solver.whole_hand import Marks, place_of
+from services.solver.whole_hand.fit import Marks, place_of
+from services.solver.whole_hand.hand_tracker import HandTracker
+from services.solver.whole_hand.initialise import begin
+from services.solver.whole_hand.motion_prior import unknown
+from services.solver.whole_hand.point_check import Seen, places
+from services.solver.whole_hand.posture_prior import habit
 
 MODEL = default_hand()
 CHAINS = k.hand_chains(MODEL)

@@ -16,13 +16,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
+from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y
 from rhot.hand import CHAIN_JOINTS, DIGITS, JOINTS, Digit, HandModel, Paint, default_hand
 from rhot.messages import HandPoint, HandPoints
-from rhot.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y
-from services.solver import analytic, dls, fabrik
-from services.solver import kinematics as k
-from services.solver.rotor import BOX
+from services.solver.finger import analytic, dls, fabrik
+from services.solver.finger.swing_limits import BOX
+from services.solver.maths import kinematics as k
 from services.solver.step import SolverStep
 
 FINGERS = ("index", "middle", "ring", "little")

@@ -11,12 +11,12 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.bus import Bus, open_bus
-from rhot.calibration import save
-from rhot.config import HandTable, RigConfig, RigTable
+from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CalibrationError, ConfigError
+from rhot.files.calibration import save
+from rhot.files.config import HandTable, RigConfig, RigTable
 from rhot.hand import default_hand
-from rhot.service import Service
+from rhot.process.service import Service
 from services.solver.service import serve
 
 MARKERS = HandTable(markers={"wrist": "violet"})

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rhot.config import RigConfig, Solver
 from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig, Solver
+from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import BASIC_LANDMARKS, JOINTS, LANDMARKS, TIPS, HandName, default_hand, forward
 from rhot.messages import HandPoint, HandPoints, HandPose
-from rhot.transforms import angle_between, rotation_from_quaternion
 from services.solver.step import SolverStep
 
 METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-seed")

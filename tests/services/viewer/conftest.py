@@ -13,7 +13,7 @@ import zstandard
 from viser import _messages
 from websockets.sync.client import ClientConnection, connect
 
-from rhot.config import CameraTable, HandTable, ObjectTable, RigConfig, RigTable, Viewer
+from rhot.files.config import CameraTable, HandTable, ObjectTable, RigConfig, RigTable, Viewer
 from rhot.hand import DIGITS, JOINTS, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPoint, HandPoints, HandPose, Health, ObjectPose, StreamHealth, WristPose
 

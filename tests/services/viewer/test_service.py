@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rhot import topics
-from rhot.config import RigConfig
+from rhot.files.config import RigConfig
 from rhot.messages import HandPoints, HandPose, Health, ObjectPose
 from services.viewer.service import serve
 

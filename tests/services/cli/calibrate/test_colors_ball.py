@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rhot.calibration import load_colors
-from rhot.config import Tracker
+from rhot.files.calibration import load_colors
+from rhot.files.config import Tracker
 from services.cli.__main__ import application
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
 

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from rhot import topics
-from rhot.config import RigConfig
 from rhot.errors import CalibrationError, CaptureError
-from rhot.guided import EXERCISES
+from rhot.files.config import RigConfig
+from rhot.hand_exercises import EXERCISES
 from rhot.messages import HandPoints
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.calibrate.hand import lengths_of, recorded

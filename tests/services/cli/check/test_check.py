@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
-from rhot.calibration import ColorRange, Lens, load_geometry, load_lens, save
+from rhot.files.calibration import ColorRange, Lens, load_geometry, load_lens, save
 from services.cli.__main__ import application
 from services.cli.check.calibration import overlap
 from services.cli.check.check import check_config

@@ -9,8 +9,8 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
-from rhot.capture import Capture, read_lines, write_lines
 from rhot.errors import CaptureError
+from rhot.files.capture import Capture, read_lines, write_lines
 from rhot.hand import DIGIT_ANGLES, DIGITS
 from rhot.messages import HandPose
 from services.cli.__main__ import application

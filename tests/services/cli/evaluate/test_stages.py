@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.camera import Camera, pinhole
+from rhot.geometry.camera import Camera, pinhole
+from rhot.geometry.transforms import rotation_from_quaternion
 from rhot.hand import BASIC_LANDMARKS, forward, landmark_point
 from rhot.messages import HandPoint, HandPoints, Marker, MarkerFrame
-from rhot.transforms import rotation_from_quaternion
 from services.cli.evaluate.stages import landmark_truth, marker_errors, point_errors
 from services.cli.evaluate.truth_track import hand_track
 

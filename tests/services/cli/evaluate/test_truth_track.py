@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rhot.errors import CaptureError
-from rhot.transforms import angle_between, quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
+from rhot.geometry.transforms import angle_between, quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
 from services.cli.evaluate.truth_track import cubic, hand_track, inside, linear, object_track, slerp
 
 STAMPS = 1_700_000_000_000_000_000 + np.arange(31, dtype=np.int64) * 33_333_333

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot.capture import FrameStamp, write_stamps
 from rhot.errors import CaptureError, ConfigError
+from rhot.files.capture import FrameStamp, write_stamps
 from services.cli.offline.inputs import job_of
 
 RIG = '[rig]\nname = "r"\n[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'

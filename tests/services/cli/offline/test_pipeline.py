@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot.config import load_rig
 from rhot.errors import CalibrationError
+from rhot.files.config import load_rig
 from services.cli.defaults import sim_toml
 from services.cli.offline.pipeline import geometry, merged
-from services.pi_tracker.frame import Frame
+from services.pi_tracker.image.frame import Frame
 
 PICTURE = np.zeros((2, 2, 3), np.uint8)
 

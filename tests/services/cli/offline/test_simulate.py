@@ -7,12 +7,12 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from rhot.capture import Capture, read_lines, read_stamps
-from rhot.config import load_rig
 from rhot.errors import ConfigError
+from rhot.files.capture import Capture, read_lines, read_stamps
+from rhot.files.config import load_rig
 from rhot.messages import Truth
 from services.cli.__main__ import application
-from services.simulator.scenes import SCENES
+from services.simulator.scene.catalog import SCENES
 
 
 def simulate(*arguments):

@@ -7,8 +7,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from rhot.capture import read_lines
 from rhot.errors import CalibrationError, CaptureError, ConfigError
+from rhot.files.capture import read_lines
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
 from services.cli.__main__ import application
 from services.cli.offline.inputs import job_of

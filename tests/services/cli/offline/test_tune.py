@@ -10,13 +10,13 @@ import pytest
 from typer.testing import CliRunner
 
 from rhot import topics
-from rhot.capture import write_lines
 from rhot.errors import CaptureError
+from rhot.files.capture import write_lines
 from rhot.messages import HandPoint, HandPoints
-from services.cli import recordings
+from services.cli import recorded_messages
 from services.cli.offline.tune import tune
-from services.fusion.synthetic import START_NS, Path
 from services.recorder.writer import RecordingWriter
+from testing.synthetic_points import START_NS, Path
 
 
 def messages() -> list[HandPoints]:
@@ -59,10 +59,10 @@ def test_reads_recordings(tmp_path):
         for message in given:
             writer.add(topics.POINTS, topics.POINTS.key("desk", hand="right"), msgspec.json.encode(message), message.stamp_ns)
             writer.add(topics.SESSION, topics.SESSION.key("desk"), b"{}", message.stamp_ns)
-    assert list(recordings.messages(path, topics.POINTS, HandPoints, "points")) == given
+    assert list(recorded_messages.messages(path, topics.POINTS, HandPoints, "points")) == given
 
 
 @pytest.mark.parametrize("name", ["nothing.jsonl", "nothing.mcap"])
 def test_a_missing_recording_is_an_error(tmp_path, name):
     with pytest.raises(CaptureError, match="cannot be read"):
-        list(recordings.messages(tmp_path / name, topics.POINTS, HandPoints, "points"))
+        list(recorded_messages.messages(tmp_path / name, topics.POINTS, HandPoints, "points"))

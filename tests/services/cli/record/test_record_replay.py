@@ -16,7 +16,7 @@ import zenoh
 from typer.testing import CliRunner
 
 from rhot import topics
-from rhot.bus import client_config
+from rhot.bus.bus import client_config
 from rhot.errors import BusError, CaptureError
 from services.cli.record.record import record
 from services.cli.record.replay import replay
@@ -106,7 +106,7 @@ def test_record_nothing(router: str, rig_toml: Path, tmp_path: Path, invoke: Inv
 
 
 def test_no_router(endpoint: str, rig_toml: Path, recording: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.cli.reach._REACH_S", 0.3)
+    monkeypatch.setattr("services.cli.router_session._REACH_S", 0.3)
     for arguments in (["record"], ["replay", recording]):
         with pytest.raises(BusError, match="no router answers"):
             invoke(*arguments, "--config", rig_toml, "--connect", endpoint)

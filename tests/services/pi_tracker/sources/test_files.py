@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot.capture import FrameStamp, write_stamps
 from rhot.errors import CaptureError
+from rhot.files.capture import FrameStamp, write_stamps
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.video import VideoReader

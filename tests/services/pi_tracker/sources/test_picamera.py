@@ -8,9 +8,9 @@ import types
 import numpy as np
 import pytest
 
-from rhot.calibration import Exposure
-from rhot.config import CameraTable
 from rhot.errors import SourceError
+from rhot.files.calibration import Exposure
+from rhot.files.config import CameraTable
 from services.pi_tracker.sources.picamera import PiCamera, unpadded
 
 EXPOSURE = Exposure(exposure_us=8000.0, gain=2.5, red_gain=1.7, blue_gain=1.4)

@@ -6,9 +6,9 @@ import cv2
 import pytest
 
 from rhot import clock
-from rhot.calibration import Exposure
-from rhot.config import CameraTable
 from rhot.errors import SourceError
+from rhot.files.calibration import Exposure
+from rhot.files.config import CameraTable
 from services.pi_tracker.sources.reader import Threaded
 from services.pi_tracker.sources.v4l2 import OpenCvCamera
 from services.pi_tracker.sources.video import VideoReader

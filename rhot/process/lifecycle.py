@@ -1,0 +1,142 @@
+"""The life of a service: from the command line over uvloop, signals and systemd to a clean end.
+
+A service is one coroutine, `serve(service)`. It runs in one TaskGroup together with the health beat and the watchdog; whatever
+fails there ends the process with a message and a code (2: the user can mend it, 1: a bug), and systemd or `rhot up` starts
+it anew. SIGTERM and SIGINT end it with code 0. While the router is away at start, the service waits for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+import uvloop
+
+from rhot.bus.bus import open_bus
+from rhot.errors import RhotError, leaves
+from rhot.files.config import RigConfig, load_rig
+from rhot.process import systemd
+from rhot.process.service import Service, rhot_version
+
+Serve = Callable[[Service], Awaitable[None]]
+
+log = logging.getLogger("rhot.lifecycle")
+
+EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
+
+
+def command(name: str, serve: Serve, instance_option: str = "instance") -> None:
+    """The whole main() of a service: options, logging, loop, exit code.
+
+    instance_option names the option that says which one of several this is, e.g. "camera"; any other than "instance" is required.
+    """
+    parser = argparse.ArgumentParser(prog=f"rhot-{name.replace('_', '-')}", description=serve.__doc__ or f"rhot's {name} service")
+    parser.add_argument("--config", type=Path, required=True, help="rig.toml")
+    required = instance_option != "instance"
+    parser.add_argument(f"--{instance_option}", dest="name", required=required, default="main", help="which one this is")
+    parser.add_argument("--connect", action="append", default=[], help="router endpoint, instead of [bus] connect of rig.toml")
+    parser.add_argument("--version", action="version", version=rhot_version())
+    options = parser.parse_args()
+    log_json_lines(f"{name}/{options.name}")
+    sys.exit(run(name, options.name, options.config, serve, options.connect))
+
+
+def run(name: str, instance: str, config_path: Path, serve: Serve, connect: Sequence[str] = ()) -> int:
+    """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml."""
+    try:
+        config = load_rig(config_path)
+        if connect:
+            config = msgspec.structs.replace(config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect)))
+        uvloop.run(_live(name, instance, config, serve))
+    except Exception as error:
+        return _explain(error, f"{name} {instance}")
+    finally:
+        systemd.notify("STOPPING=1")
+    return EXIT_OK
+
+
+def _explain(error: Exception, who: str) -> int:
+    """Log what ended a service; its exit code."""
+    found = list(leaves(error))
+    if all(isinstance(leaf, RhotError) for leaf in found):
+        for leaf in found:
+            log.error("%s", leaf)
+        return EXIT_USER
+    log.error("%s failed", who, exc_info=error)
+    return EXIT_BUG
+
+
+async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> None:
+    stopping = stop_on_signals()
+    with cancelled_by(stopping):
+        async with open_bus(config.rig.name, config.bus.connect) as bus, asyncio.TaskGroup() as tasks:
+            service = Service(name, instance, config, bus, tasks)
+            companions = [tasks.create_task(service.beat()), tasks.create_task(_watchdog())]
+            await serve(service)
+            # A source that ended (a file, a replay) ends its service; what keeps it company goes too.
+            for task in companions:
+                task.cancel()
+
+
+def stop_on_signals() -> asyncio.Event:
+    """SIGTERM and SIGINT cancel the current task; the event tells that they did."""
+    stopping = asyncio.Event()
+    task = asyncio.current_task()
+    loop = asyncio.get_running_loop()
+
+    def stop() -> None:
+        stopping.set()
+        if task is not None:
+            task.cancel()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop)
+    return stopping
+
+
+@contextlib.contextmanager
+def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
+    """Swallow the cancellation that a signal asked for, and no other."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        if not stopping.is_set():
+            raise
+
+
+async def _watchdog() -> None:
+    """Tell systemd that the event loop turns; a loop that is stuck says nothing and is restarted."""
+    period_s = systemd.watchdog_s()
+    while period_s is not None:
+        systemd.notify("WATCHDOG=1")
+        await asyncio.sleep(period_s)
+
+
+class _JsonLines(logging.Formatter):
+    """One JSON object a line, for the journal."""
+
+    def __init__(self, who: str) -> None:
+        super().__init__()
+        self._who = who
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {"time": self.formatTime(record), "level": record.levelname.lower(), "who": self._who, "text": record.getMessage()}
+        if record.exc_info:
+            line["trace"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False)
+
+
+def log_json_lines(who: str) -> None:
+    """Log as JSON lines on standard output; RHOT_LOG sets the level (default info)."""
+    handler = logging.StreamHandler(sys.stdout)
+    handler.setFormatter(_JsonLines(who))
+    logging.basicConfig(level=os.environ.get("RHOT_LOG", "info").upper(), handlers=[handler], force=True)

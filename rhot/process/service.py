@@ -1,0 +1,131 @@
+"""What a running service has at hand, and the health it tells of itself once a second."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import resource
+import time
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from rhot import clock, topics
+from rhot.bus.bus import Bus
+from rhot.bus.stats import StreamStats
+from rhot.files.config import RigConfig
+from rhot.messages import Health, StreamHealth
+from rhot.process import systemd
+
+log = logging.getLogger("rhot.service")
+
+# The first two beats after the start hold parts of a second; what they would say of rates is not true.
+_SETTLE_S = 2.0
+# One slow second is scheduling, three are a fault worth a line in the journal.
+_SLOW_BEATS = 3
+_PAGE_MB = resource.getpagesize() / 1e6
+
+
+def rhot_version() -> str:
+    """Installed version of rhot."""
+    try:
+        return version("rhot")
+    except PackageNotFoundError:
+        return "0+unknown"
+
+
+@dataclass
+class Service:
+    """One process of the rig: its configuration, its bus, its tasks, its health."""
+
+    name: str
+    instance: str
+    config: RigConfig
+    bus: Bus
+    tasks: asyncio.TaskGroup
+    state: str = "starting"
+    values: dict[str, float] = field(default_factory=dict)
+    errors: int = 0
+    last_error: str = ""
+    _started_s: float = field(default_factory=time.monotonic)
+    _logged_s: float = float("-inf")
+    _ready_s: float = float("inf")
+    _slow_beats: dict[str, int] = field(default_factory=dict)
+
+    def ready(self) -> None:
+        """Initialised: tell systemd, and everybody who watches liveliness."""
+        self.state = "running"
+        self._ready_s = time.monotonic()
+        self.bus.alive(self.name, self.instance)
+        systemd.notify(f"READY=1\nSTATUS={self.state}")
+        log.info("%s %s ready", self.name, self.instance)
+
+    def error(self, text: str) -> None:
+        """Count an error that the service survives; the journal gets at most one such line a second."""
+        self.errors += 1
+        self.last_error = text[:500]
+        now_s = time.monotonic()
+        if now_s - self._logged_s >= 1.0:
+            self._logged_s = now_s
+            log.warning("%s", self.last_error)
+
+    async def beat(self) -> None:
+        """Publish Health once a second, and log when a stream falls below its expected rate or recovers."""
+        publisher = self.bus.publisher(topics.HEALTH, service=self.name, instance=self.instance)
+        last_s, last_cpu_s = time.monotonic(), time.process_time()
+        while True:
+            await asyncio.sleep(1.0)
+            now_s, cpu_s = time.monotonic(), time.process_time()
+            elapsed_s = now_s - last_s
+            streams = [stats.beat(elapsed_s, self._expected_hz(stats)) for stats in self.bus.streams if stats.topic is not topics.HEALTH]
+            publisher.put(self._health(streams, 100.0 * (cpu_s - last_cpu_s) / elapsed_s))
+            self._log_changes(streams)
+            last_s, last_cpu_s = now_s, cpu_s
+
+    def _health(self, streams: list[StreamHealth], cpu_percent: float) -> Health:
+        return Health(
+            service=self.name,
+            instance=self.instance,
+            stamp_ns=clock.now_ns(),
+            version=rhot_version(),
+            pid=os.getpid(),
+            uptime_s=round(time.monotonic() - self._started_s, 1),
+            state=self.state,
+            streams=streams,
+            errors=self.errors,
+            last_error=self.last_error,
+            cpu_percent=round(cpu_percent, 1),
+            rss_mb=round(_rss_mb(), 1),
+            values={name: round(value, 4) for name, value in self.values.items() if abs(value) < 1e300},
+        )
+
+    def _expected_hz(self, stats: StreamStats) -> float:
+        """What the topics table and rig.toml lead to expect; of a pattern, the sum over its streams."""
+        if time.monotonic() - self._ready_s < _SETTLE_S:
+            return 0.0
+        rate = stats.topic.rate
+        if "camera" in stats.topic.fields:
+            cameras = [stats.names["camera"]] if "camera" in stats.names else [c.name for c in self.config.camera]
+            return sum(self.config.rate_hz(rate, camera) for camera in cameras)
+        many = {"hand": len(self.config.hand), "serial": len(self.config.object), "object": len(self.config.object)}
+        streams = 1
+        for field_name in stats.topic.fields:
+            if field_name not in stats.names:
+                streams *= many.get(field_name, 1)
+        return self.config.rate_hz(rate) * streams
+
+    def _log_changes(self, streams: list[StreamHealth]) -> None:
+        text = "%s %s: %.1f Hz of %.1f expected, %d dropped, %d rejected"
+        for stream in streams:
+            slow_before = self._slow_beats.get(stream.key, 0)
+            slow = 0 if stream.ok else slow_before + 1
+            self._slow_beats[stream.key] = slow
+            if slow == _SLOW_BEATS or (slow == 0 and slow_before >= _SLOW_BEATS):
+                level = logging.WARNING if slow else logging.INFO
+                log.log(level, text, stream.direction, stream.key, stream.rate_hz, stream.expected_hz, stream.dropped, stream.rejected)
+
+
+def _rss_mb() -> float:
+    """Resident memory in MB."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE_MB

@@ -1,0 +1,117 @@
+"""Calibration boards: chessboards and ChArUco boards, as points in the board's own frame. Pure data, no pictures.
+
+The board frame: origin in the first inner corner, x along a row of corners, y down the rows, z away from whoever looks at the
+printed side, metres. A board is counted in inner corners, the points where black squares touch. An impossible board is a
+CalibrationError that says what is possible.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rhot.errors import CalibrationError
+from rhot.geometry.transforms import Array
+
+BoardKind = Literal["chessboard", "charuco"]
+
+# OpenCV's name and number of markers.
+DICTIONARIES = {
+    "DICT_4X4_50": 50,
+    "DICT_4X4_100": 100,
+    "DICT_4X4_250": 250,
+    "DICT_5X5_50": 50,
+    "DICT_5X5_100": 100,
+    "DICT_5X5_250": 250,
+    "DICT_6X6_250": 250,
+    "DICT_APRILTAG_36H11": 587,
+}
+# A board of more corners than this on one page has squares no camera resolves; OpenCV's detector needs three.
+_MIN_CORNERS, _MAX_CORNERS = 3, 40
+# Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in millimetres, or a slip.
+_MIN_SQUARE_M, _MAX_SQUARE_M = 0.001, 2.0
+
+
+@dataclass(frozen=True)
+class Board:
+    """A flat board of cols x rows inner corners, square_m apart.
+
+    marker is the side of a ChArUco marker in squares. A ChArUco board of cols x rows inner corners has (cols + 1) x (rows + 1)
+    squares. legacy is the pattern of OpenCV before 4.6, which differs where the number of rows of squares is even.
+    """
+
+    cols: int
+    rows: int
+    square_m: float
+    kind: BoardKind = "chessboard"
+    dictionary: str = "DICT_4X4_50"
+    marker: float = 0.7
+    legacy: bool = False
+
+    def __post_init__(self) -> None:
+        if min(self.cols, self.rows) < _MIN_CORNERS or max(self.cols, self.rows) > _MAX_CORNERS:
+            raise CalibrationError(
+                f"a board of {self.cols}x{self.rows} inner corners cannot be used; both numbers must be {_MIN_CORNERS}..{_MAX_CORNERS}. "
+                "Inner corners are the points where black squares touch: one less than the squares each way"
+            )
+        if not _MIN_SQUARE_M <= self.square_m <= _MAX_SQUARE_M:
+            raise CalibrationError(
+                f"squares of {self.square_m:g} m cannot be right; give the side of one square in metres, "
+                f"{_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}, e.g. --square 0.025"
+            )
+        if not 0.3 <= self.marker <= 0.9:
+            raise CalibrationError(f"markers of {self.marker:g} squares cannot be used; give 0.3..0.9, e.g. --marker 0.7")
+        if self.dictionary not in DICTIONARIES:
+            raise CalibrationError(f"dictionary {self.dictionary!r} is not known; use one of {', '.join(DICTIONARIES)}")
+        markers = (self.cols + 1) * (self.rows + 1) // 2
+        if self.kind == "charuco" and markers > DICTIONARIES[self.dictionary]:
+            raise CalibrationError(
+                f"a ChArUco board of {self.cols}x{self.rows} inner corners has {markers} markers, {self.dictionary} only "
+                f"{DICTIONARIES[self.dictionary]}; use a larger dictionary: {', '.join(DICTIONARIES)}"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number of inner corners."""
+        return self.cols * self.rows
+
+    @property
+    def grid(self) -> Array:
+        """Column and row of every corner, in the order of their numbers; (n, 2)."""
+        return np.stack([np.tile(np.arange(self.cols), self.rows), np.repeat(np.arange(self.rows), self.cols)], axis=1).astype(np.float64)
+
+    @property
+    def points(self) -> Array:
+        """The corners in the board frame, metres; (n, 3)."""
+        return np.concatenate([self.grid * self.square_m, np.zeros((self.size, 1))], axis=1)
+
+    @property
+    def name(self) -> str:
+        """How people write it: `chessboard 9x6, 25 mm squares`."""
+        return f"{self.kind} {self.cols}x{self.rows}, {1e3 * self.square_m:g} mm squares"
+
+    def neighbours(self, ids: np.ndarray) -> np.ndarray:
+        """Pairs of positions in ids whose corners are next to each other on the board; (k, 2) int."""
+        place = {int(corner): position for position, corner in enumerate(ids)}
+        pairs = []
+        for corner, position in place.items():
+            right, below = corner + 1, corner + self.cols
+            if right % self.cols and right in place:
+                pairs.append((position, place[right]))
+            if below in place:
+                pairs.append((position, place[below]))
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def parse_corners(text: str) -> tuple[int, int]:
+    """`9x6` -> (9, 6).
+
+    Raises CalibrationError for anything else.
+    """
+    match = re.fullmatch(r"\s*(\d{1,3})\s*[xX×,]\s*(\d{1,3})\s*", text)
+    if not match:
+        raise CalibrationError(f"board {text!r} is not understood; write its inner corners as COLSxROWS, e.g. --board 9x6")
+    return int(match[1]), int(match[2])

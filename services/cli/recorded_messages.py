@@ -1,0 +1,35 @@
+"""Messages of one stream out of a recording: a result folder of `rhot track`, one of its .jsonl files, or an MCAP of `rhot record`.
+
+A recording that is none, or a damaged message, is a CaptureError that names the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from rhot import topics
+from rhot.errors import CaptureError
+from rhot.files.capture import read_lines
+
+M = TypeVar("M", bound=msgspec.Struct)
+
+
+def messages(recording: Path, topic: topics.Topic[M], kind: type[M], stream: str) -> Iterator[M]:
+    """All messages of a topic, in order; stream is the name of the .jsonl file that holds them in a result folder."""
+    path = recording / f"{stream}.jsonl" if recording.is_dir() else recording
+    if path.suffix != ".mcap":
+        yield from read_lines(path, kind)
+        return
+    from services.recorder.reader import read
+
+    for record in read(path):
+        if topics.find(record.key) is not topic:
+            continue
+        try:
+            yield msgspec.json.decode(record.payload, type=kind)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None

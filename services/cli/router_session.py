@@ -1,0 +1,36 @@
+"""A bus for a command that a person waits for: with an error instead of endless patience where no router answers."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from rhot.bus.bus import Bus, open_bus
+from rhot.errors import BusError
+from rhot.files.config import RigConfig, load_rig
+from services.cli.defaults import sim_toml
+
+# A router on the same network answers within milliseconds.
+_REACH_S = 3.0
+
+
+def rig_and_endpoints(config: Path | None, connect: str | None) -> tuple[RigConfig, list[str]]:
+    """The rig of a rig.toml (default: the simulated one) and where its router is."""
+    rig = load_rig(config or sim_toml())
+    return rig, [connect] if connect else list(rig.bus.connect)
+
+
+@contextlib.asynccontextmanager
+async def reach(rig: str, endpoints: list[str]) -> AsyncIterator[Bus]:
+    """open_bus, or BusError after three seconds without a router."""
+    async with contextlib.AsyncExitStack() as stack:
+        try:
+            async with asyncio.timeout(_REACH_S):
+                bus = await stack.enter_async_context(open_bus(rig, endpoints))
+        except TimeoutError:
+            raise BusError(
+                f"no router answers at {', '.join(endpoints)}; start the rig (`rhot demo`, `rhot up CONFIG`) or name another with --connect"
+            ) from None
+        yield bus

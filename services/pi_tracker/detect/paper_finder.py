@@ -1,0 +1,79 @@
+"""The seed's own pipeline, for comparison: per colour HSV, Gaussian, inRange, erosion, dilation, largest contour, its centroid.
+
+RHOT, sections 8 and 9.1. Searched in the last box + margin, or in the whole image where the colour was lost.
+Pure; a colour without a contour has no marker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from rhot.files.calibration import Colors
+from rhot.files.config import Tracker
+from rhot.messages import Marker
+from services.pi_tracker.detect.color_table import hsv_mask
+from services.pi_tracker.image.frame import Frame, Image
+
+# Standard deviation of a binary contour's centroid, a 9 px tip at sigma 5: .22 px of disparity between two views.
+_SIGMA_PX = 0.155
+Box = tuple[int, int, int, int]
+
+
+class SeedFinder:
+    """Markers as the seed found them."""
+
+    def __init__(self, colors: Colors, settings: Tracker, wanted: Sequence[str]) -> None:
+        self._spans = {name: colors.colors[name] for name in wanted}
+        self._settings = settings
+        self._element = np.ones((3, 3), np.uint8)
+        self._boxes: dict[str, Box] = {}
+
+    def find(self, frame: Frame) -> list[Marker]:
+        """Markers of one image."""
+        bgr = frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+        markers = []
+        for name in self._spans:
+            found = self._largest(bgr, name)
+            if found is not None:
+                markers.append(found)
+        return markers
+
+    def mask(self, bgr: Image, name: str) -> Image:
+        """The filtered mask of one colour, 0 or 255."""
+        hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV)
+        if self._settings.gaussian_px > 1:
+            size = self._settings.gaussian_px | 1
+            hsv = cv2.GaussianBlur(hsv, (size, size), 0)
+        mask = hsv_mask(hsv, self._spans[name])
+        mask = cv2.erode(mask, self._element, iterations=self._settings.erode)
+        return cv2.dilate(mask, self._element, iterations=self._settings.dilate)
+
+    def _largest(self, bgr: Image, name: str) -> Marker | None:
+        height, width = bgr.shape[:2]
+        margin = self._settings.roi_margin_px
+        box = self._boxes.pop(name, None)
+        x0, y0, x1, y1 = (0, 0, width, height)
+        if box is not None:
+            x0, y0 = max(box[0] - margin, 0), max(box[1] - margin, 0)
+            x1, y1 = min(box[0] + box[2] + margin, width), min(box[1] + box[3] + margin, height)
+        contours, _ = cv2.findContours(self.mask(bgr[y0:y1, x0:x1], name), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        contour = max(contours, key=cv2.contourArea, default=None)
+        if contour is None:
+            return None
+        moments = cv2.moments(contour)
+        area = moments["m00"]
+        if not max(self._settings.min_area_px, 1.0) <= area <= self._settings.max_area_px:
+            return None
+        x, y, w, h = cv2.boundingRect(contour)
+        self._boxes[name] = (x0 + x, y0 + y, w, h)
+        return Marker(
+            color=name,
+            x_px=round(x0 + moments["m10"] / area, 3),
+            y_px=round(y0 + moments["m01"] / area, 3),
+            area_px=round(area, 1),
+            sigma_px=_SIGMA_PX,
+            quality=1.0,
+        )

@@ -1,0 +1,131 @@
+"""The exposure in force: asked for and set over the bus, found by the camera's automatics if wished, written to its file.
+
+A source without such controls (a file, the simulator) says so and refuses; automatics that do not settle in time are frozen at the
+last values, with a note, and a driver that reports nothing is a refusal. What cannot be is refused, and the old stays.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import datetime
+import time
+
+import msgspec
+
+from rhot import clock, topics
+from rhot.camera_messages import ExposureControl
+from rhot.errors import CalibrationError
+from rhot.files.calibration import Exposure, load_exposure, save
+from rhot.process.service import Service
+from services.pi_tracker.colors.exposure_advice import Settling
+from services.pi_tracker.sources.controls import Controls
+
+# picamera2's automatics settle in one to two seconds, a webcam's in five.
+_PATIENCE_S = 15.0
+# Twice a frame at 30 fps: every report is seen.
+_LOOK_EVERY_S = 0.015
+
+
+class Exposing:
+    """Exposure of one camera; attach() it once the source is open."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._camera = service.config.camera_named(service.instance)
+        self._path = service.config.calibration_dir / f"{self._camera.name}.exposure.json"
+        self._controls: Controls | None = None
+        self._state = ExposureControl(adjustable=False, note="the camera is not open yet")
+        service.bus.answer(topics.EXPOSURE, self._answer, camera=self._camera.name)
+
+    def attach(self, controls: Controls | None) -> None:
+        """The source's controls, None if it has none."""
+        self._controls = controls
+        if controls is None:
+            note = f"source {self._camera.source.partition(':')[0]!r} has no exposure to set"
+            self._state = ExposureControl(adjustable=False, note=note)
+            return
+        try:
+            self._state = _state(load_exposure(self._path.parent, self._camera.name), controls.note, 0)
+        except CalibrationError:
+            note = "not calibrated: the camera's automatics run all the time, and colours drift with them"
+            self._state = ExposureControl(mode="auto", note=note)
+
+    async def follow(self) -> None:
+        """Do what is put on the bus, for ever."""
+        async for sample in self._service.bus.raw(topics.EXPOSURE, 4, camera=self._camera.name):
+            try:
+                await self._do(msgspec.json.decode(sample.payload, type=ExposureControl))
+            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
+                text = f"exposure put on the bus for camera {self._camera.name!r} is refused: {error}"
+                self._service.error(text)
+                self._state = msgspec.structs.replace(self._state, note=text[:400], changed_ns=clock.now_ns())
+
+    async def _do(self, wanted: ExposureControl) -> None:
+        if self._controls is None:
+            raise CalibrationError(self._state.note.partition("refused: ")[2] or self._state.note)
+        if wanted.mode == "auto":
+            await self._settle(self._controls)
+            return
+        exposure = Exposure(
+            exposure_us=wanted.exposure_us or self._state.exposure_us or _unknown("exposure_us"),
+            gain=wanted.gain or self._state.gain,
+            red_gain=wanted.red_gain or self._state.red_gain,
+            blue_gain=wanted.blue_gain or self._state.blue_gain,
+        )
+        if min(exposure.gain, exposure.red_gain, exposure.blue_gain) <= 0.0:
+            _unknown("gain, red_gain and blue_gain")
+        await self._fix(exposure, self._controls, "by hand", self._controls.note)
+
+    async def _settle(self, controls: Controls) -> None:
+        """Run the automatics, freeze what they find."""
+        before = self._state
+        self._state = ExposureControl(mode="auto", note="the automatics are running")
+        controls.adjust(None)
+        settling, last = Settling(), None
+        deadline_s = time.monotonic() + _PATIENCE_S
+        while (found := settling.settled()) is None and time.monotonic() < deadline_s:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            report = controls.reported
+            if report is not None and report is not last:
+                settling.add(report, time.monotonic_ns())
+                last = report
+        if found is None and last is None:
+            self._state = before
+            if before.exposure_us > 0.0 and before.mode == "fixed":
+                controls.adjust(_exposure(before))
+            raise CalibrationError(f"the driver reports no exposure within {_PATIENCE_S:.0f} s; set the values by hand")
+        note = controls.note if found else f"the automatics had not settled after {_PATIENCE_S:.0f} s: is the picture still?"
+        await self._fix(found or last or _exposure(before), controls, "automatics, once", note)
+
+    async def _fix(self, exposure: Exposure, controls: Controls, how: str, note: str) -> None:
+        date = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+        made = msgspec.structs.replace(exposure, date=date, tool="rhot calibrate camera", inputs={"how": how, "note": note})
+        controls.adjust(made)
+        try:
+            await asyncio.to_thread(save, self._path, made)
+        except OSError as error:
+            self._state = _state(made, note, 0)
+            raise CalibrationError(f"{self._path} cannot be written: {error}; the values are in force until the tracker ends") from None
+        self._state = _state(made, note, clock.now_ns())
+
+    def _answer(self) -> ExposureControl:
+        return self._state
+
+
+def _unknown(what: str) -> float:
+    raise CalibrationError(f"{what} must be given once: nobody knows what is in force; or run the automatics once")
+
+
+def _state(exposure: Exposure, note: str, changed_ns: int) -> ExposureControl:
+    return ExposureControl(
+        exposure_us=min(exposure.exposure_us, 1e6),
+        gain=min(exposure.gain, 64.0),
+        red_gain=min(exposure.red_gain, 64.0),
+        blue_gain=min(exposure.blue_gain, 64.0),
+        note=note,
+        changed_ns=changed_ns,
+    )
+
+
+def _exposure(state: ExposureControl) -> Exposure:
+    return Exposure(exposure_us=state.exposure_us, gain=state.gain, red_gain=state.red_gain, blue_gain=state.blue_gain)

@@ -1,0 +1,66 @@
+"""The camera's pictures for people: a JPEG preview while somebody watches, and the last frame, lossless, when somebody asks.
+
+Encoding runs in a worker thread: a preview never delays a marker. No frame yet: a request gets no answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+import cv2
+
+from rhot import topics
+from rhot.bus.bus import Bus
+from services.pi_tracker.image.frame import Frame, Image
+
+# Previews are for people: 5 a second look alive and cost 2 % of a Pi's core each.
+_PREVIEW_PERIOD_NS = 200_000_000
+_JPEG_QUALITY = 80
+# PNG level 1: half the size of level 9's time budget is not worth a second of waiting for one frame.
+_PNG_LEVEL = 1
+
+
+def bgr(frame: Frame) -> Image:
+    """The frame as BGR (h, w, 3)."""
+    return frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+
+
+def jpeg(frame: Frame) -> bytes:
+    """The frame as JPEG."""
+    return cv2.imencode(".jpg", bgr(frame), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+
+
+def png(frame: Frame) -> bytes:
+    """The frame as PNG, lossless in BGR."""
+    return cv2.imencode(".png", bgr(frame), [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[1].tobytes()
+
+
+class Pictures:
+    """Publishes previews and answers requests for frames of one camera."""
+
+    def __init__(self, bus: Bus, camera: str, tasks: asyncio.TaskGroup) -> None:
+        self._publisher = bus.publisher(topics.PREVIEW, camera=camera)
+        self._tasks = tasks
+        self._last: Frame | None = None
+        self._sent_ns = 0
+        self._busy = False
+        bus.answer(topics.FRAME, self._answer, camera=camera)
+
+    def show(self, frame: Frame, now_ns: int) -> None:
+        """Remember the frame; send it if a preview is wanted and due."""
+        self._last = frame
+        # A clock that was set back counts as due.
+        if self._busy or 0 <= now_ns - self._sent_ns < _PREVIEW_PERIOD_NS or not self._publisher.wanted:
+            return
+        self._busy = True
+        self._sent_ns = now_ns
+        self._tasks.create_task(self._send(frame))
+
+    async def _send(self, frame: Frame) -> None:
+        try:
+            self._publisher.put_bytes(await asyncio.to_thread(jpeg, frame))
+        finally:
+            self._busy = False
+
+    async def _answer(self) -> bytes | None:
+        return None if self._last is None else await asyncio.to_thread(png, self._last)

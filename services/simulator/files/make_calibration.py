@@ -1,0 +1,127 @@
+"""Makes the calibration of a simulated rig: `python -m services.simulator.files.make_calibration config/sim.toml`.
+
+Lens, place, exposure and objects are what a calibration of good cheap cameras would give; colours are fitted to rendered samples
+(services/simulator/files/fit_colors.py). Existing files are replaced: a simulated rig has nothing to lose. The values follow from the
+cameras' names and order alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from rhot.errors import RhotError
+from rhot.files.calibration import CameraPlace, Colors, Exposure, Lens, ObjectPlace, Objects, RigGeometry, save
+from rhot.files.config import CameraTable, RigConfig, load_rig
+from rhot.geometry.camera import pinhole
+from rhot.geometry.transforms import Array, rotation_from_vector, rotation_x, rotation_y, transform
+from services.simulator.files.fit_colors import Samples, fit, samples
+from services.simulator.render.renderer import Renderer
+from services.simulator.scene.scene import load_scene
+
+TOOL = "services.simulator.rig"
+# RHOT: 62.5 deg over 640 px, cameras 75 mm apart.
+_HFOV_RAD = np.deg2rad(62.5)
+_BASELINE_M = 0.075
+# Barrel distortion of a Raspberry Pi camera's lens after the usual calibration.
+_K1, _K2 = -0.055, 0.020
+# The base station stands 2 m behind and above the rig, its universe turned against it.
+_LIGHTHOUSE_M = (0.6, 0.9, 1.4)
+
+# Scenes and frames that show every paint from many sides, in light and shade.
+_SAMPLED, _FRAMES = ("fist", "piano", "random", "wave"), tuple(range(5, 200, 13))
+
+
+def lens(camera: CameraTable, date: str) -> Lens:
+    """A lens like the others of its kind, yet its own: focal length, middle and distortion differ a little."""
+    rng = _rng(camera.name, 1)
+    matrix = pinhole(camera.size_px, float(_HFOV_RAD))
+    matrix[:2, :2] *= 1.0 + 0.002 * rng.standard_normal()
+    matrix[:2, 2] += rng.uniform(-4.0, 4.0, 2) * camera.size_px[0] / 640.0
+    k1, k2 = _K1 * rng.uniform(0.9, 1.1), _K2 * rng.uniform(0.9, 1.1)
+    p1, p2 = rng.uniform(-5e-4, 5e-4, 2)
+    rows = np.round(matrix, 4).tolist()
+    distortion = tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0))
+    return Lens(date=date, tool=TOOL, size_px=camera.size_px, matrix=tuple(tuple(r) for r in rows), distortion=distortion)  # type: ignore[arg-type]
+
+
+def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:
+    """Cameras in a row, 75 mm apart, each but the first turned by up to half a degree about each axis, and displaced by millimetres."""
+    places = {}
+    for number, camera in enumerate(cameras):
+        rng = _rng(camera.name, 2)
+        T = np.eye(4)
+        if number:
+            wrong = rng.uniform(-1.0, 1.0, 6)
+            T = transform(rotation_from_vector(np.deg2rad(0.5) * wrong[:3]), np.array([number * _BASELINE_M, 0.0, 0.0]) + 1e-3 * wrong[3:])
+        places[camera.name] = CameraPlace(T_rig_from_camera=_rows(T))
+    return RigGeometry(date=date, tool=TOOL, cameras=places)
+
+
+def objects(config: RigConfig, date: str) -> Objects:
+    """Where the lighthouse stands, and how the trackers sit on their objects."""
+    T = transform(rotation_x(np.pi) @ rotation_y(0.6) @ rotation_x(0.15), _LIGHTHOUSE_M)
+    # A tracker sits at the lower end of its object, 75 mm from the middle.
+    places = {o.name: ObjectPlace(offset_m=(0.075, 0.0, 0.0), orientation_wxyz=(0.70710678, 0.0, 0.0, -0.70710678)) for o in config.object}
+    return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=_rows(T), objects=places)
+
+
+def write_all(config: RigConfig, date: str = "") -> list[Path]:
+    """Write every calibration file of a simulated rig; returns the paths."""
+    folder = config.calibration_dir
+    written = []
+
+    def put(name: str, calibration: object) -> None:
+        save(folder / name, calibration)  # type: ignore[arg-type]
+        written.append(folder / name)
+
+    for camera in config.camera:
+        put(f"{camera.name}.lens.json", lens(camera, date))
+        put(f"{camera.name}.exposure.json", Exposure(date=date, tool=TOOL, exposure_us=8000.0, gain=2.0, red_gain=1.6, blue_gain=1.7))
+    put("rig.json", geometry(config.camera, date))
+    put("objects.json", objects(config, date))
+    for camera in config.camera:
+        put(f"{camera.name}.colors.json", colors(config, camera.name, date))
+    return written
+
+
+def colors(config: RigConfig, camera: str, date: str) -> Colors:
+    """Ranges of all configured colours, fitted to the pictures that one camera takes of several scenes."""
+    painted: dict[str, list[Samples]] = {}
+    others = []
+    for name in _SAMPLED:
+        renderer = Renderer(load_scene(config, name), camera)
+        surfaces, rest = samples(renderer, _FRAMES)
+        others.append(rest)
+        for (hand, landmark), surface in renderer.cast.marks.items():
+            painted.setdefault(config.hand[hand].markers[landmark], []).append(surfaces[surface])  # type: ignore[index]
+    return fit({name: np.concatenate(rows) for name, rows in painted.items()}, np.concatenate(others), date, TOOL)
+
+
+def _rows(T: Array) -> tuple:
+    return tuple(tuple(round(float(v), 8) for v in row) for row in T)
+
+
+def _rng(name: str, use: int) -> np.random.Generator:
+    return np.random.default_rng([zlib.crc32(name.encode()), use])
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("config", type=Path, help="rig.toml of the simulated rig")
+    parser.add_argument("--date", default="", help="date to write into the files")
+    options = parser.parse_args()
+    try:
+        for path in write_all(load_rig(options.config), options.date):
+            print(path)
+    except RhotError as error:
+        sys.exit(f"rig: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+"""Small turns as rotation vectors, for the kernels (rhot/geometry/transforms.py has the same maths for everybody else)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rhot.geometry.transforms import Array
+
+
+@njit(cache=True)
+def turned(R: Array, v: Array) -> Array:
+    """exp(v) R for a rotation vector v (3,)."""
+    angle = math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    a = 1.0 - angle * angle / 6.0 if angle < 1e-4 else math.sin(angle) / angle
+    b = 0.5 - angle * angle / 24.0 if angle < 1e-4 else (1.0 - math.cos(angle)) / (angle * angle)
+    x, y, z = v
+    E = np.array(
+        [
+            [1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)],
+        ]
+    )
+    return E @ R
+
+
+@njit(cache=True)
+def rotation_vector(R: Array) -> Array:
+    """The rotation vector of R (3, 3), from its skew part; near 180 deg only its length is reliable, which is all LM needs."""
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
+    factor = 0.5 if sine < 1e-9 else 0.5 * angle / sine
+    return np.array([factor * x, factor * y, factor * z])

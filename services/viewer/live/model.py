@@ -1,0 +1,155 @@
+"""What the live view shows, reduced from messages. Pure: time is an argument (seconds of one monotonic clock).
+
+Whatever has not come for a second is hidden, and said to be missing. Absurd positions (not finite, beyond 100 m) are not drawn.
+Objects in the lighthouse frame are not drawn either: where they are in the rig would be a guess. Nothing from the network makes
+the state grow without bound.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
+from rhot.messages import HandPoints, HandPose, Health, ObjectPose
+
+# Older than this is no live view any more.
+STALE_S = 1.0
+# Three beats of a service's health.
+HEALTH_STALE_S = 3.5
+# Beyond any room; float32 on the way to the browser would overflow at 1e38.
+_MAX_M = 100.0
+_MAX_OBJECTS, _MAX_SERVICES = 32, 64
+# Two seconds of finger tips at 30 Hz.
+TRAIL = 60
+# A stamp further from now than this is a replay's or another clock's, and says nothing about latency.
+_MAX_LATENCY_S = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class HandView:
+    """A hand to draw; sources are those of its joints."""
+
+    hand: HandName
+    positions_m: Array  # (26, 3)
+    radii_m: Array  # (26,)
+    sources: tuple[str, ...]
+    pose: HandPose
+
+
+@dataclass(frozen=True)
+class PointView:
+    """A marked landmark; predicted ones were not seen just now."""
+
+    hand: HandName
+    name: str
+    position_m: tuple[float, float, float]
+    predicted: bool
+
+
+@dataclass(frozen=True)
+class ObjectView:
+    """An object; drawn is false while it is lost or not registered."""
+
+    name: str
+    position_m: tuple[float, float, float]
+    orientation_wxyz: tuple[float, float, float, float]
+    tracking: str
+    registered: bool
+
+    @property
+    def drawn(self) -> bool:
+        """Whether its pose is one in the rig frame."""
+        return self.registered and self.tracking != "lost"
+
+
+@dataclass(frozen=True)
+class View:
+    """Everything to draw at one instant; trails (n, 5, 3) are finger tips, oldest first."""
+
+    hands: dict[HandName, HandView]
+    points: dict[tuple[HandName, str], PointView]
+    objects: dict[str, ObjectView]
+    trails: dict[HandName, Array]
+    health: list[Health]
+    # Glass to pose arriving here, ms, of the newest pose; None where its stamp says nothing.
+    latency_ms: dict[HandName, float | None]
+
+
+@dataclass
+class _Hand:
+    view: HandView
+    seen_s: float
+    latency_ms: float | None
+    trail: deque[Array] = field(default_factory=lambda: deque(maxlen=TRAIL))
+
+
+class ViewModel:
+    """Takes messages in, gives views out."""
+
+    def __init__(self) -> None:
+        self._hands: dict[HandName, _Hand] = {}
+        self._points: dict[HandName, tuple[float, list[PointView]]] = {}
+        self._objects: dict[str, tuple[float, ObjectView]] = {}
+        self._health: dict[tuple[str, str], tuple[float, Health]] = {}
+        self.absurd = 0
+
+    def pose(self, pose: HandPose, now_s: float, wall_ns: int) -> None:
+        """A hand pose that arrived now, at wall_ns of the wall clock."""
+        positions = np.array([joint.position_m for joint in pose.joints])  # (26, 3)
+        radii = np.array([joint.radius_m for joint in pose.joints])
+        if not np.all(np.abs(positions) <= _MAX_M) or not np.all(radii <= _MAX_M):
+            self.absurd += 1
+            return
+        view = HandView(pose.hand, positions, radii, tuple(joint.source for joint in pose.joints), pose)
+        latency_s = (wall_ns - pose.stamp_ns) * 1e-9
+        latency_ms = latency_s * 1e3 if abs(latency_s) <= _MAX_LATENCY_S else None
+        known = self._hands.get(pose.hand)
+        if known is None or now_s - known.seen_s > STALE_S:
+            known = self._hands[pose.hand] = _Hand(view, now_s, latency_ms)
+        known.view, known.seen_s, known.latency_ms = view, now_s, latency_ms
+        known.trail.append(positions[CHAIN_JOINTS[:, 3]])
+
+    def points(self, points: HandPoints, now_s: float) -> None:
+        """The marked landmarks of a hand."""
+        drawn = []
+        for point in points.points:
+            if point.name in LANDMARKS and all(abs(v) <= _MAX_M for v in point.position_m):
+                drawn.append(PointView(points.hand, point.name, point.position_m, point.source == "predicted"))
+            else:
+                self.absurd += 1
+        self._points[points.hand] = (now_s, drawn)
+
+    def object(self, pose: ObjectPose, now_s: float) -> None:
+        """An object's pose."""
+        norm = float(np.sqrt(np.sum(np.minimum(np.abs(pose.orientation_wxyz), 1e9) ** 2)))
+        if not all(abs(v) <= _MAX_M for v in pose.position_m) or not 0.5 < norm < 2.0:
+            self.absurd += 1
+            return
+        if pose.object in self._objects or len(self._objects) < _MAX_OBJECTS:
+            view = ObjectView(pose.object, pose.position_m, pose.orientation_wxyz, pose.tracking, pose.registered)
+            self._objects[pose.object] = (now_s, view)
+
+    def health(self, health: Health, now_s: float) -> None:
+        """A service's beat."""
+        key = (health.service, health.instance)
+        if key in self._health or len(self._health) < _MAX_SERVICES:
+            self._health[key] = (now_s, health)
+
+    def view(self, now_s: float) -> View:
+        """What is to be seen now; forgets what is stale."""
+        self._hands = {name: hand for name, hand in self._hands.items() if now_s - hand.seen_s <= STALE_S}
+        self._points = {name: entry for name, entry in self._points.items() if now_s - entry[0] <= STALE_S}
+        self._objects = {name: entry for name, entry in self._objects.items() if now_s - entry[0] <= STALE_S}
+        self._health = {key: entry for key, entry in self._health.items() if now_s - entry[0] <= HEALTH_STALE_S}
+        return View(
+            hands={name: hand.view for name, hand in self._hands.items()},
+            points={(p.hand, p.name): p for _, points in self._points.values() for p in points},
+            objects={name: view for name, (_, view) in self._objects.items()},
+            trails={name: np.array(hand.trail) for name, hand in self._hands.items()},
+            health=[health for _, (_, health) in sorted(self._health.items(), key=lambda item: item[0])],
+            latency_ms={name: hand.latency_ms for name, hand in self._hands.items()},
+        )

@@ -1,0 +1,140 @@
+"""The texts beside the picture, as HTML. Pure.
+
+Everything that came over the network is escaped and shortened: a browser executes what it is given. What is missing is said in
+words, with what to look at.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhot import topics
+from rhot.files.config import RigConfig
+from rhot.hand import DIGIT_ANGLES, DIGITS
+from rhot.messages import HandPose, Health, StreamHealth
+from services.viewer.live.model import View
+from services.viewer.live.palette import SOURCE_RGB
+
+# Rows of the rates table: a rig of two Pis has some twenty streams.
+_MAX_ROWS = 60
+_STYLE = "font-size:0.8em;line-height:1.35;padding:0 0.6em;"
+_CELL = "padding:0 0.5em 0 0;text-align:right;white-space:nowrap"
+_LEFT = "padding:0 0.5em 0 0;text-align:left"
+
+
+def text(value: str, longest: int = 60) -> str:
+    """Any string, made harmless."""
+    return html.escape("".join(c for c in value if c.isprintable())[:longest])
+
+
+def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
+    """What is seen, what is waited for, and standing notes such as missing calibration."""
+    lines = []
+    for hand in config.hand:
+        if hand in view.hands:
+            latency = view.latency_ms.get(hand)
+            lines.append(f"{hand} hand: tracked" + ("" if latency is None else f", {latency:.0f} ms after the light"))
+        elif any(h == hand for h, _ in view.points):
+            lines.append(f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)")
+        else:
+            lines.append(f"waiting for hand poses of the {hand} hand ... ({_missing(view)})")
+    if not config.hand:
+        lines.append("no hand is configured: add [hand.right.markers] to rig.toml")
+    for table in config.object:
+        known = view.objects.get(table.name)
+        if known is None:
+            lines.append(f"waiting for the object {text(table.name)} ...")
+        elif not known.registered:
+            lines.append(f"object {text(table.name)}: not registered to the rig; run `rhot calibrate objects`")
+        else:
+            lines.append(f"object {text(table.name)}: {text(known.tracking.replace('_', ' '))}")
+    lines += [text(note, 200) for note in notes]
+    return _box("<br>".join(lines))
+
+
+def _missing(view: View) -> str:
+    services = {health.service for health in view.health}
+    for needed, hint in (
+        ("pi_tracker", "no camera's tracker is heard"),
+        ("fusion", "rhot-fusion is not heard"),
+        ("solver", "rhot-solver is not heard"),
+    ):
+        if needed not in services:
+            return hint
+    return "all services are heard: is the hand in view of two cameras?"
+
+
+def legend() -> str:
+    """What the colours of joints and bones say."""
+    return _box(" &nbsp; ".join(f'<span style="color:rgb{rgb}">&#9679;</span> {name}' for name, rgb in SOURCE_RGB.items()))
+
+
+def angles(pose: HandPose) -> str:
+    """Joint angles in degrees, one row a finger."""
+    rows = [_row(("", "abd", "cmc/mcp", "pip/mcp", "dip", "off"), head=True)]
+    for digit, names, finger in zip(DIGITS, DIGIT_ANGLES, pose.fingers, strict=True):
+        degrees = [f"{_degrees(getattr(finger.angles_rad, name)):.0f}&deg;" for name in names]
+        off = f"{min(finger.residual_m * 1e3, 999.0):.1f} mm" if finger.status != "solved" else ""
+        mark = "" if finger.status == "solved" else f" ({text(finger.status.replace('_', ' '))})"
+        rows.append(_row((digit + mark, *degrees, off)))
+    return _table(rows)
+
+
+def no_angles() -> str:
+    """Instead of angles, while no hand is tracked."""
+    return _box("waiting for hand poses ...")
+
+
+def rates(health: Sequence[Health]) -> str:
+    """Every stream's rate against what is expected, and each service's last error."""
+    if not health:
+        return _box("waiting for the services' health ...")
+    rows = [_row(("stream", "Hz", "of", "ms", "lost"), head=True)]
+    for beat in health:
+        name = f"{beat.service}/{beat.instance}"
+        rows.append(f'<tr><td colspan="5"><b>{text(name)}</b> {min(beat.cpu_percent, 9999.0):.0f} % of a core</td></tr>')
+        rows += [_stream(stream) for stream in beat.streams]
+        if beat.last_error:
+            rows.append(f'<tr><td colspan="5" style="color:#c0392b">{text(beat.last_error, 120)}</td></tr>')
+    more = f"<tr><td>... and {len(rows) - _MAX_ROWS} more</td></tr>" if len(rows) > _MAX_ROWS else ""
+    return _table([*rows[:_MAX_ROWS], more])
+
+
+def _stream(stream: StreamHealth) -> str:
+    topic = topics.find(stream.key)
+    short = stream.key.split("/", 2)[-1] if topic or "*" in stream.key else stream.key
+    arrow = "&rarr;" if stream.direction == "out" else "&larr;"
+    rate = f"{min(stream.rate_hz, 99999.0):.1f}"
+    shown = rate if stream.ok else f'<span style="color:#c0392b">{rate}</span>'
+    expected = f"{min(stream.expected_hz, 99999.0):.0f}" if stream.expected_hz else ""
+    latency = f"{min(stream.latency_p50_ms, 99999.0):.1f}" if stream.latency_p50_ms >= 0.0 else ""
+    lost = stream.dropped + stream.rejected
+    return _row((f"{arrow} {text(short, 40)}", shown, expected, latency, str(min(lost, 10**9)) if lost else ""))
+
+
+def preview(camera: str, jpeg_base64: str | None) -> str:
+    """One camera's picture, or that it is waited for."""
+    if jpeg_base64 is None:
+        return _box(f"waiting for the picture of {text(camera)} ...")
+    return _box(f'{text(camera)}<br><img style="width:100%" src="data:image/jpeg;base64,{jpeg_base64}" alt="{text(camera)}">')
+
+
+def _degrees(angle_rad: float) -> float:
+    # Angles come over the network: anything beyond a full turn is shown as such.
+    return float(np.rad2deg(min(max(angle_rad, -7.0), 7.0))) + 0.0
+
+
+def _row(cells: Sequence[str], *, head: bool = False) -> str:
+    tag = "th" if head else "td"
+    return "<tr>" + "".join(f'<{tag} style="{_CELL if i else _LEFT}">{cell}</{tag}>' for i, cell in enumerate(cells)) + "</tr>"
+
+
+def _table(rows: Sequence[str]) -> str:
+    return _box(f'<table style="border-collapse:collapse;width:100%">{"".join(rows)}</table>')
+
+
+def _box(content: str) -> str:
+    return f'<div style="{_STYLE}">{content}</div>'

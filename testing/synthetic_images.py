@@ -1,0 +1,125 @@
+"""Pictures with a known truth: painted finger tips on skin before a wall, with shading, blur, noise and 2x2 averaged chroma.
+
+For tests and benchmarks of the eye alone; whole hands in whole rooms are the simulator's. Pure: the same seed gives the same picture.
+A tip that reaches over the picture's edge is cut there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rhot.files.calibration import ColorRange, Colors
+from services.pi_tracker.image.frame import Frame, Image, Layout
+
+Bgr = tuple[float, float, float]
+# Paints that a pair of cameras can tell apart, skin, and a grey wall, as a camera shows them in full light.
+PAINTS: dict[str, Bgr] = {
+    "green": (60, 150, 50),
+    "blue": (190, 90, 30),
+    "magenta": (140, 40, 190),
+    "cyan": (190, 170, 40),
+    "violet": (170, 50, 110),
+    "lime": (40, 200, 150),
+}
+SKIN: Bgr = (120, 150, 200)
+WALL: Bgr = (150, 152, 149)
+# Edges are drawn so many times finer and averaged.
+_FINE = 6
+# The part of its light that comes from all around: no side of a finger is black.
+_DARKEST = 0.15
+_YUV_FROM_BGR = np.array([[0.0979, 0.5041, 0.2568], [0.4392, -0.2910, -0.1482], [-0.0714, -0.3678, 0.4392]], np.float32)
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A painted finger tip: the middle of its paint, width and length in px, direction in rad, the side the light comes from in rad."""
+
+    color: str
+    x_px: float
+    y_px: float
+    width_px: float = 9.0
+    length_px: float = 10.0
+    turn_rad: float = 0.4
+    light_rad: float = 0.3
+
+
+def clean(
+    tips: Sequence[Tip], size_px: tuple[int, int] = (64, 64), shading: float = 0.5, blur_px: float = 0.8, wall: Bgr | Image = WALL
+) -> tuple[Image, dict[str, tuple[float, float]]]:
+    """The picture without noise, float32 BGR (h, w, 3), and the centre of the visible paint of each colour, as if no other tip hid it.
+
+    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of the lens; a wall of several colours is an
+    image (h, w, 3).
+    """
+    image = np.empty((size_px[1], size_px[0], 3), np.float32)
+    image[:] = _light(wall)
+    truth = {tip.color: _draw(image, tip, shading) for tip in tips}
+    # A lens blurs light, not grey levels.
+    light = cv2.GaussianBlur(image, (0, 0), blur_px)
+    return np.float32(255.0) * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055), truth
+
+
+def noisy(image: Image, sigma: float, seed: int) -> Image:
+    """With white sensor noise of sigma grey levels in each channel, as bytes."""
+    noise = np.random.default_rng(seed).normal(0.0, sigma, image.shape)
+    return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+
+
+def i420(bgr: Image) -> Image:
+    """YUV420 as a camera makes it, the chroma of 2x2 pixels averaged; (h, w, 3) -> (h * 3 / 2, w)."""
+    height, width = bgr.shape[:2]
+    yuv = bgr.astype(np.float32) @ _YUV_FROM_BGR.T + np.array([16, 128, 128], np.float32)
+    chroma = cv2.resize(yuv[..., 1:], (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    planes = np.concatenate([yuv[..., 0].ravel(), chroma[..., 0].ravel(), chroma[..., 1].ravel()])
+    return np.clip(np.rint(planes), 0, 255).astype(np.uint8).reshape(height * 3 // 2, width)
+
+
+def frame_of(bgr: Image, seq: int = 0, layout: Layout = "i420", fps: float = 30.0) -> Frame:
+    """A frame of a BGR image, number `seq` of a camera called "left"."""
+    image = i420(bgr) if layout == "i420" else bgr
+    stamp_ns = 1_700_000_000_000_000_000 + round(seq * 1e9 / fps)
+    return Frame("left", seq, stamp_ns, 30_000.0, (bgr.shape[1], bgr.shape[0]), image, layout)
+
+
+def ranges() -> Colors:
+    """HSV ranges of all paints."""
+    return Colors(colors={name: _range(bgr) for name, bgr in PAINTS.items()})
+
+
+def _range(bgr: Bgr) -> ColorRange:
+    hue = int(cv2.cvtColor(np.array([[bgr]], np.uint8), cv2.COLOR_BGR2HSV)[0, 0, 0])
+    return ColorRange(hsv_low=((hue - 10) % 180, 90, 30), hsv_high=((hue + 10) % 180, 255, 255))
+
+
+def _light(bgr: Bgr | Image) -> Image:
+    """Linear light 0..1 of grey levels (..., 3), by the sRGB curve (IEC 61966-2-1)."""
+    levels = np.array(bgr) / 255.0
+    return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
+
+
+def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
+    """Draw a tip in linear light, sharp but anti-aliased; returns the centre of its paint."""
+    reach = int(3.2 * tip.length_px + tip.width_px)
+    x0, y0 = max(int(tip.x_px) - reach, 0), max(int(tip.y_px) - reach, 0)
+    window = image[y0 : int(tip.y_px) + reach, x0 : int(tip.x_px) + reach]
+    height, width = window.shape[:2]
+    fine = window.repeat(_FINE, 0).repeat(_FINE, 1)
+    rows, columns = np.mgrid[: height * _FINE, : width * _FINE].astype(np.float32)
+    x, y = (columns + 0.5) / _FINE - 0.5 + x0 - tip.x_px, (rows + 0.5) / _FINE - 0.5 + y0 - tip.y_px
+    c, s = np.cos(tip.turn_rad), np.sin(tip.turn_rad)
+    along, across = x * c + y * s, -x * s + y * c
+    # A cylinder that ends in a hemisphere, lit from one side and from all around.
+    radius, start = tip.width_px / 2, -tip.length_px / 2 + tip.width_px / 2
+    away = np.where(along < start, np.hypot(along - start, across), np.abs(across))
+    finger = (away < radius) & (along < 3 * tip.length_px)
+    paint = finger & (along < tip.length_px / 2)
+    facing = np.sqrt(np.clip(1 - (away / radius) ** 2, 0, 1)) * np.cos(tip.light_rad) + across / radius * np.sin(tip.light_rad)
+    light = np.clip(1 - shading + shading * facing, _DARKEST, 1.0)[..., None]
+    fine[finger] = (_light(SKIN) * light)[finger]
+    fine[paint] = (_light(PAINTS[tip.color]) * light)[paint]
+    window[:] = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    return float(x[paint].mean() + tip.x_px), float(y[paint].mean() + tip.y_px)

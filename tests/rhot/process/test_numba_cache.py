@@ -1,0 +1,74 @@
+"""The folder of compiled kernels: one for each state of the sources, and never one of an older state."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rhot.process.numba_cache import cache_folder, clear_old, use_cache
+
+PACKAGE = "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\nuse_cache(Path(__file__).parent)\n"
+KERNEL = "from numba import njit\n\n\n@njit(cache=True)\ndef {name}(x):\n    return {body}\n"
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    monkeypatch.setenv("RHOT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    folder = tmp_path / "kernels"
+    folder.mkdir()
+    (folder / "__init__.py").write_text(
+        "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\nuse_cache(Path(__file__).parent)\n"
+    )
+    (folder / "inner.py").write_text(KERNEL.format(name="inner", body="x + 1"))
+    outer = KERNEL.format(name="outer", body="inner(x)").replace("import njit\n", "import njit\n\nfrom kernels.inner import inner\n")
+    (folder / "outer.py").write_text(outer)
+    (folder / "plain.py").write_text("ANSWER = 42\n")
+    return folder
+
+
+def outcome(package, **variables) -> int:
+    code = "from kernels.outer import outer; print(outer(1))"
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), **variables}
+    return int(subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True).stdout)
+
+
+def test_a_changed_callee_is_compiled_anew(package):
+    assert outcome(package) == 2
+    before = cache_folder(package)
+    assert list(before.rglob("*.nbc"))
+    (package / "inner.py").write_text(KERNEL.format(name="inner", body="x + 10"))
+    # Also below a parent process that still has the old folder in its environment.
+    assert outcome(package, NUMBA_CACHE_DIR=str(before)) == 11
+    clear_old(package)
+    assert not before.exists()
+    assert cache_folder(package).is_dir()
+
+
+def test_files_without_kernels_do_not_count(package):
+    before = cache_folder(package)
+    (package / "plain.py").write_text("ANSWER = 43\n")
+    assert cache_folder(package) == before
+
+
+def test_a_users_own_choice_stays(package, monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "mine"))
+    assert use_cache(package) is None
+    assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "mine")
+
+
+def test_without_a_folder_to_write_numba_decides(package, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("RHOT_CACHE", str(tmp_path / "file"))
+    assert use_cache(package) is None
+    assert "NUMBA_CACHE_DIR" not in os.environ
+
+
+def test_systemds_folder_comes_before_the_users(package, monkeypatch, tmp_path):
+    monkeypatch.delenv("RHOT_CACHE")
+    monkeypatch.setenv("CACHE_DIRECTORY", f"{tmp_path / 'rhot'}:{tmp_path / 'other'}")
+    assert cache_folder(package).parent == tmp_path / "rhot"

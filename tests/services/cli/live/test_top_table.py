@@ -1,0 +1,78 @@
+import msgspec
+import pytest
+
+from rhot.messages import Health, StreamHealth
+from services.cli.live.top_table import Watcher, text
+
+NOW_NS = 1_700_000_000_000_000_000
+
+
+def stream(**changes):
+    values = {
+        "key": "rhot/sim/hand/right/pose",
+        "direction": "out",
+        "count": 30,
+        "rate_hz": 30.0,
+        "expected_hz": 30.0,
+        "ok": True,
+        "dropped": 0,
+        "rejected": 0,
+        "latency_p50_ms": 21.0,
+        "latency_p99_ms": 35.0,
+    }
+    return StreamHealth(**values | changes)
+
+
+@pytest.fixture
+def health():
+    return Health(
+        service="solver",
+        instance="main",
+        stamp_ns=NOW_NS,
+        version="0",
+        pid=1,
+        uptime_s=5.0,
+        state="running",
+        streams=[stream()],
+        errors=0,
+        last_error="",
+        cpu_percent=3.0,
+        rss_mb=90.0,
+    )
+
+
+@pytest.fixture
+def watcher():
+    return Watcher("sim", [("solver", "main")])
+
+
+def test_a_service_that_never_came_is_absent(watcher):
+    board = watcher.board(NOW_NS)
+    assert [row.state for row in board.services] == ["absent"]
+    assert not board.healthy
+
+
+def test_running_silent_and_gone(watcher, health):
+    watcher.token("solver", "main", True)
+    watcher.beat(health, NOW_NS)
+    board = watcher.board(NOW_NS + 1_000_000_000)
+    assert board.healthy
+    assert board.glass_to_pose_ms == {"right": (21.0, 35.0)}
+    assert watcher.board(NOW_NS + 4_000_000_000).services[0].state == "silent"
+    watcher.token("solver", "main", False)
+    assert watcher.board(NOW_NS + 1_000_000_000).services[0].state == "gone"
+
+
+def test_a_slow_stream_is_marked(watcher, health):
+    watcher.token("solver", "main", True)
+    watcher.beat(msgspec.structs.replace(health, streams=[stream(ok=False, rate_hz=3.0, rejected=5)]), NOW_NS)
+    board = watcher.board(NOW_NS)
+    assert not board.healthy
+    line = next(line for line in text(board).splitlines() if "hand/right/pose" in line)
+    assert line.lstrip().startswith("! out")
+    assert "rejected 5" in line
+
+
+def test_uninvited_services_are_listed_too(watcher, health):
+    watcher.token("bridge", "vmc", True)
+    assert [(row.service, row.state) for row in watcher.board(NOW_NS).services] == [("solver", "absent"), ("bridge", "silent")]

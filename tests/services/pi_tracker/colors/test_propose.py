@@ -1,0 +1,79 @@
+"""Markers nobody pointed at."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.pi_tracker.colors.fit import fit, gather
+from services.pi_tracker.colors.propose import PAINT_HUES, boxes_of, propose
+from services.pi_tracker.colors.report import examine
+
+SIZE = (240, 160)
+PLACES = {"green": 30.0, "blue": 66.0, "magenta": 102.0, "cyan": 138.0, "violet": 174.0, "lime": 210.0}
+
+
+@pytest.fixture
+def hand(studio, tip):
+    def make(colors, count=3, thing=None):
+        frames, truths = [], []
+        for number in range(count):
+            tips = [tip(c, PLACES[c] + 2 * number, 70.0 + 3 * number, width_px=13.0, length_px=14.0) for c in colors]
+            clean, truth = studio.clean(tips, SIZE)
+            if thing is not None:
+                clean[10:40, 20:200] = thing
+            frames.append(studio.of(studio.bgr(clean, 5.0, number), number))
+            truths.append(truth)
+        return frames, truths
+
+    return make
+
+
+def test_six_paints_are_found_named_and_can_be_fitted(hand):
+    frames, truths = hand(PLACES)
+    proposals, _ = propose(frames, list(PLACES))
+    assert {one.color for one in proposals} == set(PLACES)
+    for one in proposals:
+        for box in one.boxes:
+            x, y = truths[box.frame][one.color]
+            assert box.x_px <= x <= box.x_px + box.width_px
+            assert box.y_px <= y <= box.y_px + box.height_px
+    study = gather(frames, boxes_of(proposals))
+    assert examine(study, fit(study.samples)).warnings == ()
+
+
+def test_names_are_those_of_the_rig_where_they_fit(hand):
+    frames, _ = hand(["green", "blue"])
+    assert {one.color for one in propose(frames, ["blue", "lime"])[0]} == {"blue", "green"}
+    assert {one.color for one in propose(frames)[0]} == {"blue", "green"}
+
+
+def test_furniture_is_not_proposed_and_its_hue_not_suggested(hand):
+    frames, _ = hand(["green"], thing=(190, 90, 30))
+    proposals, suggestions = propose(frames)
+    assert [one.color for one in proposals] == ["green"]
+    names = [one.color for one in suggestions]
+    assert "blue" not in names
+    assert "green" not in names
+    assert {"magenta", "violet"} <= set(names)
+
+
+def test_skin_hues_are_never_suggested(hand):
+    frames, _ = hand([])
+    proposals, suggestions = propose(frames)
+    assert proposals == []
+    assert not {"red", "orange"} & {one.color for one in suggestions}
+    assert all(one.clearance >= 12.0 for one in suggestions)
+    assert set(PAINT_HUES) >= {one.color for one in suggestions}
+
+
+def test_what_is_seen_in_few_pictures_only_is_passed_over(hand):
+    frames, _ = hand(["green", "blue"], count=2)
+    more, _ = hand(["green"], count=4)
+    assert {one.color for one in propose(frames + more)[0]} == {"green"}
+
+
+def test_noise_alone_proposes_nothing(studio):
+    rng = np.random.default_rng(1)
+    noise = np.clip(rng.normal(40.0, 12.0, (SIZE[1], SIZE[0], 3)), 0, 255).astype(np.uint8)
+    assert propose([studio.of(noise)])[0] == []

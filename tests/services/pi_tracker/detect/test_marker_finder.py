@@ -1,0 +1,57 @@
+"""Search, identity and measurement together: markers that others hide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rhot.files.config import Tracker
+from services.pi_tracker.step import TrackerStep
+
+SIZE = (160, 100)
+
+
+@pytest.fixture
+def shows(studio):
+    """A frame with a green patch at x = 60 and a blue one at a given place, before it, with a rim of another colour."""
+
+    def make(seq, blue_x, rim_px=0):
+        image = np.full((SIZE[1], SIZE[0], 3), 140.0, np.float32)
+        image[40:52, 60:76] = studio.paints["green"]
+        image[36:60, blue_x - rim_px : blue_x] = 90.0
+        image[36:60, blue_x : blue_x + 24] = studio.paints["blue"]
+        return studio.of(studio.bgr(image, 2.0, seq), seq)
+
+    return make
+
+
+def markers(step, frame):
+    return {marker.color: marker for marker in step.step(frame).markers}
+
+
+# The last is a single column of cells, which the mask filters take away.
+@pytest.mark.parametrize(("left_px", "rim_px"), [(8, 0), (4, 0), (2, 6)])
+def test_what_is_left_of_a_marker_is_found_where_it_must_be_and_said_to_be_little(shows, colors, left_px, rim_px):
+    step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
+    for seq in range(6):
+        free = markers(step, shows(seq, 110))
+    partly = markers(step, shows(6, 60 + left_px + rim_px, rim_px))
+    assert set(partly) == {"green", "blue"}
+    assert partly["green"].x_px == pytest.approx(60 + left_px / 2, abs=2.0)
+    assert partly["green"].quality < 0.7 * free["green"].quality
+    # The middle of the whole is at 67.5.
+    assert abs(partly["green"].x_px - 67.5) < 3.0 * partly["green"].sigma_px
+
+
+def test_a_marker_that_is_gone_is_not_guessed(shows, colors):
+    step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
+    for seq in range(6):
+        markers(step, shows(seq, 110))
+    assert set(markers(step, shows(6, 56))) == {"blue"}
+    # And found again at once.
+    assert set(markers(step, shows(7, 110))) == {"green", "blue"}
+
+
+def test_without_having_been_seen_a_sliver_is_nothing(shows, colors):
+    step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
+    assert set(markers(step, shows(0, 62))) == {"blue"}

@@ -1,0 +1,172 @@
+"""Colour ranges over the bus, without a restart."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+
+import msgspec
+import pytest
+
+from rhot import topics
+from rhot.errors import BusError, CalibrationError
+from rhot.files.calibration import ColorRange, Colors, load_colors
+
+NOTHING = ColorRange(hsv_low=(150, 250, 250), hsv_high=(151, 255, 255))
+
+
+async def refused(service, count):
+    while service.values["colors_refused"] < count:
+        await asyncio.sleep(0.02)
+
+
+async def test_a_put_takes_effect_and_is_written_and_told(config, tracking, seen, colors, tmp_path):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        assert await client.colors("left") == colors
+        made = Colors(date="2026-01-02T03:04:05", tool="test", residuals={"x": 1}, colors={**colors.colors, "green": NOTHING})
+        await client.set_colors("left", made)
+        await seen(client, "blue")
+        assert await client.colors("left") == made
+        assert load_colors(tmp_path / "calibration", "left") == made
+        assert [path.name for path in (tmp_path / "calibration").iterdir()] == ["left.colors.json"]
+        assert service.errors == 0
+
+
+async def test_the_file_itself_can_be_put_by_any_tool(config, tracking, seen, colors):
+    """As `zenoh put` does: bytes on the key."""
+    async with tracking(config) as (_, client):
+        await seen(client, "blue", "green")
+        text = json.dumps({"colors": {name: msgspec.to_builtins(span) for name, span in {**colors.colors, "blue": NOTHING}.items()}})
+        client.bus.put_raw(topics.COLORS.key("desk", camera="left"), text.encode())
+        await seen(client, "green")
+        # Who says nothing of the date gets one.
+        assert (await client.colors("left")).date
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"green": None}, "'green' of rig.toml's markers, which is tracked, would be lost"),
+        ({"green": ColorRange(hsv_low=(0, 200, 0), hsv_high=(10, 100, 255))}, "lowest saturation, 200, is above its highest"),
+    ],
+)
+async def test_what_cannot_be_is_refused_with_the_reason(config, tracking, seen, colors, change, words):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        ranges = {name: span for name, span in {**colors.colors, **change}.items() if span is not None}
+        with pytest.raises(CalibrationError, match=words):
+            await client.set_colors("left", Colors(date="d", tool="t", colors=ranges))
+        assert service.values["colors_refused"] == 1
+        assert await client.colors("left") == colors
+        await seen(client, "blue", "green")
+
+
+async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(config, tracking, seen, colors):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        with pytest.raises(CalibrationError):
+            await client.set_colors("left", Colors(date="d", tool="t", colors={"green": NOTHING}))
+        assert "are refused" in service.last_error
+        await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
+        assert service.last_error == ""
+        service.error("something else")
+        await client.set_colors("left", Colors(date="f", tool="t", colors=colors.colors))
+        assert service.last_error == "something else"
+
+
+GARBAGE = [
+    b"",
+    b"{}",
+    b"\xff\xfe",
+    b"[" * 30_000,
+    b'{"colors":{"green":{"hsv_low":[180,0,0],"hsv_high":[10,255,255]}}}',
+    b'{"colors":{"green":{"hsv_low":[0,0,0],"hsv_high":[10,256,255]}}}',
+    b'{"colors":{"green":{"hsv_low":[0,-1,0],"hsv_high":[10,255,255]}}}',
+    b'{"colors":{"green":{"hsv_low":[0.5,1,0],"hsv_high":[10,255,255]}}}',
+    b'{"colors":{"gr een":{"hsv_low":[0,1,0],"hsv_high":[10,255,255]}}}',
+]
+
+
+async def test_garbage_is_refused_counted_and_does_no_harm(config, tracking, seen, colors):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        for count, payload in enumerate(GARBAGE, start=1):
+            client.bus.put_raw(topics.COLORS.key("desk", camera="left"), payload)
+            await refused(service, count)
+            assert "are refused" in service.last_error
+        assert service.errors == len(GARBAGE)
+        assert await client.colors("left") == colors
+        await seen(client, "blue", "green")
+
+
+async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(config, tracking, seen, colors, monkeypatch):
+    def full(path, calibration):
+        raise OSError(28, "No space left on device")
+
+    async with tracking(config) as (_, client):
+        await seen(client, "blue", "green")
+        monkeypatch.setattr("services.pi_tracker.endpoints.color_ranges.save", full)
+        with pytest.raises(CalibrationError, match=r"cannot be written.*No space left"):
+            await client.set_colors("left", Colors(date="d", tool="t", colors={**colors.colors, "green": NOTHING}))
+        await seen(client, "blue", "green")
+        assert await client.colors("left") == colors
+
+
+@pytest.mark.parametrize("spoil", ["missing", "incomplete", "broken"])
+async def test_a_live_camera_starts_uncalibrated_and_is_calibrated_over_the_bus(config, tracking, seen, colors, tmp_path, spoil):
+    path = tmp_path / "calibration" / "left.colors.json"
+    match spoil:
+        case "missing":
+            path.unlink()
+        case "incomplete":
+            path.write_bytes(msgspec.json.encode(Colors(colors={"green": colors.colors["green"]})))
+        case "broken":
+            path.write_text("{")
+    async with tracking(config) as (service, client):
+        await seen(client, *(["green"] if spoil == "incomplete" else []))
+        assert "rhot calibrate colors" in service.last_error
+        await client.set_colors("left", msgspec.structs.replace(colors, date="now", tool="t"))
+        await seen(client, "blue", "green")
+        assert load_colors(tmp_path / "calibration", "left").colors == colors.colors
+
+
+async def test_drift_is_told_in_health_and_not_followed(config, tracking, seen, colors):
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        green = colors.colors["green"]
+        # As if the light had turned: the range ends in the middle of the marker's hues.
+        low, high = green.hsv_low, green.hsv_high
+        turned = ColorRange(hsv_low=(low[0] + 8, *low[1:]), hsv_high=(high[0] + 8, *high[1:]))
+        await client.set_colors("left", Colors(date="d", tool="t", colors={**colors.colors, "green": turned}))
+        while "has drifted" not in service.last_error:
+            await asyncio.sleep(0.02)
+        assert "'green'" in service.last_error
+        assert "Range that fits now" in service.last_error
+        assert service.values["green_outside"] >= 0.0
+        assert abs(service.values["green_hue_off"]) > 0.5
+        assert (await client.colors("left")).colors["green"] == turned
+        errors = service.errors
+        await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
+        assert "green_hue_off" not in service.values or abs(service.values["green_hue_off"]) < 0.5
+        assert service.errors == errors
+
+
+async def test_a_camera_that_is_not_there_is_said_to_be_missing(config, tracking, seen, colors):
+    async with tracking(config) as (_, client):
+        await seen(client, "blue", "green")
+        for asked in (client.colors("nobody"), client.set_colors("nobody", colors), client.exposure("nobody")):
+            with pytest.raises(BusError, match="no tracker of camera 'nobody' answers"):
+                await asked
+
+
+async def test_colours_may_come_one_after_the_other(config, tracking, seen, colors, tmp_path):
+    (tmp_path / "calibration" / "left.colors.json").unlink()
+    async with tracking(config) as (service, client):
+        await seen(client)
+        green = Colors(date="1", tool="t", colors={"green": colors.colors["green"]})
+        await client.set_colors("left", green)
+        assert "blue not calibrated yet" in service.last_error
+        await seen(client, "green")
+        await client.set_colors("left", Colors(date="2", tool="t", colors={**green.colors, "blue": colors.colors["blue"]}))
+        await seen(client, "blue", "green")

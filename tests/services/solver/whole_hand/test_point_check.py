@@ -1,0 +1,85 @@
+"""Which points are let in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot.hand import LANDMARKS, forward, landmark_point
+from rhot.messages import HandPoints
+from services.solver.whole_hand.point_check import places, usable
+
+
+@pytest.fixture
+def message(world: Callable) -> HandPoints:
+    ours = world("right")
+    return ours.message(ours.points(ours.motion(1, 1)[0]), 0)
+
+
+def _replaced(message: HandPoints, index: int, **fields: object) -> HandPoints:
+    points = list(message.points)
+    points[index] = msgspec.structs.replace(points[index], **fields)
+    return msgspec.structs.replace(message, points=points)
+
+
+def test_good_points_pass(message: HandPoints, world: Callable) -> None:
+    seen = usable(message, places(world("right").model))
+    assert list(seen) == [point.name for point in message.points]
+    assert all(landmark.measured for landmark in seen.values())
+    np.testing.assert_allclose(seen["wrist"].inverse_sigma, 1e3)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, np.nan, np.inf, 11.0])
+def test_absurd_places_are_dropped(message: HandPoints, world: Callable, value: float) -> None:
+    seen = usable(_replaced(message, 2, position_m=(0.0, value, 0.5)), places(world("right").model))
+    assert list(seen) == [point.name for i, point in enumerate(message.points) if i != 2]
+
+
+@pytest.mark.parametrize("sigma", [np.nan, np.inf, 1e300, 0.2])
+def test_points_that_know_nothing_are_dropped(message: HandPoints, world: Callable, sigma: float) -> None:
+    assert len(usable(_replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3)), places(world("right").model))) == 5
+
+
+def test_too_good_a_sigma_is_not_believed(message: HandPoints, world: Callable) -> None:
+    seen = usable(_replaced(message, 1, sigma_m=(0.0, 0.0, 0.0)), places(world("right").model))
+    assert np.all(seen["thumb_tip"].inverse_sigma < 1e4)
+
+
+def test_predicted_points_weigh_less(message: HandPoints, world: Callable) -> None:
+    seen = usable(_replaced(message, 1, source="predicted"), places(world("right").model))
+    assert not seen["thumb_tip"].measured
+    np.testing.assert_allclose(seen["thumb_tip"].inverse_sigma, 1e3 / 3.0)
+
+
+def test_unknown_names_and_repetitions(message: HandPoints, world: Callable) -> None:
+    twice = msgspec.structs.replace(
+        message, points=[*message.points, msgspec.structs.replace(message.points[0], position_m=(0.0, 0.0, 0.0))]
+    )
+    nose = _replaced(twice, 3, name="nose")
+    seen = usable(nose, places(world("right").model))
+    assert set(seen) == {point.name for point in message.points} - {message.points[3].name}
+    np.testing.assert_array_equal(seen["wrist"].point_m, message.points[0].position_m)
+
+
+@pytest.mark.parametrize("index", [0, 1, 4])
+def test_a_point_of_another_hand_is_dropped(message: HandPoints, world: Callable, index: int) -> None:
+    place = np.array(message.points[index].position_m) + np.array([0.6, 0.0, 0.0])
+    seen = usable(_replaced(message, index, position_m=tuple(place)), places(world("right").model))
+    assert message.points[index].name not in seen
+    assert len(seen) == 5
+
+
+def test_no_posture_of_a_hand_is_taken_for_two_hands(world: Callable) -> None:
+    ours = world("right")
+    known = places(ours.model)
+    for instant in ours.motion(2, 60):
+        joints = forward(ours.model, instant.rotation, instant.position_m, instant.angles_rad)
+        everything = {name: landmark_point(ours.model, name, *joints) for name in LANDMARKS}
+        assert len(usable(ours.message(everything, 0), known)) == len(LANDMARKS)
+
+
+def test_nothing_is_no_error(message: HandPoints, world: Callable) -> None:
+    assert usable(msgspec.structs.replace(message, points=[]), places(world("right").model)) == {}

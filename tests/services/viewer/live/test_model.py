@@ -1,0 +1,117 @@
+"""Messages in, views out: freshness, absurd values, bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rhot.messages import HandPoints, HandPose, Health, ObjectPose
+from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
+
+STAMP_NS = 1_700_000_000_000_000_000
+
+
+def test_a_hand_is_shown_until_it_is_stale(make_pose: Callable[..., HandPose], make_points: Callable[..., HandPoints]) -> None:
+    model = ViewModel()
+    assert model.view(0.0).hands == {}
+    pose = make_pose()
+    model.pose(pose, 1.0, STAMP_NS + 31_000_000)
+    model.points(make_points("index_tip", "nonsense"), 1.0)
+    view = model.view(1.0 + STALE_S)
+    hand = view.hands["right"]
+    np.testing.assert_array_equal(hand.positions_m, [j.position_m for j in pose.joints])
+    assert hand.sources == ("solved",) * 26
+    assert view.latency_ms["right"] == pytest.approx(31.0)
+    assert list(view.points) == [("right", "index_tip")]
+    assert not view.points["right", "index_tip"].predicted
+    assert model.absurd == 1
+    empty = model.view(1.01 + STALE_S)
+    assert empty.hands == empty.points == empty.latency_ms == empty.trails == {}
+
+
+@pytest.mark.parametrize("wall_ns", [0, STAMP_NS - 11 * 10**9, STAMP_NS + 11 * 10**9, 2**63])
+def test_stamps_of_another_time_say_nothing_about_latency(make_pose: Callable[..., HandPose], wall_ns: int) -> None:
+    model = ViewModel()
+    model.pose(make_pose(), 0.0, wall_ns)
+    assert model.view(0.0).latency_ms == {"right": None}
+
+
+@pytest.mark.parametrize("at", [(math.nan, 0.0, 0.0), (0.0, 1e300, 0.0), (0.0, 0.0, -101.0), (math.inf, 0.0, 0.0)])
+def test_absurd_positions_are_not_drawn(
+    make_pose: Callable[..., HandPose],
+    make_points: Callable[..., HandPoints],
+    make_object: Callable[..., ObjectPose],
+    at: tuple[float, float, float],
+) -> None:
+    model = ViewModel()
+    model.pose(make_pose(at), 0.0, STAMP_NS)
+    model.points(make_points("wrist", at=at), 0.0)
+    model.object(make_object(position_m=at), 0.0)
+    view = model.view(0.0)
+    assert view.hands == view.points == view.objects == {}
+    assert model.absurd == 3
+
+
+@pytest.mark.parametrize("wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1e300, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)])
+def test_absurd_orientations_are_not_drawn(make_object: Callable[..., ObjectPose], wxyz: tuple[float, ...]) -> None:
+    model = ViewModel()
+    model.object(make_object(orientation_wxyz=wxyz), 0.0)
+    assert model.view(0.0).objects == {}
+
+
+@pytest.mark.parametrize(
+    ("fields", "drawn"),
+    [({}, True), ({"tracking": "rotation_only"}, True), ({"tracking": "lost"}, False), ({"registered": False}, False)],
+)
+def test_objects_are_drawn_where_they_are_known(make_object: Callable[..., ObjectPose], fields: dict[str, object], drawn: bool) -> None:
+    model = ViewModel()
+    model.object(make_object(**fields), 0.0)
+    assert model.view(0.0).objects["cup"].drawn is drawn
+
+
+def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(make_pose: Callable[..., HandPose]) -> None:
+    model = ViewModel()
+    for i in range(TRAIL + 10):
+        model.pose(make_pose((0.001 * i, 0.0, 0.5)), 0.03 * i, STAMP_NS)
+    trail = model.view(0.03 * (TRAIL + 9)).trails["right"]
+    assert trail.shape == (TRAIL, 5, 3)
+    np.testing.assert_allclose(trail[:, 0, 0], 0.001 * np.arange(10, TRAIL + 10))
+    model.pose(make_pose(), 100.0, STAMP_NS)
+    assert model.view(100.0).trails["right"].shape == (1, 5, 3)
+
+
+def test_state_is_bounded(make_object: Callable[..., ObjectPose], make_health: Callable[..., Health]) -> None:
+    model = ViewModel()
+    for i in range(1000):
+        model.object(make_object(f"o{i}"), 0.0)
+        model.health(make_health(f"s{i}"), 0.0)
+    view = model.view(0.0)
+    assert (len(view.objects), len(view.health)) == (32, 64)
+    # What has left makes room.
+    later = 1.0 + HEALTH_STALE_S
+    assert model.view(later).health == []
+    model.object(make_object("new"), later)
+    assert list(model.view(later).objects) == ["new"]
+
+
+numbers = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(at=st.tuples(numbers, numbers, numbers), wxyz=st.tuples(numbers, numbers, numbers, numbers), wall_ns=st.integers(-(2**70), 2**70))
+def test_whatever_comes_only_finite_things_are_drawn(
+    make_pose: Callable[..., HandPose], make_object: Callable[..., ObjectPose], at: tuple[float, ...], wxyz: tuple[float, ...], wall_ns: int
+) -> None:
+    model = ViewModel()
+    model.pose(make_pose(at), 0.0, wall_ns)
+    model.object(make_object(position_m=at, orientation_wxyz=wxyz), 0.0)
+    view = model.view(0.0)
+    for hand in view.hands.values():
+        assert np.all(np.isfinite(hand.positions_m.astype(np.float32)))
+    for thing in view.objects.values():
+        assert np.all(np.isfinite([*thing.position_m, *thing.orientation_wxyz]))
