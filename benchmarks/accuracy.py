@@ -1,10 +1,13 @@
-"""How exact fusion is, how honest, and what it costs: `python benchmarks/accuracy.py [--synthetic-only] [--json FILE]`.
+"""How exact fusion is, how honest, and what it costs: `python benchmarks/accuracy.py
+[--synthetic-only] [--json FILE]`.
 
-The figures under the names of issue 4 are from pictures: hands as the simulator's cameras see them (sensor noise of 5 grey levels), through
-the tracker and fusion, with the solver's finger directions fed back, against the landmarks of the truth; four seeds each. Those under
-`synthetic` are from points (testing/synthetic_points.py) with 0.06 px of white noise: fusion's own errors. In mm; *_rms_mm is about the
-truth, *_precision_mm about each landmark's own mean, *_bias_mm that mean's. nees is squared error over predicted variance: 1 if sigma is
-honest. *_over_crb is the precision against one frame of each camera at the detector's measured noise.
+The figures under the names of issue 4 are from pictures: hands as the simulator's cameras see them
+(sensor noise of 5 grey levels), through the tracker and fusion, with the solver's finger directions
+fed back, against the landmarks of the truth; four seeds each. Those under `synthetic` are from
+points (testing/synthetic_points.py) with 0.06 px of white noise: fusion's own errors. In mm;
+*_rms_mm is about the truth, *_precision_mm about each landmark's own mean, *_bias_mm that mean's.
+nees is squared error over predicted variance: 1 if sigma is honest. *_over_crb is the precision
+against one frame of each camera at the detector's measured noise.
 """
 
 from __future__ import annotations
@@ -40,37 +43,64 @@ OTHERS = {
 }
 
 
-def synthetic(fusion: Fusion, path: Callable[[int], Motion] = lambda seed: Path(seed=seed), **setup: Any) -> dict[str, float]:
+def synthetic(
+    fusion: Fusion, path: Callable[[int], Motion] = lambda seed: Path(seed=seed), **setup: Any
+) -> dict[str, float]:
     """Figures of one method over all seeds; path makes the motion of a seed."""
     found = Score()
     for seed in SEEDS:
         rig, motion = Setup(seed=seed, **setup), path(seed)
         step = FusionStep(rig.config(fusion), rig.rig(), point_hands())
-        told = [points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)] + step.flush()
-        found.add(told, lambda at_s, motion=motion: dict(zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True)))  # type: ignore[misc]
+        told = [
+            points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)
+        ] + step.flush()
+        found.add(
+            told,
+            lambda at_s, motion=motion: dict(
+                zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True)
+            ),
+        )  # type: ignore[misc]
     return found.figures()
 
 
 def depth_bound_mm(distance_m: float, sigma_px: float) -> float:
-    """Cramer-Rao bound of the depth from one frame of each camera: the covariance of the triangulation."""
+    """Cramer-Rao bound of the depth from one frame of each camera: the covariance of the
+    triangulation.
+    """
     cameras = tuple(Setup().rig().values())
     R, t = extrinsics(cameras)
     seen = np.einsum("nij,j->ni", R, [0.0375, 0.0, distance_m]) + t
     sigma = sigma_px / cameras[0].focal_px[0]
-    return 1e3 * float(np.sqrt(triangulate(seen[:, :2] / seen[:, 2:], np.full(2, sigma), R, t, 3.0).covariance_m2[2, 2]))
+    return 1e3 * float(
+        np.sqrt(
+            triangulate(seen[:, :2] / seen[:, 2:], np.full(2, sigma), R, t, 3.0).covariance_m2[2, 2]
+        )
+    )
 
 
 def cost(cameras: int = 2, fps: float = 30.0, markers: int = 6) -> dict[str, float]:
-    """Microseconds of one frame: all of it, with and without telling points, and the share of a core."""
+    """Microseconds of one frame: all of it, with and without telling points, and the share of a
+    core.
+    """
     setup = Setup(cameras=cameras, fps=fps, phase_s=1.0 / (fps * cameras))
     given, config = frames(setup, Path(), 8.0), setup.config()
     # Further markers are knuckles that move as the first ones do, some pixels beside them.
-    more = dict(zip(("index_proximal", "middle_proximal"), ("yellow", "orange"), strict=True)) if markers > 6 else {}
+    more = (
+        dict(zip(("index_proximal", "middle_proximal"), ("yellow", "orange"), strict=True))
+        if markers > 6
+        else {}
+    )
     given = [
-        msgspec.structs.replace(f, markers=f.markers + [_beside(m, c) for m, c in zip(f.markers, more.values(), strict=False)])
+        msgspec.structs.replace(
+            f,
+            markers=f.markers
+            + [_beside(m, c) for m, c in zip(f.markers, more.values(), strict=False)],
+        )
         for f in given
     ]
-    config = msgspec.structs.replace(config, hand={"right": HandTable(markers=config.hand["right"].markers | more)})
+    config = msgspec.structs.replace(
+        config, hand={"right": HandTable(markers=config.hand["right"].markers | more)}
+    )
     step = FusionStep(config, setup.rig(), point_hands())
     quiet, telling, total = [], [], 0.0
     for number, frame in enumerate(given):
@@ -94,64 +124,106 @@ def _beside(marker: Marker, color: str) -> Marker:
 
 
 def still_figures(scenes: list[Pictures]) -> dict[str, Any]:
-    """Depth of a still hand: about the truth, about its own mean, against the bound, and how honest."""
+    """Depth of a still hand: about the truth, about its own mean, against the bound, and how
+    honest.
+    """
     scores = {str(scene.distance_m): scene.score(Fusion()) for scene in scenes}
     noise = {str(scene.distance_m): scene.detector_noise_px() for scene in scenes}
     precision = {distance: score.precision_z_mm() for distance, score in scores.items()}
-    bound = {distance: depth_bound_mm(float(distance), noise_px) for distance, noise_px in noise.items()}
+    bound = {
+        distance: depth_bound_mm(float(distance), noise_px) for distance, noise_px in noise.items()
+    }
     return {
-        "still_depth_rms_mm": {distance: score.figures()["z"] for distance, score in scores.items()},
-        "still_depth_precision_mm": {distance: round(value, 3) for distance, value in precision.items()},
-        "still_depth_bias_mm": {distance: round(score.bias_z_mm(), 3) for distance, score in scores.items()},
+        "still_depth_rms_mm": {
+            distance: score.figures()["z"] for distance, score in scores.items()
+        },
+        "still_depth_precision_mm": {
+            distance: round(value, 3) for distance, value in precision.items()
+        },
+        "still_depth_bias_mm": {
+            distance: round(score.bias_z_mm(), 3) for distance, score in scores.items()
+        },
         "still_detector_noise_px": {distance: round(value, 4) for distance, value in noise.items()},
         "still_crb_mm": {distance: round(value, 3) for distance, value in bound.items()},
-        "still_over_crb": {distance: round(precision[distance] / bound[distance], 3) for distance in scores},
-        "still_rms_over_crb": {distance: round(score.figures()["z"] / bound[distance], 3) for distance, score in scores.items()},
+        "still_over_crb": {
+            distance: round(precision[distance] / bound[distance], 3) for distance in scores
+        },
+        "still_rms_over_crb": {
+            distance: round(score.figures()["z"] / bound[distance], 3)
+            for distance, score in scores.items()
+        },
         "still_nees": {distance: score.figures()["nees"] for distance, score in scores.items()},
-        "still_nees_depth": {distance: score.figures()["nees_z"] for distance, score in scores.items()},
-        "still_without_finger_direction": {str(scene.distance_m): scene.score(Fusion(), feedback=False).figures() for scene in scenes},
+        "still_nees_depth": {
+            distance: score.figures()["nees_z"] for distance, score in scores.items()
+        },
+        "still_without_finger_direction": {
+            str(scene.distance_m): scene.score(Fusion(), feedback=False).figures()
+            for scene in scenes
+        },
     }
 
 
 def moving_figures(scene: Pictures) -> dict[str, Any]:
     """A moving hand by lag, and by the other methods."""
     lags = {str(lag): scene.score(Fusion(lag_frames=lag)).figures() for lag in (0, 1, 2)}
-    plain = {str(lag): scene.score(Fusion(lag_frames=lag), feedback=False).figures() for lag in (0, 1, 2)}
+    plain = {
+        str(lag): scene.score(Fusion(lag_frames=lag), feedback=False).figures() for lag in (0, 1, 2)
+    }
     return {
         "moving_rms_mm": {lag: figures["rms"] for lag, figures in lags.items()},
         "moving_nees": {lag: figures["nees"] for lag, figures in lags.items()},
         "moving_nees_depth": {lag: figures["nees_z"] for lag, figures in lags.items()},
-        "moving_without_finger_direction_rms_mm": {lag: figures["rms"] for lag, figures in plain.items()},
-        "moving_other_methods_rms_mm": {name: scene.score(fusion).figures()["rms"] for name, fusion in OTHERS.items()},
+        "moving_without_finger_direction_rms_mm": {
+            lag: figures["rms"] for lag, figures in plain.items()
+        },
+        "moving_other_methods_rms_mm": {
+            name: scene.score(fusion).figures()["rms"] for name, fusion in OTHERS.items()
+        },
     }
 
 
 def rendered_figures(config: RigConfig, seconds: float, seeds: tuple[int, ...]) -> dict[str, Any]:
-    """Issue 4's figures on pictures: still at two distances, moving at about 0.5 m/s RMS at 0.7 m, and fingers that play at 0.5 m."""
-    still = [Pictures(config, "still", distance_m, (0.0, 0.0, 0.0), seconds, seeds) for distance_m in (0.5, 1.0)]
+    """Issue 4's figures on pictures: still at two distances, moving at about 0.5 m/s RMS at 0.7 m,
+    and fingers that play at 0.5 m.
+    """
+    still = [
+        Pictures(config, "still", distance_m, (0.0, 0.0, 0.0), seconds, seeds)
+        for distance_m in (0.5, 1.0)
+    ]
     figures = still_figures(still)
     figures |= moving_figures(Pictures(config, "random", 0.7, (0.085, 0.06, 0.07), seconds, seeds))
     piano = Pictures(config, "piano", 0.5, (0.0, 0.0, 0.0), seconds, seeds)
-    figures["piano_0.5"] = {f"lag{lag}": piano.score(Fusion(lag_frames=lag)).figures() for lag in (0, 1, 2)}
+    figures["piano_0.5"] = {
+        f"lag{lag}": piano.score(Fusion(lag_frames=lag)).figures() for lag in (0, 1, 2)
+    }
     return figures
 
 
 def synthetic_figures() -> dict[str, Any]:
     """Everything from synthetic observations, under the names of the requirements."""
-    still = {str(z_m): synthetic(Fusion(), lambda seed, z_m=z_m: Sway(distance_m=z_m, seed=seed)) for z_m in (0.5, 1.0)}  # type: ignore[misc]
+    still = {
+        str(z_m): synthetic(Fusion(), lambda seed, z_m=z_m: Sway(distance_m=z_m, seed=seed))
+        for z_m in (0.5, 1.0)
+    }  # type: ignore[misc]
     moving = {str(lag): synthetic(Fusion(lag_frames=lag)) for lag in (0, 1, 2)}
     others = {name: synthetic(fusion) for name, fusion in OTHERS.items()}
     noisy = {str(lag): synthetic(Fusion(lag_frames=lag), sigma_px=0.2) for lag in (0, 1, 2)}
     return {
         "still_depth_rms_mm": {distance: figures["z"] for distance, figures in still.items()},
-        "still_over_crb": {distance: round(figures["z"] / depth_bound_mm(float(distance), 0.06), 3) for distance, figures in still.items()},
+        "still_over_crb": {
+            distance: round(figures["z"] / depth_bound_mm(float(distance), 0.06), 3)
+            for distance, figures in still.items()
+        },
         "still_nees": {distance: figures["nees"] for distance, figures in still.items()},
         "moving_rms_mm": {lag: figures["rms"] for lag, figures in moving.items()},
         "moving_nees": {lag: figures["nees"] for lag, figures in moving.items()},
         "moving_other_methods_rms_mm": {name: figures["rms"] for name, figures in others.items()},
         "moving_noise_0.2px_rms_mm": {lag: figures["rms"] for lag, figures in noisy.items()},
         "moving_clocks_off_10ms_rms_mm": {
-            str(lag): synthetic(Fusion(lag_frames=lag), clock_error_s=0.005, clock_sigma_s=0.01)["rms"] for lag in (0, 2)
+            str(lag): synthetic(Fusion(lag_frames=lag), clock_error_s=0.005, clock_sigma_s=0.01)[
+                "rms"
+            ]
+            for lag in (0, 2)
         },
     }
 
@@ -160,16 +232,24 @@ def main() -> int:
     """Run, print, and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=File, help="write the figures to this file")
-    parser.add_argument("--synthetic-only", action="store_true", help="leave the pictures out: ten seconds instead of a minute")
+    parser.add_argument(
+        "--synthetic-only",
+        action="store_true",
+        help="leave the pictures out: ten seconds instead of a minute",
+    )
     parser.add_argument("--seconds", type=float, default=6.0, help="length of each rendered scene")
     parser.add_argument(
-        "--seeds", default=",".join(map(str, RENDERED_SEEDS)), help="of the rendered scenes; constants were tuned on 1 to 4"
+        "--seeds",
+        default=",".join(map(str, RENDERED_SEEDS)),
+        help="of the rendered scenes; constants were tuned on 1 to 4",
     )
     options = parser.parse_args()
     figures: dict[str, Any] = {}
     seeds = tuple(int(seed) for seed in options.seeds.split(","))
     if not options.synthetic_only:
-        figures |= rendered_figures(load_rig(File(__file__).parents[1] / "config" / "sim.toml"), options.seconds, seeds)
+        figures |= rendered_figures(
+            load_rig(File(__file__).parents[1] / "config" / "sim.toml"), options.seconds, seeds
+        )
     figures |= cost()
     figures["load_8_markers_4_cameras_90_fps"] = cost(4, 90.0, markers=8)
     figures["synthetic"] = synthetic_figures()

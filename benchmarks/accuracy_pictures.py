@@ -1,4 +1,6 @@
-"""Hands in pictures for the benchmarks of accuracy: rendered, detected, fused, and compared with the truth. See accuracy.py."""
+"""Hands in pictures for the benchmarks of accuracy: rendered, detected, fused, and compared with
+the truth. See accuracy.py.
+"""
 
 from __future__ import annotations
 
@@ -47,18 +49,33 @@ class Score:
             at_s = (message.stamp_ns - start_ns) * 1e-9
             if at_s >= WARM_S and message.points:
                 places = truth(at_s)
-                self._errors += [np.array(point.position_m) - places[point.name] for point in message.points]
+                self._errors += [
+                    np.array(point.position_m) - places[point.name] for point in message.points
+                ]
                 self._sigmas += [np.array(point.sigma_m) for point in message.points]
                 for point in message.points:
-                    self._depths[self._runs, point.name].append(point.position_m[2] - float(places[point.name][2]))
+                    self._depths[self._runs, point.name].append(
+                        point.position_m[2] - float(places[point.name][2])
+                    )
 
     def precision_z_mm(self) -> float:
         """RMS of the depth errors about the mean of each landmark in each run."""
-        return 1e3 * float(np.sqrt(np.mean(np.concatenate([np.array(errors) - np.mean(errors) for errors in self._depths.values()]) ** 2)))
+        return 1e3 * float(
+            np.sqrt(
+                np.mean(
+                    np.concatenate(
+                        [np.array(errors) - np.mean(errors) for errors in self._depths.values()]
+                    )
+                    ** 2
+                )
+            )
+        )
 
     def bias_z_mm(self) -> float:
         """RMS of these means."""
-        return 1e3 * float(np.sqrt(np.mean([np.mean(errors) ** 2 for errors in self._depths.values()])))
+        return 1e3 * float(
+            np.sqrt(np.mean([np.mean(errors) ** 2 for errors in self._depths.values()]))
+        )
 
     def figures(self) -> dict[str, float]:
         """RMS along the axes and in space (mm), and the mean squared error over variance."""
@@ -66,33 +83,65 @@ class Score:
         x, y, z = (1e3 * np.sqrt(np.mean(errors**2, axis=0))).tolist()
         rms = 1e3 * float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
         nees = np.mean((errors / sigmas) ** 2, axis=0)
-        named = (("rms", rms), ("x", x), ("y", y), ("z", z), ("nees", float(nees.mean())), ("nees_z", float(nees[2])))
+        named = (
+            ("rms", rms),
+            ("x", x),
+            ("y", y),
+            ("z", z),
+            ("nees", float(nees.mean())),
+            ("nees_z", float(nees[2])),
+        )
         return {name: round(value, 3) for name, value in named}
 
 
-def make_scene(config: RigConfig, motion: str, distance_m: float, travel_m: tuple[float, float, float], seed: int) -> Scene:
+def make_scene(
+    config: RigConfig,
+    motion: str,
+    distance_m: float,
+    travel_m: tuple[float, float, float],
+    seed: int,
+) -> Scene:
     """A scene of that motion with sensor noise of 5 grey levels."""
     return build_scene(
-        config, dataclasses.replace(SCENES[motion], distance_m=distance_m, travel_m=travel_m, travel_hz=0.9, noise=5.0), motion, seed
+        config,
+        dataclasses.replace(
+            SCENES[motion], distance_m=distance_m, travel_m=travel_m, travel_hz=0.9, noise=5.0
+        ),
+        motion,
+        seed,
     )
 
 
 def detect(config: RigConfig, scene: Scene, seconds: float) -> list[MarkerFrame]:
-    """Every camera's pictures through the tracker, in order of exposure; clocks as well known as synchronisation leaves them."""
+    """Every camera's pictures through the tracker, in order of exposure.
+
+    Clocks as well known as synchronisation leaves them.
+    """
     found: list[tuple[float, MarkerFrame]] = []
     for name in scene.cameras:
         source = FrameSource(scene, name, recorded=True)
-        tracker = TrackerStep(name, load_colors(config.calibration_dir, name), config.tracker, source.camera.size_px, config.colors)
+        tracker = TrackerStep(
+            name,
+            load_colors(config.calibration_dir, name),
+            config.tracker,
+            source.camera.size_px,
+            config.colors,
+        )
         for seq in range(int(seconds * config.camera_named(name).fps)):
             taken = source.take(seq, START_NS)
             if taken.image is not None:
-                frame = Frame(name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420")
+                frame = Frame(
+                    name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420"
+                )
                 found.append((taken.time_s, tracker.step(frame, 0, 500_000)))
     return [frame for _, frame in sorted(found, key=lambda entry: entry[0])]
 
 
 class Pictures:
-    """One motion at one distance, rendered and detected for every seed; each method then runs on the same markers."""
+    """One motion at one distance, rendered and detected for every seed.
+
+    Each method then runs on the same markers.
+    """
 
     def __init__(
         self,
@@ -108,16 +157,24 @@ class Pictures:
         self._scenes = [make_scene(config, motion, distance_m, travel_m, seed) for seed in seeds]
         self._given = [detect(config, scene, seconds) for scene in self._scenes]
         self._hands: dict[HandName, Any] = {
-            hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()
+            hand: load_hand(config.calibration_dir, hand, table.scale)
+            for hand, table in config.hand.items()
         }
         # What each scene's truth was asked for already: kinematics take longer than fusion.
         self._known: list[dict[float, dict[str, Array]]] = [{} for _ in self._scenes]
 
     def score(self, fusion: Fusion, *, feedback: bool = True) -> Score:
-        """One method; feedback: the solver tells fusion which way the fingers point, as it does in a running rig."""
+        """One method.
+
+        Feedback: the solver tells fusion which way the fingers point, as it does in a running rig.
+        """
         config, found = msgspec.structs.replace(self._config, fusion=fusion), Score()
         for number, scene in enumerate(self._scenes):
-            step, solver, told = FusionStep(config, scene.cameras, self._hands), SolverStep(config, self._hands), []
+            step, solver, told = (
+                FusionStep(config, scene.cameras, self._hands),
+                SolverStep(config, self._hands),
+                [],
+            )
             for frame in self._given[number]:
                 for points in step.step(frame):
                     told.append(points)
@@ -133,12 +190,15 @@ class Pictures:
             scene = self._scenes[number]
             positions, rotations = scene.hands["right"].joints(scene.hand_states(at_s)["right"])
             known[at_s] = {
-                name: landmark_point(self._hands["right"], name, positions, rotations) for name in self._config.hand["right"].markers
+                name: landmark_point(self._hands["right"], name, positions, rotations)
+                for name in self._config.hand["right"].markers
             }
         return known[at_s]
 
     def detector_noise_px(self) -> float:
-        """How much a resting marker's x scatters from frame to frame (second differences: motion of a still hand cancels), RMS of all."""
+        """How much a resting marker's x scatters from frame to frame (second differences: motion of
+        a still hand cancels), RMS of all.
+        """
         squares = []
         for given in self._given:
             tracks: dict[tuple[str, str], list[float]] = defaultdict(list)
@@ -146,5 +206,7 @@ class Pictures:
                 for marker in frame.markers:
                     tracks[frame.camera, marker.color].append(marker.x_px)
             # A second difference has 1 + 4 + 1 times the variance.
-            squares += [float(np.mean(np.diff(xs, 2) ** 2)) / 6.0 for xs in tracks.values() if len(xs) > 30]
+            squares += [
+                float(np.mean(np.diff(xs, 2) ** 2)) / 6.0 for xs in tracks.values() if len(xs) > 30
+            ]
         return float(np.sqrt(np.mean(squares)))

@@ -1,4 +1,5 @@
-"""What the bus costs: latency of one message through a router, bare Zenoh beside rhot's typed streams, in one process.
+"""What the bus costs: latency of one message through a router, bare Zenoh beside rhot's typed
+streams, in one process.
 
     python benchmarks/bus.py [--json FILE]
 
@@ -29,7 +30,12 @@ MESSAGES, WARM_UP = 1000, 100
 
 def frame() -> MarkerFrame:
     """A MarkerFrame of six markers."""
-    markers = [Marker(color=f"c{i}", x_px=100.123 + i, y_px=200.456, area_px=64.0, sigma_px=0.05, quality=1.0) for i in range(6)]
+    markers = [
+        Marker(
+            color=f"c{i}", x_px=100.123 + i, y_px=200.456, area_px=64.0, sigma_px=0.05, quality=1.0
+        )
+        for i in range(6)
+    ]
     return MarkerFrame(
         camera="left",
         seq=1,
@@ -45,8 +51,13 @@ def frame() -> MarkerFrame:
 def bare(endpoint: str) -> list[float]:
     """Zenoh alone: put in one session, callback in another; us."""
     key, arrived, latencies = "bench/bare", threading.Event(), []
-    with zenoh.open(client_config([endpoint])) as sender, zenoh.open(client_config([endpoint])) as receiver:
-        receiver.declare_subscriber(key, lambda _: (latencies.append(time.perf_counter_ns()), arrived.set()))
+    with (
+        zenoh.open(client_config([endpoint])) as sender,
+        zenoh.open(client_config([endpoint])) as receiver,
+    ):
+        receiver.declare_subscriber(
+            key, lambda _: (latencies.append(time.perf_counter_ns()), arrived.set())
+        )
         publisher = sender.declare_publisher(key, express=True)
         while not publisher.matching_status.matching:
             time.sleep(0.01)
@@ -99,12 +110,17 @@ def main() -> None:
         for name, way in ways.items():
             outcome = way()
             latencies = sorted(outcome if isinstance(outcome, list) else uvloop.run(outcome))
-            results[name] = {"p50_us": statistics.median(latencies), "p99_us": latencies[int(0.99 * len(latencies))]}
+            results[name] = {
+                "p50_us": statistics.median(latencies),
+                "p99_us": latencies[int(0.99 * len(latencies))],
+            }
     base = results["bare Zenoh callback"]["p50_us"]
     print(f"{'way':<22} {'p50 us':>8} {'p99 us':>8} {'ratio':>6}")
     for name, result in results.items():
         result["ratio"] = result["p50_us"] / base
-        print(f"{name:<22} {result['p50_us']:>8.0f} {result['p99_us']:>8.0f} {result['ratio']:>6.2f}")
+        print(
+            f"{name:<22} {result['p50_us']:>8.0f} {result['p99_us']:>8.0f} {result['ratio']:>6.2f}"
+        )
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 

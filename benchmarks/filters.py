@@ -1,13 +1,15 @@
 """Which filter is best for a noisy 3D marker? `python benchmarks/filters.py [--json FILE]`
 
-RHOT section 10 chose the 1-Euro filter as better than Kalman, moving average and exponential smoothing. Here each is tuned on a
-fair footing: the parameters with the smallest error in motion among those that bring the jitter of a resting hand down to a given
-share. Noise of 1 mm is added to synthetic and to real motion (Leap at 110 Hz, optical motion capture at 100 Hz; $RHOT_DATA, left
-out if absent). Reported: error in motion (mm RMS in space), lag (ms: the shift at which the filtered path fits best), and the
-jitter at rest.
+RHOT section 10 chose the 1-Euro filter as better than Kalman, moving average and exponential
+smoothing. Here each is tuned on a fair footing: the parameters with the smallest error in motion
+among those that bring the jitter of a resting hand down to a given share. Noise of 1 mm is added to
+synthetic and to real motion (Leap at 110 Hz, optical motion capture at 100 Hz; $RHOT_DATA, left out
+if absent). Reported: error in motion (mm RMS in space), lag (ms: the shift at which the filtered
+path fits best), and the jitter at rest.
 
-Found: at equal rest, 1-Euro beats every filter with fixed gains, also a Kalman filter with a fixed model; the seed was right in
-that. A Kalman filter that weighs several models, as fusion does, has the least error and no lag.
+Found: at equal rest, 1-Euro beats every filter with fixed gains, also a Kalman filter with a fixed
+model; the seed was right in that. A Kalman filter that weighs several models, as fusion does, has
+the least error and no lag.
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ def moving_average(path: Array, rate_hz: float, samples: float) -> Array:  # noq
     """Mean of the last samples."""
     n = int(samples)
     padded = np.concatenate([np.repeat(path[:1], n - 1, axis=0), path])
-    return np.stack([np.convolve(padded[:, k], np.full(n, 1.0 / n), mode="valid") for k in range(3)], axis=1)
+    return np.stack(
+        [np.convolve(padded[:, k], np.full(n, 1.0 / n), mode="valid") for k in range(3)], axis=1
+    )
 
 
 def exponential(path: Array, rate_hz: float, cutoff_hz: float) -> Array:
@@ -66,7 +70,9 @@ def double_exponential(path: Array, rate_hz: float, alpha: float, trend: float) 
 
 
 def kalman(path: Array, rate_hz: float, density: float) -> Array:
-    """Fusion's motion model (services/fusion/kalman/motion_model.py) with one jerk density, position measured; its gain is the same for all axes."""
+    """Fusion's motion model (services/fusion/kalman/motion_model.py) with one jerk density,
+    position measured; its gain is the same for all axes.
+    """
     f01, f02, f12, f22 = transition(1.0 / rate_hz)
     F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))
     unit_noise(1.0 / rate_hz, Q)
@@ -82,7 +88,9 @@ def kalman(path: Array, rate_hz: float, density: float) -> Array:
 
 
 def adaptive_kalman(path: Array, rate_hz: float, calmest: float) -> Array:
-    """Four of these side by side, weighed by their likelihoods as in services/fusion/kalman/track_history.py; densities from `calmest` to 5000."""
+    """Four of these side by side, weighed by their likelihoods as in
+    services/fusion/kalman/track_history.py; densities from `calmest` to 5000.
+    """
     densities = np.geomspace(calmest, 5000.0, 4)
     f01, f02, f12, f22 = transition(1.0 / rate_hz)
     F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))
@@ -111,12 +119,21 @@ def unfiltered(path: Array, rate_hz: float) -> Array:  # noqa: ARG001
 
 CANDIDATES: dict[str, tuple[Callable[..., Array], list[tuple[float, ...]]]] = {
     "none": (unfiltered, [()]),
-    "one_euro": (one_euro, list(product(np.geomspace(0.2, 20.0, 14).tolist(), np.geomspace(3.0, 3000.0, 13).tolist()))),
+    "one_euro": (
+        one_euro,
+        list(product(np.geomspace(0.2, 20.0, 14).tolist(), np.geomspace(3.0, 3000.0, 13).tolist())),
+    ),
     "kalman": (kalman, [(density,) for density in np.geomspace(1e-3, 1e4, 29).tolist()]),
-    "adaptive_kalman": (adaptive_kalman, [(density,) for density in np.geomspace(1e-5, 10.0, 13).tolist()]),
+    "adaptive_kalman": (
+        adaptive_kalman,
+        [(density,) for density in np.geomspace(1e-5, 10.0, 13).tolist()],
+    ),
     "moving_average": (moving_average, [(float(n),) for n in range(1, 33)]),
     "exponential": (exponential, [(cutoff,) for cutoff in np.geomspace(0.2, 30.0, 29).tolist()]),
-    "double_exponential": (double_exponential, list(product(np.linspace(0.1, 0.95, 12).tolist(), np.linspace(0.02, 0.8, 10).tolist()))),
+    "double_exponential": (
+        double_exponential,
+        list(product(np.linspace(0.1, 0.95, 12).tolist(), np.linspace(0.02, 0.8, 10).tolist())),
+    ),
 }
 
 
@@ -133,14 +150,21 @@ def motions(data: File) -> Iterator[Motion]:
     """Synthetic ones, and the real ones that are there."""
     for rate_hz, speed in ((30.0, 0.5), (60.0, 0.5), (30.0, 0.15)):
         instants = np.arange(0.0, 12.0, 1.0 / rate_hz)
-        yield Motion(f"synthetic {speed} m/s {rate_hz:.0f} Hz", rate_hz, Path(speed_m_s=speed)(instants)[:, 2])
+        yield Motion(
+            f"synthetic {speed} m/s {rate_hz:.0f} Hz",
+            rate_hz,
+            Path(speed_m_s=speed)(instants)[:, 2],
+        )
     for name in ("grab", "pinch", "wave"):
         file = data / "leap" / f"{name}.csv"
         if file.exists():
             with file.open() as lines:
                 rows = list(csv.DictReader(lines))
             yield Motion(
-                f"leap {name} 110 Hz", 110.0, 1e-3 * np.array([[float(row[f"index_tip_{axis}"]) for axis in "xyz"] for row in rows])
+                f"leap {name} 110 Hz",
+                110.0,
+                1e-3
+                * np.array([[float(row[f"index_tip_{axis}"]) for axis in "xyz"] for row in rows]),
             )
     file = data / "qualisys" / "recording.tsv.gz"
     if file.exists():
@@ -149,7 +173,9 @@ def motions(data: File) -> Iterator[Motion]:
         header = next(row for row in table if row[0] == "Frame")
         column = header.index("index_tip X")
         rows = [row for row in table[table.index(header) + 1 :] if len(row) > column + 2]
-        path = 1e-3 * np.array([[float(cell or 0.0) for cell in row[column : column + 3]] for row in rows[1500:3000]])
+        path = 1e-3 * np.array(
+            [[float(cell or 0.0) for cell in row[column : column + 3]] for row in rows[1500:3000]]
+        )
         yield Motion("qualisys 100 Hz", 100.0, path)
 
 
@@ -160,7 +186,9 @@ def lag_ms(filtered: Array, motion: Motion) -> float:
     delays = np.arange(0.0, 0.2, 0.002)
     errors = []
     for delay_s in delays:
-        shifted = np.stack([np.interp(instants - delay_s, instants, motion.path[:, k]) for k in range(3)], axis=1)
+        shifted = np.stack(
+            [np.interp(instants - delay_s, instants, motion.path[:, k]) for k in range(3)], axis=1
+        )
         errors.append(float(np.mean((filtered - shifted)[inside] ** 2)))
     return 1e3 * float(delays[int(np.argmin(errors))])
 
@@ -176,14 +204,22 @@ def compare(motion: Motion) -> dict[str, Any]:
         tried = []
         for values in candidates:
             filtered = own(noisy, motion.rate_hz, *values)
-            error = 1e3 * float(np.sqrt(np.mean(np.sum((filtered - motion.path)[settled:] ** 2, axis=1))))
-            tried.append((float(own(rest, motion.rate_hz, *values)[200:].std()) / NOISE_M, error, values))
+            error = 1e3 * float(
+                np.sqrt(np.mean(np.sum((filtered - motion.path)[settled:] ** 2, axis=1)))
+            )
+            tried.append(
+                (float(own(rest, motion.rate_hz, *values)[200:].std()) / NOISE_M, error, values)
+            )
         for target in TARGETS if name != "none" else (1.0,):
             allowed = [entry for entry in tried if entry[0] <= target * 1.05]
             if not allowed:
                 continue
             jitter, error, values = min(allowed, key=lambda entry: entry[1])
-            entry = {"jitter": round(jitter, 2), "error_mm": round(error, 2), "values": [round(value, 3) for value in values]}
+            entry = {
+                "jitter": round(jitter, 2),
+                "error_mm": round(error, 2),
+                "values": [round(value, 3) for value in values],
+            }
             entry["lag_ms"] = round(lag_ms(own(noisy, motion.rate_hz, *values), motion), 1)
             found.setdefault(str(target), {})[name] = entry
     return found
@@ -194,7 +230,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=File, help="write the figures to this file")
     options = parser.parse_args()
-    data = File(os.environ.get("RHOT_DATA", File(__file__).parents[2] / "shared" / "data")) / "hand_motion"
+    data = (
+        File(os.environ.get("RHOT_DATA", File(__file__).parents[2] / "shared" / "data"))
+        / "hand_motion"
+    )
     results = {}
     for motion in motions(data):
         results[motion.name] = compare(motion)

@@ -1,13 +1,18 @@
-"""What the tracker needs of a Raspberry Pi: `python benchmarks/footprint.py [--runs N] [--seconds S] [--json FILE]`.
+"""What the tracker needs of a Raspberry Pi: `python benchmarks/footprint.py [--runs N] [--seconds
+S] [--json FILE]`.
 
-rhot-pi-tracker is started as systemd starts it, as a process of its own, against a router on the loopback, with six colours; this process
-plays the camera (640 x 480 YUV420 at 30 frames a second, over the bus) and the master that has started the session. Measured:
-    start_s         from exec to the liveliness token: the median of the runs (start_worst_s: the slowest)
+rhot-pi-tracker is started as systemd starts it, as a process of its own, against a router on the
+loopback, with six colours; this process plays the camera (640 x 480 YUV420 at 30 frames a second,
+over the bus) and the master that has started the session. Measured:
+    start_s         from exec to the liveliness token: the median of the runs (start_worst_s: the
+                    slowest)
     start_cpu_s     processor time that took: what start_s would be on an idle core
     first_marker_s  from exec to the first MarkerFrame
-    peak_mb         peak resident memory after so many seconds of tracking while somebody watches the preview (VmHWM); 1 MB is 10^6 bytes
+    peak_mb         peak resident memory after so many seconds of tracking while somebody watches
+                    the preview (VmHWM); 1 MB is 10^6 bytes
     cpu_percent     of one core at 30 frames a second, preview included
-    forbidden       modules of scipy, numba and viser that it imported, of all that it imported (`modules`) from start to end
+    forbidden       modules of scipy, numba and viser that it imported, of all that it imported
+                    (`modules`) from start to end
 Linux only: memory is read from /proc.
 """
 
@@ -56,9 +61,14 @@ class Run(NamedTuple):
 
 def write_rig(folder: Path) -> Path:
     """rig.toml and the colours of a simulated camera; the path of the former."""
-    markers = "\n".join(f'{landmark} = "{color}"' for landmark, color in zip(LANDMARKS, synthetic_images.PAINTS, strict=True))
+    markers = "\n".join(
+        f'{landmark} = "{color}"'
+        for landmark, color in zip(LANDMARKS, synthetic_images.PAINTS, strict=True)
+    )
     path = folder / "rig.toml"
-    path.write_text(f'[rig]\nname = "{RIG}"\n[[camera]]\nname = "{CAMERA}"\nsource = "simulator"\n[hand.right.markers]\n{markers}\n')
+    path.write_text(
+        f'[rig]\nname = "{RIG}"\n[[camera]]\nname = "{CAMERA}"\nsource = "simulator"\n[hand.right.markers]\n{markers}\n'
+    )
     (folder / "calibration").mkdir()
     save(folder / "calibration" / f"{CAMERA}.colors.json", synthetic_images.ranges())
     return path
@@ -68,8 +78,15 @@ def pictures() -> list[bytes]:
     """A hand's worth of painted tips that move a little."""
     images = []
     for n in range(8):
-        tips = [synthetic_images.Tip(color, 200.0 + 45 * i + 2 * n, 200.0 + 30 * (i % 3) + n) for i, color in enumerate(synthetic_images.PAINTS)]
-        images.append(synthetic_images.i420(synthetic_images.noisy(synthetic_images.clean(tips, SIZE)[0], 5.0, n)).tobytes())
+        tips = [
+            synthetic_images.Tip(color, 200.0 + 45 * i + 2 * n, 200.0 + 30 * (i % 3) + n)
+            for i, color in enumerate(synthetic_images.PAINTS)
+        ]
+        images.append(
+            synthetic_images.i420(
+                synthetic_images.noisy(synthetic_images.clean(tips, SIZE)[0], 5.0, n)
+            ).tobytes()
+        )
     return images
 
 
@@ -78,7 +95,14 @@ async def play(bus: Bus, images: list[bytes]) -> None:
     camera, seq = bus.publisher(topics.SIM_FRAME, camera=CAMERA), 0
     while True:
         if camera.wanted:
-            told = SimFrame(camera=CAMERA, seq=seq, stamp_ns=time.time_ns(), row_time_ns=3e4, size_px=SIZE, clock_skew_ns=0)
+            told = SimFrame(
+                camera=CAMERA,
+                seq=seq,
+                stamp_ns=time.time_ns(),
+                row_time_ns=3e4,
+                size_px=SIZE,
+                clock_skew_ns=0,
+            )
             camera.put_bytes(images[seq % len(images)], told)
             seq += 1
         await asyncio.sleep(1.0 / FPS)
@@ -109,7 +133,9 @@ async def tracker(rig: Path, endpoint: str, *, imports: bool) -> AsyncIterator[P
         await process.wait()
 
 
-async def one_run(bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports: bool = False) -> Run:
+async def one_run(
+    bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports: bool = False
+) -> Run:
     """Start it, let it work, read its memory, end it."""
     markers, alive = bus.every(topics.MARKERS, 64, camera=CAMERA), bus.watch_alive()
     previews = bus.raw(topics.PREVIEW, 4, camera=CAMERA)
@@ -123,7 +149,11 @@ async def one_run(bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports
         async for frame in markers:
             if len(frame.markers) == len(synthetic_images.PAINTS):
                 break
-        first_s, cpu_s, since_s = time.monotonic() - begun_s, cpu_seconds(process.pid), time.monotonic()
+        first_s, cpu_s, since_s = (
+            time.monotonic() - begun_s,
+            cpu_seconds(process.pid),
+            time.monotonic(),
+        )
         await asyncio.sleep(seconds)
         busy = (cpu_seconds(process.pid) - cpu_s) / (time.monotonic() - since_s)
         peak_mb = peak_memory_mb(process.pid)
@@ -140,7 +170,10 @@ async def one_run(bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports
 def peak_memory_mb(pid: int) -> float:
     """Peak resident memory of a process."""
     text = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("VmHWM")) * 1024e-6
+    return (
+        next(int(line.split()[1]) for line in text.splitlines() if line.startswith("VmHWM"))
+        * 1024e-6
+    )
 
 
 def cpu_seconds(pid: int) -> float:
@@ -161,8 +194,13 @@ async def measure(runs: int, seconds: float) -> dict[str, Any]:
                 bus.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
                 camera = asyncio.ensure_future(play(bus, pictures()))
                 deadline_s = DEADLINE_S + seconds
-                with_imports = await asyncio.wait_for(one_run(bus, rig, endpoint, 2.0, imports=True), deadline_s)
-                lives = [await asyncio.wait_for(one_run(bus, rig, endpoint, seconds), deadline_s) for _ in range(runs)]
+                with_imports = await asyncio.wait_for(
+                    one_run(bus, rig, endpoint, 2.0, imports=True), deadline_s
+                )
+                lives = [
+                    await asyncio.wait_for(one_run(bus, rig, endpoint, seconds), deadline_s)
+                    for _ in range(runs)
+                ]
                 camera.cancel()
     starts = [life.start_s for life in lives]
     return {
@@ -173,7 +211,9 @@ async def measure(runs: int, seconds: float) -> dict[str, Any]:
         "peak_mb": round(max(life.peak_mb for life in lives), 1),
         "cpu_percent": round(statistics.median(life.cpu_percent for life in lives), 1),
         "modules": len(with_imports.modules),
-        "forbidden": sorted(name for name in with_imports.modules if name.partition(".")[0] in FORBIDDEN),
+        "forbidden": sorted(
+            name for name in with_imports.modules if name.partition(".")[0] in FORBIDDEN
+        ),
     }
 
 

@@ -1,12 +1,17 @@
-"""The tracker in the simulator's hard scene: `python benchmarks/hard.py [--frames N] [--seeds N] [--json FILE]`.
+"""The tracker in the simulator's hard scene: `python benchmarks/hard.py [--frames N] [--seeds N]
+[--json FILE]`.
 
-Fast motion, blur, things of the paints' own colours in the room, coloured light on the skin. Both cameras, one after the other, each with
-the colour ranges of config/calibration; rendering takes nearly all of the time (0.1 s a frame; the whole run 20 minutes). Against the
-renderer's own account of what each pixel shows (services/simulator/camera/visibility.py):
-    recall              of the frames in which at least half of a patch is visible - of what would be seen of it if no other part of the
-                        hand were there -, the share in which its marker is reported on it; the worst marker's
-    wrong_identity      share of all reported markers that are not on their paint: more than 3 px from every pixel that shows it
-    refound_next_frame  of the frames that show half of a patch whose marker was lost, i.e. not reported on it in the frame before, the
+Fast motion, blur, things of the paints' own colours in the room, coloured light on the skin. Both
+cameras, one after the other, each with the colour ranges of config/calibration; rendering takes
+nearly all of the time (0.1 s a frame; the whole run 20 minutes). Against the renderer's own account
+of what each pixel shows (services/simulator/camera/visibility.py):
+    recall              of the frames in which at least half of a patch is visible - of what would
+                        be seen of it if no other part of the hand were there -, the share in which
+                        its marker is reported on it; the worst marker's
+    wrong_identity      share of all reported markers that are not on their paint: more than 3 px
+                        from every pixel that shows it
+    refound_next_frame  of the frames that show half of a patch whose marker was lost, i.e. not
+    reported on it in the frame before, the
                         share in which it is
 A patch that the picture's edge cuts counts by what lies inside the picture.
 """
@@ -49,7 +54,8 @@ class Tally:
     wrong: int = 0
     lost: int = 0
     refound: int = 0
-    # Whether it was reported in the last frame; None before it ever was: what was never found cannot be lost.
+    # Whether it was reported in the last frame; None before it ever was: what was never found
+    # cannot be lost.
     known: bool | None = None
 
     def add(self, sight: Sight, marker: Marker | None, shows: npt.NDArray[np.bool_]) -> None:
@@ -87,8 +93,18 @@ def on_paint(marker: Marker, shows: npt.NDArray[np.bool_]) -> bool:
 def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str, Tally]) -> None:
     """Track `count` frames of one camera."""
     source = FrameSource(load_scene(config, SCENE, seed), camera)
-    step = TrackerStep(camera, load_colors(config.calibration_dir, camera), config.tracker, source.camera.size_px, config.colors)
-    landmarks = {color: landmark for table in config.hand.values() for landmark, color in table.markers.items()}
+    step = TrackerStep(
+        camera,
+        load_colors(config.calibration_dir, camera),
+        config.tracker,
+        source.camera.size_px,
+        config.colors,
+    )
+    landmarks = {
+        color: landmark
+        for table in config.hand.values()
+        for landmark, color in table.markers.items()
+    }
     for tally in tallies.values():
         tally.known = None
     for seq in range(count):
@@ -96,9 +112,14 @@ def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str
         if taken.image is None:
             continue
         markers = {marker.color: marker for marker in step.step(frame_of(taken)).markers}
-        seen = {landmark: sight for (_, landmark), sight in sights(source.renderer, taken.time_s).items()}
+        seen = {
+            landmark: sight
+            for (_, landmark), sight in sights(source.renderer, taken.time_s).items()
+        }
         labels = source.renderer.labels(taken.time_s)
-        surfaces = {landmark: surface for (_, landmark), surface in source.renderer.cast.marks.items()}
+        surfaces = {
+            landmark: surface for (_, landmark), surface in source.renderer.cast.marks.items()
+        }
         for color, landmark in landmarks.items():
             tallies[color].add(seen[landmark], markers.get(color), labels == 1 + surfaces[landmark])
 
@@ -106,13 +127,25 @@ def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str
 def frame_of(taken: TakenFrame) -> Frame:
     """As the simulator's source would hand it to the tracker."""
     assert taken.image is not None, "lost frames are left out"
-    return Frame(taken.camera, taken.seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420")
+    return Frame(
+        taken.camera,
+        taken.seq,
+        taken.stamp_ns,
+        taken.row_time_ns,
+        taken.size_px,
+        taken.image,
+        "i420",
+    )
 
 
 def summary(tallies: dict[str, Tally]) -> dict[str, float]:
     """The keys of the JSON file."""
-    reported, wrong = (sum(getattr(tally, name) for tally in tallies.values()) for name in ("reported", "wrong"))
-    lost, refound = (sum(getattr(tally, name) for tally in tallies.values()) for name in ("lost", "refound"))
+    reported, wrong = (
+        sum(getattr(tally, name) for tally in tallies.values()) for name in ("reported", "wrong")
+    )
+    lost, refound = (
+        sum(getattr(tally, name) for tally in tallies.values()) for name in ("lost", "refound")
+    )
     return {
         "recall": min(tally.recall for tally in tallies.values()),
         "wrong_identity": share(wrong, reported) if reported else 0.0,
@@ -126,8 +159,12 @@ def summary(tallies: dict[str, Tally]) -> dict[str, float]:
 
 def main() -> None:
     """Render, track, count, print, write."""
-    parser = argparse.ArgumentParser(description="Recall, identity and recovery of pi_tracker in the simulator's hard scene")
-    parser.add_argument("--frames", type=int, default=10_000, help="of all cameras and seeds together")
+    parser = argparse.ArgumentParser(
+        description="Recall, identity and recovery of pi_tracker in the simulator's hard scene"
+    )
+    parser.add_argument(
+        "--frames", type=int, default=10_000, help="of all cameras and seeds together"
+    )
     parser.add_argument("--seeds", type=int, default=5, help="different rooms and motions")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
@@ -139,14 +176,21 @@ def main() -> None:
         for camera in config.camera:
             run(config, camera.name, seed, each, tallies)
             print(f"seed {seed}, camera {camera.name}: {each} frames", file=sys.stderr)
-    print(f"{'marker':10s} {'half visible':>12s} {'recall':>8s} {'reported':>9s} {'wrong':>6s} {'lost':>5s} {'refound':>8s}")
+    print(
+        f"{'marker':10s} {'half visible':>12s} {'recall':>8s} {'reported':>9s} {'wrong':>6s} {'lost':>5s} {'refound':>8s}"
+    )
     for color, t in tallies.items():
-        print(f"{color:10s} {t.visible:12d} {t.recall:8.4f} {t.reported:9d} {t.wrong:6d} {t.lost:5d} {t.refound:8d}")
+        print(
+            f"{color:10s} {t.visible:12d} {t.recall:8.4f} {t.reported:9d} {t.wrong:6d} {t.lost:5d} {t.refound:8d}"
+        )
     result = summary(tallies)
     for name in ("recall", "wrong_identity", "refound_next_frame"):
         print(f"{name:20s} {result[name]:.5f}")
     if options.json:
-        options.json.write_text(json.dumps({name: round(value, 6) for name, value in result.items()}, indent=1) + "\n", encoding="utf-8")
+        options.json.write_text(
+            json.dumps({name: round(value, 6) for name, value in result.items()}, indent=1) + "\n",
+            encoding="utf-8",
+        )
 
 
 if __name__ == "__main__":

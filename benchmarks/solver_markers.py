@@ -1,7 +1,9 @@
-"""What one more painted knuckle brings, and which gestures wrist and tips cannot tell: `python benchmarks/solver_markers.py [--json FILE]`.
+"""What one more painted knuckle brings, and which gestures wrist and tips cannot tell: `python
+benchmarks/solver_markers.py [--json FILE]`.
 
-Simulated hands with 1 mm of noise on every marker; mean errors in degrees: flexion of the fingers, orientation, thumb, abduction.
-Gestures are formed from the open hand and left again by a hand at rest; hardly any of the solver's constants was tuned on them.
+Simulated hands with 1 mm of noise on every marker; mean errors in degrees: flexion of the fingers,
+orientation, thumb, abduction. Gestures are formed from the open hand and left again by a hand at
+rest; hardly any of the solver's constants was tuned on them.
 """
 
 from __future__ import annotations
@@ -23,7 +25,11 @@ from services.simulator.scene.gestures import CURVED, FIST, OPEN, Fitted, bump
 _JOINTS = ("proximal", "intermediate")
 CANDIDATES = (
     (),
-    *((f"{finger}_{joint}",) for joint in _JOINTS for finger in ("index", "middle", "ring", "little")),
+    *(
+        (f"{finger}_{joint}",)
+        for joint in _JOINTS
+        for finger in ("index", "middle", "ring", "little")
+    ),
     ("palm",),
     ("middle_metacarpal",),
     *((f"thumb_{joint}",) for joint in ("metacarpal", "proximal", "distal")),
@@ -55,11 +61,24 @@ _SWING_HZ, _GESTURE_S = 2.5, 2.4
 
 def gesture(model: HandModel, name: str, rng: np.random.Generator) -> Motion:
     """Five seconds of a gesture or a swing of GESTURES and SWINGS, at any orientation."""
-    start, fit, t = moving(model, rng, "fist").rotations[0], Fitted(model), np.arange(FRAMES) / RATE_HZ
-    turns = np.outer(np.sin(2.0 * np.pi * _SWING_HZ * t), np.deg2rad(SWINGS.get(name, (0.0, 0.0, 0.0))))
-    postures = [CURVED if name in SWINGS else OPEN + bump(s / _GESTURE_S % 1.0) * (GESTURES[name] - OPEN) for s in t]
+    start, fit, t = (
+        moving(model, rng, "fist").rotations[0],
+        Fitted(model),
+        np.arange(FRAMES) / RATE_HZ,
+    )
+    turns = np.outer(
+        np.sin(2.0 * np.pi * _SWING_HZ * t), np.deg2rad(SWINGS.get(name, (0.0, 0.0, 0.0)))
+    )
+    postures = [
+        CURVED if name in SWINGS else OPEN + bump(s / _GESTURE_S % 1.0) * (GESTURES[name] - OPEN)
+        for s in t
+    ]
     rotations = np.array([start @ rotation_from_vector(turn) for turn in turns])
-    return Motion(rotations, np.tile((0.0, 0.0, 0.5), (FRAMES, 1)), np.array([fit(posture) for posture in postures]))
+    return Motion(
+        rotations,
+        np.tile((0.0, 0.0, 0.5), (FRAMES, 1)),
+        np.array([fit(posture) for posture in postures]),
+    )
 
 
 def on_the_other_side(name: str, believed: bool) -> tuple[float, ...]:
@@ -71,18 +90,28 @@ def on_the_other_side(name: str, believed: bool) -> tuple[float, ...]:
         turned = msgspec.structs.replace(back.paint[name], offset_m=(x, -y, z))
         palm = msgspec.structs.replace(back, paint={**back.paint, name: turned})
         motion = moving(palm, rng, "random" if seed % 2 else "fist")
-        rows.append(errors_of(palm if believed else back, motion, (*BASIC_LANDMARKS, name), rng, painted=palm))
+        rows.append(
+            errors_of(
+                palm if believed else back, motion, (*BASIC_LANDMARKS, name), rng, painted=palm
+            )
+        )
     return tuple(np.mean(rows, axis=0).tolist())
 
 
 def main() -> int:
     """Run, print, and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
-    found: dict[str, tuple[float, ...]] = {"+".join(extra) or "wrist and tips": with_painted(extra, 2) for extra in CANDIDATES}
+    found: dict[str, tuple[float, ...]] = {
+        "+".join(extra) or "wrist and tips": with_painted(extra, 2) for extra in CANDIDATES
+    }
     found["middle_proximal on the palm side, told"] = on_the_other_side("middle_proximal", True)
-    found["middle_proximal on the palm side, not told"] = on_the_other_side("middle_proximal", False)
+    found["middle_proximal on the palm side, not told"] = on_the_other_side(
+        "middle_proximal", False
+    )
     for name in (*GESTURES, *SWINGS):
         rows = []
         for seed in range(4):
@@ -90,7 +119,9 @@ def main() -> int:
             rows.append(errors_of(model, gesture(model, name, rng), BASIC_LANDMARKS, rng))
         found[name] = tuple(np.mean(rows, axis=0).tolist())
     for name, values in found.items():
-        print(f"{name:64s} flexion {values[0]:5.2f} orientation {values[1]:5.2f} thumb {values[2]:5.2f} abduction {values[3]:5.2f}")
+        print(
+            f"{name:64s} flexion {values[0]:5.2f} orientation {values[1]:5.2f} thumb {values[2]:5.2f} abduction {values[3]:5.2f}"
+        )
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -1,7 +1,9 @@
-"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py; what is absent is skipped and says why.
+"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py; what
+is absent is skipped and says why.
 
-Every peer gets the same chain (as URDF, or the functions of kinematics.py), the same goals (tip pose) and the same end: position within
-1e-6 mm and orientation within 1e-8 rad, or 100 iterations. It starts each frame from its own last solution.
+Every peer gets the same chain (as URDF, or the functions of kinematics.py), the same goals (tip
+pose) and the same end: position within 1e-6 mm and orientation within 1e-8 rad, or 100 iterations.
+It starts each frame from its own last solution.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ _AXES = ("0 1 0", "-1 0 0", "-1 0 0", "-1 0 0")
 
 
 def peers(chain: k.Chain) -> tuple[dict[str, Solve], dict[str, str]]:
-    """The solvers of all peers that are installed, and why the others are not among them, both by name."""
+    """The solvers of all peers that are installed, and why the others are not among them, both by
+    name.
+    """
     installed, skipped = {}, {}
     for name, make in PEERS.items():
         try:
@@ -41,9 +45,7 @@ def urdf(chain: k.Chain) -> Path:
     text = '<robot name="finger"><link name="base"/>'
     for j, (axis, offset) in enumerate(zip(_AXES, offsets, strict=True)):
         low, high = chain.limits[j]
-        text += (
-            f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute"><parent link="{"base" if j == 0 else f"l{j - 1}"}"/>'
-        )
+        text += f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute"><parent link="{"base" if j == 0 else f"l{j - 1}"}"/>'
         text += f'<child link="l{j}"/><origin xyz="{offset}"/><axis xyz="{axis}"/>'
         text += f'<limit lower="{low}" upper="{high}" effort="1e3" velocity="1e3"/></joint>'
     text += f'<link name="tip">{inertial}</link><joint name="end" type="fixed"><parent link="l3"/><child link="tip"/>'
@@ -54,7 +56,9 @@ def urdf(chain: k.Chain) -> Path:
 
 
 class End:
-    """Whether to stop: compiled, and fed with plain arrays, so that asking costs a peer half a microsecond an iteration."""
+    """Whether to stop: compiled, and fed with plain arrays, so that asking costs a peer half a
+    microsecond an iteration.
+    """
 
     def __init__(self, chain: k.Chain, point: Array, axes: Array) -> None:
         self._fixed = (chain.lengths, chain.tool, point, axes)
@@ -110,7 +114,9 @@ def mink(chain: k.Chain) -> Solve:
     spec.compiler.fusestatic = False
     model = spec.compile()
     configuration = package.Configuration(model)
-    task = package.FrameTask("tip", "body", position_cost=1.0, orientation_cost=0.05, lm_damping=1e-6)
+    task = package.FrameTask(
+        "tip", "body", position_cost=1.0, orientation_cost=0.05, lm_damping=1e-6
+    )
     limits = [package.ConfigurationLimit(model)]
 
     def solve(point: Array, axes: Array) -> Array:
@@ -139,7 +145,9 @@ def pink(chain: k.Chain) -> Solve:
         task.set_target(pinocchio.SE3(axes, point))
         end = End(chain, point, axes)
         for _ in range(MOST):
-            velocity = package.solve_ik(configuration, [task], 1.0, solver="daqp", safety_break=False)
+            velocity = package.solve_ik(
+                configuration, [task], 1.0, solver="daqp", safety_break=False
+            )
             configuration.integrate_inplace(velocity, 1.0)
             if end(configuration.q):
                 break
@@ -152,18 +160,27 @@ def ikpy(chain: k.Chain) -> Solve:
     """Phylliade's ikpy: scipy's bounded least squares over its own chains."""
     from ikpy.chain import Chain as Package
 
-    robot = Package.from_urdf_file(str(urdf(chain)), base_elements=["base"], active_links_mask=[False, True, True, True, True, False])
+    robot = Package.from_urdf_file(
+        str(urdf(chain)),
+        base_elements=["base"],
+        active_links_mask=[False, True, True, True, True, False],
+    )
     last = np.zeros(6)
 
     def solve(point: Array, axes: Array) -> Array:
-        last[:] = robot.inverse_kinematics_frame(_pose(point, axes), initial_position=last, orientation_mode="all")
+        last[:] = robot.inverse_kinematics_frame(
+            _pose(point, axes), initial_position=last, orientation_mode="all"
+        )
         return last[1:5].copy()
 
     return solve
 
 
 def scipy(chain: k.Chain) -> Solve:
-    """scipy's bounded least squares with our Jacobian; lengths relative to the finger's, as for ours."""
+    """scipy's bounded least squares with our Jacobian.
+
+    Lengths relative to the finger's, as for ours.
+    """
     from scipy.optimize import least_squares
 
     scale, last = 1.0 / k.reach_of(chain), np.zeros(4)
@@ -179,23 +196,40 @@ def scipy(chain: k.Chain) -> Solve:
             return J * np.array([[scale]] * 3 + [[1.0]] * 3)
 
         start = np.clip(last, chain.limits[:, 0] + 1e-9, chain.limits[:, 1] - 1e-9)
-        last[:] = least_squares(residual, start, slope, bounds=chain.limits.T, xtol=1e-10, ftol=1e-10, gtol=1e-10).x
+        last[:] = least_squares(
+            residual, start, slope, bounds=chain.limits.T, xtol=1e-10, ftol=1e-10, gtol=1e-10
+        ).x
         return last.copy()
 
     return solve
 
 
 def roboticstoolbox(chain: k.Chain) -> Solve:
-    """Peter Corke's toolbox: its compiled Levenberg-Marquardt; limits are not part of its problem."""
+    """Peter Corke's toolbox: its compiled Levenberg-Marquardt.
+
+    Limits are not part of its problem.
+    """
     import roboticstoolbox as rtb
 
     ET, (a, b), c = rtb.ET, chain.lengths[:2], -chain.tool[2]
-    robot = rtb.ETS([ET.Ry(), ET.Rx(flip=True), ET.tz(-a), ET.Rx(flip=True), ET.tz(-b), ET.Rx(flip=True), ET.tz(-c)])
+    robot = rtb.ETS(
+        [
+            ET.Ry(),
+            ET.Rx(flip=True),
+            ET.tz(-a),
+            ET.Rx(flip=True),
+            ET.tz(-b),
+            ET.Rx(flip=True),
+            ET.tz(-c),
+        ]
+    )
     robot.qlim = chain.limits.T
     last = np.zeros(4)
 
     def solve(point: Array, axes: Array) -> Array:
-        last[:] = robot.ik_LM(_pose(point, axes), q0=last.copy(), tol=1e-9, joint_limits=False, slimit=1, ilimit=MOST)[0]
+        last[:] = robot.ik_LM(
+            _pose(point, axes), q0=last.copy(), tol=1e-9, joint_limits=False, slimit=1, ilimit=MOST
+        )[0]
         return last.copy()
 
     return solve
@@ -203,5 +237,16 @@ def roboticstoolbox(chain: k.Chain) -> Solve:
 
 # Peers whose problem has no limits: their result may still keep them by luck.
 WITHOUT_LIMITS = ("roboticstoolbox",)
-PACKAGES = {"roboticstoolbox": "roboticstoolbox-python", "mink": "mink daqp", "pin-pink": "pin-pink daqp"}
-PEERS = {"placo": placo, "mink": mink, "pin-pink": pink, "roboticstoolbox": roboticstoolbox, "ikpy": ikpy, "scipy": scipy}
+PACKAGES = {
+    "roboticstoolbox": "roboticstoolbox-python",
+    "mink": "mink daqp",
+    "pin-pink": "pin-pink daqp",
+}
+PEERS = {
+    "placo": placo,
+    "mink": mink,
+    "pin-pink": pink,
+    "roboticstoolbox": roboticstoolbox,
+    "ikpy": ikpy,
+    "scipy": scipy,
+}

@@ -1,4 +1,7 @@
-"""rhot: hand and object tracking from low-cost parts. `rhot.connect` is the client SDK; see rhot/client.py."""
+"""rhot: hand and object tracking from low-cost parts. `rhot.connect` is the client SDK.
+
+See rhot/client.py.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
-"""What is set on a camera from any machine: colour ranges, exposure, and patches of paint to fit ranges to.
+"""What is set on a camera from any machine: colour ranges, exposure, and patches of paint to fit
+ranges to.
 
-Colors and Exposure are calibration files (rhot/files/calibration.py) that travel as they are: what is put on the bus is what the tracker
-writes on its machine. Like all messages they are untrusted: what does not decode or cannot be is refused, and the old stays in force.
+Colors and Exposure are calibration files (rhot/files/calibration.py) that travel as they are: what
+is put on the bus is what the tracker writes on its machine. Like all messages they are untrusted:
+what does not decode or cannot be is refused, and the old stays in force.
 """
 
 from __future__ import annotations
@@ -63,10 +65,11 @@ class Exposure(Calibration, frozen=True, kw_only=True):
 class ExposureControl(Message, frozen=True, kw_only=True):
     """Exposure to be set, or in force.
 
-    Put with mode "auto", the camera's automatics run until they have settled; then their values are frozen, written, and told with mode
-    "fixed". Numbers are 0 where nobody knows them; of a put, a 0 leaves that value as it is. adjustable is false of sources that have no
-    such controls (files, the simulator); note says what a person should know, and why a put was refused; changed_ns is when the tracker
-    last took or refused one.
+    Put with mode "auto", the camera's automatics run until they have settled; then their values are
+    frozen, written, and told with mode "fixed". Numbers are 0 where nobody knows them; of a put, a
+    0 leaves that value as it is. adjustable is false of sources that have no such controls (files,
+    the simulator); note says what a person should know, and why a put was refused; changed_ns is
+    when the tracker last took or refused one.
     """
 
     mode: Literal["fixed", "auto"] = "fixed"
@@ -91,11 +94,18 @@ class PointedAt(Message, frozen=True, kw_only=True):
 
 
 class FitRequest(Message, frozen=True, kw_only=True):
-    """Fit ranges to the paint that is pointed at; or, with auto, to whatever stands out in these pictures."""
+    """Fit ranges to the paint that is pointed at.
 
-    pointed: Annotated[list[PointedAt], msgspec.Meta(max_length=96)] = msgspec.field(default_factory=list)
+    Or, with auto, to whatever stands out in these pictures.
+    """
+
+    pointed: Annotated[list[PointedAt], msgspec.Meta(max_length=96)] = msgspec.field(
+        default_factory=list
+    )
     auto: bool = False
-    pictures: Annotated[list[PictureName], msgspec.Meta(max_length=8)] = msgspec.field(default_factory=list)
+    pictures: Annotated[list[PictureName], msgspec.Meta(max_length=8)] = msgspec.field(
+        default_factory=list
+    )
 
 
 class Patch(Message, frozen=True, kw_only=True):
@@ -107,7 +117,10 @@ class Patch(Message, frozen=True, kw_only=True):
 
 
 class FitResult(Message, frozen=True, kw_only=True):
-    """Fitted ranges with statistics, and warnings and notes for a person; error says why there are none. Nothing is in force by this."""
+    """Fitted ranges with statistics, and warnings and notes for a person.
+
+    Error says why there are none. Nothing is in force by this.
+    """
 
     colors: dict[str, ColorRange] = msgspec.field(default_factory=dict)
     patches: list[Patch] = msgspec.field(default_factory=list)

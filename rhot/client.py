@@ -4,9 +4,9 @@
         async for pose in rig.hand_poses("right"):
             print(pose.wrist.position_m)
 
-Streams end with the `async with` block. Nothing arrives while nothing is sent; a router that dies and returns is met again
-by itself. By default a stream skips to the newest message (`latest`); with queue=n it delivers every message through a queue
-of n that drops the oldest.
+Streams end with the `async with` block. Nothing arrives while nothing is sent; a router that dies
+and returns is met again by itself. By default a stream skips to the newest message (`latest`); with
+queue=n it delivers every message through a queue of n that drops the oldest.
 """
 
 from __future__ import annotations
@@ -38,19 +38,27 @@ class RigClient:
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
 
-    def hand_poses(self, hand: HandName | None = None, queue: int | None = None) -> Subscription[HandPose]:
+    def hand_poses(
+        self, hand: HandName | None = None, queue: int | None = None
+    ) -> Subscription[HandPose]:
         """Full hand poses, of one hand or of both."""
         return self._stream(topics.POSE, queue, hand=hand)
 
-    def hand_points(self, hand: HandName | None = None, queue: int | None = None) -> Subscription[HandPoints]:
+    def hand_points(
+        self, hand: HandName | None = None, queue: int | None = None
+    ) -> Subscription[HandPoints]:
         """3D landmarks, of one hand or of both."""
         return self._stream(topics.POINTS, queue, hand=hand)
 
-    def object_poses(self, name: str | None = None, queue: int | None = None) -> Subscription[ObjectPose]:
+    def object_poses(
+        self, name: str | None = None, queue: int | None = None
+    ) -> Subscription[ObjectPose]:
         """Object poses, of one object or of all."""
         return self._stream(topics.OBJECT, queue, object=name)
 
-    def markers(self, camera: str | None = None, queue: int | None = None) -> Subscription[MarkerFrame]:
+    def markers(
+        self, camera: str | None = None, queue: int | None = None
+    ) -> Subscription[MarkerFrame]:
         """Markers in the image of one camera or of all."""
         return self._stream(topics.MARKERS, queue, camera=camera)
 
@@ -80,12 +88,16 @@ class RigClient:
         return _one(await self.bus.get(topics.COLORS, camera=camera), camera)
 
     async def set_colors(self, camera: str, colors: Colors, timeout_s: float = 5.0) -> None:
-        """Put colour ranges in force, and in their file on the camera's machine; colors.date and .tool tell this change from others.
+        """Put colour ranges in force, and in their file on the camera's machine; colors.date and
+        .tool tell this change from others.
 
-        Raises CalibrationError with the tracker's words if it refuses them, BusError if none answers.
+        Raises CalibrationError with the tracker's words if it refuses them, BusError if none
+        answers.
         """
         health = self.bus.every(topics.HEALTH, 16, service="pi_tracker", instance=camera)
-        refusal = asyncio.ensure_future(_refusal(health, f"colours of {colors.date} by {colors.tool}"))
+        refusal = asyncio.ensure_future(
+            _refusal(health, f"colours of {colors.date} by {colors.tool}")
+        )
         try:
             await self.colors(camera)
             await self._put(topics.COLORS, colors, camera)
@@ -100,16 +112,21 @@ class RigClient:
         finally:
             refusal.cancel()
             self.bus.close(health)
-        raise CalibrationError(f"camera {camera!r} did not take the colours within {timeout_s:g} s, and does not say why; see its log")
+        raise CalibrationError(
+            f"camera {camera!r} did not take the colours within {timeout_s:g} s, and does not say why; see its log"
+        )
 
     async def exposure(self, camera: str) -> ExposureControl:
         """The exposure in force; raises BusError if no tracker of that camera answers."""
         return _one(await self.bus.get(topics.EXPOSURE, camera=camera), camera)
 
-    async def set_exposure(self, camera: str, wanted: ExposureControl, timeout_s: float = 20.0) -> ExposureControl:
+    async def set_exposure(
+        self, camera: str, wanted: ExposureControl, timeout_s: float = 20.0
+    ) -> ExposureControl:
         """Set exposure, gain and white balance, or run the automatics once; what is in force then.
 
-        Raises CalibrationError with the tracker's words if it refuses, or if the camera has no such controls.
+        Raises CalibrationError with the tracker's words if it refuses, or if the camera has no such
+        controls.
         """
         now = await self.exposure(camera)
         if not now.adjustable:
@@ -129,7 +146,8 @@ class RigClient:
     async def _put(self, topic: Topic[T], message: T, camera: str) -> None:
         publisher = self.bus.publisher(topic, camera=camera)
         try:
-            # The tracker has just answered, so it is there: its subscription is known to the router within milliseconds.
+            # The tracker has just answered, so it is there: its subscription is known to the router
+            # within milliseconds.
             for _ in range(100):
                 if publisher.wanted:
                     break
@@ -140,12 +158,18 @@ class RigClient:
 
     def _stream(self, topic: Topic[T], queue: int | None, **names: str | None) -> Subscription[T]:
         given = {field: name for field, name in names.items() if name is not None}
-        return self.bus.latest(topic, **given) if queue is None else self.bus.every(topic, queue, **given)
+        return (
+            self.bus.latest(topic, **given)
+            if queue is None
+            else self.bus.every(topic, queue, **given)
+        )
 
 
 def _one(answers: list[T], camera: str) -> T:
     if not answers:
-        raise BusError(f"no tracker of camera {camera!r} answers; is it running, and is the name right? `rhot top` shows them")
+        raise BusError(
+            f"no tracker of camera {camera!r} answers; is it running, and is the name right? `rhot top` shows them"
+        )
     return answers[0]
 
 
@@ -159,7 +183,8 @@ async def _refusal(health: Subscription[Health], made: str) -> str:
 
 @contextlib.asynccontextmanager
 async def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str = "*") -> AsyncIterator[RigClient]:
-    """A session with the router at endpoint; waits for it as long as it takes (cancel, or use asyncio.timeout, to give up).
+    """A session with the router at endpoint; waits for it as long as it takes (cancel, or use
+    asyncio.timeout, to give up).
 
     rig is the name in [rig] of rig.toml; "*" listens to every rig of that router.
     """

@@ -1,7 +1,7 @@
 """Stamps, and how far this machine's clock is from the master's.
 
-All stamps are CLOCK_REALTIME nanoseconds. No NTP is needed: every node asks the master for its clock over Zenoh and
-estimates its own offset:
+All stamps are CLOCK_REALTIME nanoseconds. No NTP is needed: every node asks the master for its
+clock over Zenoh and estimates its own offset:
 
 1. The node reads its clock: t1.
 2. It asks the master (topic control/clock).
@@ -9,32 +9,33 @@ estimates its own offset:
 4. The node reads its clock as the answer arrives: t2.
 5. If both ways took equally long, t_master was read at (t1 + t2) / 2 of the node's clock, so
        offset = (t1 + t2) / 2 - t_master,  stamp on the master's clock = own stamp - offset.
-6. Delays are never equal, but the error is at most (t2 - t1) / 2: only the quickest exchanges of a window count.
-7. A line through them gives offset and drift; their scatter, and the delay itself, give the uncertainty.
-8. Exchanges that contradict the line three times in a row mean that a clock was set: the window starts anew.
+6. Delays are never equal, but the error is at most (t2 - t1) / 2: only the quickest exchanges of a
+   window count.
+7. A line through them gives offset and drift; their scatter, and the delay itself, give the
+   uncertainty.
+8. Exchanges that contradict the line three times in a row mean that a clock was set: the window
+   starts anew.
 
-Late or missing answers make the uncertainty grow, never an error; before the first answer the offset is unknown (sigma -1).
+Late or missing answers make the uncertainty grow, never an error; before the first answer the
+offset is unknown (sigma -1).
 """
 
 from __future__ import annotations
 
-import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rhot.bus.bus import Bus
-
-# Exchanges kept: a minute at one a second, long enough to see 1 ppm of drift, short enough to follow a warming crystal.
+# Exchanges kept: a minute at one a second, long enough to see 1 ppm of drift, short enough to
+# follow a warming crystal.
 _WINDOW = 60
-# Only exchanges this near the quickest one count; a queueing delay is one-sided and would bias the rest.
+# Only exchanges this near the quickest one count; a queueing delay is one-sided and would bias the
+# rest.
 _NEAR_BEST = 1.5
 # Crystals stay within 100 ppm; older exchanges lose that much certainty for each second of age.
 _DRIFT_LIMIT = 1e-4
-# An exchange this far off the line (in its own half delays, plus 1 ms) contradicts it; so many in a row mean a clock was set.
+# An exchange this far off the line (in its own half delays, plus 1 ms) contradicts it; so many in a
+# row mean a clock was set.
 _JUMP_FACTOR, _JUMP_FLOOR_NS, _JUMP_COUNT = 2.0, 1_000_000, 3
 
 
@@ -45,7 +46,10 @@ def now_ns() -> int:
 
 @dataclass(frozen=True)
 class Offset:
-    """Own clock minus the master's at one instant; sigma_ns is one standard deviation, -1 while unknown."""
+    """Own clock minus the master's at one instant.
+
+    sigma_ns is one standard deviation, -1 while unknown.
+    """
 
     offset_ns: int
     sigma_ns: int
@@ -96,24 +100,28 @@ class OffsetEstimator:
         offsets = [float(e.offset_ns - base_ns) for e in good]
         mean_age, mean_offset = sum(ages) / n, sum(offsets) / n
         spread = sum((a - mean_age) ** 2 for a in ages)
-        # A slope from a short stretch is noise: five seconds of standard deviation are needed to see 10 ppm in 50 us.
-        slope = sum((a - mean_age) * (o - mean_offset) for a, o in zip(ages, offsets, strict=True)) / spread if spread > 25.0 * n else 0.0
+        # A slope from a short stretch is noise: five seconds of standard deviation are needed to
+        # see 10 ppm in 50 us.
+        slope = (
+            sum((a - mean_age) * (o - mean_offset) for a, o in zip(ages, offsets, strict=True))
+            / spread
+            if spread > 25.0 * n
+            else 0.0
+        )
         slope = max(-_DRIFT_LIMIT * 1e9, min(_DRIFT_LIMIT * 1e9, slope))
         at_s = (own_ns - origin_ns) * 1e-9
         offset = mean_offset + slope * (at_s - mean_age)
-        residual = sum((o - mean_offset - slope * (a - mean_age)) ** 2 for a, o in zip(ages, offsets, strict=True)) / n
+        residual = (
+            sum(
+                (o - mean_offset - slope * (a - mean_age)) ** 2
+                for a, o in zip(ages, offsets, strict=True)
+            )
+            / n
+        )
         unknown_s = max(0.0, at_s) if slope else abs(at_s - mean_age)
-        # Half the delay bounds the asymmetry; uniform within it means a standard deviation of 1/sqrt(3) of the bound.
-        sigma = (residual / n + (quickest / 2) ** 2 / 3.0 + (unknown_s * _DRIFT_LIMIT * 1e9 / 3.0) ** 2) ** 0.5
+        # Half the delay bounds the asymmetry; uniform within it means a standard deviation of
+        # 1/sqrt(3) of the bound.
+        sigma = (
+            residual / n + (quickest / 2) ** 2 / 3.0 + (unknown_s * _DRIFT_LIMIT * 1e9 / 3.0) ** 2
+        ) ** 0.5
         return Offset(base_ns + round(offset), round(min(sigma, 2.0**60)))
-
-
-async def follow_master(bus: Bus, estimator: OffsetEstimator, own_ns: Callable[[], int]) -> None:
-    """Keep an estimator fed for ever: eight exchanges at once for a quick start, then one a second."""
-    exchanges = 0
-    while True:
-        exchange = await bus.echo(own_ns)
-        if exchange is not None:
-            estimator.update(*exchange)
-            exchanges += 1
-        await asyncio.sleep(0.05 if exchange is not None and exchanges < 8 else 1.0)

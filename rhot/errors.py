@@ -1,7 +1,8 @@
 """The one base error of rhot.
 
-Every error a user can meet derives from RhotError, and its message says three things: what is wrong,
-which values are valid, and what to do next. The commands print it in one line; services log it and exit.
+Every error a user can meet derives from RhotError, and its message says three things: what is
+wrong, which values are valid, and what to do next. The commands print it in one line; services log
+it and exit.
 """
 
 from __future__ import annotations

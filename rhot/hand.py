@@ -1,13 +1,16 @@
-"""The one description of a hand: joints, bones, limits, painted landmarks, and where they all are for given angles.
+"""The one description of a hand: joints, bones, limits, painted landmarks, and where they all are
+for given angles.
 
-Frames (docs/frames.md): the wrist frame is OpenXR's: -z towards the finger tips, +y out of the back of the hand, +x right.
-Each joint frame has -z along the bone that starts there. Angles in radians:
+Frames (docs/frames.md): the wrist frame is OpenXR's: -z towards the finger tips, +y out of the back
+of the hand, +x right. Each joint frame has -z along the bone that starts there. Angles in radians:
   flexion    positive towards the palm (a rotation about -x of the joint frame);
-  abduction  positive towards the thumb side of the hand (radial); for the thumb, away from the palm plane (palmar).
-Each digit is one chain of four degrees of freedom, DIGIT_ANGLES: abduction, then three flexions. The chain of a finger
-starts at its MCP joint (mcp, pip, dip), that of the thumb at its CMC joint (cmc, mcp, dip): the thumb has no middle phalanx,
-its interphalangeal joint is called `dip` as its bone is the distal one, and its MCP abduction is fixed at zero, RHOT eq. (3).
-Pure data and maths; a hand that was never measured uses the tables below and says so in HandModel.origin.
+  abduction  positive towards the thumb side of the hand (radial); for the thumb, away from the palm
+             plane (palmar).
+Each digit is one chain of four degrees of freedom, DIGIT_ANGLES: abduction, then three flexions.
+The chain of a finger starts at its MCP joint (mcp, pip, dip), that of the thumb at its CMC joint
+(cmc, mcp, dip): the thumb has no middle phalanx, its interphalangeal joint is called `dip` as its
+bone is the distal one, and its MCP abduction is fixed at zero, RHOT eq. (3). Pure data and maths; a
+hand that was never measured uses the tables below and says so in HandModel.origin.
 """
 
 from __future__ import annotations
@@ -17,7 +20,14 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y, rotation_z
+from rhot.geometry.transforms import (
+    Array,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
 
 HandName = Literal["left", "right"]
 HANDS: tuple[HandName, ...] = ("left", "right")
@@ -43,7 +53,8 @@ LANDMARKS = (*BASIC_LANDMARKS, *(name for name in JOINTS if name not in BASIC_LA
 
 # The four joints of each digit's chain: root, second, third, tip (indices into JOINTS), (5, 4).
 CHAIN_JOINTS = np.array(
-    [[JOINT_INDEX[j] for j in _THUMB_JOINTS]] + [[JOINT_INDEX[f"{finger}_{bone}"] for bone in _FINGER_BONES[1:]] for finger in DIGITS[1:]]
+    [[JOINT_INDEX[j] for j in _THUMB_JOINTS]]
+    + [[JOINT_INDEX[f"{finger}_{bone}"] for bone in _FINGER_BONES[1:]] for finger in DIGITS[1:]]
 )
 
 # Names of the four angles of each chain, in the order of the columns of an angle array (5, 4).
@@ -58,7 +69,9 @@ Range = tuple[float, float]
 
 
 class Digit(msgspec.Struct, frozen=True, kw_only=True):
-    """One digit: where its chain starts in the wrist frame, its three bones, radii, limits and couplings."""
+    """One digit: where its chain starts in the wrist frame, its three bones, radii, limits and
+    couplings.
+    """
 
     name: Literal["thumb", "index", "middle", "ring", "little"]
     # Start of the metacarpal (equal to base_m for the thumb), for the OpenXR metacarpal joint only.
@@ -67,22 +80,26 @@ class Digit(msgspec.Struct, frozen=True, kw_only=True):
     base_m: Vec3
     # Orientation of the first bone at zero angles, in the wrist frame.
     base_wxyz: Quat
-    # Lengths of the three bones: proximal, middle, distal with pulp (thumb: metacarpal, proximal, distal with pulp).
+    # Lengths of the three bones: proximal, middle, distal with pulp (thumb: metacarpal, proximal,
+    # distal with pulp).
     lengths_m: tuple[Length, Length, Length]
     # Skin radius about the four joints of the chain, root to tip.
     radii_m: tuple[Length, Length, Length, Length]
     # (low, high) of the four angles of DIGIT_ANGLES.
     limits_rad: tuple[Range, Range, Range, Range]
-    # Type II constraint, RHOT eq. (4): last flexion = ratio * second flexion; weight 0 leaves it free, 1 is the usual prior.
+    # Type II constraint, RHOT eq. (4): last flexion = ratio * second flexion; weight 0 leaves it
+    # free, 1 is the usual prior.
     coupling: float = 2.0 / 3.0
     coupling_weight: float = 1.0
 
 
 class Paint(msgspec.Struct, frozen=True, kw_only=True):
-    """A painted landmark: the point that stands for it, fixed to its joint's frame, and how the paint surrounds it.
+    """A painted landmark: the point that stands for it, fixed to its joint's frame, and how the
+    paint surrounds it.
 
-    What cameras see is skin, yet two of them locate the centre of paint all round a finger (radius_m > 0) on the bone axis, within
-    .3 radii: its outline is what counts. A dab on one side (radius_m = 0) lies where it is seen. See services/fusion/output/paint_to_bone.py.
+    What cameras see is skin, yet two of them locate the centre of paint all round a finger
+    (radius_m > 0) on the bone axis, within .3 radii: its outline is what counts. A dab on one side
+    (radius_m = 0) lies where it is seen. See services/fusion/output/paint_to_bone.py.
     """
 
     offset_m: Vec3
@@ -120,8 +137,8 @@ class HandModel(msgspec.Struct, frozen=True, kw_only=True):
         return 1.0 if self.hand == "right" else -1.0
 
 
-# Phalanx lengths in mm, Buryanov & Kotiuk, "Proportions of Hand Segments", Int. J. Morphol. 28(3), 2010, n = 66:
-# metacarpal, proximal, middle, distal + pulp.
+# Phalanx lengths in mm, Buryanov & Kotiuk, "Proportions of Hand Segments", Int. J. Morphol. 28(3),
+# 2010, n = 66: metacarpal, proximal, middle, distal + pulp.
 _BONES_MM = {
     "thumb": (46.2, 31.6, 0.0, 21.7 + 5.7),
     "index": (68.1, 39.8, 22.4, 15.8 + 3.8),
@@ -129,8 +146,9 @@ _BONES_MM = {
     "ring": (58.0, 41.4, 25.7, 17.3 + 4.0),
     "little": (53.7, 32.7, 18.1, 16.0 + 3.7),
 }
-# Start of the metacarpals (mm) and their directions (deg: towards the thumb, about the bone) for a right hand, fitted by eye
-# to the three recorded OpenXR poses of the npm package iwer 2.5.0 (relaxed, point, pinch), mirrored.
+# Start of the metacarpals (mm) and their directions (deg: towards the thumb, about the bone) for a
+# right hand, fitted by eye to the three recorded OpenXR poses of the npm package iwer 2.5.0
+# (relaxed, point, pinch), mirrored.
 _CARPUS_MM = {
     "thumb": (-25.0, -14.0, -27.0),
     "index": (-17.0, -6.0, -30.0),
@@ -139,7 +157,12 @@ _CARPUS_MM = {
     "little": (20.0, -8.0, -28.0),
 }
 _METACARPAL_DEG = {"index": 5.0, "middle": 1.0, "ring": -5.0, "little": -13.0}
-_SPLAY_DEG = {"index": (6.0, 3.0), "middle": (0.0, 0.0), "ring": (-6.0, -7.0), "little": (-13.0, -16.0)}
+_SPLAY_DEG = {
+    "index": (6.0, 3.0),
+    "middle": (0.0, 0.0),
+    "ring": (-6.0, -7.0),
+    "little": (-13.0, -16.0),
+}
 # Skin radii in mm at the four chain joints, rounded from the same recordings.
 _RADII_MM = {
     "thumb": (17.0, 12.0, 9.8, 8.8),
@@ -148,8 +171,9 @@ _RADII_MM = {
     "ring": (10.2, 8.2, 7.4, 6.4),
     "little": (9.0, 7.2, 6.6, 5.6),
 }
-# Type I limits, RHOT eq. (1) and (2); the thumb's from the ranges of motion of the AAOS handbook (CMC 53 deg of flexion-extension
-# and 42 deg of palmar abduction about the resting pose, MCP 0..55, IP 0..80).
+# Type I limits, RHOT eq. (1) and (2); the thumb's from the ranges of motion of the AAOS handbook
+# (CMC 53 deg of flexion-extension and 42 deg of palmar abduction about the resting pose, MCP 0..55,
+# IP 0..80).
 _FINGER_LIMITS_DEG = ((-15.0, 15.0), (0.0, 90.0), (0.0, 110.0), (0.0, 90.0))
 _MIDDLE_LIMITS_DEG = ((0.0, 0.0), (0.0, 90.0), (0.0, 110.0), (0.0, 90.0))
 _THUMB_LIMITS_DEG = ((-17.0, 25.0), (-23.0, 30.0), (0.0, 55.0), (0.0, 80.0))
@@ -162,7 +186,9 @@ _WRIST_DAB_M = 0.016
 def default_hand(hand: HandName = "right", scale: float = 1.0) -> HandModel:
     """A hand from the anthropometric tables, `scale` times the average adult's."""
     digits = tuple(_default_digit(name, hand, scale) for name in DIGITS)
-    return HandModel(hand=hand, digits=digits, paint=_default_paint(scale), wrist_radius_m=0.021 * scale)  # type: ignore[arg-type]
+    return HandModel(
+        hand=hand, digits=digits, paint=_default_paint(scale), wrist_radius_m=0.021 * scale
+    )  # type: ignore[arg-type]
 
 
 def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
@@ -170,14 +196,17 @@ def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
     carpus = np.array(_CARPUS_MM[name]) * 1e-3 * scale
     if name == "thumb":
         base, lengths, limits = carpus, (bones[0], bones[1], bones[3]), _THUMB_LIMITS_DEG
-        # -z and x of the thumb's metacarpal frame at rest, from the same recordings, made orthonormal.
+        # -z and x of the thumb's metacarpal frame at rest, from the same recordings, made
+        # orthonormal.
         z = -np.array([-0.675, -0.250, -0.690])
         x = np.array([0.115, 0.887, -0.442])
         z /= np.linalg.norm(z)
         y = np.cross(z, x) / np.linalg.norm(np.cross(z, x))
         rotation = np.stack([np.cross(y, z), y, z], axis=1)
     else:
-        base = carpus + rotation_y(np.deg2rad(_METACARPAL_DEG[name])) @ np.array([0.0, 0.0, -bones[0]])
+        base = carpus + rotation_y(np.deg2rad(_METACARPAL_DEG[name])) @ np.array(
+            [0.0, 0.0, -bones[0]]
+        )
         lengths = (bones[1], bones[2], bones[3])
         limits = _MIDDLE_LIMITS_DEG if name == "middle" else _FINGER_LIMITS_DEG
         splay, roll = np.deg2rad(_SPLAY_DEG[name])
@@ -197,25 +226,37 @@ def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
 
 
 def _default_paint(scale: float) -> dict[str, Paint]:
-    """Painted tips all round, dabs of paint on the palm side of the wrist and on the back of every other joint."""
+    """Painted tips all round, dabs of paint on the palm side of the wrist and on the back of every
+    other joint.
+    """
     paint = {}
     for name in LANDMARKS:
         if name == "wrist":
-            paint[name] = Paint(offset_m=(0.0, -0.021 * scale, 0.0), radius_m=0.0, extent_m=_WRIST_DAB_M)
+            paint[name] = Paint(
+                offset_m=(0.0, -0.021 * scale, 0.0), radius_m=0.0, extent_m=_WRIST_DAB_M
+            )
         elif name in TIPS:
             radius = _RADII_MM[name.removesuffix("_tip")][3] * 1e-3 * scale
-            paint[name] = Paint(offset_m=(0.0, 0.0, 0.5 * _TIP_PAINT_M), radius_m=radius, extent_m=_TIP_PAINT_M)
+            paint[name] = Paint(
+                offset_m=(0.0, 0.0, 0.5 * _TIP_PAINT_M), radius_m=radius, extent_m=_TIP_PAINT_M
+            )
         else:
             height = 0.018 if name == "palm" or name.endswith("metacarpal") else 0.009
-            paint[name] = Paint(offset_m=(0.0, height * scale, 0.0), radius_m=0.0, extent_m=_KNUCKLE_DAB_M)
+            paint[name] = Paint(
+                offset_m=(0.0, height * scale, 0.0), radius_m=0.0, extent_m=_KNUCKLE_DAB_M
+            )
     return paint
 
 
-def forward(model: HandModel, wrist_rotation: Array, wrist_m: Array, angles_rad: Array) -> tuple[Array, Array]:
-    """All 26 joints of the hand: positions (26, 3) and rotations (26, 3, 3) in the frame of wrist_rotation and wrist_m.
+def forward(
+    model: HandModel, wrist_rotation: Array, wrist_m: Array, angles_rad: Array
+) -> tuple[Array, Array]:
+    """All 26 joints of the hand: positions (26, 3) and rotations (26, 3, 3) in the frame of
+    wrist_rotation and wrist_m.
 
-    wrist_rotation (3, 3), wrist_m (3,) metres, angles_rad (5, 4) in the order of DIGITS and DIGIT_ANGLES.
-    Equal to the D-H rows of the finger study (Appendix A1) with its axes renamed; tests compare the two.
+    wrist_rotation (3, 3), wrist_m (3,) metres, angles_rad (5, 4) in the order of DIGITS and
+    DIGIT_ANGLES. Equal to the D-H rows of the finger study (Appendix A1) with its axes renamed;
+    tests compare the two.
     """
     positions, rotations = np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1))
     for row, digit in enumerate(model.digits):
@@ -238,7 +279,9 @@ def forward(model: HandModel, wrist_rotation: Array, wrist_m: Array, angles_rad:
 
 
 def landmark_point(model: HandModel, name: str, positions: Array, rotations: Array) -> Array:
-    """The point that stands for a painted landmark, (3,), given all joints as `forward` returns them."""
+    """The point that stands for a painted landmark, (3,), given all joints as `forward` returns
+    them.
+    """
     joint = JOINT_INDEX[name]
     return positions[joint] + rotations[joint] @ np.array(model.paint[name].offset_m)
 

@@ -32,9 +32,17 @@ EXERCISES: tuple[Exercise, ...] = (
         exercise
         for row, digit in enumerate(DIGITS[1:], 1)
         for exercise in (
-            Exercise(f"{digit}_knuckle", "knuckle", row, f"{digit} finger: bend it at the knuckle, kept straight, twice; hold the others"),
             Exercise(
-                f"{digit}_hook", "hook", row, f"{digit} finger: roll in its two last joints, knuckle straight, twice; hold the others"
+                f"{digit}_knuckle",
+                "knuckle",
+                row,
+                f"{digit} finger: bend it at the knuckle, kept straight, twice; hold the others",
+            ),
+            Exercise(
+                f"{digit}_hook",
+                "hook",
+                row,
+                f"{digit} finger: roll in its two last joints, knuckle straight, twice; hold the others",
             ),
         )
     ),

@@ -1,9 +1,9 @@
 """Every message that crosses the wire, and nothing else.
 
-JSON, readable with any Zenoh command-line tool. Fields may be added, never renamed; unknown ones are ignored, missing or
-wrong ones make the decoder raise, which the bus counts as `rejected`. Units are part of the names. `stamp_ns` is
-CLOCK_REALTIME at the instant the content describes, `sent_ns` the instant the sender handed the message to Zenoh, on the
-sender's own clock (0 in files).
+JSON, readable with any Zenoh command-line tool. Fields may be added, never renamed; unknown ones
+are ignored, missing or wrong ones make the decoder raise, which the bus counts as `rejected`. Units
+are part of the names. `stamp_ns` is CLOCK_REALTIME at the instant the content describes, `sent_ns`
+the instant the sender handed the message to Zenoh, on the sender's own clock (0 in files).
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Marker(Message, frozen=True, kw_only=True):
-    """One coloured blob in one image; sigma_px is one standard deviation of each coordinate, quality 0..1."""
+    """One coloured blob in one image.
+
+    sigma_px is one standard deviation of each coordinate, quality 0..1.
+    """
 
     color: Name
     x_px: float
@@ -45,8 +48,9 @@ class Marker(Message, frozen=True, kw_only=True):
 class MarkerFrame(Message, frozen=True, kw_only=True):
     """All markers of one image, also when there are none.
 
-    stamp_ns is mid-exposure of row 0 on the camera's own clock; a marker's own instant is stamp_ns + y_px * row_time_ns, and
-    subtracting clock_offset_ns brings it to the master's clock. clock_sigma_ns is -1 while the offset is unknown.
+    stamp_ns is mid-exposure of row 0 on the camera's own clock; a marker's own instant is stamp_ns
+    + y_px * row_time_ns, and subtracting clock_offset_ns brings it to the master's clock.
+    clock_sigma_ns is -1 while the offset is unknown.
     """
 
     camera: Name
@@ -55,7 +59,9 @@ class MarkerFrame(Message, frozen=True, kw_only=True):
     row_time_ns: Annotated[float, msgspec.Meta(ge=0.0, le=1e8)]
     clock_offset_ns: Offset
     clock_sigma_ns: Annotated[int, msgspec.Meta(ge=-1, le=2**62)]
-    size_px: tuple[Annotated[int, msgspec.Meta(ge=1, le=65536)], Annotated[int, msgspec.Meta(ge=1, le=65536)]]
+    size_px: tuple[
+        Annotated[int, msgspec.Meta(ge=1, le=65536)], Annotated[int, msgspec.Meta(ge=1, le=65536)]
+    ]
     markers: Annotated[list[Marker], msgspec.Meta(max_length=256)]
     sent_ns: Stamp = 0
 
@@ -104,10 +110,12 @@ class HandJoint(Message, frozen=True, kw_only=True):
 
 
 class FingerAngles(Message, frozen=True, kw_only=True, omit_defaults=True):
-    """Joint angles of one digit in radians; flexion is positive towards the palm, abduction towards the thumb side.
+    """Joint angles of one digit in radians; flexion is positive towards the palm, abduction towards
+    the thumb side.
 
-    Fingers: abduction and mcp at the MCP joint, pip, dip. Thumb: abduction and cmc at the CMC joint, mcp at the MCP joint,
-    dip at the interphalangeal joint; pip is 0, as the thumb has no middle phalanx.
+    Fingers: abduction and mcp at the MCP joint, pip, dip. Thumb: abduction and cmc at the CMC
+    joint, mcp at the MCP joint, dip at the interphalangeal joint; pip is 0, as the thumb has no
+    middle phalanx.
     """
 
     abduction: float
@@ -121,9 +129,11 @@ FingerStatus = Literal["solved", "unreachable", "not_converged", "predicted"]
 
 
 class FingerPose(Message, frozen=True, kw_only=True):
-    """One digit's solution: residual_m is the distance left between the model's marker and the measured one.
+    """One digit's solution: residual_m is the distance left between the model's marker and the
+    measured one.
 
-    sigma_rad is one standard deviation of its angles (root mean square over those that can move), None if the sender knows none.
+    sigma_rad is one standard deviation of its angles (root mean square over those that can move),
+    None if the sender knows none.
     """
 
     name: Literal["thumb", "index", "middle", "ring", "little"]
@@ -135,16 +145,25 @@ class FingerPose(Message, frozen=True, kw_only=True):
 
     @property
     def model_angles_rad(self) -> tuple[float, float, float, float]:
-        """In the order of a HandModel's limits_rad: abduction, cmc, mcp, dip of the thumb; abduction, mcp, pip, dip of a finger."""
+        """In the order of a HandModel's limits_rad: abduction, cmc, mcp, dip of the thumb.
+
+        Abduction, mcp, pip, dip of a finger.
+        """
         a = self.angles_rad
-        return (a.abduction, a.cmc, a.mcp, a.dip) if self.name == "thumb" else (a.abduction, a.mcp, a.pip, a.dip)
+        return (
+            (a.abduction, a.cmc, a.mcp, a.dip)
+            if self.name == "thumb"
+            else (a.abduction, a.mcp, a.pip, a.dip)
+        )
 
 
 class HandPose(Message, frozen=True, kw_only=True):
-    """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from thumb to little.
+    """The full hand at one instant of the master's clock; joints in OpenXR order, fingers from
+    thumb to little.
 
-    wrist_sigma_m and wrist_sigma_rad are one standard deviation of how far the wrist's position and orientation may be off, as
-    lengths of vectors, from the covariance of the solution; None if the sender knows none.
+    wrist_sigma_m and wrist_sigma_rad are one standard deviation of how far the wrist's position and
+    orientation may be off, as lengths of vectors, from the covariance of the solution; None if the
+    sender knows none.
     """
 
     hand: HandName
@@ -174,9 +193,11 @@ Row4 = tuple[float, float, float, float]
 
 
 class OpenVrPose(Message, frozen=True, kw_only=True):
-    """A TrackedDevicePose_t under Valve's own field names, with what it lacks: device, universe, stamp.
+    """A TrackedDevicePose_t under Valve's own field names, with what it lacks: device, universe,
+    stamp.
 
-    mDeviceToAbsoluteTracking is 3x4 row by row, column 3 the translation in metres, in the `lighthouse` frame.
+    mDeviceToAbsoluteTracking is 3x4 row by row, column 3 the translation in metres, in the
+    `lighthouse` frame.
     """
 
     v: int
@@ -197,7 +218,10 @@ ObjectTracking = Literal["ok", "out_of_range", "rotation_only", "calibrating", "
 
 
 class ObjectPose(Message, frozen=True, kw_only=True):
-    """A tracked object; in the rig frame if registered is true, else still in the lighthouse frame."""
+    """A tracked object.
+
+    In the rig frame if registered is true, else still in the lighthouse frame.
+    """
 
     object: Name
     serial: Name
@@ -213,7 +237,10 @@ class ObjectPose(Message, frozen=True, kw_only=True):
 
 
 class Session(Message, frozen=True, kw_only=True):
-    """The start broadcast: trackers work while running is true. start_ns is on the master's clock."""
+    """The start broadcast: trackers work while running is true.
+
+    start_ns is on the master's clock.
+    """
 
     running: bool
     start_ns: Stamp
@@ -229,8 +256,9 @@ class ClockEcho(Message, frozen=True, kw_only=True):
 class StreamHealth(Message, frozen=True, kw_only=True):
     """One stream of a service since the last beat.
 
-    age is (now - stamp_ns) of what was sent, hop is (now - sent_ns) of what arrived; -1 where nothing was measured.
-    ok compares rate_hz with expected_hz (0: no expectation) from the topics table.
+    age is (now - stamp_ns) of what was sent, hop is (now - sent_ns) of what arrived; -1 where
+    nothing was measured. ok compares rate_hz with expected_hz (0: no expectation) from the topics
+    table.
     """
 
     key: str
@@ -246,7 +274,10 @@ class StreamHealth(Message, frozen=True, kw_only=True):
 
 
 class Health(Message, frozen=True, kw_only=True):
-    """A service's state once a second. values holds its own figures, e.g. stage times in ms or the clock offset."""
+    """A service's state once a second. values holds its own figures, e.g.
+
+    stage times in ms or the clock offset.
+    """
 
     service: Name
     instance: Name
@@ -265,7 +296,10 @@ class Health(Message, frozen=True, kw_only=True):
 
 
 class HandTruth(Message, frozen=True, kw_only=True):
-    """What the simulator knows of one hand; points_m maps a landmark to its OpenXR joint's position in the rig frame."""
+    """What the simulator knows of one hand.
+
+    points_m maps a landmark to its OpenXR joint's position in the rig frame.
+    """
 
     points_m: dict[str, Vec3]
     wrist: WristPose
@@ -289,7 +323,9 @@ class Truth(Message, frozen=True, kw_only=True):
 
 
 class SimFrame(Message, frozen=True, kw_only=True):
-    """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far its computer's clock is ahead now."""
+    """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far
+    its computer's clock is ahead now.
+    """
 
     camera: Name
     seq: Count

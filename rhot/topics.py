@@ -1,8 +1,8 @@
 """THE table of topics: key, message, expected rate, quality of service, recorded or not.
 
-No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and docs/topics.md derive from TOPICS.
-A key is `<root>/<rig>/` + the template with its fields filled in, root being `rhot` for all but raw
-pictures; a field left out becomes the wildcard `*`.
+No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and
+docs/topics.md derive from TOPICS. A key is `<root>/<rig>/` + the template with its fields filled
+in, root being `rhot` for all but raw pictures; a field left out becomes the wildcard `*`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,10 @@ class Priority(Enum):
 
 @dataclass(frozen=True)
 class Topic(Generic[T]):
-    """One row of the table. message is None where the payload is not JSON (media_type says what it is)."""
+    """One row of the table.
+
+    message is None where the payload is not JSON (media_type says what it is).
+    """
 
     template: str
     message: type[T] | None
@@ -62,9 +65,11 @@ class Topic(Generic[T]):
     recorded: bool
     about: str
     media_type: str = "application/json"
-    # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the largest (HandPose, 9 kB).
+    # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the
+    # largest (HandPose, 9 kB).
     max_bytes: int = 65_536
-    # First part of the key. Raw pictures have another, so that a subscription to rhot/** shows JSON and stays small.
+    # First part of the key. Raw pictures have another, so that a subscription to rhot/** shows JSON
+    # and stays small.
     root: str = ROOT
 
     @property
@@ -80,20 +85,28 @@ class Topic(Generic[T]):
     @property
     def encoding(self) -> str:
         """Zenoh encoding of the payload."""
-        return self.media_type if self.message is None else f"{self.media_type};rhot.{self.message.__name__}.1"
+        return (
+            self.media_type
+            if self.message is None
+            else f"{self.media_type};rhot.{self.message.__name__}.1"
+        )
 
     def key(self, rig: str, **names: str) -> str:
         """The key of one stream, or a key expression where fields are left out."""
         unknown = set(names) - set(self.fields)
         if unknown:
-            raise BusError(f"topic {self.template} has no field {sorted(unknown)}; it has {list(self.fields)}")
+            raise BusError(
+                f"topic {self.template} has no field {sorted(unknown)}; it has {list(self.fields)}"
+            )
         for field, value in {"rig": rig, **names}.items():
             if not _NAME.match(value) and not (field == "rig" and value == "*"):
                 raise BusError(
                     f"{field} name {value!r} cannot be part of a key; "
                     "use letters, digits, '_', '-' and '.', starting with a letter or digit"
                 )
-        return f"{self.root}/{rig}/" + _FIELD.sub(lambda match: names.get(match[1], "*"), self.template)
+        return f"{self.root}/{rig}/" + _FIELD.sub(
+            lambda match: names.get(match[1], "*"), self.template
+        )
 
     def names(self, key: str) -> dict[str, str] | None:
         """The fields of a key of this topic, or None if the key is another's."""
@@ -102,14 +115,20 @@ class Topic(Generic[T]):
         return match.groupdict() if match else None
 
 
-def _stream(template: str, message: type[T], rate: Rate, about: str, *, recorded: bool = True) -> Topic[T]:
+def _stream(
+    template: str, message: type[T], rate: Rate, about: str, *, recorded: bool = True
+) -> Topic[T]:
     return Topic(template, message, Kind.STREAM, rate, Priority.REAL_TIME, recorded, about)
 
 
-MARKERS = _stream("camera/{camera}/markers", m.MarkerFrame, Rate.CAMERA, "coloured blobs of every image")
+MARKERS = _stream(
+    "camera/{camera}/markers", m.MarkerFrame, Rate.CAMERA, "coloured blobs of every image"
+)
 POINTS = _stream("hand/{hand}/points", m.HandPoints, Rate.HAND, "3D landmarks")
 POSE = _stream("hand/{hand}/pose", m.HandPose, Rate.HAND, "the full hand")
-OPENVR = _stream("openvr/{serial}/pose", m.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them")
+OPENVR = _stream(
+    "openvr/{serial}/pose", m.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them"
+)
 OBJECT = _stream("object/{object}/pose", m.ObjectPose, Rate.OBJECT, "objects in the rig frame")
 TRUTH = _stream("sim/truth", m.Truth, Rate.CAMERA, "the simulator's ground truth")
 PREVIEW: Topic[bytes] = Topic(
@@ -146,7 +165,15 @@ SIM_FRAME: Topic[bytes] = Topic(
     40_000_000,
     "rhot-sim",
 )
-COLORS = Topic("camera/{camera}/colors", c.Colors, Kind.STATE, Rate.DEMAND, Priority.DATA, False, "colour ranges; a put changes them")
+COLORS = Topic(
+    "camera/{camera}/colors",
+    c.Colors,
+    Kind.STATE,
+    Rate.DEMAND,
+    Priority.DATA,
+    False,
+    "colour ranges; a put changes them",
+)
 EXPOSURE = Topic(
     "camera/{camera}/exposure",
     c.ExposureControl,
@@ -157,13 +184,51 @@ EXPOSURE = Topic(
     "exposure in force; a put changes it, or runs the automatics once",
 )
 FIT = Topic(
-    "camera/{camera}/fit", c.FitResult, Kind.QUERY, Rate.DEMAND, Priority.BACKGROUND, False, "ranges fitted to the patches of a FitRequest"
+    "camera/{camera}/fit",
+    c.FitResult,
+    Kind.QUERY,
+    Rate.DEMAND,
+    Priority.BACKGROUND,
+    False,
+    "ranges fitted to the patches of a FitRequest",
 )
-SESSION = Topic("control/session", m.Session, Kind.STATE, Rate.DEMAND, Priority.REAL_TIME, True, "the start broadcast")
-CLOCK = Topic("control/clock", m.ClockEcho, Kind.QUERY, Rate.DEMAND, Priority.REAL_TIME, False, "the master's clock")
-HEALTH = Topic("service/{service}/{instance}/health", m.Health, Kind.STREAM, Rate.BEAT, Priority.DATA, True, "state of each service")
+SESSION = Topic(
+    "control/session",
+    m.Session,
+    Kind.STATE,
+    Rate.DEMAND,
+    Priority.REAL_TIME,
+    True,
+    "the start broadcast",
+)
+CLOCK = Topic(
+    "control/clock",
+    m.ClockEcho,
+    Kind.QUERY,
+    Rate.DEMAND,
+    Priority.REAL_TIME,
+    False,
+    "the master's clock",
+)
+HEALTH = Topic(
+    "service/{service}/{instance}/health",
+    m.Health,
+    Kind.STREAM,
+    Rate.BEAT,
+    Priority.DATA,
+    True,
+    "state of each service",
+)
 ALIVE: Topic[bytes] = Topic(
-    "service/{service}/{instance}/alive", None, Kind.TOKEN, Rate.DEMAND, Priority.DATA, False, "liveliness token", "", 0
+    "service/{service}/{instance}/alive",
+    None,
+    Kind.TOKEN,
+    Rate.DEMAND,
+    Priority.DATA,
+    False,
+    "liveliness token",
+    "",
+    0,
 )
 
 TOPICS: tuple[Topic, ...] = (

@@ -1,7 +1,8 @@
-"""Pictures with a known truth: painted finger tips on skin before a wall, with shading, blur, noise and 2x2 averaged chroma.
+"""Pictures with a known truth: painted finger tips on skin before a wall, with shading, blur, noise
+and 2x2 averaged chroma.
 
-For tests and benchmarks of the eye alone; whole hands in whole rooms are the simulator's. Pure: the same seed gives the same picture.
-A tip that reaches over the picture's edge is cut there.
+For tests and benchmarks of the eye alone; whole hands in whole rooms are the simulator's. Pure: the
+same seed gives the same picture. A tip that reaches over the picture's edge is cut there.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from rhot.files.calibration import ColorRange, Colors
 from services.pi_tracker.image.frame import Frame, Image, Layout
 
 Bgr = tuple[float, float, float]
-# Paints that a pair of cameras can tell apart, skin, and a grey wall, as a camera shows them in full light.
+# Paints that a pair of cameras can tell apart, skin, and a grey wall, as a camera shows them in
+# full light.
 PAINTS: dict[str, Bgr] = {
     "green": (60, 150, 50),
     "blue": (190, 90, 30),
@@ -31,12 +33,16 @@ WALL: Bgr = (150, 152, 149)
 _FINE = 6
 # The part of its light that comes from all around: no side of a finger is black.
 _DARKEST = 0.15
-_YUV_FROM_BGR = np.array([[0.0979, 0.5041, 0.2568], [0.4392, -0.2910, -0.1482], [-0.0714, -0.3678, 0.4392]], np.float32)
+_YUV_FROM_BGR = np.array(
+    [[0.0979, 0.5041, 0.2568], [0.4392, -0.2910, -0.1482], [-0.0714, -0.3678, 0.4392]], np.float32
+)
 
 
 @dataclass(frozen=True)
 class Tip:
-    """A painted finger tip: the middle of its paint, width and length in px, direction in rad, the side the light comes from in rad."""
+    """A painted finger tip: the middle of its paint, width and length in px, direction in rad, the
+    side the light comes from in rad.
+    """
 
     color: str
     x_px: float
@@ -48,19 +54,26 @@ class Tip:
 
 
 def clean(
-    tips: Sequence[Tip], size_px: tuple[int, int] = (64, 64), shading: float = 0.5, blur_px: float = 0.8, wall: Bgr | Image = WALL
+    tips: Sequence[Tip],
+    size_px: tuple[int, int] = (64, 64),
+    shading: float = 0.5,
+    blur_px: float = 0.8,
+    wall: Bgr | Image = WALL,
 ) -> tuple[Image, dict[str, tuple[float, float]]]:
-    """The picture without noise, float32 BGR (h, w, 3), and the centre of the visible paint of each colour, as if no other tip hid it.
+    """The picture without noise, float32 BGR (h, w, 3), and the centre of the visible paint of each
+    colour, as if no other tip hid it.
 
-    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of the lens; a wall of several colours is an
-    image (h, w, 3).
+    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of
+    the lens; a wall of several colours is an image (h, w, 3).
     """
     image = np.empty((size_px[1], size_px[0], 3), np.float32)
     image[:] = _light(wall)
     truth = {tip.color: _draw(image, tip, shading) for tip in tips}
     # A lens blurs light, not grey levels.
     light = cv2.GaussianBlur(image, (0, 0), blur_px)
-    return np.float32(255.0) * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055), truth
+    return np.float32(255.0) * np.where(
+        light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055
+    ), truth
 
 
 def noisy(image: Image, sigma: float, seed: int) -> Image:
@@ -70,7 +83,10 @@ def noisy(image: Image, sigma: float, seed: int) -> Image:
 
 
 def i420(bgr: Image) -> Image:
-    """YUV420 as a camera makes it, the chroma of 2x2 pixels averaged; (h, w, 3) -> (h * 3 / 2, w)."""
+    """YUV420 as a camera makes it, the chroma of 2x2 pixels averaged.
+
+    (h, w, 3) -> (h * 3 / 2, w).
+    """
     height, width = bgr.shape[:2]
     yuv = bgr.astype(np.float32) @ _YUV_FROM_BGR.T + np.array([16, 128, 128], np.float32)
     chroma = cv2.resize(yuv[..., 1:], (width // 2, height // 2), interpolation=cv2.INTER_AREA)
@@ -117,7 +133,9 @@ def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
     away = np.where(along < start, np.hypot(along - start, across), np.abs(across))
     finger = (away < radius) & (along < 3 * tip.length_px)
     paint = finger & (along < tip.length_px / 2)
-    facing = np.sqrt(np.clip(1 - (away / radius) ** 2, 0, 1)) * np.cos(tip.light_rad) + across / radius * np.sin(tip.light_rad)
+    facing = np.sqrt(np.clip(1 - (away / radius) ** 2, 0, 1)) * np.cos(
+        tip.light_rad
+    ) + across / radius * np.sin(tip.light_rad)
     light = np.clip(1 - shading + shading * facing, _DARKEST, 1.0)[..., None]
     fine[finger] = (_light(SKIN) * light)[finger]
     fine[paint] = (_light(PAINTS[tip.color]) * light)[paint]

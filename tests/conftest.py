@@ -57,11 +57,18 @@ Running = Callable[..., AbstractAsyncContextManager[tuple[Service, Bus]]]
 
 @pytest.fixture
 def running(router: str) -> Running:
-    """`async with running(name, serve, config) as (service, bus)`: a service in this process on a real router, and a bus of one's own."""
+    """`async with running(name, serve, config) as (service, bus)`: a service in this process on a
+    real router, and a bus of one's own.
+    """
 
     @contextlib.asynccontextmanager
     async def run(
-        name: str, serve: Serve, config: RigConfig, *, instance: str = "main", deadline_s: float = 60.0
+        name: str,
+        serve: Serve,
+        config: RigConfig,
+        *,
+        instance: str = "main",
+        deadline_s: float = 60.0,
     ) -> AsyncIterator[tuple[Service, Bus]]:
         async with (
             open_bus("desk", [router]) as theirs,
@@ -79,7 +86,9 @@ def running(router: str) -> Running:
 
 @pytest.fixture
 def sending() -> Callable[[Callable[[], None]], AbstractContextManager[None]]:
-    """`with sending(send):` calls send again and again: subscriptions need a moment to reach the router."""
+    """`with sending(send):` calls send again and again: subscriptions need a moment to reach the
+    router.
+    """
 
     @contextlib.contextmanager
     def repeat(send: Callable[[], None]) -> Iterator[None]:

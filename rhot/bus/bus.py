@@ -1,12 +1,15 @@
-"""asyncio over Zenoh: typed publishers, subscriptions that name their contract, queries, liveliness.
+"""asyncio over Zenoh: typed publishers, subscriptions that name their contract, queries,
+liveliness.
 
-Zenoh calls back in its own threads. Each subscription copies the payload there, puts it into a bounded buffer and wakes the
-event loop once, however many samples arrive meanwhile: the lowest latency measured (210 us direct, 390 us through a router)
-and no way for a slow consumer to stall another subscription. What does not fit is dropped, oldest first, and counted; what
-does not decode is rejected and counted, never raised: every message is untrusted.
+Zenoh calls back in its own threads. Each subscription copies the payload there, puts it into a
+bounded buffer and wakes the event loop once, however many samples arrive meanwhile: the lowest
+latency measured (210 us direct, 390 us through a router) and no way for a slow consumer to stall
+another subscription. What does not fit is dropped, oldest first, and counted; what does not decode
+is rejected and counted, never raised: every message is untrusted.
 
-Late: a consumer sees at most its buffer's worth of old samples. Missing: nothing arrives, nothing raises; after the router's
-death sessions reconnect by themselves, and what was sent meanwhile is lost. No router yet: open_bus waits for it.
+Late: a consumer sees at most its buffer's worth of old samples. Missing: nothing arrives, nothing
+raises; after the router's death sessions reconnect by themselves, and what was sent meanwhile is
+lost. No router yet: open_bus waits for it.
 """
 
 from __future__ import annotations
@@ -22,7 +25,15 @@ import zenoh
 
 from rhot import clock, topics
 from rhot.bus.stats import StreamStats
-from rhot.bus.streams import Alive, AliveWatch, Payload, Publisher, RawSubscription, Sample, Subscription
+from rhot.bus.streams import (
+    Alive,
+    AliveWatch,
+    Payload,
+    Publisher,
+    RawSubscription,
+    Sample,
+    Subscription,
+)
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.errors import BusError
 from rhot.messages import ClockEcho
@@ -32,19 +43,32 @@ T = TypeVar("T")
 Answer = msgspec.Struct | bytes | None
 log = logging.getLogger("rhot.bus")
 
-__all__ = ["Alive", "Bus", "Publisher", "Sample", "Subscription", "client_config", "open_bus", "router_config"]
+__all__ = [
+    "Alive",
+    "Bus",
+    "Publisher",
+    "Sample",
+    "Subscription",
+    "client_config",
+    "open_bus",
+    "router_config",
+]
 
-# Between attempts to reach a router that is not there yet: short, so that services are up as soon as it is.
+# Between attempts to reach a router that is not there yet: short, so that services are up as soon
+# as it is.
 _RETRY_S = 0.25
-# A router that starts together with its clients takes a second or two, which is no news; one that is late is.
+# A router that starts together with its clients takes a second or two, which is no news; one that
+# is late is.
 _SILENT_ATTEMPTS = 10
-# A session that does not close in this time belongs to a wedged link; the process goes on without it.
+# A session that does not close in this time belongs to a wedged link; the process goes on without
+# it.
 _CLOSE_S = 3.0
 
 
 @contextlib.asynccontextmanager
 async def open_bus(rig: str, connect: Sequence[str]) -> AsyncIterator[Bus]:
-    """A session with the router at `connect`; waits for the router as long as it takes, and is cancellable.
+    """A session with the router at `connect`; waits for the router as long as it takes, and is
+    cancellable.
 
     rig is the name in every key; "*" listens to all rigs (and cannot publish).
     """
@@ -55,7 +79,8 @@ async def open_bus(rig: str, connect: Sequence[str]) -> AsyncIterator[Bus]:
     finally:
         bus.stop()
         with contextlib.suppress(TimeoutError, zenoh.ZError):
-            # Shielded: a second cancellation must not leave the session open, which would keep the process alive for ever.
+            # Shielded: a second cancellation must not leave the session open, which would keep the
+            # process alive for ever.
             await asyncio.shield(asyncio.wait_for(asyncio.to_thread(session.close), _CLOSE_S))
 
 
@@ -68,7 +93,11 @@ async def _connect(connect: Sequence[str]) -> zenoh.Session:
         except zenoh.ZError as error:
             attempts += 1
             if attempts == _SILENT_ATTEMPTS:
-                log.warning("no router at %s yet, waiting for it: %s", ", ".join(connect), str(error).split(" at /")[0])
+                log.warning(
+                    "no router at %s yet, waiting for it: %s",
+                    ", ".join(connect),
+                    str(error).split(" at /")[0],
+                )
             await asyncio.sleep(_RETRY_S)
 
 
@@ -87,7 +116,9 @@ class Bus:
         """A publisher of one stream; its name fields must all be given."""
         key = topic.key(self.rig, **names)
         if "*" in key:
-            raise BusError(f"cannot publish on the pattern {key}; give {list(topic.fields)} and the rig's name")
+            raise BusError(
+                f"cannot publish on the pattern {key}; give {list(topic.fields)} and the rig's name"
+            )
         publisher = Publisher(self._session, topic, key, self._stats(topic, key, names, "out"))
         self._open.append(publisher)
         return publisher
@@ -115,14 +146,25 @@ class Bus:
         self._open.append(subscription)
         return subscription
 
-    def _stats(self, topic: Topic[Any], key: str, names: dict[str, str], direction: Any) -> StreamStats:
+    def _stats(
+        self, topic: Topic[Any], key: str, names: dict[str, str], direction: Any
+    ) -> StreamStats:
         stats = StreamStats(topic, key, names, direction)
         if topic.kind is Kind.STREAM:
             self.streams.append(stats)
         return stats
 
-    async def get(self, topic: Topic[T], timeout_s: float = 1.0, request: msgspec.Struct | None = None, **names: str) -> list[T]:
-        """Answers to a query, decoded; those that do not decode are left out. Empty after timeout_s without any."""
+    async def get(
+        self,
+        topic: Topic[T],
+        timeout_s: float = 1.0,
+        request: msgspec.Struct | None = None,
+        **names: str,
+    ) -> list[T]:
+        """Answers to a query, decoded; those that do not decode are left out.
+
+        Empty after timeout_s without any.
+        """
         decoder = msgspec.json.Decoder(topic.message) if topic.message else None
         answers: list[T] = []
         for payload, _ in await self._query(topic, timeout_s, names, clock.now_ns, request):
@@ -133,8 +175,11 @@ class Bus:
                 answers.append(decoder.decode(payload))
         return answers
 
-    async def echo(self, now_ns: Callable[[], int], timeout_s: float = 1.0) -> tuple[int, int, int] | None:
-        """One exchange with the master's clock: (asked, the master's answer, answered) in ns, or None without an answer.
+    async def echo(
+        self, now_ns: Callable[[], int], timeout_s: float = 1.0
+    ) -> tuple[int, int, int] | None:
+        """One exchange with the master's clock: (asked, the master's answer, answered) in ns, or
+        None without an answer.
 
         Both own stamps are read from now_ns as close to the wire as Python gets.
         """
@@ -146,7 +191,12 @@ class Bus:
         return None
 
     async def _query(
-        self, topic: Topic[Any], timeout_s: float, names: dict[str, str], now_ns: Callable[[], int], request: msgspec.Struct | None = None
+        self,
+        topic: Topic[Any],
+        timeout_s: float,
+        names: dict[str, str],
+        now_ns: Callable[[], int],
+        request: msgspec.Struct | None = None,
     ) -> list[tuple[bytes, int]]:
         replies: list[tuple[bytes, int]] = []
         asked = None if request is None else msgspec.json.encode(request)
@@ -165,19 +215,28 @@ class Bus:
             with contextlib.suppress(RuntimeError):  # the loop is gone, and nobody waits
                 self._loop.call_soon_threadsafe(finish)
 
-        self._session.get(topic.key(self.rig, **names), zenoh.handlers.Callback(on_reply, on_end), payload=asked, timeout=timeout_s)
+        self._session.get(
+            topic.key(self.rig, **names),
+            zenoh.handlers.Callback(on_reply, on_end),
+            payload=asked,
+            timeout=timeout_s,
+        )
         # Zenoh ends every query at its timeout; a second more covers a link that dies meanwhile.
-        # (Not wait_for: where the answer and a cancellation meet, Python 3.11's swallows the cancellation, and its task runs for ever.)
+        # (Not wait_for: where the answer and a cancellation meet, Python 3.11's swallows the
+        # cancellation, and its task runs for ever.)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout_s + 1.0):
                 await done
         return replies
 
-    def answer(self, topic: Topic[Any], handler: Callable[[], Answer | Awaitable[Answer]], **names: str) -> None:
+    def answer(
+        self, topic: Topic[Any], handler: Callable[[], Answer | Awaitable[Answer]], **names: str
+    ) -> None:
         """Answer queries for the rest of the session.
 
-        A plain function runs in Zenoh's thread (quick and thread-safe); a coroutine function runs on the event loop.
-        It returns a message, bytes, or None for no answer; what it raises goes to the asker as an error, and to the log.
+        A plain function runs in Zenoh's thread (quick and thread-safe); a coroutine function runs
+        on the event loop. It returns a message, bytes, or None for no answer; what it raises goes
+        to the asker as an error, and to the log.
         """
         key = topic.key(self.rig, **names)
 
@@ -199,13 +258,23 @@ class Bus:
 
         self._open.append(self._session.declare_queryable(key, on_query))
 
-    def answer_requests(self, topic: Topic[Any], handler: Callable[[bytes], Awaitable[Answer]], **names: str) -> None:
-        """As answer(), with a coroutine function that takes the request's payload; a request larger than max_bytes gets no answer."""
+    def answer_requests(
+        self, topic: Topic[Any], handler: Callable[[bytes], Awaitable[Answer]], **names: str
+    ) -> None:
+        """As answer(), with a coroutine function that takes the request's payload.
+
+        A request larger than max_bytes gets no answer.
+        """
         key = topic.key(self.rig, **names)
 
         async def answer_later(query: zenoh.Query) -> None:
             with query:
-                await self._reply(query, key, topic, lambda: handler(query.payload.to_bytes() if query.payload else b""))
+                await self._reply(
+                    query,
+                    key,
+                    topic,
+                    lambda: handler(query.payload.to_bytes() if query.payload else b""),
+                )
 
         def on_query(query: zenoh.Query) -> None:
             if query.payload is None or len(query.payload) <= topic.max_bytes:
@@ -214,7 +283,9 @@ class Bus:
 
         self._open.append(self._session.declare_queryable(key, on_query))
 
-    async def _reply(self, query: zenoh.Query, key: str, topic: Topic[Any], handler: Callable[[], Any]) -> None:
+    async def _reply(
+        self, query: zenoh.Query, key: str, topic: Topic[Any], handler: Callable[[], Any]
+    ) -> None:
         try:
             _send(query, key, topic, await handler())
         except Exception as error:  # likewise
@@ -228,7 +299,11 @@ class Bus:
 
     def alive(self, service: str, instance: str) -> None:
         """Declare this service alive until the session ends."""
-        self._open.append(self._session.liveliness().declare_token(topics.ALIVE.key(self.rig, service=service, instance=instance)))
+        self._open.append(
+            self._session.liveliness().declare_token(
+                topics.ALIVE.key(self.rig, service=service, instance=instance)
+            )
+        )
 
     def watch_alive(self) -> AliveWatch:
         """Services coming and going, beginning with those that are there."""
@@ -239,7 +314,9 @@ class Bus:
 
     def put_raw(self, key: str, payload: Payload, encoding: str = "application/json") -> None:
         """Publish bytes on a full key, for replay."""
-        self._session.put(key, payload, encoding=encoding, congestion_control=zenoh.CongestionControl.DROP)
+        self._session.put(
+            key, payload, encoding=encoding, congestion_control=zenoh.CongestionControl.DROP
+        )
 
     def close(self, subscription: Subscription[Any] | RawSubscription) -> None:
         """End one subscription before the session ends; its stream leaves health with it."""

@@ -1,6 +1,7 @@
 """Counters and latencies of one stream, for a service's health. Pure: time is an argument.
 
-Counts are reset by each beat; a stream that carries nothing reports zeros, and -1 for latencies nobody measured.
+Counts are reset by each beat; a stream that carries nothing reports zeros, and -1 for latencies
+nobody measured.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from typing import Literal
 from rhot.messages import StreamHealth
 from rhot.topics import Topic
 
-# A beat of 1 s at 1 kHz keeps every second latency; more would cost more than the percentiles are worth.
+# A beat of 1 s at 1 kHz keeps every second latency; more would cost more than the percentiles are
+# worth.
 _LATENCIES = 512
 
 
@@ -39,7 +41,8 @@ class StreamStats:
             count=self.count,
             rate_hz=round(rate_hz, 2),
             expected_hz=round(expected_hz, 2),
-            # 0.8: one frame lost in five is where a user should look; scheduling jitter stays within it.
+            # 0.8: one frame lost in five is where a user should look; scheduling jitter stays
+            # within it.
             ok=expected_hz <= 0.0 or rate_hz >= 0.8 * expected_hz,
             dropped=self.dropped,
             rejected=self.rejected,

@@ -1,4 +1,7 @@
-"""The two ends of a stream: publishers and the buffers between Zenoh's threads and the event loop. Used through rhot.bus.bus."""
+"""The two ends of a stream: publishers and the buffers between Zenoh's threads and the event loop.
+
+Used through rhot.bus.bus.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,8 @@ Payload = bytes | bytearray | str
 
 # Consecutive messages a consumer gets without giving the event loop to others.
 _BURST = 32
-# Keys of which `latest()` remembers the newest message: keys come from the network, memory must not.
+# Keys of which `latest()` remembers the newest message: keys come from the network, memory must
+# not.
 _MAX_KEYS = 256
 
 _PRIORITY = {
@@ -46,7 +50,9 @@ class Sample:
 class Publisher(Generic[T]):
     """Sends one stream; never blocks: what the network cannot take is dropped."""
 
-    def __init__(self, session: zenoh.Session, topic: Topic[T], key: str, stats: StreamStats) -> None:
+    def __init__(
+        self, session: zenoh.Session, topic: Topic[T], key: str, stats: StreamStats
+    ) -> None:
         self.key = key
         self._stats = stats
         self._encoder = msgspec.json.Encoder()
@@ -54,7 +60,8 @@ class Publisher(Generic[T]):
         self._publisher = session.declare_publisher(
             key,
             encoding=topic.encoding,
-            # Blocking live data stalls everything behind it (measured: 5 s); late poses are worth nothing.
+            # Blocking live data stalls everything behind it (measured: 5 s); late poses are worth
+            # nothing.
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITY[topic.priority],
             express=topic.priority is Priority.REAL_TIME,
@@ -91,7 +98,9 @@ class Publisher(Generic[T]):
     def put_bytes(self, payload: Payload, attachment: msgspec.Struct | None = None) -> None:
         """Send bytes on a topic without a message type, with a message as attachment."""
         self._count(None)
-        self._publisher.put(payload, attachment=None if attachment is None else self._encoder.encode(attachment))
+        self._publisher.put(
+            payload, attachment=None if attachment is None else self._encoder.encode(attachment)
+        )
 
     def _count(self, latency_ns: int | None) -> None:
         self._stats.count += 1
@@ -103,7 +112,9 @@ class Publisher(Generic[T]):
 
 
 class _Buffer(Generic[S]):
-    """A bounded buffer filled by Zenoh's threads and emptied by the event loop, with one wake-up per filling."""
+    """A bounded buffer filled by Zenoh's threads and emptied by the event loop, with one wake-up
+    per filling.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, capacity: int | None) -> None:
         if capacity is not None and capacity < 1:
@@ -181,7 +192,9 @@ class _Buffer(Generic[S]):
 class RawSubscription(_Buffer[Sample]):
     """Undecoded samples of a key expression."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None) -> None:
+    def __init__(
+        self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None
+    ) -> None:
         super().__init__(loop, capacity)
         self.stats = stats
 
@@ -195,7 +208,9 @@ class RawSubscription(_Buffer[Sample]):
             return
         attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
         key = str(sample.key_expr)
-        self.stats.dropped += self.push(key, Sample(key, sample.payload.to_bytes(), attachment, received_ns))
+        self.stats.dropped += self.push(
+            key, Sample(key, sample.payload.to_bytes(), attachment, received_ns)
+        )
 
     def __aiter__(self) -> RawSubscription:
         return self
@@ -209,9 +224,17 @@ class RawSubscription(_Buffer[Sample]):
 class Subscription(Generic[T]):
     """Decoded messages of one topic: `async for message in subscription`."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, topic: Topic[T], stats: StreamStats, capacity: int | None) -> None:
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        topic: Topic[T],
+        stats: StreamStats,
+        capacity: int | None,
+    ) -> None:
         if topic.message is None:
-            raise BusError(f"topic {topic.template} carries {topic.media_type}, no message; use raw()")
+            raise BusError(
+                f"topic {topic.template} carries {topic.media_type}, no message; use raw()"
+            )
         self.stats = stats
         self._topic = topic
         self._raw = RawSubscription(loop, stats, capacity)
@@ -273,7 +296,9 @@ class AliveWatch(_Buffer[Alive]):
         key = str(sample.key_expr)
         names = ALIVE.names(key)
         if names is not None:
-            self.push(key, Alive(names["service"], names["instance"], sample.kind == zenoh.SampleKind.PUT))
+            self.push(
+                key, Alive(names["service"], names["instance"], sample.kind == zenoh.SampleKind.PUT)
+            )
 
     def __aiter__(self) -> AliveWatch:
         return self

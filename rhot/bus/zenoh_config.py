@@ -1,4 +1,6 @@
-"""Zenoh configurations of clients and routers: quick to notice a dead link, quick to be back, no scouting."""
+"""Zenoh configurations of clients and routers: quick to notice a dead link, quick to be back, no
+scouting.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,9 @@ import zenoh
 
 from rhot.errors import BusError
 
-# Of shared memory for what goes to processes of the same machine: room for eight pictures of 640 x 480. Zenoh's own 16 MB, one pool in the
-# sender and its image in each receiver, brought a tracker that gets simulated pictures to 137 MB.
+# Of shared memory for what goes to processes of the same machine: room for eight pictures of 640 x
+# 480. Zenoh's own 16 MB, one pool in the sender and its image in each receiver, brought a tracker
+# that gets simulated pictures to 137 MB.
 _POOL_BYTES = 4 << 20
 
 
@@ -32,7 +35,11 @@ def client_config(connect: Sequence[str]) -> zenoh.Config:
             "connect": {
                 "endpoints": list(connect),
                 "timeout_ms": 0,
-                "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+                "retry": {
+                    "period_init_ms": 100,
+                    "period_max_ms": 500,
+                    "period_increase_factor": 1.5,
+                },
             },
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
             "transport": _transport(),
@@ -57,4 +64,6 @@ def _config(values: dict[str, Any]) -> zenoh.Config:
     try:
         return zenoh.Config.from_json5(msgspec.json.encode(values).decode())
     except zenoh.ZError as error:
-        raise BusError(f"Zenoh refuses the endpoints {values}: {error}; write them like tcp/192.168.1.10:7447") from None
+        raise BusError(
+            f"Zenoh refuses the endpoints {values}: {error}; write them like tcp/192.168.1.10:7447"
+        ) from None

@@ -1,7 +1,8 @@
 """Files that tools write: calibration/*.json, each with its date, tool, inputs and residuals.
 
-Written atomically (a crash leaves the old file). Unknown fields are kept out of the way, not rejected: a newer tool may say
-more. A missing or broken file raises CalibrationError with the command that makes it.
+Written atomically (a crash leaves the old file). Unknown fields are kept out of the way, not
+rejected: a newer tool may say more. A missing or broken file raises CalibrationError with the
+command that makes it.
 """
 
 from __future__ import annotations
@@ -94,7 +95,9 @@ def load(path: Path, kind: type[S], command: str) -> S:
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read: {error}") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise CalibrationError(f"{path}: {error}; mend it or make it anew with `{command}`") from None
+        raise CalibrationError(
+            f"{path}: {error}; mend it or make it anew with `{command}`"
+        ) from None
 
 
 def save(path: Path, calibration: msgspec.Struct) -> None:
@@ -107,7 +110,8 @@ def save(path: Path, calibration: msgspec.Struct) -> None:
             file.write(text + b"\n")
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp makes files only their owner can read; calibrations are read by services of other users.
+        # mkstemp makes files only their owner can read; calibrations are read by services of other
+        # users.
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except BaseException:
@@ -164,23 +168,44 @@ def load_cameras(folder: Path, names: list[str]) -> dict[str, Camera]:
             )
         lens = load_lens(folder, name)
         T = np.array(place.T_rig_from_camera)
-        cameras[name] = Camera(name, lens.size_px, np.array(lens.matrix), np.array(lens.distortion), _rigid(T, folder / "rig.json", name))
+        cameras[name] = Camera(
+            name,
+            lens.size_px,
+            np.array(lens.matrix),
+            np.array(lens.distortion),
+            _rigid(T, folder / "rig.json", name),
+        )
     return cameras
 
 
 def load_rig_cameras(config: RigConfig, names: list[str] | None = None) -> dict[str, Camera]:
-    """The cameras of rig.toml (or those of these names) in the rig frame: as load_cameras, with [rig.world] applied."""
-    cameras = load_cameras(config.calibration_dir, [c.name for c in config.camera] if names is None else names)
+    """The cameras of rig.toml (or those of these names) in the rig frame: as load_cameras, with
+    [rig.world] applied.
+    """
+    cameras = load_cameras(
+        config.calibration_dir, [c.name for c in config.camera] if names is None else names
+    )
     if config.rig.world is None:
         return cameras
-    T_rig_from_first = _rigid(np.array(config.rig.world.T_rig_from_camera), Path("rig.toml, [rig.world]"), "the first camera")
-    return {n: replace(camera, T_rig_from_camera=T_rig_from_first @ camera.T_rig_from_camera) for n, camera in cameras.items()}
+    T_rig_from_first = _rigid(
+        np.array(config.rig.world.T_rig_from_camera),
+        Path("rig.toml, [rig.world]"),
+        "the first camera",
+    )
+    return {
+        n: replace(camera, T_rig_from_camera=T_rig_from_first @ camera.T_rig_from_camera)
+        for n, camera in cameras.items()
+    }
 
 
 def _rigid(T: np.ndarray, path: Path, name: str) -> np.ndarray:
     R = T[:3, :3]
     # 1e-4: a matrix typed with five digits passes, a scaled or mirrored one does not.
-    if not np.all(np.isfinite(T)) or abs(np.linalg.det(R) - 1.0) > 1e-4 or np.abs(R @ R.T - np.eye(3)).max() > 1e-4:
+    if (
+        not np.all(np.isfinite(T))
+        or abs(np.linalg.det(R) - 1.0) > 1e-4
+        or np.abs(R @ R.T - np.eye(3)).max() > 1e-4
+    ):
         raise CalibrationError(
             f"{path}: T_rig_from_camera of {name!r} is not a rigid transform (rotation and metres); run `rhot calibrate stereo` again"
         )

@@ -1,7 +1,9 @@
-"""The capture folder: rig.toml, calibration/, <camera>.mkv + <camera>.csv, objects.jsonl, truth.jsonl.
+"""The capture folder: rig.toml, calibration/, <camera>.mkv + <camera>.csv, objects.jsonl,
+truth.jsonl.
 
-Written by the simulator and by recordings of the real rig, read by `rhot track`. Pictures are the frame sources' matter
-(services/pi_tracker/sources); here is what can be read without OpenCV. A broken line is a CaptureError with its number.
+Written by the simulator and by recordings of the real rig, read by `rhot track`. Pictures are the
+frame sources' matter (services/pi_tracker/sources); here is what can be read without OpenCV. A
+broken line is a CaptureError with its number.
 """
 
 from __future__ import annotations
@@ -74,7 +76,9 @@ def _stamp(path: Path, number: int, row: list[str]) -> FrameStamp:
         frame, stamp_ns, row_time_ns = row
         return FrameStamp(int(frame), int(stamp_ns), float(row_time_ns))
     except ValueError:
-        raise CaptureError(f"{path}: line {number}: expected three numbers `{','.join(CSV_HEADER)}`, got {','.join(row)!r}") from None
+        raise CaptureError(
+            f"{path}: line {number}: expected three numbers `{','.join(CSV_HEADER)}`, got {','.join(row)!r}"
+        ) from None
 
 
 def write_stamps(path: Path, stamps: Iterable[FrameStamp]) -> None:
@@ -98,7 +102,9 @@ def read_lines(path: Path, kind: type[M]) -> Iterator[M]:
                     try:
                         yield decoder.decode(line)
                     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-                        raise CaptureError(f"{path}: line {number}: not a {kind.__name__}: {error}") from None
+                        raise CaptureError(
+                            f"{path}: line {number}: not a {kind.__name__}: {error}"
+                        ) from None
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read: {error}") from None
 

@@ -1,7 +1,9 @@
-"""rig.toml, the one file people write: strict, frozen, with errors that name file, field and allowed values.
+"""rig.toml, the one file people write: strict, frozen, with errors that name file, field and
+allowed values.
 
-Calibration results live in other files (rhot/files/calibration.py) and are never touched from here. A missing table means its
-defaults; an unknown table or key is an error, with the nearest valid name.
+Calibration results live in other files (rhot/files/calibration.py) and are never touched from here.
+A missing table means its defaults; an unknown table or key is an error, with the nearest valid
+name.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ class CameraTable(Table, frozen=True, kw_only=True):
     source: str = "picamera2"
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=240.0)] = 30.0
     size_px: tuple[Pixels, Pixels] = (640, 480)
-    # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all with the same fps, expose together.
+    # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all
+    # with the same fps, expose together.
     sync: Literal["off", "server", "client"] = "off"
     # Host that runs this camera's tracker; empty: the machine of `rhot up`.
     host: str = ""
@@ -58,8 +61,9 @@ class Tracker(Table, frozen=True, kw_only=True):
     method: Literal["lut", "seed"] = "lut"
     # RHOT, section 9.1: 40 px gave the most consistent tracking.
     roi_margin_px: Annotated[int, msgspec.Meta(ge=0, le=500)] = 40
-    # The lens's distortion taken out of whole pictures, as the seed did at first; needs <camera>.lens.json. For comparison: it costs
-    # time, and fusion takes it out of the markers' positions anyway.
+    # The lens's distortion taken out of whole pictures, as the seed did at first; needs
+    # <camera>.lens.json. For comparison: it costs time, and fusion takes it out of the markers'
+    # positions anyway.
     rectify: bool = False
     # Gaussian kernel (odd, 0 = off) and erode / dilate rounds, on the mask.
     gaussian_px: Annotated[int, msgspec.Meta(ge=0, le=31)] = 3
@@ -72,7 +76,8 @@ class Tracker(Table, frozen=True, kw_only=True):
 class OneEuro(Table, frozen=True, kw_only=True):
     """Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012."""
 
-    # Of all pairs that halve the jitter of a resting hand (1 mm at 30 Hz), these follow a hand at 0.15-0.5 m/s best: benchmarks/filters.py.
+    # Of all pairs that halve the jitter of a resting hand (1 mm at 30 Hz), these follow a hand at
+    # 0.15-0.5 m/s best: benchmarks/filters.py.
     mincutoff_hz: Positive = 1.2
     # Hz per m/s.
     beta: NonNegative = 170.0
@@ -85,12 +90,14 @@ class Disparity(Table, frozen=True, kw_only=True):
     k: Positive = 4543.3
     z: Annotated[float, msgspec.Meta(ge=-3.0, le=-0.1)] = -1.035
     phi_rad: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)] = 0.0
-    # "power": eq. (9) with k and z above; "geometry": z = -1 and k from eq. (10) with baseline, field of view and phi_rad.
+    # "power": eq. (9) with k and z above; "geometry": z = -1 and k from eq. (10) with baseline,
+    # field of view and phi_rad.
     law: Literal["power", "geometry"] = "power"
 
 
 class Fusion(Table, frozen=True, kw_only=True):
-    # "kalman": every observation at its own instant; "triangulate" and "disparity": pair the views first.
+    # "kalman": every observation at its own instant; "triangulate" and "disparity": pair the views
+    # first.
     method: Literal["kalman", "triangulate", "disparity"] = "kalman"
     # How paired methods bring views to one instant.
     pairing: Literal["hermite", "linear", "nearest"] = "hermite"
@@ -99,9 +106,11 @@ class Fusion(Table, frozen=True, kw_only=True):
     lag_frames: Annotated[int, msgspec.Meta(ge=0, le=2)] = 0
     # A landmark not seen by two cameras is carried on this long, then dropped.
     hold_s: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.15
-    # Working volume in front of the cameras; points outside it are mismatches. RHOT section 6: 100 x 100 x 100 cm.
+    # Working volume in front of the cameras; points outside it are mismatches. RHOT section 6: 100
+    # x 100 x 100 cm.
     max_distance_m: Positive = 2.0
-    # Learn what is left of the cameras' clock errors from the markers' motion (epipolar residual against image speed).
+    # Learn what is left of the cameras' clock errors from the markers' motion (epipolar residual
+    # against image speed).
     tune_clocks: bool = True
     one_euro: OneEuro = OneEuro()
     disparity: Disparity = Disparity()
@@ -119,7 +128,8 @@ class ObjectTable(Table, frozen=True, kw_only=True):
 
 
 class Objects(Table, frozen=True, kw_only=True):
-    # steamvr, libsurvive, replay:FILE, simulator, or network (poses arrive on the bus from elsewhere).
+    # steamvr, libsurvive, replay:FILE, simulator, or network (poses arrive on the bus from
+    # elsewhere).
     source: str = "simulator"
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 90.0
 
@@ -233,7 +243,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file; config/sim.toml and config/rig.example.toml are ready to copy") from None
+        raise ConfigError(
+            f"{path}: no such file; config/sim.toml and config/rig.example.toml are ready to copy"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from None
     except tomllib.TOMLDecodeError as error:
@@ -258,11 +270,19 @@ def _check(config: RigConfig, path: Path) -> None:
             if landmark not in LANDMARKS:
                 near = difflib.get_close_matches(landmark, LANDMARKS, n=1)
                 hint = f"did you mean {near[0]!r}? " if near else ""
-                raise ConfigError(f"{where}: unknown landmark {landmark!r}; {hint}Valid: {', '.join(LANDMARKS)}")
+                raise ConfigError(
+                    f"{where}: unknown landmark {landmark!r}; {hint}Valid: {', '.join(LANDMARKS)}"
+                )
         if not table.markers:
-            raise ConfigError(f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"')
+            raise ConfigError(
+                f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'
+            )
         _unique(list(table.markers.values()), f"colour in [hand.{hand}.markers]", path)
-    _unique([c for h in HANDS if h in config.hand for c in config.hand[h].markers.values()], "colour of both hands together", path)
+    _unique(
+        [c for h in HANDS if h in config.hand for c in config.hand[h].markers.values()],
+        "colour of both hands together",
+        path,
+    )
 
 
 def _unique(names: list[str], what: str, path: Path) -> None:

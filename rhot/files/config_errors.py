@@ -1,4 +1,6 @@
-"""msgspec's validation errors in the words of a TOML file, with the valid names where a key is unknown."""
+"""msgspec's validation errors in the words of a TOML file, with the valid names where a key is
+unknown.
+"""
 
 from __future__ import annotations
 

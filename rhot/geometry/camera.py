@@ -1,8 +1,9 @@
 """The pinhole camera with Brown-Conrady distortion, and where each camera stands in the rig.
 
-Frames: `camera` is x right, y down, z forward (OpenCV); pixel (0, 0) is the centre of the top left pixel.
-A point behind the camera projects to NaN, and a pixel that no ray of the lens model reaches undistorts to NaN. An uncalibrated
-camera is the caller's matter: rhot.files.config loads what exists and says what is missing.
+Frames: `camera` is x right, y down, z forward (OpenCV); pixel (0, 0) is the centre of the top left
+pixel. A point behind the camera projects to NaN, and a pixel that no ray of the lens model reaches
+undistorts to NaN. An uncalibrated camera is the caller's matter: rhot.files.config loads what
+exists and says what is missing.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from rhot.geometry.transforms import Array, inverse
 class Camera:
     """One calibrated camera.
 
-    matrix is the pinhole matrix (3, 3) in px, distortion is (k1, k2, p1, p2, k3) as OpenCV orders it, and
-    T_rig_from_camera (4, 4) in metres places the optical centre in the rig.
+    matrix is the pinhole matrix (3, 3) in px, distortion is (k1, k2, p1, p2, k3) as OpenCV orders
+    it, and T_rig_from_camera (4, 4) in metres places the optical centre in the rig.
     """
 
     name: str
@@ -50,7 +51,9 @@ class Camera:
         Brown-Conrady model, OpenCV documentation of `projectPoints`.
         """
         T = self.T_camera_from_rig
-        p_camera = np.asarray(p_rig, dtype=np.float64).reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]  # (n, 3)
+        p_camera = (
+            np.asarray(p_rig, dtype=np.float64).reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+        )  # (n, 3)
         return self.project_camera(p_camera)
 
     def project_camera(self, p_camera: npt.ArrayLike) -> Array:
@@ -65,12 +68,18 @@ class Camera:
         distorted = distort(xy, self.distortion)
         m = self.matrix
         return np.stack(
-            [m[0, 0] * distorted[:, 0] + m[0, 1] * distorted[:, 1] + m[0, 2], m[1, 1] * distorted[:, 1] + m[1, 2]],
+            [
+                m[0, 0] * distorted[:, 0] + m[0, 1] * distorted[:, 1] + m[0, 2],
+                m[1, 1] * distorted[:, 1] + m[1, 2],
+            ],
             axis=1,
         )
 
     def rays_from_pixels(self, pixels: npt.ArrayLike) -> Array:
-        """Undistorted normalised image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the lens model has no inverse."""
+        """Undistorted normalised image points (x/z, y/z) (n, 2) of pixels (n, 2).
+
+        NaN where the lens model has no inverse.
+        """
         px = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
         m = self.matrix
         y = (px[:, 1] - m[1, 2]) / m[1, 1]
@@ -79,7 +88,8 @@ class Camera:
 
 
 def undistort(target: Array, distortion: Array) -> Array:
-    """Image points (n, 2) that Brown-Conrady (k1, k2, p1, p2, k3) takes to `target` (n, 2); NaN where it takes none there.
+    """Image points (n, 2) that Brown-Conrady (k1, k2, p1, p2, k3) takes to `target` (n, 2); NaN
+    where it takes none there.
 
     Newton's method: the usual fixed-point iteration diverges at the corners of wide-angle lenses.
     """
@@ -94,8 +104,12 @@ def undistort(target: Array, distortion: Array) -> Array:
         (a, b), (c, d) = distortion_derivatives(xy, distortion)
         determinant = a * d - b * c
         safe = np.where(np.abs(determinant) < 1e-6, np.nan, determinant)
-        step = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1) / safe[:, None]
-        # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a barrel lens.
+        step = (
+            np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]], axis=1)
+            / safe[:, None]
+        )
+        # A step is kept within a quarter of the unit ray: overshooting lands on the far branch of a
+        # barrel lens.
         length = np.linalg.norm(step, axis=1, keepdims=True)
         xy = xy + step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-12))
     off = np.abs(distort(xy, distortion) - target).max(axis=1)
@@ -104,8 +118,12 @@ def undistort(target: Array, distortion: Array) -> Array:
     return np.where(good[:, None], xy, np.nan)
 
 
-def distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """The 2x2 derivative, (n,) each, of the distorted by the undistorted image point (n, 2), by rows; distortion as for `distort`."""
+def distortion_derivatives(
+    xy: Array, distortion: Array
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """The 2x2 derivative, (n,) each, of the distorted by the undistorted image point (n, 2), by
+    rows; distortion as for `distort`.
+    """
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y
@@ -119,7 +137,10 @@ def distortion_derivatives(xy: Array, distortion: Array) -> tuple[tuple[Array, A
 
 
 def distort(xy: Array, distortion: Array) -> Array:
-    """Brown-Conrady distortion of normalised points; (n, 2) -> (n, 2). distortion is (5,), or (5, n) for a lens of each point's own."""
+    """Brown-Conrady distortion of normalised points; (n, 2) -> (n, 2).
+
+    distortion is (5,), or (5, n) for a lens of each point's own.
+    """
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y
@@ -140,4 +161,6 @@ def pinhole(size_px: tuple[int, int], hfov_rad: float) -> Array:
     """
     width, height = size_px
     focal_px = 0.5 * width / np.tan(0.5 * hfov_rad)
-    return np.array([[focal_px, 0.0, (width - 1) / 2.0], [0.0, focal_px, (height - 1) / 2.0], [0.0, 0.0, 1.0]])
+    return np.array(
+        [[focal_px, 0.0, (width - 1) / 2.0], [0.0, focal_px, (height - 1) / 2.0], [0.0, 0.0, 1.0]]
+    )

@@ -1,8 +1,9 @@
 """Rigid transforms and quaternions.
 
-Conventions (docs/frames.md): right-handed, metres, radians; quaternions are (w, x, y, z) with w >= 0;
-`T_a_from_b` is a (4, 4) matrix with p_a = T_a_from_b @ p_b, so that names cancel: T_a_from_c = T_a_from_b @ T_b_from_c.
-Input that is not finite is the caller's error: these functions neither check nor repair it.
+Conventions (docs/frames.md): right-handed, metres, radians; quaternions are (w, x, y, z) with w >=
+0; `T_a_from_b` is a (4, 4) matrix with p_a = T_a_from_b @ p_b, so that names cancel: T_a_from_c =
+T_a_from_b @ T_b_from_c. Input that is not finite is the caller's error: these functions neither
+check nor repair it.
 """
 
 from __future__ import annotations
@@ -39,11 +40,18 @@ def rotation_from_vector(vector_rad: npt.ArrayLike) -> Array:
     cross = skew(vector)
     if angle < 1e-12:
         return np.eye(3) + cross
-    return np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * (cross @ cross)
+    return (
+        np.eye(3)
+        + np.sin(angle) / angle * cross
+        + (1.0 - np.cos(angle)) / angle**2 * (cross @ cross)
+    )
 
 
 def vector_from_rotation(rotation: Array) -> Array:
-    """The rotation vector of a rotation, of length 0..pi rad; (3, 3) -> (3,). Right at 180 deg too."""
+    """The rotation vector of a rotation, of length 0..pi rad; (3, 3) -> (3,).
+
+    Right at 180 deg too.
+    """
     w, x, y, z = quaternion_from_rotation(rotation)
     imaginary = np.array([x, y, z])
     norm = float(np.sqrt(imaginary @ imaginary))
@@ -61,8 +69,8 @@ def skew(vector: Array) -> Array:
 def quaternion_from_rotation(rotation: Array) -> Array:
     """Unit quaternion wxyz with w >= 0 of a rotation; (3, 3) -> (4,).
 
-    Shepperd's method (1978): the largest of the four squared components is the pivot, so no division is by a
-    small number, not even at 180 deg where w = 0.
+    Shepperd's method (1978): the largest of the four squared components is the pivot, so no
+    division is by a small number, not even at 180 deg where w = 0.
     """
     r = np.asarray(rotation, dtype=np.float64)
     trace = r[0, 0] + r[1, 1] + r[2, 2]
@@ -71,11 +79,17 @@ def quaternion_from_rotation(rotation: Array) -> Array:
         case 0:
             q = np.array([1.0 + trace, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
         case 1:
-            q = np.array([r[2, 1] - r[1, 2], 1.0 - trace + 2 * r[0, 0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]])
+            q = np.array(
+                [r[2, 1] - r[1, 2], 1.0 - trace + 2 * r[0, 0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]]
+            )
         case 2:
-            q = np.array([r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1.0 - trace + 2 * r[1, 1], r[1, 2] + r[2, 1]])
+            q = np.array(
+                [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1.0 - trace + 2 * r[1, 1], r[1, 2] + r[2, 1]]
+            )
         case _:
-            q = np.array([r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1.0 - trace + 2 * r[2, 2]])
+            q = np.array(
+                [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1.0 - trace + 2 * r[2, 2]]
+            )
     q = q / np.sqrt(q @ q)
     return -q if q[0] < 0.0 else q
 

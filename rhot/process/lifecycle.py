@@ -1,8 +1,9 @@
 """The life of a service: from the command line over uvloop, signals and systemd to a clean end.
 
-A service is one coroutine, `serve(service)`. It runs in one TaskGroup together with the health beat and the watchdog; whatever
-fails there ends the process with a message and a code (2: the user can mend it, 1: a bug), and systemd or `rhot up` starts
-it anew. SIGTERM and SIGINT end it with code 0. While the router is away at start, the service waits for it.
+A service is one coroutine, `serve(service)`. It runs in one TaskGroup together with the health beat
+and the watchdog; whatever fails there ends the process with a message and a code (2: the user can
+mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0.
+While the router is away at start, the service waits for it.
 """
 
 from __future__ import annotations
@@ -37,25 +38,43 @@ EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
 def command(name: str, serve: Serve, instance_option: str = "instance") -> None:
     """The whole main() of a service: options, logging, loop, exit code.
 
-    instance_option names the option that says which one of several this is, e.g. "camera"; any other than "instance" is required.
+    instance_option names the option that says which one of several this is, e.g. "camera"; any
+    other than "instance" is required.
     """
-    parser = argparse.ArgumentParser(prog=f"rhot-{name.replace('_', '-')}", description=serve.__doc__ or f"rhot's {name} service")
+    parser = argparse.ArgumentParser(
+        prog=f"rhot-{name.replace('_', '-')}", description=serve.__doc__ or f"rhot's {name} service"
+    )
     parser.add_argument("--config", type=Path, required=True, help="rig.toml")
     required = instance_option != "instance"
-    parser.add_argument(f"--{instance_option}", dest="name", required=required, default="main", help="which one this is")
-    parser.add_argument("--connect", action="append", default=[], help="router endpoint, instead of [bus] connect of rig.toml")
+    parser.add_argument(
+        f"--{instance_option}",
+        dest="name",
+        required=required,
+        default="main",
+        help="which one this is",
+    )
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        help="router endpoint, instead of [bus] connect of rig.toml",
+    )
     parser.add_argument("--version", action="version", version=rhot_version())
     options = parser.parse_args()
     log_json_lines(f"{name}/{options.name}")
     sys.exit(run(name, options.name, options.config, serve, options.connect))
 
 
-def run(name: str, instance: str, config_path: Path, serve: Serve, connect: Sequence[str] = ()) -> int:
+def run(
+    name: str, instance: str, config_path: Path, serve: Serve, connect: Sequence[str] = ()
+) -> int:
     """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml."""
     try:
         config = load_rig(config_path)
         if connect:
-            config = msgspec.structs.replace(config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect)))
+            config = msgspec.structs.replace(
+                config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect))
+            )
         uvloop.run(_live(name, instance, config, serve))
     except Exception as error:
         return _explain(error, f"{name} {instance}")
@@ -78,11 +97,15 @@ def _explain(error: Exception, who: str) -> int:
 async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> None:
     stopping = stop_on_signals()
     with cancelled_by(stopping):
-        async with open_bus(config.rig.name, config.bus.connect) as bus, asyncio.TaskGroup() as tasks:
+        async with (
+            open_bus(config.rig.name, config.bus.connect) as bus,
+            asyncio.TaskGroup() as tasks,
+        ):
             service = Service(name, instance, config, bus, tasks)
             companions = [tasks.create_task(service.beat()), tasks.create_task(_watchdog())]
             await serve(service)
-            # A source that ended (a file, a replay) ends its service; what keeps it company goes too.
+            # A source that ended (a file, a replay) ends its service; what keeps it company goes
+            # too.
             for task in companions:
                 task.cancel()
 
@@ -114,7 +137,10 @@ def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
 
 
 async def _watchdog() -> None:
-    """Tell systemd that the event loop turns; a loop that is stuck says nothing and is restarted."""
+    """Tell systemd that the event loop turns.
+
+    A loop that is stuck says nothing and is restarted.
+    """
     period_s = systemd.watchdog_s()
     while period_s is not None:
         systemd.notify("WATCHDOG=1")
@@ -129,7 +155,12 @@ class _JsonLines(logging.Formatter):
         self._who = who
 
     def format(self, record: logging.LogRecord) -> str:
-        line = {"time": self.formatTime(record), "level": record.levelname.lower(), "who": self._who, "text": record.getMessage()}
+        line = {
+            "time": self.formatTime(record),
+            "level": record.levelname.lower(),
+            "who": self._who,
+            "text": record.getMessage(),
+        }
         if record.exc_info:
             line["trace"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)
@@ -139,4 +170,6 @@ def log_json_lines(who: str) -> None:
     """Log as JSON lines on standard output; RHOT_LOG sets the level (default info)."""
     handler = logging.StreamHandler(sys.stdout)
     handler.setFormatter(_JsonLines(who))
-    logging.basicConfig(level=os.environ.get("RHOT_LOG", "info").upper(), handlers=[handler], force=True)
+    logging.basicConfig(
+        level=os.environ.get("RHOT_LOG", "info").upper(), handlers=[handler], force=True
+    )

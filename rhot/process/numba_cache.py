@@ -1,7 +1,9 @@
-"""Where compiled numba kernels are kept, so that a changed source never meets machine code of an older one.
+"""Where compiled numba kernels are kept, so that a changed source never meets machine code of an
+older one.
 
-numba looks only at the file a kernel is written in: one that calls into a changed file goes on with the old callee. So the folder's name
-carries a digest of all files with kernels. Services that compile call `use_cache` in their package, before numba is imported.
+numba looks only at the file a kernel is written in: one that calls into a changed file goes on with
+the old callee. So the folder's name carries a digest of all files with kernels. Services that
+compile call `use_cache` in their package, before numba is imported.
 """
 
 from __future__ import annotations
@@ -34,16 +36,18 @@ def cache_folder(package: Path) -> Path:
         source = path.read_bytes()
         if b"njit" in source:
             digest.update(str(path.relative_to(package)).encode() + b"\0" + source)
-    # Another checkout on the same machine has a folder of its own, or `clear_old` of one would take the other's.
+    # Another checkout on the same machine has a folder of its own, or `clear_old` of one would take
+    # the other's.
     place = hashlib.sha256(str(package).encode()).hexdigest()[:8]
     return cache_root() / f"{_PREFIX}{place}-{digest.hexdigest()[:12]}"
 
 
 def use_cache(package: Path) -> Path | None:
-    """Make numba keep kernels in `cache_folder(package)`; returns the folder, None where somebody else has decided already.
+    """Make numba keep kernels in `cache_folder(package)`; returns the folder, None where somebody
+    else has decided already.
 
-    A NUMBA_CACHE_DIR that is not ours (a parent process may have left one of older sources) is kept. Where the folder cannot be written,
-    numba's own choice stays: beside the sources.
+    A NUMBA_CACHE_DIR that is not ours (a parent process may have left one of older sources) is
+    kept. Where the folder cannot be written, numba's own choice stays: beside the sources.
     """
     decided = os.environ.get(_NUMBA, "")
     if "numba" in sys.modules or (decided and not Path(decided).name.startswith(_PREFIX)):

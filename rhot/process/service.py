@@ -20,7 +20,8 @@ from rhot.process import systemd
 
 log = logging.getLogger("rhot.service")
 
-# The first two beats after the start hold parts of a second; what they would say of rates is not true.
+# The first two beats after the start hold parts of a second; what they would say of rates is not
+# true.
 _SETTLE_S = 2.0
 # One slow second is scheduling, three are a fault worth a line in the journal.
 _SLOW_BEATS = 3
@@ -62,7 +63,10 @@ class Service:
         log.info("%s %s ready", self.name, self.instance)
 
     def error(self, text: str) -> None:
-        """Count an error that the service survives; the journal gets at most one such line a second."""
+        """Count an error that the service survives.
+
+        The journal gets at most one such line a second.
+        """
         self.errors += 1
         self.last_error = text[:500]
         now_s = time.monotonic()
@@ -71,14 +75,20 @@ class Service:
             log.warning("%s", self.last_error)
 
     async def beat(self) -> None:
-        """Publish Health once a second, and log when a stream falls below its expected rate or recovers."""
+        """Publish Health once a second, and log when a stream falls below its expected rate or
+        recovers.
+        """
         publisher = self.bus.publisher(topics.HEALTH, service=self.name, instance=self.instance)
         last_s, last_cpu_s = time.monotonic(), time.process_time()
         while True:
             await asyncio.sleep(1.0)
             now_s, cpu_s = time.monotonic(), time.process_time()
             elapsed_s = now_s - last_s
-            streams = [stats.beat(elapsed_s, self._expected_hz(stats)) for stats in self.bus.streams if stats.topic is not topics.HEALTH]
+            streams = [
+                stats.beat(elapsed_s, self._expected_hz(stats))
+                for stats in self.bus.streams
+                if stats.topic is not topics.HEALTH
+            ]
             publisher.put(self._health(streams, 100.0 * (cpu_s - last_cpu_s) / elapsed_s))
             self._log_changes(streams)
             last_s, last_cpu_s = now_s, cpu_s
@@ -97,18 +107,31 @@ class Service:
             last_error=self.last_error,
             cpu_percent=round(cpu_percent, 1),
             rss_mb=round(_rss_mb(), 1),
-            values={name: round(value, 4) for name, value in self.values.items() if abs(value) < 1e300},
+            values={
+                name: round(value, 4) for name, value in self.values.items() if abs(value) < 1e300
+            },
         )
 
     def _expected_hz(self, stats: StreamStats) -> float:
-        """What the topics table and rig.toml lead to expect; of a pattern, the sum over its streams."""
+        """What the topics table and rig.toml lead to expect.
+
+        Of a pattern, the sum over its streams.
+        """
         if time.monotonic() - self._ready_s < _SETTLE_S:
             return 0.0
         rate = stats.topic.rate
         if "camera" in stats.topic.fields:
-            cameras = [stats.names["camera"]] if "camera" in stats.names else [c.name for c in self.config.camera]
+            cameras = (
+                [stats.names["camera"]]
+                if "camera" in stats.names
+                else [c.name for c in self.config.camera]
+            )
             return sum(self.config.rate_hz(rate, camera) for camera in cameras)
-        many = {"hand": len(self.config.hand), "serial": len(self.config.object), "object": len(self.config.object)}
+        many = {
+            "hand": len(self.config.hand),
+            "serial": len(self.config.object),
+            "object": len(self.config.object),
+        }
         streams = 1
         for field_name in stats.topic.fields:
             if field_name not in stats.names:
@@ -123,7 +146,16 @@ class Service:
             self._slow_beats[stream.key] = slow
             if slow == _SLOW_BEATS or (slow == 0 and slow_before >= _SLOW_BEATS):
                 level = logging.WARNING if slow else logging.INFO
-                log.log(level, text, stream.direction, stream.key, stream.rate_hz, stream.expected_hz, stream.dropped, stream.rejected)
+                log.log(
+                    level,
+                    text,
+                    stream.direction,
+                    stream.key,
+                    stream.rate_hz,
+                    stream.expected_hz,
+                    stream.dropped,
+                    stream.rejected,
+                )
 
 
 def _rss_mb() -> float:

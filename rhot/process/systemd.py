@@ -1,4 +1,7 @@
-"""sd_notify in a few lines: what a service tells systemd over $NOTIFY_SOCKET. Does nothing where there is no systemd."""
+"""sd_notify in a few lines: what a service tells systemd over $NOTIFY_SOCKET.
+
+Does nothing where there is no systemd.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ def notify(state: str) -> bool:
 
 
 def watchdog_s() -> float | None:
-    """How often systemd wants to hear from us: half of WatchdogSec (sd_watchdog_enabled(3)), or None."""
+    """How often systemd wants to hear from us: half of WatchdogSec (sd_watchdog_enabled(3)), or
+    None.
+    """
     usec = os.environ.get("WATCHDOG_USEC", "")
     pid = os.environ.get("WATCHDOG_PID", "")
     if not usec.isdigit() or (pid and pid != str(os.getpid())):

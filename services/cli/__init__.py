@@ -1,4 +1,5 @@
-"""The `rhot` command. Each command is a file in the room of what its user does; what several rooms share lies here beside them.
+"""The `rhot` command. Each command is a file in the room of what its user does; what several rooms
+share lies here beside them.
 
 live      a running rig: demo, up, router, top, session, and warm before the first start
 record    what a running rig says, into a file and out again: record, replay
@@ -7,6 +8,6 @@ check     whether a rig.toml will do, before anything runs
 offline   recordings in, results out, without a rig: simulate, track, tune
 evaluate  results against the truth, as figures and as pictures: score, plot
 
-Only calibrate and evaluate use another room (offline); check, offline and evaluate import no bus, clock or thread themselves.
-tests/test_architecture.py sees to both.
+Only calibrate and evaluate use another room (offline); check, offline and evaluate import no bus,
+clock or thread themselves. tests/test_architecture.py sees to both.
 """

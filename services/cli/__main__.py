@@ -1,4 +1,8 @@
-"""The `rhot` command. Every subcommand is one function in the file of its name, in a room of this folder; here they are only gathered."""
+"""The `rhot` command.
+
+Every subcommand is one function in the file of its name, in a room of this folder; here they are
+only gathered.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +32,22 @@ from services.cli.options import menu
 from services.cli.record.record import record
 from services.cli.record.replay import replay
 
-COMMANDS = (demo, up, router, top, session, track, score, plot, simulate, record, replay, check, board, warm)
+COMMANDS = (
+    demo,
+    up,
+    router,
+    top,
+    session,
+    track,
+    score,
+    plot,
+    simulate,
+    record,
+    replay,
+    check,
+    board,
+    warm,
+)
 
 
 def _version(wanted: bool) -> None:
@@ -42,7 +61,11 @@ def application() -> typer.Typer:
     app = menu("rhot", "Real-time hand and object tracking from low-cost parts.")
 
     @app.callback()
-    def options(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="print the version")) -> None:
+    def options(
+        version: bool = typer.Option(
+            False, "--version", callback=_version, is_eager=True, help="print the version"
+        ),
+    ) -> None:
         pass
 
     for function in COMMANDS:

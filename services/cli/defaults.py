@@ -1,6 +1,8 @@
-"""Where the ready-made configurations are: config/ of the source tree, or the copy that the wheel carries beside this file.
+"""Where the ready-made configurations are: config/ of the source tree, or the copy that the wheel
+carries beside this file.
 
-pyproject.toml (hatch, force-include) puts the copy there, so the two cannot differ; a source tree has no copy.
+pyproject.toml (hatch, force-include) puts the copy there, so the two cannot differ; a source tree
+has no copy.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ def config_dir() -> Path:
     for folder in (here / "config", here.parents[1] / "config"):
         if (folder / "sim.toml").is_file():
             return folder
-    raise ConfigError(f"{here / 'config'}: rhot's own sim.toml is missing; install rhot again, or name a file with --config")
+    raise ConfigError(
+        f"{here / 'config'}: rhot's own sim.toml is missing; install rhot again, or name a file with --config"
+    )
 
 
 def sim_toml() -> Path:

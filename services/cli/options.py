@@ -1,4 +1,6 @@
-"""Options and menus that commands of several rooms share, so that one thing has one name and one help text everywhere."""
+"""Options and menus that commands of several rooms share, so that one thing has one name and one
+help text everywhere.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +9,27 @@ from typing import Annotated
 
 import typer
 
-RunningRigOption = Annotated[Path | None, typer.Option("--config", help="rig.toml of the rig; default: the simulated rig's")]
-ConnectOption = Annotated[str | None, typer.Option("--connect", help="router endpoint, instead of rig.toml's")]
-ProgressOption = Annotated[bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")]
-VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="show everything the services log")]
+RunningRigOption = Annotated[
+    Path | None, typer.Option("--config", help="rig.toml of the rig; default: the simulated rig's")
+]
+ConnectOption = Annotated[
+    str | None, typer.Option("--connect", help="router endpoint, instead of rig.toml's")
+]
+ProgressOption = Annotated[
+    bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")
+]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", "-v", help="show everything the services log")
+]
 
 
 def menu(name: str, says: str) -> typer.Typer:
     """A command that has commands; alone it shows them."""
     return typer.Typer(
-        name=name, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, help=says
+        name=name,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        help=says,
     )

@@ -1,4 +1,6 @@
-"""One line of progress on standard error, and none where nobody watches: pipes, logs and CI stay clean."""
+"""One line of progress on standard error, and none where nobody watches: pipes, logs and CI stay
+clean.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from typing import TextIO
 
 from services.cli.terminal import Teller
 
-# A reader cannot follow more than a few numbers a second; where every line stays, one each two seconds is enough.
+# A reader cannot follow more than a few numbers a second; where every line stays, one each two
+# seconds is enough.
 _TERMINAL_S, _LINES_S = 0.2, 2.0
 
 
@@ -18,7 +21,9 @@ class Progress:
     shown is None for "on a terminal only"; total, 0 if unknown, may be set when it becomes known.
     """
 
-    def __init__(self, what: str, total: int, shown: bool | None, out: TextIO | None = None) -> None:
+    def __init__(
+        self, what: str, total: int, shown: bool | None, out: TextIO | None = None
+    ) -> None:
         out = out or sys.stderr
         terminal = out.isatty()
         self.total = total

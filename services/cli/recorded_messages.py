@@ -1,4 +1,5 @@
-"""Messages of one stream out of a recording: a result folder of `rhot track`, one of its .jsonl files, or an MCAP of `rhot record`.
+"""Messages of one stream out of a recording: a result folder of `rhot track`, one of its .jsonl
+files, or an MCAP of `rhot record`.
 
 A recording that is none, or a damaged message, is a CaptureError that names the file.
 """
@@ -19,7 +20,10 @@ M = TypeVar("M", bound=msgspec.Struct)
 
 
 def messages(recording: Path, topic: topics.Topic[M], kind: type[M], stream: str) -> Iterator[M]:
-    """All messages of a topic, in order; stream is the name of the .jsonl file that holds them in a result folder."""
+    """All messages of a topic, in order.
+
+    Stream is the name of the .jsonl file that holds them in a result folder.
+    """
     path = recording / f"{stream}.jsonl" if recording.is_dir() else recording
     if path.suffix != ".mcap":
         yield from read_lines(path, kind)

@@ -1,4 +1,6 @@
-"""A bus for a command that a person waits for: with an error instead of endless patience where no router answers."""
+"""A bus for a command that a person waits for: with an error instead of endless patience where no
+router answers.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What long-running commands print: events on standard error, one status line that is overwritten on a terminal."""
+"""What long-running commands print: events on standard error, one status line that is overwritten
+on a terminal.
+"""
 
 from __future__ import annotations
 

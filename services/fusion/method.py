@@ -1,4 +1,5 @@
-"""What every method of fusion offers: take in one camera's observations, and tell where the landmarks are at an instant.
+"""What every method of fusion offers: take in one camera's observations, and tell where the
+landmarks are at an instant.
 
 FusionStep owns one of the three (kalman, triangulate, disparity) and knows no more of it than this.
 """
@@ -44,18 +45,27 @@ class Counts:
 
 
 class Method(Protocol):
-    """One way from observations to points. Times are seconds since an instant that FusionStep chose."""
+    """One way from observations to points.
+
+    Times are seconds since an instant that FusionStep chose.
+    """
 
     counts: Counts
     # Frames of the reference camera that a result waits for at least, beyond what the user asked.
     frames_after: int
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
-        """Take in a frame; times_s (n,) are the observations' own instants, in any order from frame to frame."""
+        """Take in a frame.
+
+        times_s (n,) are the observations' own instants, in any order from frame to frame.
+        """
         ...
 
     def estimate(self, time_s: float) -> Estimates:
-        """Where the landmarks are at an instant, as far as the observations so far tell; may be asked once for each, ascending."""
+        """Where the landmarks are at an instant, as far as the observations so far tell.
+
+        May be asked once for each, ascending.
+        """
         ...
 
     def reset(self) -> None:

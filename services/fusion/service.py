@@ -1,8 +1,10 @@
-"""Fusion, the master of a rig: markers of all cameras in, 3D landmarks out; it also gives the start signal and the time.
+"""Fusion, the master of a rig: markers of all cameras in, 3D landmarks out; it also gives the start
+signal and the time.
 
-Late frames are put in their place or counted; a missing camera leaves its landmarks `predicted`, then absent, and the rest goes
-on; without calibration (lenses, rig.json) the service ends with the command that makes it. At the end of its start it broadcasts
-the session; it answers queries for session and clock, and repeats the broadcast to every tracker that comes.
+Late frames are put in their place or counted; a missing camera leaves its landmarks `predicted`,
+then absent, and the rest goes on; without calibration (lenses, rig.json) the service ends with the
+command that makes it. At the end of its start it broadcasts the session; it answers queries for
+session and clock, and repeats the broadcast to every tracker that comes.
 """
 
 from __future__ import annotations
@@ -30,7 +32,10 @@ async def serve(service: Service) -> None:
     """Turns the cameras' markers into 3D landmarks, and leads the rig: start broadcast and clock."""
     config = service.config
     cameras = load_rig_cameras(config)
-    hands = {hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()}
+    hands = {
+        hand: load_hand(config.calibration_dir, hand, table.scale)
+        for hand, table in config.hand.items()
+    }
     step = FusionStep(config, cameras, hands)
     await asyncio.to_thread(warm_up, config, cameras, hands)
     publishers = {hand: service.bus.publisher(topics.POINTS, hand=hand) for hand in config.hand}
@@ -107,8 +112,13 @@ class _Report:
         self._tell_moved()
         self._tell_mirrored()
         values |= {f"late_{name}_ms": 1e3 * late_s for name, late_s in step.clocks.late_s.items()}
-        values |= {f"height_{pair}_px": height_px for pair, height_px in step.clocks.heights_px.items()}
-        values |= {name: float(getattr(counts, name)) for name in ("gated", "late", "refused", "started", "dropped", "incoherent")}
+        values |= {
+            f"height_{pair}_px": height_px for pair, height_px in step.clocks.heights_px.items()
+        }
+        values |= {
+            name: float(getattr(counts, name))
+            for name in ("gated", "late", "refused", "started", "dropped", "incoherent")
+        }
         values |= {f"frames_{reason}": float(count) for reason, count in step.refusals.items()}
         self._accepted = counts.accepted
         self._busy_s.clear()

@@ -1,7 +1,8 @@
 """The start broadcast's state, which fusion keeps as the rig's master.
 
-It begins as running when fusion is ready; whoever broadcasts later (`rhot session stop`, a client) changes it. A broadcast that comes
-twice changes nothing; what was last heard is what late comers are told.
+It begins as running when fusion is ready; whoever broadcasts later (`rhot session stop`, a client)
+changes it. A broadcast that comes twice changes nothing; what was last heard is what late comers
+are told.
 """
 
 from __future__ import annotations
@@ -16,7 +17,10 @@ class SessionState:
         self.session = Session(running=True, start_ns=now_ns)
 
     def hear(self, session: Session) -> bool:
-        """Take in somebody's broadcast (or the echo of the own one); whether it changes anything."""
+        """Take in somebody's broadcast (or the echo of the own one).
+
+        Whether it changes anything.
+        """
         told = (session.running, session.start_ns)
         if told == (self.session.running, self.session.start_ns):
             return False

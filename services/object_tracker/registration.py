@@ -1,7 +1,8 @@
 """Where the lighthouses and the objects stand: calibration/objects.json turned into transforms.
 
-Pure. Without the file every object keeps its tracker's own pose in the lighthouse frame (Registration.registered is false);
-a file whose matrix is not a rigid transform is a CalibrationError, never repaired.
+Pure. Without the file every object keeps its tracker's own pose in the lighthouse frame
+(Registration.registered is false); a file whose matrix is not a rigid transform is a
+CalibrationError, never repaired.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ _RIGID_TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """One configured object: its name, its origin in its tracker's frame, and how late its tracker's stamps are."""
+    """One configured object: its name, its origin in its tracker's frame, and how late its
+    tracker's stamps are.
+    """
 
     name: str
     T_tracker_from_object: Array  # (4, 4)
@@ -39,15 +42,20 @@ class Registration:
 
 
 def register(config: RigConfig, objects: Objects | None) -> Registration:
-    """The registration of the objects that rig.toml names; objects is None where none was calibrated.
+    """The registration of the objects that rig.toml names; objects is None where none was
+    calibrated.
 
-    An object without an entry in objects.json is its tracker: no offset. Raises CalibrationError if objects.json holds a
-    matrix that is not a rigid transform or a quaternion without a direction.
+    An object without an entry in objects.json is its tracker: no offset. Raises CalibrationError if
+    objects.json holds a matrix that is not a rigid transform or a quaternion without a direction.
     """
     places = objects.objects if objects else {}
-    placements = {o.serial: _placement(o.name, places.get(o.name, ObjectPlace())) for o in config.object}
+    placements = {
+        o.serial: _placement(o.name, places.get(o.name, ObjectPlace())) for o in config.object
+    }
     if objects is None:
-        return Registration(registered=False, T_rig_from_lighthouse=np.eye(4), placements=placements)
+        return Registration(
+            registered=False, T_rig_from_lighthouse=np.eye(4), placements=placements
+        )
     return Registration(True, _rigid(np.array(objects.T_rig_from_lighthouse)), placements)
 
 
@@ -59,7 +67,9 @@ def load_registration(config: RigConfig) -> Objects | None:
 
 
 def is_rotation(R: Array, tolerance: float) -> bool:
-    """Whether (3, 3) is a right-handed rotation with every entry of R R^T within `tolerance` of the identity's."""
+    """Whether (3, 3) is a right-handed rotation with every entry of R R^T within `tolerance` of the
+    identity's.
+    """
     # Large entries are sorted out first, so that the products below cannot overflow.
     if not np.all(np.abs(R) <= 1.0 + tolerance):
         return False
@@ -79,7 +89,11 @@ def _placement(name: str, place: ObjectPlace) -> Placement:
 
 def _rigid(T: Array) -> Array:
     bottom = np.array([0.0, 0.0, 0.0, 1.0])
-    if not np.all(np.isfinite(T)) or not is_rotation(T[:3, :3], _RIGID_TOLERANCE) or np.abs(T[3] - bottom).max() > _RIGID_TOLERANCE:
+    if (
+        not np.all(np.isfinite(T))
+        or not is_rotation(T[:3, :3], _RIGID_TOLERANCE)
+        or np.abs(T[3] - bottom).max() > _RIGID_TOLERANCE
+    ):
         raise CalibrationError(
             "objects.json: T_rig_from_lighthouse is not a rigid transform (rotation and metres); run `rhot calibrate objects` again"
         )

@@ -1,8 +1,9 @@
 """The object tracker: OpenVR-shaped poses in, object poses in the rig frame out.
 
-Poses come from a source of its own (steamvr, libsurvive, replay) or from elsewhere on the bus (simulator, network); either way they
-travel on the openvr topic, so that everybody can see and record them. Late: each pose keeps its own stamp. Missing: nothing is
-published. Uncalibrated: poses stay in the lighthouse frame with registered = false, and health says so.
+Poses come from a source of its own (steamvr, libsurvive, replay) or from elsewhere on the bus
+(simulator, network); either way they travel on the openvr topic, so that everybody can see and
+record them. Late: each pose keeps its own stamp. Missing: nothing is published. Uncalibrated: poses
+stay in the lighthouse frame with registered = false, and health says so.
 """
 
 from __future__ import annotations
@@ -25,9 +26,13 @@ async def serve(service: Service) -> None:
     """Tracks the objects that rig.toml names, from SteamVR, libsurvive, a file or the bus."""
     step = ObjectStep(service.config, load_registration(service.config))
     if not step.registered and service.config.object:
-        service.error("no calibration/objects.json: poses stay in the lighthouse frame; run `rhot calibrate objects`")
+        service.error(
+            "no calibration/objects.json: poses stay in the lighthouse frame; run `rhot calibrate objects`"
+        )
     source = open_source(service.config, service.error)
-    publishers = {o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in service.config.object}
+    publishers = {
+        o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in service.config.object
+    }
     poses = service.bus.every(topics.OPENVR, 64)
     if source is not None:
         service.tasks.create_task(_feed(service, source))
@@ -37,8 +42,12 @@ async def serve(service: Service) -> None:
         if result is not None:
             publishers[result.object].put(result)
         elif step.unknown == 1:
-            service.error(f"device {pose.device.serial} is none of rig.toml's [[object]] tables; its poses are ignored (and counted)")
-        service.values.update(registered=float(step.registered), lost=step.lost, unknown=step.unknown)
+            service.error(
+                f"device {pose.device.serial} is none of rig.toml's [[object]] tables; its poses are ignored (and counted)"
+            )
+        service.values.update(
+            registered=float(step.registered), lost=step.lost, unknown=step.unknown
+        )
 
 
 async def _feed(service: Service, source: PoseSource) -> None:
@@ -49,7 +58,9 @@ async def _feed(service: Service, source: PoseSource) -> None:
             serial = pose.device.serial
             if serial not in publishers:
                 if len(publishers) >= _MAX_DEVICES:
-                    service.error(f"the source names more than {_MAX_DEVICES} devices; {serial} is left out")
+                    service.error(
+                        f"the source names more than {_MAX_DEVICES} devices; {serial} is left out"
+                    )
                     continue
                 publishers[serial] = service.bus.publisher(topics.OPENVR, serial=serial)
             publishers[serial].put(pose)

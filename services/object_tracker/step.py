@@ -1,9 +1,10 @@
 """One OpenVR-shaped pose in, one object pose in the rig frame out.
 
-Pure. A pose that cannot be trusted (not valid, disconnected, not finite, not a rotation, absurdly far away) gives an ObjectPose
-with tracking "lost" and neutral numbers: the last good pose is not held, nothing is guessed. A device that rig.toml does not name
-gives None and is counted. Without calibration/objects.json poses stay in the lighthouse frame with registered = false.
-Late poses are not reordered: each stands for itself, at its own stamp.
+Pure. A pose that cannot be trusted (not valid, disconnected, not finite, not a rotation, absurdly
+far away) gives an ObjectPose with tracking "lost" and neutral numbers: the last good pose is not
+held, nothing is guessed. A device that rig.toml does not name gives None and is counted. Without
+calibration/objects.json poses stay in the lighthouse frame with registered = false. Late poses are
+not reordered: each stands for itself, at its own stamp.
 """
 
 from __future__ import annotations
@@ -12,7 +13,12 @@ import numpy as np
 
 from rhot.files.calibration import Objects
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, transform
+from rhot.geometry.transforms import (
+    Array,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    transform,
+)
 from rhot.messages import ObjectPose, ObjectTracking, OpenVrPose, Quat, Vec3
 from services.object_tracker.registration import Placement, Registration, is_rotation, register
 
@@ -24,9 +30,11 @@ _TRACKING: dict[int, ObjectTracking] = {
     201: "out_of_range",  # Running_OutOfRange
     300: "rotation_only",  # Fallback_RotationOnly
 }
-# 20 minutes of SteamVR poses (vive/marvin) stay within 2e-7 of a rotation (float32); 1e-3 still excludes any real scale or shear.
+# 20 minutes of SteamVR poses (vive/marvin) stay within 2e-7 of a rotation (float32); 1e-3 still
+# excludes any real scale or shear.
 _ROTATION_TOLERANCE = 1e-3
-# Lighthouses reach 10 m; SteamVR was seen to jump some metres when it resolves them anew. Beyond 100 m it is no pose.
+# Lighthouses reach 10 m; SteamVR was seen to jump some metres when it resolves them anew. Beyond
+# 100 m it is no pose.
 _MAX_DISTANCE_M = 100.0
 # A thrown tracker stays under 30 m/s and a spun one under 60 rad/s; ten times that is no velocity.
 _MAX_SPEED = 600.0
@@ -38,9 +46,9 @@ _LATEST_STAMP_NS = 2**63 - 1
 class ObjectStep:
     """Turns trackers' poses into objects' poses.
 
-    unknown counts poses of devices that rig.toml does not name, unknown_serials names them (the first 64);
-    lost counts poses that were turned into tracking "lost".
-    Raises CalibrationError at construction if objects.json cannot be right.
+    unknown counts poses of devices that rig.toml does not name, unknown_serials names them (the
+    first 64); lost counts poses that were turned into tracking "lost". Raises CalibrationError at
+    construction if objects.json cannot be right.
     """
 
     def __init__(self, config: RigConfig, objects: Objects | None) -> None:
@@ -55,10 +63,12 @@ class ObjectStep:
         return self._registration.registered
 
     def step(self, pose: OpenVrPose) -> ObjectPose | None:
-        """The object's pose at the same instant (less the tracker's own delay), or None for a device rig.toml does not name.
+        """The object's pose at the same instant (less the tracker's own delay), or None for a
+        device rig.toml does not name.
 
-        T_rig_from_object = T_rig_from_lighthouse T_lighthouse_from_tracker T_tracker_from_object; the velocity is that of the
-        object's origin, v + w x r with r from the tracker to it (rigid body), and both are turned into the rig frame.
+        T_rig_from_object = T_rig_from_lighthouse T_lighthouse_from_tracker T_tracker_from_object;
+        the velocity is that of the object's origin, v + w x r with r from the tracker to it (rigid
+        body), and both are turned into the rig frame.
         """
         placement = self._registration.placements.get(pose.device.serial)
         if placement is None:
@@ -73,16 +83,31 @@ class ObjectStep:
             return self._message(pose, placement, "lost", np.eye(4), np.zeros(3), np.zeros(3))
         T_rig_from_lighthouse = self._registration.T_rig_from_lighthouse
         R_rig_from_lighthouse = T_rig_from_lighthouse[:3, :3]
-        lever_lighthouse = T_lighthouse_from_tracker[:3, :3] @ placement.T_tracker_from_object[:3, 3]  # (3,)
+        lever_lighthouse = (
+            T_lighthouse_from_tracker[:3, :3] @ placement.T_tracker_from_object[:3, 3]
+        )  # (3,)
         w_lighthouse = np.array(pose.vAngularVelocity)
         v_lighthouse = np.array(pose.vVelocity) + np.cross(w_lighthouse, lever_lighthouse)
-        T_rig_from_object = T_rig_from_lighthouse @ T_lighthouse_from_tracker @ placement.T_tracker_from_object
+        T_rig_from_object = (
+            T_rig_from_lighthouse @ T_lighthouse_from_tracker @ placement.T_tracker_from_object
+        )
         return self._message(
-            pose, placement, tracking, T_rig_from_object, R_rig_from_lighthouse @ v_lighthouse, R_rig_from_lighthouse @ w_lighthouse
+            pose,
+            placement,
+            tracking,
+            T_rig_from_object,
+            R_rig_from_lighthouse @ v_lighthouse,
+            R_rig_from_lighthouse @ w_lighthouse,
         )
 
     def _message(
-        self, pose: OpenVrPose, placement: Placement, tracking: ObjectTracking, T: Array, velocity_m_s: Array, angular_velocity_rad_s: Array
+        self,
+        pose: OpenVrPose,
+        placement: Placement,
+        tracking: ObjectTracking,
+        T: Array,
+        velocity_m_s: Array,
+        angular_velocity_rad_s: Array,
     ) -> ObjectPose:
         return ObjectPose(
             object=placement.name,
@@ -105,7 +130,9 @@ def _rigid_or_none(pose: OpenVrPose) -> Array | None:
     rows = np.array(pose.mDeviceToAbsoluteTracking, dtype=np.float64)  # (3, 4)
     speeds = np.array([pose.vVelocity, pose.vAngularVelocity], dtype=np.float64)
     # Comparisons written so that NaN fails them.
-    if not np.all(np.abs(rows[:, 3]) <= _MAX_DISTANCE_M) or not np.all(np.abs(speeds) <= _MAX_SPEED):
+    if not np.all(np.abs(rows[:, 3]) <= _MAX_DISTANCE_M) or not np.all(
+        np.abs(speeds) <= _MAX_SPEED
+    ):
         return None
     if not is_rotation(rows[:, :3], _ROTATION_TOLERANCE):
         return None

@@ -1,11 +1,12 @@
-"""The text that libsurvive's `survive-cli --record-stdout` prints, line by line, turned into OpenVR-shaped poses.
+"""The text that libsurvive's `survive-cli --record-stdout` prints, line by line, turned into
+OpenVR-shaped poses.
 
 Pure. Lines of interest (metres, seconds, wxyz, z up):
     t object CONFIG {json}                       the device's own configuration, with its serial number
     t object POSE x y z qw qx qy qz
     t object VELOCITY vx vy vz wx wy wz          follows the POSE of the same instant, usually
-Everything else (raw light, IMU, logs) and every malformed line is skipped; malformed POSE lines are counted. libsurvive goes
-silent when it loses a device: no line, no pose.
+Everything else (raw light, IMU, logs) and every malformed line is skipped; malformed POSE lines are
+counted. libsurvive goes silent when it loses a device: no line, no pose.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from rhot.messages import OpenVrDevice, OpenVrPose, Vec3
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
 _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{0,63})"')
-# libsurvive's z-up world to the `lighthouse` frame of docs/frames.md (x right, y up, -z forward): -90 deg about x.
+# libsurvive's z-up world to the `lighthouse` frame of docs/frames.md (x right, y up, -z forward):
+# -90 deg about x.
 R_LIGHTHOUSE_FROM_SURVIVE: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 # Devices libsurvive can name at once are a handful; more names are garbage.
 _MAX_DEVICES = 64
@@ -31,9 +33,11 @@ _UNIT_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class SurvivePose:
-    """One POSE line with its VELOCITY (zero where libsurvive said none), in libsurvive's z-up world.
+    """One POSE line with its VELOCITY (zero where libsurvive said none), in libsurvive's z-up
+    world.
 
-    time_s counts from the start of survive-cli; serial is the device's own where its CONFIG was seen, else its code name.
+    time_s counts from the start of survive-cli; serial is the device's own where its CONFIG was
+    seen, else its code name.
     """
 
     time_s: float
@@ -64,7 +68,11 @@ class SurviveLines:
         if word == "POSE":
             self._pending = self._pose(time, device, rest)
             self.malformed += self._pending is None
-        elif word == "CONFIG" and _DEVICE.match(device) and (device in self._serials or len(self._serials) < _MAX_DEVICES):
+        elif (
+            word == "CONFIG"
+            and _DEVICE.match(device)
+            and (device in self._serials or len(self._serials) < _MAX_DEVICES)
+        ):
             serial = _SERIAL.search(rest)
             if serial:
                 self._serials[device] = serial[1]
@@ -82,7 +90,9 @@ class SurviveLines:
         t, x, y, z, qw, qx, qy, qz = numbers
         if t < 0.0 or not abs(math.hypot(qw, qx, qy, qz) - 1.0) < _UNIT_TOLERANCE:
             return None
-        return SurvivePose(t, device, self._serials.get(device, device), (x, y, z), (qw, qx, qy, qz))
+        return SurvivePose(
+            t, device, self._serials.get(device, device), (x, y, z), (qw, qx, qy, qz)
+        )
 
     def _with_velocity(self, time: str, rest: str) -> SurvivePose | None:
         done = self.flush()
@@ -107,13 +117,15 @@ def _numbers(text: str, count: int) -> list[float] | None:
 class RunClock:
     """libsurvive's run time as wall-clock nanoseconds.
 
-    The least (arrival - run time) seen is the offset with the least delay in it; it is taken over the current and the previous
-    window, so that a clock that drifts (50 ppm: 0.5 ms in 10 s) or is set is followed.
+    The least (arrival - run time) seen is the offset with the least delay in it; it is taken over
+    the current and the previous window, so that a clock that drifts (50 ppm: 0.5 ms in 10 s) or is
+    set is followed.
     """
 
     # Long enough to meet an undelayed line, short enough for the drift above.
     WINDOW_NS = 10_000_000_000
-    # Arrivals scatter by milliseconds; one this much earlier than its window means that the wall clock was set back.
+    # Arrivals scatter by milliseconds; one this much earlier than its window means that the wall
+    # clock was set back.
     BACKWARDS_NS = 1_000_000_000
 
     def __init__(self) -> None:
@@ -122,16 +134,25 @@ class RunClock:
         self._previous_ns: int | None = None
 
     def stamp_ns(self, time_s: float, arrival_ns: int) -> int:
-        """The wall clock at run time time_s, for a line that arrived at arrival_ns; never later than arrival_ns."""
+        """The wall clock at run time time_s, for a line that arrived at arrival_ns.
+
+        Never later than arrival_ns.
+        """
         time_ns = round(min(time_s, 9e9) * 1e9)
         offset_ns = arrival_ns - time_ns
         age_ns = 0 if self._window_start_ns is None else arrival_ns - self._window_start_ns
         if self._window_start_ns is None or not -self.BACKWARDS_NS < age_ns < 2 * self.WINDOW_NS:
             self._window_start_ns, self._least_ns, self._previous_ns = arrival_ns, offset_ns, None
         elif age_ns >= self.WINDOW_NS:
-            self._window_start_ns, self._least_ns, self._previous_ns = arrival_ns, offset_ns, self._least_ns
+            self._window_start_ns, self._least_ns, self._previous_ns = (
+                arrival_ns,
+                offset_ns,
+                self._least_ns,
+            )
         self._least_ns = min(self._least_ns, offset_ns)
-        least_ns = self._least_ns if self._previous_ns is None else min(self._least_ns, self._previous_ns)
+        least_ns = (
+            self._least_ns if self._previous_ns is None else min(self._least_ns, self._previous_ns)
+        )
         return max(0, time_ns + least_ns)
 
 
@@ -146,7 +167,14 @@ def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
         seq=seq,
         stamp_ns=stamp_ns,
         universe="libsurvive",
-        device=OpenVrDevice(index=0, serial=pose.serial, device_class="GenericTracker", model=pose.device, battery=0.0, charging=False),
+        device=OpenVrDevice(
+            index=0,
+            serial=pose.serial,
+            device_class="GenericTracker",
+            model=pose.device,
+            battery=0.0,
+            charging=False,
+        ),
         mDeviceToAbsoluteTracking=rows,  # type: ignore[arg-type]
         vVelocity=tuple((R @ np.array(pose.velocity_m_s)).tolist()),
         vAngularVelocity=tuple((R @ np.array(pose.angular_velocity_rad_s)).tolist()),

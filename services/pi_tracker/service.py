@@ -1,8 +1,9 @@
 """The tracker's process: frame -> step() -> MarkerFrame, for one camera.
 
-It waits for the start broadcast; a camera that fails ends it with SourceError, and systemd starts it anew; a file that ends, ends
-it in peace. Colour ranges and exposure are changed without a restart, by their files or over the bus (sinks/coloring.py, exposing.py); a
-live camera starts without them, so that it can be calibrated.
+It waits for the start broadcast; a camera that fails ends it with SourceError, and systemd starts
+it anew; a file that ends, ends it in peace. Colour ranges and exposure are changed without a
+restart, by their files or over the bus (sinks/coloring.py, exposing.py); a live camera starts
+without them, so that it can be calibrated.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import time
 from collections.abc import Coroutine
 
 from rhot import topics
-from rhot.clock import OffsetEstimator, follow_master
+from rhot.bus.master_clock import follow_master
+from rhot.clock import OffsetEstimator
 from rhot.process.service import Service
 from services.pi_tracker import sources
 from services.pi_tracker.endpoints.color_fitting import Fitting
@@ -27,7 +29,9 @@ async def serve(service: Service) -> None:
     """Finds the coloured markers in one camera's images."""
     tracker = CameraTracker(service)
     gate = SessionGate(service.bus)
-    companions = [service.tasks.create_task(task) for task in (gate.follow(), *tracker.companions())]
+    companions = [
+        service.tasks.create_task(task) for task in (gate.follow(), *tracker.companions())
+    ]
     try:
         service.ready()
         service.state = "waiting"
@@ -35,7 +39,9 @@ async def serve(service: Service) -> None:
         start_ns = (await gate.started()).start_ns if sources.is_file(table) else 0
         source = sources.open_source(table, service.config, service.bus, start_ns)
         tracker.exposing.attach(source.controls)
-        companions.append(service.tasks.create_task(follow_master(service.bus, tracker.offset, source.now_ns)))
+        companions.append(
+            service.tasks.create_task(follow_master(service.bus, tracker.offset, source.now_ns))
+        )
         async with contextlib.aclosing(source.frames()) as frames:
             async for frame in frames:
                 service.state = "running" if gate.running else "waiting"

@@ -1,7 +1,8 @@
 """One frame in, one MarkerFrame out: the whole of pi_tracker without its process.
 
-Pure: the same object runs live, in `rhot track`, in replay and in tests. A frame without any marker gives a MarkerFrame without
-markers; frames may skip and repeat. A colour without calibration is a CalibrationError at the start, not later.
+Pure: the same object runs live, in `rhot track`, in replay and in tests. A frame without any marker
+gives a MarkerFrame without markers; frames may skip and repeat. A colour without calibration is a
+CalibrationError at the start, not later.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ Clock = Callable[[], int]
 class TrackerStep:
     """The tracker of one camera.
 
-    wanted are the colours to look for; all must be in colors, else CalibrationError (naming colors_path). size_px is the size in
-    rig.toml; a frame of another size is tracked as it is. clock, if given, is read at the stages' ends, for times_ms. With a lens, frames
-    are rectified first (rectify.py).
+    wanted are the colours to look for; all must be in colors, else CalibrationError (naming
+    colors_path). size_px is the size in rig.toml; a frame of another size is tracked as it is.
+    clock, if given, is read at the stages' ends, for times_ms. With a lens, frames are rectified
+    first (rectify.py).
     """
 
     def __init__(
@@ -56,7 +58,10 @@ class TrackerStep:
         self.recolor(colors, colors_path or f"{camera_name}.colors.json")
 
     def recolor(self, colors: Colors, path: Path | str) -> None:
-        """Take new colour ranges into force with the next frame; raises CalibrationError and keeps the old ones."""
+        """Take new colour ranges into force with the next frame.
+
+        Raises CalibrationError and keeps the old ones.
+        """
         table = compile_colors(colors, self._wanted, path)
         self._finder: LutFinder | SeedFinder
         if self._settings.method == "seed":
@@ -65,7 +70,10 @@ class TrackerStep:
             self._finder = LutFinder(table, self._settings, self._lap)
 
     def step(self, frame: Frame, clock_offset_ns: int = 0, clock_sigma_ns: int = -1) -> MarkerFrame:
-        """Find the markers of one frame; the offset is the camera clock's, as rhot.clock estimates it."""
+        """Find the markers of one frame.
+
+        The offset is the camera clock's, as rhot.clock estimates it.
+        """
         if self._clock is not None:
             started_ns = self._last_ns = self._clock()
         markers = self._find(frame)

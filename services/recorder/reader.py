@@ -1,7 +1,7 @@
 """Recordings read back: what arrived, when, on which key.
 
-Files that are no recording of rhot, or were cut off, raise CaptureError; `recover` makes a whole file of a cut one.
-Payloads are given as they were recorded: they may not decode.
+Files that are no recording of rhot, or were cut off, raise CaptureError; `recover` makes a whole
+file of a cut one. Payloads are given as they were recorded: they may not decode.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from rhot.errors import CaptureError
 from services.recorder.writer import PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
-# Ours are at most 65 KiB and the largest message; a longer record is damage, and must not be allocated.
+# Ours are at most 65 KiB and the largest message; a longer record is damage, and must not be
+# allocated.
 RECORD_LIMIT = 16 * 1024 * 1024
 
 
@@ -66,7 +67,12 @@ def read(path: Path) -> Iterator[Record]:
         reader = _reader(path, file)
         try:
             for _, channel, message in reader.iter_messages():
-                yield Record(message.log_time, channel.topic, message.data, channel.metadata.get("encoding", channel.message_encoding))
+                yield Record(
+                    message.log_time,
+                    channel.topic,
+                    message.data,
+                    channel.metadata.get("encoding", channel.message_encoding),
+                )
         except CaptureError:
             raise
         except Exception as error:  # the decoders of damaged bytes raise whatever they like
@@ -79,16 +85,27 @@ def summarize(path: Path) -> Summary:
         reader = _reader(path, file)
         try:
             summary = reader.get_summary()
-            rig = next((m.metadata.get("rig", "") for m in reader.iter_metadata() if m.name == "rhot"), "")
+            rig = next(
+                (m.metadata.get("rig", "") for m in reader.iter_metadata() if m.name == "rhot"), ""
+            )
             if summary is None or summary.statistics is None:
                 raise CaptureError(f"{path}: has no summary; it was not written by rhot's recorder")
             statistics = summary.statistics
-            keys = {c.topic: statistics.channel_message_counts.get(c.id, 0) for c in summary.channels.values()}
+            keys = {
+                c.topic: statistics.channel_message_counts.get(c.id, 0)
+                for c in summary.channels.values()
+            }
         except CaptureError:
             raise
         except Exception as error:  # likewise
             raise _damaged(path, error) from None
-    return Summary(rig, statistics.message_count, statistics.message_start_time, statistics.message_end_time, keys)
+    return Summary(
+        rig,
+        statistics.message_count,
+        statistics.message_start_time,
+        statistics.message_end_time,
+        keys,
+    )
 
 
 def read_attachments(path: Path) -> dict[str, bytes]:
@@ -114,18 +131,23 @@ def _reader(path: Path, file: IO[bytes]) -> SeekingReader:
         raise CaptureError(f"{path}: is no MCAP file; give a recording (*.mcap) of `rhot record`")
     file.seek(0)
     if not is_finished(path):
-        raise CaptureError(f"{path}: was cut off before it was finished; restore it with `rhot replay --recover {path}`")
+        raise CaptureError(
+            f"{path}: was cut off before it was finished; restore it with `rhot replay --recover {path}`"
+        )
     try:
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=RECORD_LIMIT)
         profile = reader.get_header().profile
     except (McapError, ValueError) as error:
         raise _damaged(path, error) from None
     if profile != PROFILE:
-        raise CaptureError(f"{path}: is an MCAP file, but no recording of rhot (its profile is {profile!r})")
+        raise CaptureError(
+            f"{path}: is an MCAP file, but no recording of rhot (its profile is {profile!r})"
+        )
     return reader
 
 
 def _damaged(path: Path, error: Exception) -> CaptureError:
     return CaptureError(
-        f"{path}: is damaged: {type(error).__name__}: {error}"[:300] + f"; save what is whole with `rhot replay --recover {path}`"
+        f"{path}: is damaged: {type(error).__name__}: {error}"[:300]
+        + f"; save what is whole with `rhot replay --recover {path}`"
     )

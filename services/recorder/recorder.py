@@ -1,8 +1,10 @@
-"""What is recorded when: a file for each session, named after its start. Pure but for the files it writes.
+"""What is recorded when: a file for each session, named after its start. Pure but for the files it
+writes.
 
-With [recorder] autostart everything is recorded from the beginning, and a session that starts opens a file of its own; without, only
-sessions are recorded. Messages that come between are not kept. Late or undecodable payloads are kept as they came; a session
-message that does not decode starts and stops nothing.
+With [recorder] autostart everything is recorded from the beginning, and a session that starts opens
+a file of its own; without, only sessions are recorded. Messages that come between are not kept.
+Late or undecodable payloads are kept as they came; a session message that does not decode starts
+and stops nothing.
 """
 
 from __future__ import annotations
@@ -23,14 +25,27 @@ _MAX_ATTACHMENT_BYTES = 1_000_000
 
 
 def recorded_topics(config: RigConfig) -> list[Topic]:
-    """The topics to record: those marked so in the table, the simulator's truth only where something is simulated."""
-    simulated = config.objects.source == "simulator" or any(c.source == "simulator" for c in config.camera)
-    return [topic for topic in topics.TOPICS if topic.recorded and (simulated or topic is not topics.TRUTH)]
+    """The topics to record: those marked so in the table, the simulator's truth only where
+    something is simulated.
+    """
+    simulated = config.objects.source == "simulator" or any(
+        c.source == "simulator" for c in config.camera
+    )
+    return [
+        topic
+        for topic in topics.TOPICS
+        if topic.recorded and (simulated or topic is not topics.TRUTH)
+    ]
 
 
 def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
-    """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3, ... where that name is taken."""
-    day, _, clock = str(np.datetime64(start_ns // 10**9, "s")).replace("-", "").replace(":", "").partition("T")
+    """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3, ...
+
+    where that name is taken.
+    """
+    day, _, clock = (
+        str(np.datetime64(start_ns // 10**9, "s")).replace("-", "").replace(":", "").partition("T")
+    )
     stem = f"rhot-{rig}-{day}-{clock}"
     path, number = folder / f"{stem}.mcap", 1
     while path.exists():
@@ -40,14 +55,17 @@ def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
 
 
 def attachments(config: RigConfig) -> dict[str, bytes]:
-    """What a recording needs to be understood later: the rig's configuration as JSON and its calibration files."""
+    """What a recording needs to be understood later: the rig's configuration as JSON and its
+    calibration files.
+    """
     files = {"config.json": msgspec.json.encode(config)}
     for path in sorted(config.calibration_dir.glob("*.json")):
         try:
             if path.stat().st_size <= _MAX_ATTACHMENT_BYTES:
                 files[f"calibration/{path.name}"] = path.read_bytes()
         except OSError:
-            # A calibration that cannot be read is missing from the recording, as it is from the rig.
+            # A calibration that cannot be read is missing from the recording, as it is from the
+            # rig.
             continue
     return files
 
@@ -55,11 +73,13 @@ def attachments(config: RigConfig) -> dict[str, bytes]:
 class Recorder:
     """Takes every sample and keeps those that belong into a file.
 
-    messages and bytes count over all files; path is the file being written, None between sessions. Without follow_sessions
-    only start() and stop() open and close files.
+    messages and bytes count over all files; path is the file being written, None between sessions.
+    Without follow_sessions only start() and stop() open and close files.
     """
 
-    def __init__(self, config: RigConfig, folder: Path, version: str = "", *, follow_sessions: bool = True) -> None:
+    def __init__(
+        self, config: RigConfig, folder: Path, version: str = "", *, follow_sessions: bool = True
+    ) -> None:
         self._config = config
         self._follow_sessions = follow_sessions
         self._folder = folder
@@ -80,7 +100,9 @@ class Recorder:
         """Open a file for what starts at start_ns (closing the one before); raises CaptureError."""
         self.stop()
         path = path or recording_path(self._folder, self._config.rig.name, start_ns)
-        self._writer = RecordingWriter(path, self._config.rig.name, self._version, attachments(self._config))
+        self._writer = RecordingWriter(
+            path, self._config.rig.name, self._version, attachments(self._config)
+        )
         return path
 
     def stop(self) -> None:
@@ -90,7 +112,10 @@ class Recorder:
             writer.close()
 
     def follow(self, session: Session) -> None:
-        """Open and close files as sessions start and stop; the same session told again changes nothing."""
+        """Open and close files as sessions start and stop.
+
+        The same session told again changes nothing.
+        """
         if session.running and session.start_ns != self._session_ns:
             self._session_ns = session.start_ns
             self.start(session.start_ns)
@@ -101,7 +126,9 @@ class Recorder:
 
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
         """One sample; kept if a file is open. Raises CaptureError."""
-        session = self._session(payload) if topic is topics.SESSION and self._follow_sessions else None
+        session = (
+            self._session(payload) if topic is topics.SESSION and self._follow_sessions else None
+        )
         if session is not None and session.running:
             self.follow(session)
         if self._writer is not None:

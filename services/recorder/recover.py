@@ -1,7 +1,9 @@
-"""Whole recordings out of cut or damaged ones: every chunk that can still be read goes to *.recovered.mcap.
+"""Whole recordings out of cut or damaged ones: every chunk that can still be read goes to
+*.recovered.mcap.
 
-A killed recorder leaves a file without its index and with half a chunk at its end; damage in the middle costs the chunks it hits.
-The broken file is left as it is. A file another process is recording into is left alone; one with nothing whole gives no file.
+A killed recorder leaves a file without its index and with half a chunk at its end; damage in the
+middle costs the chunks it hits. The broken file is left as it is. A file another process is
+recording into is left alone; one with nothing whole gives no file.
 """
 
 from __future__ import annotations
@@ -38,7 +40,10 @@ def unfinished(folder: Path) -> list[Path]:
     return [
         path
         for path in sorted(folder.glob("*.mcap"))
-        if not path.name.endswith(_SUFFIX) and not target_of(path).exists() and not _is_in_use(path) and not is_finished(path)
+        if not path.name.endswith(_SUFFIX)
+        and not target_of(path).exists()
+        and not _is_in_use(path)
+        and not is_finished(path)
     ]
 
 
@@ -50,7 +55,8 @@ def target_of(path: Path) -> Path:
 def recover(path: Path) -> Recovered:
     """Write what is whole in `path` to *.recovered.mcap beside it.
 
-    Raises CaptureError if the file cannot be read, is no recording of rhot, is being recorded into, or holds nothing whole.
+    Raises CaptureError if the file cannot be read, is no recording of rhot, is being recorded into,
+    or holds nothing whole.
     """
     target = target_of(path)
     try:
@@ -69,7 +75,8 @@ def _copy(path: Path, target: Path, whole: _Whole) -> Recovered:
         raise CaptureError(f"{path}: is no recording of rhot, or not even its beginning is whole")
     rig = next((m.metadata.get("rig", "") for m in head if isinstance(m, Metadata)), "")
     attachments = {a.name: a.data for a in head if isinstance(a, Attachment)}
-    # Written under a hidden name: a recovery that is killed in turn must not look like one that was finished.
+    # Written under a hidden name: a recovery that is killed in turn must not look like one that was
+    # finished.
     partial = target.with_name(f".{target.name}.part")
     partial.unlink(missing_ok=True)
     with RecordingWriter(partial, rig, header.library.removeprefix("rhot "), attachments) as writer:

@@ -17,7 +17,8 @@ def schema_name(topic: Topic) -> str:
 def json_schema(message: type) -> bytes:
     """The JSON Schema of a message, its root spelled out.
 
-    msgspec makes the root a $ref into $defs, which viewers do not follow; inner references are kept.
+    msgspec makes the root a $ref into $defs, which viewers do not follow; inner references are
+    kept.
     """
     schema = msgspec.json.schema(message)
     defs = schema.pop("$defs", {})

@@ -1,7 +1,8 @@
 """The recorder: everything the topics table marks as recorded, into one MCAP file a session.
 
-Late or missing streams are recorded late or not at all. A full disk, or a folder that cannot be written, ends the service with a clear
-error. At its start it restores recordings that were cut off by a crash.
+Late or missing streams are recorded late or not at all. A full disk, or a folder that cannot be
+written, ends the service with a clear error. At its start it restores recordings that were cut off
+by a crash.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from rhot.topics import Topic
 from services.recorder.recorder import Recorder, recorded_topics
 from services.recorder.recover import recover, unfinished
 
-# Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a camera, and no memory to speak of.
+# Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a
+# camera, and no memory to speak of.
 QUEUE = 512
 _FLUSH_S = 1.0
 
@@ -58,12 +60,17 @@ async def keep(recorder: Recorder, topic: Topic, samples: RawSubscription) -> No
 
 
 def recover_all(folder: Path) -> list[str]:
-    """Restore the cut recordings of a folder; what to tell of it. Files with nothing in them are told too, and left."""
+    """Restore the cut recordings of a folder; what to tell of it.
+
+    Files with nothing in them are told too, and left.
+    """
     notes = []
     for path in unfinished(folder):
         try:
             done = recover(path)
-            notes.append(f"{path.name} had been cut off: {done.messages} messages restored to {done.target.name}")
+            notes.append(
+                f"{path.name} had been cut off: {done.messages} messages restored to {done.target.name}"
+            )
         except CaptureError as error:
             notes.append(str(error))
     return notes
@@ -74,7 +81,13 @@ async def _tend(service: Service, recorder: Recorder) -> None:
     while True:
         await asyncio.sleep(_FLUSH_S)
         recorder.flush()
-        service.values.update(recording=float(recorder.path is not None), messages=recorder.messages, megabytes=recorder.bytes / 1e6)
+        service.values.update(
+            recording=float(recorder.path is not None),
+            messages=recorder.messages,
+            megabytes=recorder.bytes / 1e6,
+        )
         if recorder.refused > service.values.get("refused", 0):
-            service.error(f"{recorder.refused} messages on too many different keys were not recorded")
+            service.error(
+                f"{recorder.refused} messages on too many different keys were not recorded"
+            )
             service.values["refused"] = recorder.refused

@@ -1,8 +1,10 @@
-"""One recording being written: an MCAP file of raw payloads, with schemas, the rig's configuration and calibration.
+"""One recording being written: an MCAP file of raw payloads, with schemas, the rig's configuration
+and calibration.
 
-Payloads are kept as they came, also when they do not decode. Chunks are small, so that a killed recorder loses less than a second
-of a busy rig; `flush` hands whole chunks to the system. A full disk or an unwritable folder raises CaptureError. The file is
-locked while it is open, so that recovery leaves it alone.
+Payloads are kept as they came, also when they do not decode. Chunks are small, so that a killed
+recorder loses less than a second of a busy rig; `flush` hands whole chunks to the system. A full
+disk or an unwritable folder raises CaptureError. The file is locked while it is open, so that
+recovery leaves it alone.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ PROFILE = "rhot"
 CHUNK_BYTES = 65_536
 # A rig has some dozen keys; MCAP has room for 65,535. Names come from the network.
 MAX_CHANNELS = 4096
-# Room left for the system and for finishing the file: its index is some 100 bytes a chunk, 1 MB for 20 hours.
+# Room left for the system and for finishing the file: its index is some 100 bytes a chunk, 1 MB for
+# 20 hours.
 MIN_FREE_BYTES = 50_000_000
 
 
@@ -35,7 +38,13 @@ class RecordingWriter:
     messages, bytes and refused (messages on more keys than MAX_CHANNELS) count what came.
     """
 
-    def __init__(self, path: Path, rig: str, version: str = "", attachments: Mapping[str, bytes] | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        rig: str,
+        version: str = "",
+        attachments: Mapping[str, bytes] | None = None,
+    ) -> None:
         self.path = path
         self.messages = 0
         self.bytes = 0
@@ -72,7 +81,9 @@ class RecordingWriter:
         try:
             if channel is None:
                 channel = self._channel(topic, key)
-            self._writer.add_message(channel, log_time_ns, payload, log_time_ns, self.messages & 0xFFFFFFFF)
+            self._writer.add_message(
+                channel, log_time_ns, payload, log_time_ns, self.messages & 0xFFFFFFFF
+            )
         except OSError as error:
             raise _failed(self.path, error) from None
         self.messages += 1
@@ -81,13 +92,20 @@ class RecordingWriter:
     def _channel(self, topic: Topic, key: str) -> int:
         name = schema_name(topic)
         if name and name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, json_schema(topic.message))  # type: ignore[arg-type]
+            self._schemas[name] = self._writer.register_schema(
+                name, SCHEMA_ENCODING, json_schema(topic.message)
+            )  # type: ignore[arg-type]
         encoding = "json" if name else topic.media_type
-        self._channels[key] = self._writer.register_channel(key, encoding, self._schemas.get(name, 0), {"encoding": topic.encoding})
+        self._channels[key] = self._writer.register_channel(
+            key, encoding, self._schemas.get(name, 0), {"encoding": topic.encoding}
+        )
         return self._channels[key]
 
     def flush(self) -> None:
-        """Hand whole chunks to the system; raises CaptureError when the disk is nearly full (the file can still be finished)."""
+        """Hand whole chunks to the system.
+
+        Raises CaptureError when the disk is nearly full (the file can still be finished).
+        """
         try:
             self._file.flush()
             check_space(self.path.parent)

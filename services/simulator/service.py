@@ -1,8 +1,10 @@
-"""The simulator live: pictures of every simulated camera, poses of every simulated tracker, and the truth, in real time.
+"""The simulator live: pictures of every simulated camera, poses of every simulated tracker, and the
+truth, in real time.
 
-Each camera runs at its own phase, in a thread of its own; a picture is published when a real one would have arrived. The true time
-is CLOCK_REALTIME of this machine, which is the master's; a simulated camera computer's clock is off by what SimFrame.clock_skew_ns
-says. Late: a camera that cannot keep up skips frames and counts them in health. Uncalibrated: the service ends with the error
+Each camera runs at its own phase, in a thread of its own; a picture is published when a real one
+would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; a
+simulated camera computer's clock is off by what SimFrame.clock_skew_ns says. Late: a camera that
+cannot keep up skips frames and counts them in health. Uncalibrated: the service ends with the error
 that names the command. Nobody listens: it runs on.
 """
 
@@ -30,7 +32,9 @@ _SMOOTHING = 0.05
 
 
 class StageClock:
-    """Seconds since the scene began, and that beginning on the master's clock, which may be slewed or set meanwhile."""
+    """Seconds since the scene began, and that beginning on the master's clock, which may be slewed
+    or set meanwhile.
+    """
 
     def __init__(self) -> None:
         self._began_ns = time.monotonic_ns()
@@ -43,8 +47,13 @@ class StageClock:
         """The scene's beginning as the master's clock has it now."""
         return time.time_ns() - (time.monotonic_ns() - self._began_ns)
 
-    async def ticks(self, period_s: float, phase_s: float = 0.0) -> AsyncIterator[tuple[int, float]]:
-        """(number, scene time) of instants a period apart, each as it comes; those missed by more than a period are left out."""
+    async def ticks(
+        self, period_s: float, phase_s: float = 0.0
+    ) -> AsyncIterator[tuple[int, float]]:
+        """(number, scene time) of instants a period apart, each as it comes.
+
+        Those missed by more than a period are left out.
+        """
         number = 0
         while True:
             due_s = phase_s + number * period_s
@@ -64,7 +73,10 @@ async def serve(service: Service) -> None:
     scene = load_scene(config)
     names = [c.name for c in config.camera if c.source == "simulator"]
     with ThreadPoolExecutor(max(1, len(names)), "camera") as threads:
-        sources = [await asyncio.get_running_loop().run_in_executor(threads, _warm, scene, name) for name in names]
+        sources = [
+            await asyncio.get_running_loop().run_in_executor(threads, _warm, scene, name)
+            for name in names
+        ]
         clock = StageClock()
         async with asyncio.TaskGroup() as tasks:
             for source in sources:
@@ -76,18 +88,26 @@ async def serve(service: Service) -> None:
 
 
 def _warm(scene: Scene, camera: str) -> FrameSource:
-    """A camera whose kernels are compiled: the first compilation takes most of a minute on a slow machine."""
+    """A camera whose kernels are compiled: the first compilation takes most of a minute on a slow
+    machine.
+    """
     source = FrameSource(scene, camera)
     source.renderer.picture(0)
     return source
 
 
-async def _film(service: Service, source: FrameSource, clock: StageClock, threads: ThreadPoolExecutor) -> None:
+async def _film(
+    service: Service, source: FrameSource, clock: StageClock, threads: ThreadPoolExecutor
+) -> None:
     """One camera for ever."""
     loop, name, timing = asyncio.get_running_loop(), source.camera.name, source.clock
     publisher = service.bus.publisher(topics.SIM_FRAME, camera=name)
     # From mid-exposure of row 0 to the picture in memory.
-    delay_s = 0.5 * timing.exposure_s + source.camera.size_px[1] * timing.row_time_ns * 1e-9 + _PROCESSING_S
+    delay_s = (
+        0.5 * timing.exposure_s
+        + source.camera.size_px[1] * timing.row_time_ns * 1e-9
+        + _PROCESSING_S
+    )
     values = service.values
     values.update({f"{name}_skipped": 0.0, f"{name}_lost": 0.0, f"{name}_render_ms": 0.0})
     seq = timing.first_frame(clock.now_s())
@@ -102,7 +122,9 @@ async def _film(service: Service, source: FrameSource, clock: StageClock, thread
         if taken.image is None:
             values[f"{name}_lost"] += 1
         else:
-            values[f"{name}_render_ms"] += _SMOOTHING * (1e3 * (clock.now_s() - began_s) - values[f"{name}_render_ms"])
+            values[f"{name}_render_ms"] += _SMOOTHING * (
+                1e3 * (clock.now_s() - began_s) - values[f"{name}_render_ms"]
+            )
             await asyncio.sleep(max(0.0, taken.time_s + delay_s - clock.now_s()))
             about = SimFrame(
                 camera=name,
@@ -124,10 +146,16 @@ async def _tell_truth(service: Service, scene: Scene, clock: StageClock) -> None
         publisher.put(scene.truth(t_s, clock.start_ns() + round(t_s * 1e9)))
 
 
-async def _track_things(service: Service, scene: Scene, clock: StageClock, config: RigConfig) -> None:
+async def _track_things(
+    service: Service, scene: Scene, clock: StageClock, config: RigConfig
+) -> None:
     """Every object's Vive tracker at the rate of rig.toml."""
-    publishers = [service.bus.publisher(topics.OPENVR, serial=thing.serial) for thing in scene.things]
+    publishers = [
+        service.bus.publisher(topics.OPENVR, serial=thing.serial) for thing in scene.things
+    ]
     async for seq, t_s in clock.ticks(1.0 / config.objects.rate_hz):
         stamp_ns = clock.start_ns() + round(t_s * 1e9)
-        for index, (thing, publisher) in enumerate(zip(scene.things, publishers, strict=True), start=1):
+        for index, (thing, publisher) in enumerate(
+            zip(scene.things, publishers, strict=True), start=1
+        ):
             publisher.put(tracker_pose(scene, thing, index, t_s, seq, stamp_ns))

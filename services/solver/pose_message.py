@@ -1,4 +1,6 @@
-"""A solved hand as a HandPose message: 26 joints in OpenXR order, angles by name, where each value comes from and how sure it is."""
+"""A solved hand as a HandPose message: 26 joints in OpenXR order, angles by name, where each value
+comes from and how sure it is.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,15 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS, JOINTS
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPoints, HandPose, JointSource, WristPose
+from rhot.messages import (
+    FingerAngles,
+    FingerPose,
+    HandJoint,
+    HandPoints,
+    HandPose,
+    JointSource,
+    WristPose,
+)
 from services.solver.finger.solve_fingers import Fingers
 from services.solver.maths.kinematics import CHAINS
 
@@ -31,11 +41,26 @@ def quaternions(rotations: Array) -> Array:
         if trace >= r[0, 0] and trace >= r[1, 1] and trace >= r[2, 2]:
             w, x, y, z = 1.0 + trace, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
         elif r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2]:
-            w, x, y, z = r[2, 1] - r[1, 2], 1.0 - trace + 2.0 * r[0, 0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]
+            w, x, y, z = (
+                r[2, 1] - r[1, 2],
+                1.0 - trace + 2.0 * r[0, 0],
+                r[0, 1] + r[1, 0],
+                r[0, 2] + r[2, 0],
+            )
         elif r[1, 1] >= r[2, 2]:
-            w, x, y, z = r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1.0 - trace + 2.0 * r[1, 1], r[1, 2] + r[2, 1]
+            w, x, y, z = (
+                r[0, 2] - r[2, 0],
+                r[0, 1] + r[1, 0],
+                1.0 - trace + 2.0 * r[1, 1],
+                r[1, 2] + r[2, 1],
+            )
         else:
-            w, x, y, z = r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1.0 - trace + 2.0 * r[2, 2]
+            w, x, y, z = (
+                r[1, 0] - r[0, 1],
+                r[0, 2] + r[2, 0],
+                r[1, 2] + r[2, 1],
+                1.0 - trace + 2.0 * r[2, 2],
+            )
         size = math.sqrt(w * w + x * x + y * y + z * z)
         if w < 0.0:
             size = -size
@@ -49,13 +74,17 @@ def rounded(values: Array) -> list:
 
 
 def rounded_inside(angles: Array, limits: Array) -> Array:
-    """Angles (5, 4) as they go out: rounded, and still within limits (5, 4, 2) where rounding would cross one."""
+    """Angles (5, 4) as they go out: rounded, and still within limits (5, 4, 2) where rounding would
+    cross one.
+    """
     inside = np.clip(np.round(angles, _DIGITS), limits[:, :, 0], limits[:, :, 1])
     return inside + 0.0
 
 
 def sources(measured: set[str], located: bool, digit_solved: list[bool]) -> list[JointSource]:
-    """Of each joint: measured (its landmark was seen), solved (markers fix it) or predicted (only the past and habit do)."""
+    """Of each joint: measured (its landmark was seen), solved (markers fix it) or predicted (only
+    the past and habit do).
+    """
     result: list[JointSource] = []
     for joint, name in enumerate(JOINTS):
         row = _DIGIT_OF[joint]
@@ -68,7 +97,9 @@ def sources(measured: set[str], located: bool, digit_solved: list[bool]) -> list
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The 26 joints: positions (26, 3) m and rotations (26, 3, 3) in the rig frame, skin radii in m, where each comes from."""
+    """The 26 joints: positions (26, 3) m and rotations (26, 3, 3) in the rig frame, skin radii in
+    m, where each comes from.
+    """
 
     positions_m: Array
     rotations: Array
@@ -78,7 +109,9 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Spread:
-    """One standard deviation: of the wrist's place (m) and turn (rad) as lengths of vectors, of each digit's angles (rad)."""
+    """One standard deviation: of the wrist's place (m) and turn (rad) as lengths of vectors, of
+    each digit's angles (rad).
+    """
 
     wrist_m: float
     wrist_rad: float
@@ -86,20 +119,37 @@ class Spread:
 
 
 def spread_of(covariance: Array, limits: Array) -> Spread:
-    """From the covariance (26, 26) of a pose; limits (5, 4, 2) tell which angles can move. Half a turn and a metre say: unknown."""
+    """From the covariance (26, 26) of a pose; limits (5, 4, 2) tell which angles can move.
+
+    Half a turn and a metre say: unknown.
+    """
     variance = np.maximum(np.diag(covariance), 0.0)
     free = limits[:, :, 1] > limits[:, :, 0]
-    angles = np.where(free, variance[6:].reshape(5, 4), 0.0).sum(axis=1) / np.maximum(free.sum(axis=1), 1)
+    angles = np.where(free, variance[6:].reshape(5, 4), 0.0).sum(axis=1) / np.maximum(
+        free.sum(axis=1), 1
+    )
     wrist_rad, wrist_m = math.sqrt(variance[:3].sum()), math.sqrt(variance[3:6].sum())
-    return Spread(min(wrist_m, 1.0), min(wrist_rad, math.pi), np.minimum(np.sqrt(angles), math.pi).tolist())
+    return Spread(
+        min(wrist_m, 1.0), min(wrist_rad, math.pi), np.minimum(np.sqrt(angles), math.pi).tolist()
+    )
 
 
-def hand_pose(points: HandPoints, method: str, skeleton: Skeleton, fingers: Fingers, spread: Spread) -> HandPose:
+def hand_pose(
+    points: HandPoints, method: str, skeleton: Skeleton, fingers: Fingers, spread: Spread
+) -> HandPose:
     """The message; fingers are already rounded and within limits."""
     where, how = rounded(skeleton.positions_m), rounded(quaternions(skeleton.rotations))
     joints = [
-        HandJoint(name=name, position_m=tuple(p), orientation_wxyz=tuple(o), radius_m=radius, source=source)
-        for name, p, o, radius, source in zip(JOINTS, where, how, skeleton.radii_m, skeleton.sources, strict=True)
+        HandJoint(
+            name=name,
+            position_m=tuple(p),
+            orientation_wxyz=tuple(o),
+            radius_m=radius,
+            source=source,
+        )
+        for name, p, o, radius, source in zip(
+            JOINTS, where, how, skeleton.radii_m, skeleton.sources, strict=True
+        )
     ]
     wrist = JOINTS.index("wrist")
     return HandPose(
@@ -109,7 +159,9 @@ def hand_pose(points: HandPoints, method: str, skeleton: Skeleton, fingers: Fing
         method=method,
         wrist=WristPose(position_m=tuple(where[wrist]), orientation_wxyz=tuple(how[wrist])),
         joints=joints,
-        fingers=[_finger(row, name, fingers, spread.fingers_rad[row]) for row, name in enumerate(DIGITS)],
+        fingers=[
+            _finger(row, name, fingers, spread.fingers_rad[row]) for row, name in enumerate(DIGITS)
+        ],
         wrist_sigma_m=round(spread.wrist_m, _DIGITS),
         wrist_sigma_rad=round(spread.wrist_rad, _DIGITS),
     )

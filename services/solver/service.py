@@ -1,7 +1,8 @@
 """The solver: hand/<h>/points in, hand/<h>/pose out, for every hand of rig.toml.
 
-Only the newest points count (latest): a solver that is behind skips. Missing points: no pose is published. A hand that was never
-measured is solved with the tables' bones at the scale of rig.toml, and health says so. Health also tells how long a pose takes.
+Only the newest points count (latest): a solver that is behind skips. Missing points: no pose is
+published. A hand that was never measured is solved with the tables' bones at the scale of rig.toml,
+and health says so. Health also tells how long a pose takes.
 """
 
 from __future__ import annotations
@@ -27,12 +28,23 @@ async def serve(service: Service) -> None:
     """Solves the pose of every hand from its painted landmarks."""
     config = service.config
     if not config.hand:
-        raise ConfigError("rig.toml has no [hand.right.markers] or [hand.left.markers]: there is no hand to solve")
-    hands: dict[HandName, HandModel] = {name: load_hand(config.calibration_dir, name, table.scale) for name, table in config.hand.items()}
+        raise ConfigError(
+            "rig.toml has no [hand.right.markers] or [hand.left.markers]: there is no hand to solve"
+        )
+    hands: dict[HandName, HandModel] = {
+        name: load_hand(config.calibration_dir, name, table.scale)
+        for name, table in config.hand.items()
+    }
     step = SolverStep(config, hands)
     # Compiling (a minute without a cache) must not stop the heart beat.
     await asyncio.get_running_loop().run_in_executor(None, warm_up, config, hands)
-    streams = {name: (service.bus.latest(topics.POINTS, hand=name), service.bus.publisher(topics.POSE, hand=name)) for name in hands}
+    streams = {
+        name: (
+            service.bus.latest(topics.POINTS, hand=name),
+            service.bus.publisher(topics.POSE, hand=name),
+        )
+        for name in hands
+    }
     for name, model in hands.items():
         service.values[f"{name}_from_tables"] = float(model.origin == "tables")
     service.ready()
@@ -41,7 +53,13 @@ async def serve(service: Service) -> None:
             tasks.create_task(_follow(service, step, name, points, poses))
 
 
-async def _follow(service: Service, step: SolverStep, hand: HandName, points: Subscription[HandPoints], poses: Publisher[HandPose]) -> None:
+async def _follow(
+    service: Service,
+    step: SolverStep,
+    hand: HandName,
+    points: Subscription[HandPoints],
+    poses: Publisher[HandPose],
+) -> None:
     """One hand, for ever."""
     mean_ms = 0.0
     async for message in points:

@@ -1,9 +1,11 @@
 """The solver's step: landmarks of one hand in, its full pose out.
 
-whole_hand.py finds the wrist's pose (and about how every digit is bent) from all markers together; config.solver.method decides how
-each digit's angles are then found (fingers.py). None until the wrist and three tips were seen in one message. Late messages: the
-belief is blurred by the time that passed; a second's gap starts anew. Missing markers: fewer equations, and what is not measured says
-`predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml. Absurd points are dropped (screen.py).
+whole_hand.py finds the wrist's pose (and about how every digit is bent) from all markers together;
+config.solver.method decides how each digit's angles are then found (fingers.py). None until the
+wrist and three tips were seen in one message. Late messages: the belief is blurred by the time that
+passed; a second's gap starts anew. Missing markers: fewer equations, and what is not measured says
+`predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml. Absurd
+points are dropped (screen.py).
 """
 
 from __future__ import annotations
@@ -18,7 +20,14 @@ from rhot.hand import DIGITS, TIPS, HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose
 from services.solver.finger.solve_fingers import Fingers, Tip, solve_fingers
 from services.solver.maths.kinematics import hand_frames
-from services.solver.pose_message import Skeleton, hand_pose, rounded, rounded_inside, sources, spread_of
+from services.solver.pose_message import (
+    Skeleton,
+    hand_pose,
+    rounded,
+    rounded_inside,
+    sources,
+    spread_of,
+)
 from services.solver.whole_hand.hand_tracker import ENOUGH, HandTracker, Look
 from services.solver.whole_hand.point_check import Seen, places, usable
 
@@ -31,7 +40,9 @@ class SolverStep:
         self._hands = {name: _Hand(config, model) for name, model in hands.items()}
 
     def step(self, points: HandPoints) -> HandPose | None:
-        """The pose at the instant of points, or None while that hand has not been found (or is none of ours)."""
+        """The pose at the instant of points, or None while that hand has not been found (or is none
+        of ours).
+        """
         hand = self._hands.get(points.hand)
         return hand.step(points) if hand is not None else None
 
@@ -55,15 +66,27 @@ class _Hand:
         fingers = self._fingers(look, seen)
         chains = self._tracker.chains
         positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
-        hand_frames(chains, look.rotation, look.position_m, fingers.angles_rad, positions, rotations)
+        hand_frames(
+            chains, look.rotation, look.position_m, fingers.angles_rad, positions, rotations
+        )
         located = len(measured) >= ENOUGH
         solved = [any(self._known[name].digit == row for name in measured) for row in range(5)]
         skeleton = Skeleton(positions, rotations, self._radii, sources(measured, located, solved))
-        return hand_pose(points, self._settings.method, skeleton, fingers, spread_of(look.covariance, chains.limits_rad))
+        return hand_pose(
+            points,
+            self._settings.method,
+            skeleton,
+            fingers,
+            spread_of(look.covariance, chains.limits_rad),
+        )
 
     def _fingers(self, look: Look, seen: Mapping[str, Seen]) -> Fingers:
         chains = self._tracker.chains
-        tips = {digit: _tip(look, seen[name]) for digit, name in zip(DIGITS, TIPS, strict=True) if name in seen}
+        tips = {
+            digit: _tip(look, seen[name])
+            for digit, name in zip(DIGITS, TIPS, strict=True)
+            if name in seen
+        }
         found = solve_fingers(self._settings, chains, look.angles_rad, tips)
         angles = rounded_inside(found.angles_rad, chains.limits_rad)
         return Fingers(angles, found.residual_m, found.iterations, found.status)
@@ -80,13 +103,32 @@ def _check(model: HandModel) -> None:
     where = f"hand.{model.hand}.json"
     missing = sorted({"wrist", *TIPS} - set(model.paint))
     if missing:
-        raise CalibrationError(f"{where}: no paint for {missing}; run `rhot calibrate hand` or copy the tables' hand")
+        raise CalibrationError(
+            f"{where}: no paint for {missing}; run `rhot calibrate hand` or copy the tables' hand"
+        )
     for digit in model.digits:
-        numbers = np.array([*digit.metacarpal_m, *digit.base_m, *digit.base_wxyz, *digit.lengths_m, digit.coupling, digit.coupling_weight])
+        numbers = np.array(
+            [
+                *digit.metacarpal_m,
+                *digit.base_m,
+                *digit.base_wxyz,
+                *digit.lengths_m,
+                digit.coupling,
+                digit.coupling_weight,
+            ]
+        )
         limits = np.array(digit.limits_rad)
-        if not (np.all(np.isfinite(numbers)) and np.linalg.norm(digit.base_wxyz) > 1e-6 and digit.coupling_weight >= 0.0):
-            raise CalibrationError(f"{where}: {digit.name} has a number that is not finite, no direction, or a negative weight")
+        if not (
+            np.all(np.isfinite(numbers))
+            and np.linalg.norm(digit.base_wxyz) > 1e-6
+            and digit.coupling_weight >= 0.0
+        ):
+            raise CalibrationError(
+                f"{where}: {digit.name} has a number that is not finite, no direction, or a negative weight"
+            )
         if not (np.all(np.abs(limits) <= np.pi) and np.all(limits[:, 0] <= limits[:, 1])):
-            raise CalibrationError(f"{where}: limits_rad of {digit.name} must be (low, high) pairs in radians, low <= high, within -pi..pi")
+            raise CalibrationError(
+                f"{where}: limits_rad of {digit.name} must be (low, high) pairs in radians, low <= high, within -pi..pi"
+            )
     if [digit.name for digit in model.digits] != list(DIGITS):
         raise CalibrationError(f"{where}: digits must be {', '.join(DIGITS)} in this order")

@@ -1,8 +1,9 @@
 """A viser server for this machine's own browsers and nobody else's.
 
-viser listens on all interfaces by default, offers a button that opens a public tunnel, and lets any web page open in the same
-browser connect. Here it listens on the loopback, has no tunnel, not even for a client that asks for one, and refuses other pages.
-A port that is taken is replaced by the next free one. Other machines look through an SSH tunnel.
+viser listens on all interfaces by default, offers a button that opens a public tunnel, and lets any
+web page open in the same browser connect. Here it listens on the loopback, has no tunnel, not even
+for a client that asks for one, and refuses other pages. A port that is taken is replaced by the
+next free one. Other machines look through an SSH tunnel.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ import websockets.asyncio.server
 from rhot.errors import BusError
 
 _LOOPBACK = ("127.0.0.1", "localhost")
-# Where a browser's own page comes from, directly or through an SSH tunnel's port; None: programs, which send no origin.
+# Where a browser's own page comes from, directly or through an SSH tunnel's port; None: programs,
+# which send no origin.
 _ORIGINS = [re.compile(r"http://(127\.0\.0\.1|localhost)(:\d+)?"), None]
 
 
@@ -45,7 +47,12 @@ def open_server(host: str, port: int) -> Iterator[LoopbackServer]:
     with contextlib.redirect_stdout(io.StringIO()), _own_pages_only():
         server = LoopbackServer(host="127.0.0.1", port=port, label="rhot", verbose=False)
     try:
-        server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large", brand_color=(0, 114, 178))
+        server.gui.configure_theme(
+            show_share_button=False,
+            show_logo=False,
+            control_width="large",
+            brand_color=(0, 114, 178),
+        )
         yield server
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
@@ -54,7 +61,10 @@ def open_server(host: str, port: int) -> Iterator[LoopbackServer]:
 
 @contextlib.contextmanager
 def _own_pages_only() -> Iterator[None]:
-    """viser passes no `origins` to websockets' serve(); while its server starts, serve() has them anyway."""
+    """viser passes no `origins` to websockets' serve().
+
+    While its server starts, serve() has them anyway.
+    """
     serve = websockets.asyncio.server.serve
     websockets.asyncio.server.serve = functools.partial(serve, origins=_ORIGINS)  # type: ignore[assignment, misc]
     try:
@@ -72,7 +82,8 @@ class Audience:
         server.on_client_connect(self._came)
         server.on_client_disconnect(self._went)
 
-    # Coroutines, so that viser runs them one after the other on its own loop instead of in a pool of threads.
+    # Coroutines, so that viser runs them one after the other on its own loop instead of in a pool
+    # of threads.
 
     async def _came(self, client: viser.ClientHandle) -> None:
         self._ids.add(client.client_id)

@@ -1,7 +1,9 @@
-"""The live view in a browser on this machine: hands, markers, objects, cameras, joint angles, rates.
+"""The live view in a browser on this machine: hands, markers, objects, cameras, joint angles,
+rates.
 
-Nothing is subscribed to, and nothing is computed, while no browser looks. Late streams are drawn when they come and hidden when they
-are a second old; missing ones are said to be missing. Uncalibrated cameras are left out, with a note.
+Nothing is subscribed to, and nothing is computed, while no browser looks. Late streams are drawn
+when they come and hidden when they are a second old; missing ones are said to be missing.
+Uncalibrated cameras are left out, with a note.
 """
 
 from __future__ import annotations
@@ -38,8 +40,13 @@ async def serve(service: Service) -> None:
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
         present = asyncio.Event()
-        Audience(server, lambda count: loop.call_soon_threadsafe(present.set if count else present.clear))
-        gui, scene = Gui(server, config, setup.notes), Scene(server, config, setup.cameras, setup.paints)
+        Audience(
+            server, lambda count: loop.call_soon_threadsafe(present.set if count else present.clear)
+        )
+        gui, scene = (
+            Gui(server, config, setup.notes),
+            Scene(server, config, setup.cameras, setup.paints),
+        )
         calibrating = service.tasks.create_task(Calibrate(service, server).run())
         service.values["port"] = server.get_port()
         log.info("live view at http://127.0.0.1:%d", server.get_port())
@@ -57,10 +64,22 @@ async def _live(service: Service, present: asyncio.Event, gui: Gui, scene: Scene
     model = ViewModel()
     async with asyncio.TaskGroup() as tasks:
         followers = [
-            tasks.create_task(_follow(service.bus, topics.POSE, lambda m: model.pose(m, time.monotonic(), clock.now_ns()))),
-            tasks.create_task(_follow(service.bus, topics.POINTS, lambda m: model.points(m, time.monotonic()))),
-            tasks.create_task(_follow(service.bus, topics.OBJECT, lambda m: model.object(m, time.monotonic()))),
-            tasks.create_task(_follow(service.bus, topics.HEALTH, lambda m: model.health(m, time.monotonic()))),
+            tasks.create_task(
+                _follow(
+                    service.bus,
+                    topics.POSE,
+                    lambda m: model.pose(m, time.monotonic(), clock.now_ns()),
+                )
+            ),
+            tasks.create_task(
+                _follow(service.bus, topics.POINTS, lambda m: model.points(m, time.monotonic()))
+            ),
+            tasks.create_task(
+                _follow(service.bus, topics.OBJECT, lambda m: model.object(m, time.monotonic()))
+            ),
+            tasks.create_task(
+                _follow(service.bus, topics.HEALTH, lambda m: model.health(m, time.monotonic()))
+            ),
         ]
         pictures: asyncio.Task[None] | None = None
         text_due_s = 0.0
@@ -86,7 +105,9 @@ async def _follow(bus: Bus, topic: Topic[Any], take: Callable[[Any], None]) -> N
         bus.close(subscription)
 
 
-def _switch(tasks: asyncio.TaskGroup, pictures: asyncio.Task[None] | None, service: Service, gui: Gui) -> asyncio.Task[None] | None:
+def _switch(
+    tasks: asyncio.TaskGroup, pictures: asyncio.Task[None] | None, service: Service, gui: Gui
+) -> asyncio.Task[None] | None:
     """Subscribe to previews only while the switch is on: cameras send none otherwise."""
     if gui.pictures == (pictures is not None):
         return pictures

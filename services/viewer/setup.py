@@ -1,6 +1,7 @@
 """What the viewer reads before it starts: cameras and paints, with a note for whatever is missing.
 
-A rig that is not calibrated is shown without frusta, a broken calibration file likewise: the note says which and what to run.
+A rig that is not calibrated is shown without frusta, a broken calibration file likewise: the note
+says which and what to run.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ def read_setup(config: RigConfig) -> Setup:
             # Paints have names; pi_tracker tells of colours that are not calibrated.
             continue
     paints: dict[tuple[HandName, str], Rgb] = {
-        (hand, landmark): paint_rgb(color, colors) for hand, markers in config.hand.items() for landmark, color in markers.markers.items()
+        (hand, landmark): paint_rgb(color, colors)
+        for hand, markers in config.hand.items()
+        for landmark, color in markers.markers.items()
     }
     return Setup(cameras, paints, notes)
 

@@ -26,9 +26,13 @@ FLAGS = (
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """A playwright browser; skips without playwright or Chromium."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed; pip install playwright")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed; pip install playwright"
+    )
     names = ("chromium", "chromium-browser", "google-chrome")
-    path = os.environ.get("RHOT_CHROMIUM") or next((found for name in names if (found := shutil.which(name))), None)
+    path = os.environ.get("RHOT_CHROMIUM") or next(
+        (found for name in names if (found := shutil.which(name))), None
+    )
     if path is None:
         pytest.skip("no Chromium found; apt-get install chromium, or set RHOT_CHROMIUM to its path")
     with playwright.sync_playwright() as driver:

@@ -1,4 +1,6 @@
-"""Calibrating colours as a new user does: real viewer and tracker processes, a real browser, clicks on painted fingers."""
+"""Calibrating colours as a new user does: real viewer and tracker processes, a real browser, clicks
+on painted fingers.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,10 @@ port = 0
 @pytest.fixture(scope="module")
 def shot() -> np.ndarray:
     """What the camera sees: a green and a blue finger tip."""
-    tips = [Tip("green", 120.0, 120.0, width_px=20.0, length_px=24.0), Tip("blue", 200.0, 110.0, width_px=20.0, length_px=24.0)]
+    tips = [
+        Tip("green", 120.0, 120.0, width_px=20.0, length_px=24.0),
+        Tip("blue", 200.0, 110.0, width_px=20.0, length_px=24.0),
+    ]
     return clean(tips, SIZE)[0]
 
 
@@ -61,14 +66,31 @@ def camera(router: str, shot: np.ndarray) -> Iterator[list[MarkerFrame]]:
 
             def answer(query: zenoh.Query) -> None:
                 with query:
-                    query.reply(topics.SESSION.key("desk"), msgspec.json.encode(Session(running=True, start_ns=1)))
+                    query.reply(
+                        topics.SESSION.key("desk"),
+                        msgspec.json.encode(Session(running=True, start_ns=1)),
+                    )
 
             session.declare_queryable(topics.SESSION.key("desk"), answer)
             key = topics.MARKERS.key("desk", camera="left")
-            session.declare_subscriber(key, lambda s: seen.append(msgspec.json.decode(s.payload.to_bytes(), type=MarkerFrame)))
+            session.declare_subscriber(
+                key,
+                lambda s: seen.append(msgspec.json.decode(s.payload.to_bytes(), type=MarkerFrame)),
+            )
             for seq in itertools.count():
-                told = SimFrame(camera="left", seq=seq, stamp_ns=time.time_ns(), row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
-                session.put(topics.SIM_FRAME.key("desk", camera="left"), image.tobytes(), attachment=msgspec.json.encode(told))
+                told = SimFrame(
+                    camera="left",
+                    seq=seq,
+                    stamp_ns=time.time_ns(),
+                    row_time_ns=1e4,
+                    size_px=SIZE,
+                    clock_skew_ns=0,
+                )
+                session.put(
+                    topics.SIM_FRAME.key("desk", camera="left"),
+                    image.tobytes(),
+                    attachment=msgspec.json.encode(told),
+                )
                 if stop.wait(1 / 15):
                     return
 
@@ -90,7 +112,11 @@ def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
         for words in (["services.pi_tracker", "--camera", "left"], ["services.viewer"]):
             command = [sys.executable, "-m", *words, *common]
             processes.append(
-                stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=repository, env=environment))
+                stack.enter_context(
+                    subprocess.Popen(
+                        command, stdout=subprocess.PIPE, text=True, cwd=repository, env=environment
+                    )
+                )
             )
         output = processes[1].stdout
         assert output is not None
@@ -109,7 +135,10 @@ def pixels(page: Any) -> np.ndarray:
 
 
 def where(page: Any, paint: str) -> tuple[float, float] | None:
-    """The middle of a paint in the page, None if it is not there; the panel on the right is left out."""
+    """The middle of a paint in the page, None if it is not there.
+
+    The panel on the right is left out.
+    """
     rgb = pixels(page)[:, :-400]
     near = np.abs(rgb - np.array(PAINTS[paint][::-1])).max(axis=2) < 45
     rows, columns = np.nonzero(near)
@@ -124,7 +153,9 @@ def until(page: Any, condition: Any) -> Any:
     return found
 
 
-def test_from_the_first_click_to_new_ranges_in_force(chromium: Any, page_url: str, camera: list[MarkerFrame], tmp_path: Path) -> None:
+def test_from_the_first_click_to_new_ranges_in_force(
+    chromium: Any, page_url: str, camera: list[MarkerFrame], tmp_path: Path
+) -> None:
     page = chromium.new_page(viewport={"width": 1200, "height": 800})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -171,7 +202,10 @@ def test_from_the_first_click_to_new_ranges_in_force(chromium: Any, page_url: st
 
     # By hand: a range that takes nothing green, and the tracker no longer does.
     hue_from, hue_to = page.locator("input[type=text]").all()[-2:]
-    assert int(hue_from.input_value()) == load_colors(tmp_path / "calibration", "left").colors["green"].hsv_low[0]
+    assert (
+        int(hue_from.input_value())
+        == load_colors(tmp_path / "calibration", "left").colors["green"].hsv_low[0]
+    )
     for box, value in ((hue_from, "0"), (hue_to, "9")):
         box.fill(value)
         box.press("Enter")

@@ -39,11 +39,25 @@ def rig(repository: Path) -> RigConfig:
 def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
     """A viewer process on a free port; its address."""
     text = (repository / "config" / "sim.toml").read_text(encoding="utf-8")
-    (tmp_path / "rig.toml").write_text(f"{text}\n[viewer]\nport = 0\n" if "[viewer]" not in text else text, encoding="utf-8")
+    (tmp_path / "rig.toml").write_text(
+        f"{text}\n[viewer]\nport = 0\n" if "[viewer]" not in text else text, encoding="utf-8"
+    )
     (tmp_path / "calibration").symlink_to(repository / "config" / "calibration")
-    command = [sys.executable, "-m", "services.viewer", "--config", str(tmp_path / "rig.toml"), "--connect", router]
+    command = [
+        sys.executable,
+        "-m",
+        "services.viewer",
+        "--config",
+        str(tmp_path / "rig.toml"),
+        "--connect",
+        router,
+    ]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, cwd=repository, env={**os.environ, "OMP_NUM_THREADS": "1"}
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=repository,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
     ) as process:
         assert process.stdout is not None
         line = next(line for line in process.stdout if "live view at" in line)
@@ -59,7 +73,9 @@ def hand_pose(seq: int) -> HandPose:
     bend = 0.4 + 0.4 * np.sin(0.1 * seq)
     angles = np.zeros((5, 4))
     angles[1:] = [0.0, 0.7 * bend, bend, 0.66 * bend]
-    positions, rotations = forward(model, rotation_x(-np.pi / 2) @ rotation_z(np.pi), np.array([0.04, 0.08, 0.48]), angles)
+    positions, rotations = forward(
+        model, rotation_x(-np.pi / 2) @ rotation_z(np.pi), np.array([0.04, 0.08, 0.48]), angles
+    )
     joints = [
         HandJoint(
             name=name,
@@ -68,12 +84,16 @@ def hand_pose(seq: int) -> HandPose:
             radius_m=float(radius),
             source="measured" if name in BASIC_LANDMARKS else "solved",
         )
-        for name, p, R, radius in zip(JOINTS, positions, rotations, joint_radii_m(model), strict=True)
+        for name, p, R, radius in zip(
+            JOINTS, positions, rotations, joint_radii_m(model), strict=True
+        )
     ]
     fingers = [
         FingerPose(
             name=digit,  # type: ignore[arg-type]
-            angles_rad=FingerAngles(abduction=float(a[0]), mcp=float(a[1]), pip=float(a[2]), dip=float(a[3])),
+            angles_rad=FingerAngles(
+                abduction=float(a[0]), mcp=float(a[1]), pip=float(a[2]), dip=float(a[3])
+            ),
             residual_m=0.0,
             iterations=1,
             status="solved",
@@ -81,7 +101,15 @@ def hand_pose(seq: int) -> HandPose:
         for digit, a in zip(DIGITS, angles, strict=True)
     ]
     wrist = WristPose(position_m=joints[1].position_m, orientation_wxyz=joints[1].orientation_wxyz)
-    return HandPose(hand="right", seq=seq, stamp_ns=time.time_ns() - 30_000_000, method="dls", wrist=wrist, joints=joints, fingers=fingers)
+    return HandPose(
+        hand="right",
+        seq=seq,
+        stamp_ns=time.time_ns() - 30_000_000,
+        method="dls",
+        wrist=wrist,
+        joints=joints,
+        fingers=fingers,
+    )
 
 
 def cup_pose(seq: int) -> ObjectPose:
@@ -107,8 +135,13 @@ def moving_hand(router: str, rig: RigConfig) -> Iterator[threading.Event]:
     def publish() -> None:
         with zenoh.open(client_config([router])) as session:
             for seq in itertools.count():
-                session.put(topics.POSE.key(rig.rig.name, hand="right"), msgspec.json.encode(hand_pose(seq)))
-                session.put(topics.OBJECT.key(rig.rig.name, object="cup"), msgspec.json.encode(cup_pose(seq)))
+                session.put(
+                    topics.POSE.key(rig.rig.name, hand="right"), msgspec.json.encode(hand_pose(seq))
+                )
+                session.put(
+                    topics.OBJECT.key(rig.rig.name, object="cup"),
+                    msgspec.json.encode(cup_pose(seq)),
+                )
                 if stop.wait(1 / 30):
                     return
 
@@ -127,12 +160,16 @@ def picture(page: Any) -> np.ndarray:
 
 
 def blue_and_green(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Masks of what is bluish (solved joints and bones) and greenish (measured joints, and the cup)."""
+    """Masks of what is bluish (solved joints and bones) and greenish (measured joints, and the
+    cup).
+    """
     red, green, blue = np.moveaxis(pixels, 2, 0)
     return (blue - red > 30) & (blue - green > 15), (green - red > 25) & (green - blue > -5)
 
 
-def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(chromium: Any, viewer: str, moving_hand: threading.Event) -> None:
+def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
+    chromium: Any, viewer: str, moving_hand: threading.Event
+) -> None:
     page = chromium.new_page(viewport={"width": 1200, "height": 750})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))

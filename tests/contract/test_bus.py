@@ -77,7 +77,9 @@ async def test_every_drops_the_oldest_and_counts(pair):
 async def test_latest_keeps_the_newest_of_each_key(pair):
     sender, receiver = pair
     subscription = receiver.latest(topics.POINTS)
-    publishers = {hand: await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")}
+    publishers = {
+        hand: await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")
+    }
     sent = 0
     async with asyncio.timeout(DEADLINE_S):
         while subscription.stats.dropped < 38:
@@ -109,7 +111,8 @@ async def test_garbage_is_rejected_counted_and_passed_over(pair):
     async with asyncio.timeout(DEADLINE_S):
         for payload in garbage:
             rejected = subscription.stats.rejected
-            # Zenoh may drop on a busy machine, and poses, at a higher priority, overtake: sent again until it is counted.
+            # Zenoh may drop on a busy machine, and poses, at a higher priority, overtake: sent
+            # again until it is counted.
             while subscription.stats.rejected == rejected:
                 sender.put_raw(key, payload)
                 publisher.put(points(8))
@@ -121,9 +124,20 @@ async def test_what_is_not_finite_is_not_sent(pair):
     sender, receiver = pair
     subscription = receiver.every(topics.POINTS, 64)
     publisher = await publisher_of(sender, topics.POINTS, hand="right")
-    bad = HandPoint(name="wrist", position_m=(float("nan"), 0.0, 0.0), sigma_m=(1.0, 1.0, 1.0), cameras=[], source="measured")
+    bad = HandPoint(
+        name="wrist",
+        position_m=(float("nan"), 0.0, 0.0),
+        sigma_m=(1.0, 1.0, 1.0),
+        cameras=[],
+        source="measured",
+    )
     publisher.put(msgspec.structs.replace(points(1), points=[bad]))
-    publisher.put(msgspec.structs.replace(points(2), points=[msgspec.structs.replace(bad, name="null", position_m=(0.0, 0.0, 0.0))]))
+    publisher.put(
+        msgspec.structs.replace(
+            points(2),
+            points=[msgspec.structs.replace(bad, name="null", position_m=(0.0, 0.0, 0.0))],
+        )
+    )
     assert [message.seq for message in await take(subscription, 1)] == [2]
 
 
@@ -131,7 +145,9 @@ async def test_a_slow_consumer_stalls_nobody_else(pair):
     sender, receiver = pair
     idle = receiver.every(topics.POINTS, 4, hand="left")
     busy = receiver.every(topics.POINTS, 64, hand="right")
-    left, right = [await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")]
+    left, right = [
+        await publisher_of(sender, topics.POINTS, hand=hand) for hand in ("left", "right")
+    ]
     for seq in range(50):
         left.put(points(seq, "left"))
         right.put(points(seq))
@@ -140,7 +156,9 @@ async def test_a_slow_consumer_stalls_nobody_else(pair):
 
 
 async def test_a_flood_leaves_the_loop_to_others():
-    buffer = RawSubscription(asyncio.get_running_loop(), StreamStats(topics.POINTS, "k", {}, "in"), 4096)
+    buffer = RawSubscription(
+        asyncio.get_running_loop(), StreamStats(topics.POINTS, "k", {}, "in"), 4096
+    )
     for number in range(2000):
         buffer.push("k", Sample("k", str(number).encode(), b"", 0))
     turns = 0
@@ -152,7 +170,9 @@ async def test_a_flood_leaves_the_loop_to_others():
             await asyncio.sleep(0)
 
     task = asyncio.create_task(other())
-    assert [sample.payload for sample in await take(buffer, 2000)] == [str(number).encode() for number in range(2000)]
+    assert [sample.payload for sample in await take(buffer, 2000)] == [
+        str(number).encode() for number in range(2000)
+    ]
     task.cancel()
     assert turns >= 50
 

@@ -39,7 +39,9 @@ async def test_the_request_arrives_and_is_answered(pair):
     request = FitRequest(auto=True)
     assert (await ask(asker, request)).error == f"{len(msgspec.json.encode(request))} bytes"
     assert (await ask(asker, None)).error == "0 bytes"
-    assert [msgspec.json.decode(payload, type=FitRequest) for payload in got if payload] == [request]
+    assert [msgspec.json.decode(payload, type=FitRequest) for payload in got if payload] == [
+        request
+    ]
 
 
 async def test_an_oversized_request_gets_no_answer_and_harms_nobody(pair):
@@ -55,7 +57,12 @@ async def test_an_oversized_request_gets_no_answer_and_harms_nobody(pair):
 
     answerer.answer_requests(topics.FIT, handler, camera="left")
     await ask(asker, None)
-    assert await asker.get(topics.FIT, 0.5, request=Large("x" * (topics.FIT.max_bytes + 1)), camera="left") == []
+    assert (
+        await asker.get(
+            topics.FIT, 0.5, request=Large("x" * (topics.FIT.max_bytes + 1)), camera="left"
+        )
+        == []
+    )
     await ask(asker, None)
     assert seen == [0, 0]
 

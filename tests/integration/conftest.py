@@ -61,7 +61,9 @@ async def rig() -> AsyncIterator[RunningRig]:
         async with open_bus("sim", [endpoint]) as bus:
             running = RunningRig(bus, endpoint, config, supervisor, logged)
             ready = {child.name for child in children} - {"router"}
-            await running.until(lambda: sum(" ready" in line for line in logged) >= len(ready), START_S)
+            await running.until(
+                lambda: sum(" ready" in line for line in logged) >= len(ready), START_S
+            )
             yield running
     finally:
         for keeper in keepers:

@@ -33,7 +33,12 @@ def children_of(pid: int) -> list[int]:
 
 async def demo(*options: str) -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
-        RHOT, "demo", *options, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, stdin=asyncio.subprocess.DEVNULL
+        RHOT,
+        "demo",
+        *options,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        stdin=asyncio.subprocess.DEVNULL,
     )
 
 
@@ -85,7 +90,11 @@ async def test_a_kill_takes_the_children_along():
 
 
 async def test_without_poses_it_says_so_and_fails(tmp_path, repository):
-    text = (repository / "config" / "sim.toml").read_text().replace('index_tip = "blue"', 'index_tip = "plaid"')
+    text = (
+        (repository / "config" / "sim.toml")
+        .read_text()
+        .replace('index_tip = "blue"', 'index_tip = "plaid"')
+    )
     (tmp_path / "rig.toml").write_text(text)
     (tmp_path / "calibration").symlink_to(repository / "config" / "calibration")
     process = await demo("--no-viewer", "--seconds", "1", "--config", str(tmp_path / "rig.toml"))

@@ -1,4 +1,6 @@
-"""The main job: from simulated cameras to poses, in real processes over a real router, against the simulator's truth."""
+"""The main job: from simulated cameras to poses, in real processes over a real router, against the
+simulator's truth.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ BIN = Path(sys.executable).parent
 
 
 async def command(*argv: str) -> tuple[int, str]:
-    process = await asyncio.create_subprocess_exec(*argv, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT)
+    process = await asyncio.create_subprocess_exec(
+        *argv, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+    )
     async with asyncio.timeout(DEADLINE_S):
         output, _ = await process.communicate()
     return process.returncode or 0, output.decode()
@@ -51,7 +55,8 @@ async def test_poses_are_right(rig):
     for task in tasks:
         task.cancel()
     summary = figures.summary({})
-    # Live, without lag and on a machine of any speed: a rig that works is within a centimetre, one that does not is decimetres off.
+    # Live, without lag and on a machine of any speed: a rig that works is within a centimetre, one
+    # that does not is decimetres off.
     assert summary.tip_error_median_mm < 10.0
     assert summary.poses_per_s > 15.0
 
@@ -59,7 +64,13 @@ async def test_poses_are_right(rig):
 async def test_every_pose_is_a_possible_hand(rig):
     limits = default_hand("right").limits_rad
     for pose in await some(rig.bus.every(topics.POSE, 64), 30):
-        assert [finger.name for finger in pose.fingers] == ["thumb", "index", "middle", "ring", "little"]
+        assert [finger.name for finger in pose.fingers] == [
+            "thumb",
+            "index",
+            "middle",
+            "ring",
+            "little",
+        ]
         for row, finger in enumerate(pose.fingers):
             assert np.all(finger.model_angles_rad >= limits[row, :, 0] - 1e-5)
             assert np.all(finger.model_angles_rad <= limits[row, :, 1] + 1e-5)
@@ -77,7 +88,10 @@ async def test_objects_are_right(rig):
         if abs(nearest.stamp_ns - pose.stamp_ns) < 10_000_000:
             truth = nearest.objects["cup"]
             errors.append(np.linalg.norm(np.subtract(pose.position_m, truth.position_m)))
-            turned = angle_between(rotation_from_quaternion(pose.orientation_wxyz), rotation_from_quaternion(truth.orientation_wxyz))
+            turned = angle_between(
+                rotation_from_quaternion(pose.orientation_wxyz),
+                rotation_from_quaternion(truth.orientation_wxyz),
+            )
             assert turned < np.deg2rad(5.0)
     assert len(errors) > 10
     assert np.median(errors) < 0.01
@@ -88,12 +102,25 @@ async def test_top_finds_everything_alive_at_its_rate(rig):
     async with asyncio.timeout(DEADLINE_S):
         while True:  # a service that was still warming up beats at its rate a second later
             code, output = await command(
-                str(BIN / "rhot"), "top", "--config", str(rig.config), "--connect", rig.endpoint, "--once", "--json"
+                str(BIN / "rhot"),
+                "top",
+                "--config",
+                str(rig.config),
+                "--connect",
+                rig.endpoint,
+                "--once",
+                "--json",
             )
             if code == 0:
                 break
     board = json.loads(output)
-    assert {row["service"] for row in board["services"]} == {"simulator", "pi_tracker", "fusion", "solver", "object_tracker"}
+    assert {row["service"] for row in board["services"]} == {
+        "simulator",
+        "pi_tracker",
+        "fusion",
+        "solver",
+        "object_tracker",
+    }
     assert all(row["state"] == "running" for row in board["services"])
     assert 0.0 < board["glass_to_pose_ms"]["right"][0] < 1000.0
 
@@ -102,19 +129,45 @@ async def test_zenoh_tools_show_readable_json(rig):
     zenoh = [str(BIN / "zenoh"), "--mode", "client", "--connect", rig.endpoint]
     code, output = await command(*zenoh, "liveliness", "get", "-k", "rhot/**")
     assert code == 0
-    for name in ("fusion/main", "solver/main", "pi_tracker/left", "pi_tracker/right", "object_tracker/main"):
+    for name in (
+        "fusion/main",
+        "solver/main",
+        "pi_tracker/left",
+        "pi_tracker/right",
+        "object_tracker/main",
+    ):
         assert f"rhot/sim/service/{name}/alive" in output
-    code, output = await command(*zenoh, "get", "-s", topics.SESSION.key("sim"), "--decoder", "json", "--line", "{value}")
+    code, output = await command(
+        *zenoh, "get", "-s", topics.SESSION.key("sim"), "--decoder", "json", "--line", "{value}"
+    )
     assert code == 0
     assert json.loads(output.strip().splitlines()[-1])["running"] is True
     subscriber = await asyncio.create_subprocess_exec(
-        *zenoh, "subscribe", "-k", "rhot/**", "--decoder", "json", "--line", "{key} {value}", stdout=asyncio.subprocess.PIPE, limit=1 << 20
+        *zenoh,
+        "subscribe",
+        "-k",
+        "rhot/**",
+        "--decoder",
+        "json",
+        "--line",
+        "{key} {value}",
+        stdout=asyncio.subprocess.PIPE,
+        limit=1 << 20,
     )
-    wanted = {"camera/markers", "hand/points", "hand/pose", "openvr/pose", "object/pose", "service/health"}
+    wanted = {
+        "camera/markers",
+        "hand/points",
+        "hand/pose",
+        "openvr/pose",
+        "object/pose",
+        "service/health",
+    }
     seen: dict[str, dict] = {}
     async with asyncio.timeout(DEADLINE_S):
         while not wanted <= set(seen) and subscriber.stdout is not None:
-            key, _, value = (await subscriber.stdout.readline()).decode(errors="replace").strip().partition(" ")
+            key, _, value = (
+                (await subscriber.stdout.readline()).decode(errors="replace").strip().partition(" ")
+            )
             topic = topics.find(key)
             if topic is not None and topic.message is not None:
                 seen[topic.name] = json.loads(value)
@@ -125,13 +178,30 @@ async def test_zenoh_tools_show_readable_json(rig):
 
 async def test_garbage_on_every_key_is_counted_and_poses_go_on(rig):
     health = rig.bus.every(topics.HEALTH, 64)
-    names = {"camera": "left", "hand": "right", "serial": "LHR-SIM00001", "object": "cup", "service": "fusion", "instance": "main"}
-    keys = [topic.key("sim", **{field: names[field] for field in topic.fields}) for topic in topics.TOPICS]
+    names = {
+        "camera": "left",
+        "hand": "right",
+        "serial": "LHR-SIM00001",
+        "object": "cup",
+        "service": "fusion",
+        "instance": "main",
+    }
+    keys = [
+        topic.key("sim", **{field: names[field] for field in topic.fields})
+        for topic in topics.TOPICS
+    ]
     rejected: dict[str, int] = {}
     async with asyncio.timeout(DEADLINE_S):
         while not {"fusion", "solver", "object_tracker"} <= set(rejected):
             # Sent again with every beat: Zenoh drops what a busy machine cannot take.
-            for payload in (b"", b"\xff\xfe", b"{}", b"[1,2,3]", b'{"stamp_ns":-1}', b"A" * 100_000):
+            for payload in (
+                b"",
+                b"\xff\xfe",
+                b"{}",
+                b"[1,2,3]",
+                b'{"stamp_ns":-1}',
+                b"A" * 100_000,
+            ):
                 for key in keys:
                     rig.bus.put_raw(key, payload)
             beat = await anext(health)
@@ -143,7 +213,14 @@ async def test_garbage_on_every_key_is_counted_and_poses_go_on(rig):
 
 
 async def test_absurd_but_well_formed_messages_do_no_harm(rig):
-    marker = {"color": "blue", "x_px": 1e300, "y_px": -1e300, "area_px": 1e300, "sigma_px": 0.0, "quality": 1.0}
+    marker = {
+        "color": "blue",
+        "x_px": 1e300,
+        "y_px": -1e300,
+        "area_px": 1e300,
+        "sigma_px": 0.0,
+        "quality": 1.0,
+    }
     frame = {
         "camera": "left",
         "seq": 2**62,
@@ -154,17 +231,33 @@ async def test_absurd_but_well_formed_messages_do_no_harm(rig):
         "size_px": [1, 1],
         "markers": [marker] * 200,
     }
-    point = {"name": "wrist", "position_m": [1e300, -1e300, 1e-300], "sigma_m": [0, 0, 0], "cameras": [], "source": "measured"}
-    points = {"hand": "right", "seq": 1, "stamp_ns": 2**63 - 1, "points": [point, {**point, "name": "nobody"}]}
+    point = {
+        "name": "wrist",
+        "position_m": [1e300, -1e300, 1e-300],
+        "sigma_m": [0, 0, 0],
+        "cameras": [],
+        "source": "measured",
+    }
+    points = {
+        "hand": "right",
+        "seq": 1,
+        "stamp_ns": 2**63 - 1,
+        "points": [point, {**point, "name": "nobody"}],
+    }
     for changes in ({}, {"stamp_ns": 0}, {"size_px": [640, 480], "clock_offset_ns": 0}):
         rig.bus.put_raw(topics.MARKERS.key("sim", camera="left"), json.dumps(frame | changes))
-        rig.bus.put_raw(topics.MARKERS.key("sim", camera="stranger"), json.dumps(frame | changes | {"camera": "stranger"}))
+        rig.bus.put_raw(
+            topics.MARKERS.key("sim", camera="stranger"),
+            json.dumps(frame | changes | {"camera": "stranger"}),
+        )
     rig.bus.put_raw(topics.POINTS.key("sim", hand="right"), json.dumps(points))
     assert len(await some(rig.bus.every(topics.POSE, 64), 60)) == 60
     assert rig.supervisor.restarts == {}
 
 
-@pytest.mark.parametrize("name", ["pi_tracker/left", "fusion", "solver", "simulator", "object_tracker", "router"])
+@pytest.mark.parametrize(
+    "name", ["pi_tracker/left", "fusion", "solver", "simulator", "object_tracker", "router"]
+)
 async def test_killing_any_one_process_brings_poses_back_without_touching_the_others(rig, name):
     before = dict(rig.supervisor.pids)
     poses = rig.bus.every(topics.POSE if name != "object_tracker" else topics.OBJECT, 1024)
@@ -175,5 +268,7 @@ async def test_killing_any_one_process_brings_poses_back_without_touching_the_ot
     async with asyncio.timeout(DEADLINE_S):
         while (await anext(poses)).stamp_ns < killed_ns:
             pass
-    assert {other: pid for other, pid in rig.supervisor.pids.items() if other != name} == {k: v for k, v in before.items() if k != name}
+    assert {other: pid for other, pid in rig.supervisor.pids.items() if other != name} == {
+        k: v for k, v in before.items() if k != name
+    }
     poses.undeclare()

@@ -12,7 +12,9 @@ from rhot.files.calibration import Colors, Exposure
 
 def test_a_colours_file_is_a_message_as_it_is(repository):
     text = (repository / "config" / "calibration" / "left.colors.json").read_bytes()
-    assert msgspec.json.decode(text, type=topics.COLORS.message) == msgspec.json.decode(text, type=Colors)
+    assert msgspec.json.decode(text, type=topics.COLORS.message) == msgspec.json.decode(
+        text, type=Colors
+    )
     assert len(text) < topics.COLORS.max_bytes
 
 
@@ -29,7 +31,10 @@ def test_a_colours_file_is_a_message_as_it_is(repository):
         (PointedAt, b'{"color":"a","picture":"xyz","x_px":0,"y_px":0}'),
         (PointedAt, b'{"color":"a b","picture":"0123456789abcdef","x_px":0,"y_px":0}'),
         (PointedAt, b'{"color":"a","picture":"0123456789abcdef","x_px":1e300,"y_px":0}'),
-        (Patch, b'{"color":"a","picture":"0123456789abcdef","box_px":[0,0,1,99999999999999999999]}'),
+        (
+            Patch,
+            b'{"color":"a","picture":"0123456789abcdef","box_px":[0,0,1,99999999999999999999]}',
+        ),
         (FitRequest, b'{"pictures":["0123456789abcdef","0","0","0","0","0","0","0","0"]}'),
     ],
 )

@@ -26,7 +26,10 @@ def test_unknown_before_the_first_exchange():
     assert OffsetEstimator().at(START_NS).sigma_ns == -1
 
 
-@pytest.mark.parametrize(("offset_ns", "drift_ppm"), [(0, 0.0), (20_000_000, 0.0), (-3_600_000_000_000, 50.0), (5_000_000, -80.0)])
+@pytest.mark.parametrize(
+    ("offset_ns", "drift_ppm"),
+    [(0, 0.0), (20_000_000, 0.0), (-3_600_000_000_000, 50.0), (5_000_000, -80.0)],
+)
 def test_finds_offset_and_drift(offset_ns, drift_ppm):
     estimator = OffsetEstimator()
     own_ns, true_ns = exchanges(estimator, 60, offset_ns, drift_ppm)

@@ -69,19 +69,35 @@ def test_the_whole_hand_moves_rigidly(model):
 
 
 def test_equals_the_denavit_hartenberg_rows_of_the_finger_study():
-    """Standard D-H rows (theta1, 0, 0, 90 deg), (theta2, 0, l1, 0), (theta3, 0, l2, 0), (theta4, 0, l3, 0); Appendix A1."""
+    """Standard D-H rows (theta1, 0, 0, 90 deg), (theta2, 0, l1, 0), (theta3, 0, l2, 0), (theta4, 0,
+    l3, 0); Appendix A1.
+    """
 
     def row(theta, a, alpha):
         c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, 0], [0, 0, 0, 1.0]])
+        return np.array(
+            [
+                [c, -s * ca, s * sa, a * c],
+                [s, c * ca, -c * sa, a * s],
+                [0, sa, ca, 0],
+                [0, 0, 0, 1.0],
+            ]
+        )
 
     model = h.default_hand("right")
     index = model.digits[1]
     angles = np.array([0.1, 0.7, 0.9, 0.6])
-    T = row(angles[0], 0, np.pi / 2) @ row(angles[1], index.lengths_m[0], 0) @ row(angles[2], index.lengths_m[1], 0)
+    T = (
+        row(angles[0], 0, np.pi / 2)
+        @ row(angles[1], index.lengths_m[0], 0)
+        @ row(angles[2], index.lengths_m[1], 0)
+    )
     tip = (T @ row(angles[3], index.lengths_m[2], 0))[:3, 3]
-    # The study's x runs along the straight finger, z to the side the finger bends to, y to the thumb side.
-    axes = np.array([[0, -1, 0], [0, 0, -1], [-1, 0, 0]], dtype=float)  # finger frame (x right, y back, z) from the study's
+    # The study's x runs along the straight finger, z to the side the finger bends to, y to the
+    # thumb side.
+    axes = np.array(
+        [[0, -1, 0], [0, 0, -1], [-1, 0, 0]], dtype=float
+    )  # finger frame (x right, y back, z) from the study's
     flat = msgspec.structs.replace(index, base_m=(0.0, 0.0, 0.0), base_wxyz=(1.0, 0.0, 0.0, 0.0))
     flat_model = msgspec.structs.replace(model, digits=(model.digits[0], flat, *model.digits[2:]))
     all_angles = np.zeros((5, 4))
@@ -94,7 +110,9 @@ def test_a_painted_tip_stands_inside_the_finger(model):
     positions, rotations = h.forward(model, np.eye(3), np.zeros(3), angles_within(model, 3))
     point = h.landmark_point(model, "index_tip", positions, rotations)
     tip, dip = (positions[h.JOINT_INDEX[name]] for name in ("index_tip", "index_distal"))
-    assert np.isclose(np.linalg.norm(point - tip) + np.linalg.norm(point - dip), np.linalg.norm(tip - dip))
+    assert np.isclose(
+        np.linalg.norm(point - tip) + np.linalg.norm(point - dip), np.linalg.norm(tip - dip)
+    )
 
 
 def test_survives_json(model):

@@ -38,8 +38,14 @@ def test_a_newer_sender_may_say_more():
         ("size_px", [640]),
         ("size_px", [0, 480]),
         ("markers", [{"color": "blue"}]),
-        ("markers", [{"color": "blue", "x_px": None, "y_px": 0, "area_px": 0, "sigma_px": 0, "quality": 0}]),
-        ("markers", [{"color": "blue", "x_px": 1, "y_px": 0, "area_px": 0, "sigma_px": 0, "quality": 7}]),
+        (
+            "markers",
+            [{"color": "blue", "x_px": None, "y_px": 0, "area_px": 0, "sigma_px": 0, "quality": 0}],
+        ),
+        (
+            "markers",
+            [{"color": "blue", "x_px": 1, "y_px": 0, "area_px": 0, "sigma_px": 0, "quality": 7}],
+        ),
     ],
 )
 def test_wrong_values_do_not_decode(field, value):
@@ -50,14 +56,20 @@ def test_wrong_values_do_not_decode(field, value):
 
 def test_numbers_beyond_double_precision_do_not_decode():
     with pytest.raises(msgspec.DecodeError):
-        msgspec.json.decode(msgspec.json.encode(FRAME).replace(b"33700.0", b"1e999"), type=MarkerFrame)
+        msgspec.json.decode(
+            msgspec.json.encode(FRAME).replace(b"33700.0", b"1e999"), type=MarkerFrame
+        )
 
 
 def test_the_cmc_angle_is_the_thumbs_alone():
     assert b"cmc" not in msgspec.json.encode(FingerAngles(abduction=0.0, mcp=0.1, pip=0.2, dip=0.3))
-    assert b"cmc" in msgspec.json.encode(FingerAngles(abduction=0.0, mcp=0.1, pip=0.0, dip=0.3, cmc=0.2))
+    assert b"cmc" in msgspec.json.encode(
+        FingerAngles(abduction=0.0, mcp=0.1, pip=0.0, dip=0.3, cmc=0.2)
+    )
 
 
 def test_valves_own_field_names():
-    device = OpenVrDevice(index=1, serial="LHR-1", device_class="tracker", model="VIVE", battery=0.5, charging=False)
+    device = OpenVrDevice(
+        index=1, serial="LHR-1", device_class="tracker", model="VIVE", battery=0.5, charging=False
+    )
     assert b'"class":"tracker"' in msgspec.json.encode(device)

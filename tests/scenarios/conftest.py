@@ -1,4 +1,6 @@
-"""What the scenarios share: a synthetic hand through FusionStep, and how far what it tells is from the truth."""
+"""What the scenarios share: a synthetic hand through FusionStep, and how far what it tells is from
+the truth.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ class Told:
         return 1e3 * float(np.sqrt(np.mean(np.sum(self.errors_m[inside] ** 2, axis=1))))
 
     def share(self, begin_s: float, end_s: float, *, measured: bool = False) -> float:
-        """How many of the points that could be there are, six for each of 30 frames a second; measured: these only."""
+        """How many of the points that could be there are, six for each of 30 frames a second.
+
+        Measured: these only.
+        """
         inside = (self.instants_s >= begin_s) & (self.instants_s < end_s)
         if measured:
             inside &= self.measured
@@ -46,7 +51,9 @@ class Told:
 def tell() -> Callable[..., tuple[FusionStep, Told]]:
     """Frames -> FusionStep -> everything it told, against the truth."""
 
-    def run(setup: Setup, given: Iterable[MarkerFrame], path: Path, fusion: Fusion | None = None) -> tuple[FusionStep, Told]:
+    def run(
+        setup: Setup, given: Iterable[MarkerFrame], path: Path, fusion: Fusion | None = None
+    ) -> tuple[FusionStep, Told]:
         step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
         messages = [message for frame in given for message in step.step(frame)] + step.flush()
         rows = []

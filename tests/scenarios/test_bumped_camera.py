@@ -1,4 +1,6 @@
-"""A camera that was bumped after its calibration is reported, if it was turned so that heights show it; a sound rig never is."""
+"""A camera that was bumped after its calibration is reported, if it was turned so that heights show
+it; a sound rig never is.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,16 @@ from rhot.geometry.transforms import rotation_x, rotation_z, transform
 from services.fusion.step import FusionStep
 from testing.synthetic_points import Path, Setup, frames, point_hands
 
-# Pitch of .5 deg moves the whole view by 4.6 px; roll of 3 deg its left and right halves against each other.
+# Pitch of .5 deg moves the whole view by 4.6 px; roll of 3 deg its left and right halves against
+# each other.
 BUMPS = {"pitch": rotation_x(np.deg2rad(0.5)), "roll": rotation_z(np.deg2rad(3.0))}
 
 
 class Bumped(Setup):
-    """The pictures are taken by a rig whose right camera was turned; fusion works with the calibration of before."""
+    """The pictures are taken by a rig whose right camera was turned.
+
+    Fusion works with the calibration of before.
+    """
 
     def __init__(self, turn, **fields):
         super().__init__(**fields)

@@ -1,7 +1,8 @@
 """What can go wrong with a rig's cameras, clocks and network, each with what must come of it.
 
-Every fault begins at 2 s of a moving hand. In all of them nothing hangs, no more than one point in two hundred is further than five of its
-sigmas from the truth, and half a second after the fault ends all landmarks are there again, within 3 mm RMS.
+Every fault begins at 2 s of a moving hand. In all of them nothing hangs, no more than one point in
+two hundred is further than five of its sigmas from the truth, and half a second after the fault
+ends all landmarks are there again, within 3 mm RMS.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ def later(seconds: float) -> Change:
 
 def swapped(frame: MarkerFrame) -> MarkerFrame:
     names = {"blue": "cyan", "cyan": "blue"}
-    return replace(frame, markers=[replace(m, color=names.get(m.color, m.color)) for m in frame.markers])
+    return replace(
+        frame, markers=[replace(m, color=names.get(m.color, m.color)) for m in frame.markers]
+    )
 
 
 def mirrored(frame: MarkerFrame) -> MarkerFrame:
@@ -73,15 +76,57 @@ class Plan:
 class Scenario(Enum):
     """Issue 4's list and its variations."""
 
-    CAMERA_STOPS = Plan("the right camera stops and returns", "right", 2.0, lost, Expected(During.NOTHING))
-    PACEMAKER_STOPS = Plan("the left camera, which sets the pace, stops and returns", "left", 2.0, lost, Expected(During.NOTHING))
-    CLOCK_AHEAD = Plan("the right camera's clock jumps 1 s ahead and back", "right", 2.0, later(1.0), Expected(During.NOTHING, "astray"))
-    CLOCK_BACK = Plan("the left camera's clock jumps 1 s back and ahead", "left", 2.0, later(-1.0), Expected(During.NOTHING, "astray"))
-    CLOCK_SET = Plan("the right clock jumps 1 s for a second only", "right", 1.0, later(1.0), Expected(During.NOTHING, "astray"))
-    OTHER_CENTURY = Plan("the left camera's stamps are of another century", "left", 2.0, later(2.2e9), Expected(During.NOTHING, "astray"))
-    MIRRORED = Plan("the right view is mirrored by a wrong setting", "right", 2.0, mirrored, Expected(During.FEW))
-    NAMES_SWAP = Plan("two markers swap names in one frame", "left", 0.034, swapped, Expected(During.ALL))
-    NETWORK_PAUSE = Plan("nothing arrives for five seconds", None, 5.0, lost, Expected(During.NOTHING))
+    CAMERA_STOPS = Plan(
+        "the right camera stops and returns", "right", 2.0, lost, Expected(During.NOTHING)
+    )
+    PACEMAKER_STOPS = Plan(
+        "the left camera, which sets the pace, stops and returns",
+        "left",
+        2.0,
+        lost,
+        Expected(During.NOTHING),
+    )
+    CLOCK_AHEAD = Plan(
+        "the right camera's clock jumps 1 s ahead and back",
+        "right",
+        2.0,
+        later(1.0),
+        Expected(During.NOTHING, "astray"),
+    )
+    CLOCK_BACK = Plan(
+        "the left camera's clock jumps 1 s back and ahead",
+        "left",
+        2.0,
+        later(-1.0),
+        Expected(During.NOTHING, "astray"),
+    )
+    CLOCK_SET = Plan(
+        "the right clock jumps 1 s for a second only",
+        "right",
+        1.0,
+        later(1.0),
+        Expected(During.NOTHING, "astray"),
+    )
+    OTHER_CENTURY = Plan(
+        "the left camera's stamps are of another century",
+        "left",
+        2.0,
+        later(2.2e9),
+        Expected(During.NOTHING, "astray"),
+    )
+    MIRRORED = Plan(
+        "the right view is mirrored by a wrong setting",
+        "right",
+        2.0,
+        mirrored,
+        Expected(During.FEW),
+    )
+    NAMES_SWAP = Plan(
+        "two markers swap names in one frame", "left", 0.034, swapped, Expected(During.ALL)
+    )
+    NETWORK_PAUSE = Plan(
+        "nothing arrives for five seconds", None, 5.0, lost, Expected(During.NOTHING)
+    )
     OTHER_SIZE = Plan(
         "the right camera runs at another resolution than its calibration",
         "right",
@@ -116,13 +161,15 @@ def test_scenario(scenario, tell):
     step, told = tell(SETUP, edited(frames(SETUP, MOVING, end_s + AFTER_S), plan), MOVING)
     assert told.share(end_s + RECOVERY_S, end_s + AFTER_S - 0.1) > 0.95
     assert told.rms_mm(end_s + RECOVERY_S, end_s + AFTER_S) < 3.0
-    # hold_s is .15 s, and a track needs a moment to be dropped; a fault of one frame has no such stretch.
+    # hold_s is .15 s, and a track needs a moment to be dropped; a fault of one frame has no such
+    # stretch.
     stretch = (BEGIN_S, end_s) if plan.expected.during is During.ALL else (BEGIN_S + 0.3, end_s)
     match plan.expected.during:
         case During.NOTHING:
             assert told.share(*stretch) == 0.0
         case During.FEW:
-            # A mirrored view can look sound for a moment: rays meet, sizes fit. Hardly ever, and never as a whole hand.
+            # A mirrored view can look sound for a moment: rays meet, sizes fit. Hardly ever, and
+            # never as a whole hand.
             assert told.share(*stretch, measured=True) < 0.1
         case During.ALL:
             assert told.share(BEGIN_S, BEGIN_S + 0.5) > 0.9
@@ -143,10 +190,15 @@ class Disorder(Enum):
 
 @pytest.mark.parametrize("disorder", Disorder, ids=lambda disorder: disorder.name.lower())
 def test_disorder(disorder, tell):
-    """Expected: the points that are told are right; a late frame of the pacemaker has no instant of its own any more."""
+    """Expected: the points that are told are right.
+
+    A late frame of the pacemaker has no instant of its own any more.
+    """
     places, twice = disorder.value
     given, random = frames(SETUP, MOVING, 5.0), np.random.default_rng(0)
-    order = np.argsort(np.arange(len(given)) + random.uniform(0.0, places, len(given)), kind="stable")
+    order = np.argsort(
+        np.arange(len(given)) + random.uniform(0.0, places, len(given)), kind="stable"
+    )
     arriving = [given[k] for k in order for _ in range(2 if random.random() < twice else 1)]
     step, told = tell(SETUP, arriving, MOVING)
     assert told.share(1.0, 4.9) > (0.95 if places == 0.0 else 0.8)

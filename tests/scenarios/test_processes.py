@@ -1,4 +1,6 @@
-"""The same faults on the real thing: `rhot-fusion` as a process, behind a real router, fed with a synthetic hand in real time."""
+"""The same faults on the real thing: `rhot-fusion` as a process, behind a real router, fed with a
+synthetic hand in real time.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +35,26 @@ def rows(matrix):
 def rig_toml(tmp_path, router) -> File:
     """The synthetic rig on disk, calibrated."""
     for camera in SETUP.rig().values():
-        lens = Lens(size_px=camera.size_px, matrix=rows(camera.matrix), distortion=tuple(camera.distortion.tolist()))
+        lens = Lens(
+            size_px=camera.size_px,
+            matrix=rows(camera.matrix),
+            distortion=tuple(camera.distortion.tolist()),
+        )
         save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
-    places = {camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera)) for camera in SETUP.rig().values()}
+    places = {
+        camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera))
+        for camera in SETUP.rig().values()
+    }
     save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
-    markers = "\n".join(f'{name} = "{color}"' for name, color in SETUP.config().hand["right"].markers.items())
+    markers = "\n".join(
+        f'{name} = "{color}"' for name, color in SETUP.config().hand["right"].markers.items()
+    )
     cameras = "\n".join(f'[[camera]]\nname = "{name}"\n' for name in SETUP.names)
     path = tmp_path / "rig.toml"
-    path.write_text(f'[rig]\nname = "bench"\n[bus]\nconnect = ["{router}"]\n{cameras}\n[hand.right.markers]\n{markers}\n', encoding="utf-8")
+    path.write_text(
+        f'[rig]\nname = "bench"\n[bus]\nconnect = ["{router}"]\n{cameras}\n[hand.right.markers]\n{markers}\n',
+        encoding="utf-8",
+    )
     return path
 
 
@@ -48,7 +62,11 @@ def rig_toml(tmp_path, router) -> File:
 async def fusion(rig_toml: File) -> AsyncIterator[asyncio.subprocess.Process]:
     """The process; killed at the end if a test left it."""
     process = await asyncio.create_subprocess_exec(
-        str(FUSION), "--config", str(rig_toml), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+        str(FUSION),
+        "--config",
+        str(rig_toml),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
     )
     try:
         yield process
@@ -68,14 +86,18 @@ class Feed:
         self.last_error = ""
 
     async def play(self) -> None:
-        publishers = {name: self._bus.publisher(topics.MARKERS, camera=name) for name in SETUP.names}
+        publishers = {
+            name: self._bus.publisher(topics.MARKERS, camera=name) for name in SETUP.names
+        }
         given = frames(SETUP, Path(), 30.0)
         begin_ns = clock.now_ns()
         for frame in given:
             late_ns = (frame.stamp_ns - START_NS) - (clock.now_ns() - begin_ns)
             if late_ns > 0:
                 await asyncio.sleep(late_ns * 1e-9)
-            publishers[frame.camera].put(msgspec.structs.replace(frame, stamp_ns=frame.stamp_ns - START_NS + begin_ns))
+            publishers[frame.camera].put(
+                msgspec.structs.replace(frame, stamp_ns=frame.stamp_ns - START_NS + begin_ns)
+            )
 
     async def hear(self) -> None:
         async for message in self._bus.every(topics.POINTS, 256):
@@ -111,7 +133,10 @@ async def until(condition, seconds: float) -> float:
 
 
 async def test_five_seconds_of_silence_and_back_within_half_a_second(rig_toml, feed):
-    """The process is stopped, as a machine that swaps or a network that is gone; what piled up meanwhile must not be worked off first."""
+    """The process is stopped, as a machine that swaps or a network that is gone.
+
+    What piled up meanwhile must not be worked off first.
+    """
     async with fusion(rig_toml) as process:
         await until(lambda: feed.full_since(0.0), START_S)
         process.send_signal(signal.SIGSTOP)
@@ -134,7 +159,14 @@ async def test_a_missing_calibration_is_one_line_and_exit_code_2(rig_toml):
 async def test_a_calibration_of_another_resolution_is_reported_and_gives_no_points(rig_toml, feed):
     path = rig_toml.parent / "calibration" / "right.lens.json"
     camera = SETUP.rig()["right"]
-    save(path, Lens(size_px=(1280, 960), matrix=rows(camera.matrix), distortion=tuple(camera.distortion.tolist())))
+    save(
+        path,
+        Lens(
+            size_px=(1280, 960),
+            matrix=rows(camera.matrix),
+            distortion=tuple(camera.distortion.tolist()),
+        ),
+    )
     async with fusion(rig_toml) as process:
         await until(lambda: "another size" in feed.last_error, START_S)
         assert process.returncode is None
@@ -143,12 +175,21 @@ async def test_a_calibration_of_another_resolution_is_reported_and_gives_no_poin
 
 
 async def test_a_bumped_camera_reaches_health(rig_toml, feed):
-    """The right camera's height is changed by 4.6 px through its calibration: fusion must name the pair and the command."""
+    """The right camera's height is changed by 4.6 px through its calibration: fusion must name the
+    pair and the command.
+    """
     path = rig_toml.parent / "calibration" / "right.lens.json"
     camera = SETUP.rig()["right"]
     matrix = camera.matrix.copy()
     matrix[1, 2] += 4.6
-    save(path, Lens(size_px=camera.size_px, matrix=rows(matrix), distortion=tuple(camera.distortion.tolist())))
+    save(
+        path,
+        Lens(
+            size_px=camera.size_px,
+            matrix=rows(matrix),
+            distortion=tuple(camera.distortion.tolist()),
+        ),
+    )
     async with fusion(rig_toml):
         await until(lambda: "rhot calibrate stereo" in feed.last_error, START_S)
     assert "left and right" in feed.last_error

@@ -1,4 +1,6 @@
-"""Rigs larger than two cameras and a hand: three and four cameras, two hands side by side, in points and in pictures."""
+"""Rigs larger than two cameras and a hand: three and four cameras, two hands side by side, in
+points and in pictures.
+"""
 
 from __future__ import annotations
 
@@ -36,10 +38,19 @@ class Shifted(Path):
 
 @pytest.mark.parametrize("cameras", [3, 4])
 def test_one_of_many_cameras_may_stop_unnoticed(cameras, tell):
-    """Expected: from 2 s to 4 s without the last camera all points are measured; with it again they are as exact as before."""
-    setup = Setup(cameras=cameras, phase_s=1.0 / (30.0 * cameras), clock_error_s=0.0, clock_sigma_s=1e-4)
+    """Expected: from 2 s to 4 s without the last camera all points are measured.
+
+    With it again they are as exact as before.
+    """
+    setup = Setup(
+        cameras=cameras, phase_s=1.0 / (30.0 * cameras), clock_error_s=0.0, clock_sigma_s=1e-4
+    )
     gone = setup.names[-1]
-    arriving = [f for f in frames(setup, Path(), 6.0) if f.camera != gone or not 2e9 <= f.stamp_ns - f.clock_offset_ns - START_NS < 4e9]
+    arriving = [
+        f
+        for f in frames(setup, Path(), 6.0)
+        if f.camera != gone or not 2e9 <= f.stamp_ns - f.clock_offset_ns - START_NS < 4e9
+    ]
     _, told = tell(setup, arriving, Path(), Fusion(lag_frames=1))
     assert told.share(2.0, 4.0, measured=True) > 0.95
     assert told.rms_mm(4.2, 6.0) < 1.1 * told.rms_mm(1.0, 2.0) + 0.2
@@ -50,46 +61,75 @@ def two_hands(setup: Setup, right: Path, left: Path, seconds: float):
     """Both hands before one rig: frames of equal seeds, markers of both."""
     rename = dict(zip(COLORS, OTHERS, strict=True))
     for a, b in zip(frames(setup, right, seconds), frames(setup, left, seconds), strict=True):
-        yield msgspec.structs.replace(a, markers=a.markers + [msgspec.structs.replace(m, color=rename[m.color]) for m in b.markers])
+        yield msgspec.structs.replace(
+            a,
+            markers=a.markers
+            + [msgspec.structs.replace(m, color=rename[m.color]) for m in b.markers],
+        )
 
 
 def test_two_hands_side_by_side_are_kept_apart():
     setup = Setup(clock_error_s=0.0, clock_sigma_s=1e-4)
-    right, left = Shifted(speed_m_s=0.25, shift_m=(-0.13, 0.0, 0.0)), Shifted(speed_m_s=0.25, shift_m=(0.13, 0.0, 0.05), seed=2)
+    right, left = (
+        Shifted(speed_m_s=0.25, shift_m=(-0.13, 0.0, 0.0)),
+        Shifted(speed_m_s=0.25, shift_m=(0.13, 0.0, 0.05), seed=2),
+    )
     tables = {
-        hand: HandTable(markers=dict(zip(BASIC_LANDMARKS, colors, strict=True))) for hand, colors in (("right", COLORS), ("left", OTHERS))
+        hand: HandTable(markers=dict(zip(BASIC_LANDMARKS, colors, strict=True)))
+        for hand, colors in (("right", COLORS), ("left", OTHERS))
     }
     config = msgspec.structs.replace(setup.config(), hand=tables)
     model = point_hands()["right"]
-    step = FusionStep(config, setup.rig(), {"right": model, "left": msgspec.structs.replace(model, hand="left")})
+    step = FusionStep(
+        config, setup.rig(), {"right": model, "left": msgspec.structs.replace(model, hand="left")}
+    )
     errors = defaultdict(list)
     for frame in two_hands(setup, right, left, 4.0):
         for message in step.step(frame):
             at_s = (message.stamp_ns - START_NS) * 1e-9
             truth = (right if message.hand == "right" else left)(np.array([at_s]))[0]
-            errors[message.hand] += [np.subtract(p.position_m, truth[BASIC_LANDMARKS.index(p.name)]) for p in message.points if at_s > 1.0]
+            errors[message.hand] += [
+                np.subtract(p.position_m, truth[BASIC_LANDMARKS.index(p.name)])
+                for p in message.points
+                if at_s > 1.0
+            ]
     for hand in ("right", "left"):
         assert len(errors[hand]) > 0.95 * 6 * 89
         assert 1e3 * np.sqrt(np.mean(np.sum(np.square(errors[hand]), axis=1))) < 2.5
 
 
 def test_two_hands_in_pictures(repository):
-    """The scene `two_hands`, three colours each, through the tracker: every landmark of both within 5 mm RMS."""
+    """The scene `two_hands`, three colours each, through the tracker: every landmark of both within
+    5 mm RMS.
+    """
     config = load_rig(repository / "config" / "sim.toml")
     right, left = ("violet", "magenta", "blue"), ("cyan", "green", "lime")
     names = ("wrist", "index_tip", "little_tip")
-    tables = {hand: HandTable(markers=dict(zip(names, colors, strict=True))) for hand, colors in (("right", right), ("left", left))}
+    tables = {
+        hand: HandTable(markers=dict(zip(names, colors, strict=True)))
+        for hand, colors in (("right", right), ("left", left))
+    }
     config = msgspec.structs.replace(config, hand=tables)
-    scene = build_scene(config, dataclasses.replace(SCENES["two_hands"], distance_m=0.6), "two_hands", 1)
+    scene = build_scene(
+        config, dataclasses.replace(SCENES["two_hands"], distance_m=0.6), "two_hands", 1
+    )
     hands = {hand: load_hand(config.calibration_dir, hand, 1.0) for hand in tables}
     step, found, errors = FusionStep(config, scene.cameras, hands), [], defaultdict(list)
     for name in scene.cameras:
         source = FrameSource(scene, name, recorded=True)
-        tracker = TrackerStep(name, load_colors(config.calibration_dir, name), config.tracker, source.camera.size_px, config.colors)
+        tracker = TrackerStep(
+            name,
+            load_colors(config.calibration_dir, name),
+            config.tracker,
+            source.camera.size_px,
+            config.colors,
+        )
         for seq in range(45):
             taken = source.take(seq, START_NS)
             if taken.image is not None:
-                frame = Frame(name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420")
+                frame = Frame(
+                    name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420"
+                )
                 found.append((taken.time_s, tracker.step(frame, 0, 500_000)))
     for _, frame in sorted(found, key=lambda entry: entry[0]):
         for message in step.step(frame):
@@ -107,7 +147,10 @@ def test_two_hands_in_pictures(repository):
 
 
 def test_four_cameras_at_90_fps_leave_most_of_a_core_free():
-    """Issue 4: 70 % free; measured: 4-6 % used. The limit here leaves room for a machine that is busy with other tests."""
+    """Issue 4: 70 % free; measured: 4-6 % used.
+
+    The limit here leaves room for a machine that is busy with other tests.
+    """
     setup = Setup(cameras=4, fps=90.0, phase_s=1.0 / 360.0)
     step = FusionStep(setup.config(), setup.rig(), point_hands())
     given, took_s = frames(setup, Path(), 3.0), 0.0

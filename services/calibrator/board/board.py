@@ -1,8 +1,9 @@
-"""Calibration boards: chessboards and ChArUco boards, as points in the board's own frame. Pure data, no pictures.
+"""Calibration boards: chessboards and ChArUco boards, as points in the board's own frame. Pure
+data, no pictures.
 
-The board frame: origin in the first inner corner, x along a row of corners, y down the rows, z away from whoever looks at the
-printed side, metres. A board is counted in inner corners, the points where black squares touch. An impossible board is a
-CalibrationError that says what is possible.
+The board frame: origin in the first inner corner, x along a row of corners, y down the rows, z away
+from whoever looks at the printed side, metres. A board is counted in inner corners, the points
+where black squares touch. An impossible board is a CalibrationError that says what is possible.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ DICTIONARIES = {
     "DICT_6X6_250": 250,
     "DICT_APRILTAG_36H11": 587,
 }
-# A board of more corners than this on one page has squares no camera resolves; OpenCV's detector needs three.
+# A board of more corners than this on one page has squares no camera resolves; OpenCV's detector
+# needs three.
 _MIN_CORNERS, _MAX_CORNERS = 3, 40
-# Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in millimetres, or a slip.
+# Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in
+# millimetres, or a slip.
 _MIN_SQUARE_M, _MAX_SQUARE_M = 0.001, 2.0
 
 
@@ -39,8 +42,9 @@ _MIN_SQUARE_M, _MAX_SQUARE_M = 0.001, 2.0
 class Board:
     """A flat board of cols x rows inner corners, square_m apart.
 
-    marker is the side of a ChArUco marker in squares. A ChArUco board of cols x rows inner corners has (cols + 1) x (rows + 1)
-    squares. legacy is the pattern of OpenCV before 4.6, which differs where the number of rows of squares is even.
+    marker is the side of a ChArUco marker in squares. A ChArUco board of cols x rows inner corners
+    has (cols + 1) x (rows + 1) squares. legacy is the pattern of OpenCV before 4.6, which differs
+    where the number of rows of squares is even.
     """
 
     cols: int
@@ -63,9 +67,13 @@ class Board:
                 f"{_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}, e.g. --square 0.025"
             )
         if not 0.3 <= self.marker <= 0.9:
-            raise CalibrationError(f"markers of {self.marker:g} squares cannot be used; give 0.3..0.9, e.g. --marker 0.7")
+            raise CalibrationError(
+                f"markers of {self.marker:g} squares cannot be used; give 0.3..0.9, e.g. --marker 0.7"
+            )
         if self.dictionary not in DICTIONARIES:
-            raise CalibrationError(f"dictionary {self.dictionary!r} is not known; use one of {', '.join(DICTIONARIES)}")
+            raise CalibrationError(
+                f"dictionary {self.dictionary!r} is not known; use one of {', '.join(DICTIONARIES)}"
+            )
         markers = (self.cols + 1) * (self.rows + 1) // 2
         if self.kind == "charuco" and markers > DICTIONARIES[self.dictionary]:
             raise CalibrationError(
@@ -81,7 +89,10 @@ class Board:
     @property
     def grid(self) -> Array:
         """Column and row of every corner, in the order of their numbers; (n, 2)."""
-        return np.stack([np.tile(np.arange(self.cols), self.rows), np.repeat(np.arange(self.rows), self.cols)], axis=1).astype(np.float64)
+        return np.stack(
+            [np.tile(np.arange(self.cols), self.rows), np.repeat(np.arange(self.rows), self.cols)],
+            axis=1,
+        ).astype(np.float64)
 
     @property
     def points(self) -> Array:
@@ -94,7 +105,10 @@ class Board:
         return f"{self.kind} {self.cols}x{self.rows}, {1e3 * self.square_m:g} mm squares"
 
     def neighbours(self, ids: np.ndarray) -> np.ndarray:
-        """Pairs of positions in ids whose corners are next to each other on the board; (k, 2) int."""
+        """Pairs of positions in ids whose corners are next to each other on the board.
+
+        (k, 2) int.
+        """
         place = {int(corner): position for position, corner in enumerate(ids)}
         pairs = []
         for corner, position in place.items():
@@ -113,5 +127,7 @@ def parse_corners(text: str) -> tuple[int, int]:
     """
     match = re.fullmatch(r"\s*(\d{1,3})\s*[xX×,]\s*(\d{1,3})\s*", text)
     if not match:
-        raise CalibrationError(f"board {text!r} is not understood; write its inner corners as COLSxROWS, e.g. --board 9x6")
+        raise CalibrationError(
+            f"board {text!r} is not understood; write its inner corners as COLSxROWS, e.g. --board 9x6"
+        )
     return int(match[1]), int(match[2])

@@ -1,7 +1,9 @@
-"""A board as a PDF of exact size: black squares as vectors, nothing a printer could resample. Pure: bytes out, the same every time.
+"""A board as a PDF of exact size: black squares as vectors, nothing a printer could resample. Pure:
+bytes out, the same every time.
 
-Written by hand, as a page of filled rectangles needs five objects (ISO 32000-1, sections 7.5 and 8.5). A ruler of 100 mm lets the user
-check that the printer did not scale. A board that does not fit on the paper is a CalibrationError that says what would.
+Written by hand, as a page of filled rectangles needs five objects (ISO 32000-1, sections 7.5 and
+8.5). A ruler of 100 mm lets the user check that the printer did not scale. A board that does not
+fit on the paper is a CalibrationError that says what would.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ PAPERS_MM = {
 }
 # 1 pt is 1/72 inch.
 _PT = 72.0 / 25.4
-# Printers leave 4 to 5 mm unprinted; detectors want a white margin about as wide as half a square, which the paper adds.
+# Printers leave 4 to 5 mm unprinted; detectors want a white margin about as wide as half a square,
+# which the paper adds.
 _MARGIN_MM = 6.0
 # Room for the ruler and the line of text below the board.
 _FOOT_MM = 16.0
@@ -33,7 +36,8 @@ Rectangle = tuple[float, float, float, float]
 
 
 def board_pdf(board: Board, paper: str = "a4") -> bytes:
-    """The page with the board: x, y of its squares in mm from its top left corner, centred, turned to fit.
+    """The page with the board: x, y of its squares in mm from its top left corner, centred, turned
+    to fit.
 
     Raises CalibrationError if the paper is unknown, or too small.
     """
@@ -65,8 +69,14 @@ def rectangles(board: Board) -> Iterator[Rectangle]:
 def _charuco(board: Board, side: float) -> Iterator[Rectangle]:
     made = charuco_board(board)
     marker_mm = board.marker * side
-    corners = [1e3 * np.asarray(points, dtype=np.float64).reshape(-1, 3)[:, :2].min(axis=0) for points in made.getObjPoints()]
-    white = {(int(y // side), int(x // side)) for x, y in (corner + 0.5 * marker_mm for corner in corners)}
+    corners = [
+        1e3 * np.asarray(points, dtype=np.float64).reshape(-1, 3)[:, :2].min(axis=0)
+        for points in made.getObjPoints()
+    ]
+    white = {
+        (int(y // side), int(x // side))
+        for x, y in (corner + 0.5 * marker_mm for corner in corners)
+    }
     for row in range(board.rows + 1):
         for col in range(board.cols + 1):
             if (row, col) not in white:
@@ -82,7 +92,10 @@ def _charuco(board: Board, side: float) -> Iterator[Rectangle]:
 
 
 def _runs(black: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Begin and end of every run of True; one rectangle for a run leaves no hairline between its cells."""
+    """Begin and end of every run of True.
+
+    One rectangle for a run leaves no hairline between its cells.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], black.astype(np.int8), [0]])))
     yield from ((int(begin), int(end)) for begin, end in edges.reshape(-1, 2))
 
@@ -93,7 +106,10 @@ def _page(board: Board, size: tuple[float, float], paper: str) -> tuple[float, f
         if size[0] + 2 * _MARGIN_MM <= page[0] and size[1] + _MARGIN_MM + _FOOT_MM <= page[1]:
             return page
     largest = max(
-        min((page[0] - 2 * _MARGIN_MM) / (board.cols + 1), (page[1] - _MARGIN_MM - _FOOT_MM) / (board.rows + 1))
+        min(
+            (page[0] - 2 * _MARGIN_MM) / (board.cols + 1),
+            (page[1] - _MARGIN_MM - _FOOT_MM) / (board.rows + 1),
+        )
         for page in ((width, height), (height, width))
     )
     raise CalibrationError(
@@ -103,25 +119,40 @@ def _page(board: Board, size: tuple[float, float], paper: str) -> tuple[float, f
 
 
 def _rectangle(page: tuple[float, float], x: float, y: float, width: float, height: float) -> str:
-    return f"{x * _PT:.4f} {(page[1] - y - height) * _PT:.4f} {width * _PT:.4f} {height * _PT:.4f} re"
+    return (
+        f"{x * _PT:.4f} {(page[1] - y - height) * _PT:.4f} {width * _PT:.4f} {height * _PT:.4f} re"
+    )
 
 
 def _foot(page: tuple[float, float], board: Board) -> list[str]:
     """The ruler, with a tick each 10 mm, and one line that says what the board is."""
     left, bottom = (page[0] - _RULER_MM) / 2.0, 10.0
-    lines = ["0.3 w", f"{left * _PT:.4f} {bottom * _PT:.4f} m {(left + _RULER_MM) * _PT:.4f} {bottom * _PT:.4f} l"]
+    lines = [
+        "0.3 w",
+        f"{left * _PT:.4f} {bottom * _PT:.4f} m {(left + _RULER_MM) * _PT:.4f} {bottom * _PT:.4f} l",
+    ]
     for tick in range(11):
         x, length = left + 10.0 * tick, 3.0 if tick % 5 == 0 else 1.5
-        lines.append(f"{x * _PT:.4f} {bottom * _PT:.4f} m {x * _PT:.4f} {(bottom + length) * _PT:.4f} l")
+        lines.append(
+            f"{x * _PT:.4f} {bottom * _PT:.4f} m {x * _PT:.4f} {(bottom + length) * _PT:.4f} l"
+        )
     text = f"100 mm  -  print at 100 %, then measure this line  -  {_described(board)}"
     # Helvetica's characters are half as wide as high, on average: close enough to centre a line.
     start = page[0] / 2.0 - 0.25 * len(text) * 8.0 / _PT
-    return [*lines, "S", f"BT /F1 8 Tf {start * _PT:.3f} {(bottom - 4.0) * _PT:.3f} Td ({text}) Tj ET"]
+    return [
+        *lines,
+        "S",
+        f"BT /F1 8 Tf {start * _PT:.3f} {(bottom - 4.0) * _PT:.3f} Td ({text}) Tj ET",
+    ]
 
 
 def _described(board: Board) -> str:
     text = f"{board.kind} --board {board.cols}x{board.rows} --square {board.square_m:g}"
-    return text + f" --marker {board.marker:g} --dictionary {board.dictionary}" if board.kind == "charuco" else text
+    return (
+        text + f" --marker {board.marker:g} --dictionary {board.dictionary}"
+        if board.kind == "charuco"
+        else text
+    )
 
 
 def _document(page: tuple[float, float], content: bytes) -> bytes:
@@ -142,4 +173,7 @@ def _document(page: tuple[float, float], content: bytes) -> bytes:
     table = b"".join(b"%010d 00000 n \n" % place for place in places)
     start = len(document)
     document += b"xref\n0 %d\n0000000000 65535 f \n%s" % (len(objects) + 1, table)
-    return document + b"trailer\n<< /Size %d /Root 1 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, start)
+    return document + b"trailer\n<< /Size %d /Root 1 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (
+        len(objects) + 1,
+        start,
+    )

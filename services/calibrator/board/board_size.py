@@ -1,7 +1,8 @@
 """What board is that? Counts the inner corners of a chessboard in pictures of it, by vote. Pure.
 
-A board that is cut off by the picture's edge, or partly lost in glare, is counted too small, so sizes are weighed by how many
-pictures show them whole, the larger one first. No board in any picture gives None.
+A board that is cut off by the picture's edge, or partly lost in glare, is counted too small, so
+sizes are weighed by how many pictures show them whole, the larger one first. No board in any
+picture gives None.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ import numpy as np
 from services.calibrator.board.board import Board
 from services.calibrator.board.detect import as_grey, detect, reduced
 
-# The smallest grid to grow from. Growing from 5x4 counted 9x6 in 9 of 10 real pictures (OpenCV 5), from 3x3 in 5; 4x3 finds small boards.
+# The smallest grid to grow from. Growing from 5x4 counted 9x6 in 9 of 10 real pictures (OpenCV 5),
+# from 3x3 in 5; 4x3 finds small boards.
 _SEEDS = ((5, 4), (4, 3))
-# Sizes that are sold, printed and shipped with tutorials, tried with the classic detector where growing fails.
+# Sizes that are sold, printed and shipped with tutorials, tried with the classic detector where
+# growing fails.
 _COMMON = (
     (9, 6),
     (8, 6),
@@ -45,9 +48,14 @@ _SHARE = 0.2
 
 
 def guess_corners(images: Iterable[np.ndarray]) -> tuple[int, int] | None:
-    """(cols, rows) of the chessboard in these pictures, cols >= rows; None if no picture shows one."""
+    """(cols, rows) of the chessboard in these pictures, cols >= rows.
+
+    None if no picture shows one.
+    """
     pictures = [as_grey(image) for _, image in zip(range(_VOTERS), images, strict=False)]
-    votes = Counter(size for picture in pictures if (size := _grown(reduced(picture)[0])) is not None)
+    votes = Counter(
+        size for picture in pictures if (size := _grown(reduced(picture)[0])) is not None
+    )
     total = sum(votes.values())
     likely = [size for size, count in votes.items() if count >= max(1.0, _SHARE * total)]
     for size in sorted(likely, key=lambda size: (size[0] * size[1], size), reverse=True):

@@ -1,9 +1,11 @@
-"""One numbering for a chessboard's corners, whoever detected them and however the board was held. Pure.
+"""One numbering for a chessboard's corners, whoever detected them and however the board was held.
+Pure.
 
-A detector may begin at any of the board's corners. Two rules settle it: rows and columns turn the same way as on the printed
-side (never mirrored), and where the colours tell the board's two ends apart (one of cols and rows even, the other odd) the square
-beyond the first corner is black. Where they do not, several numberings are equally right for one camera, and stereo.py chooses
-the one on which the cameras agree.
+A detector may begin at any of the board's corners. Two rules settle it: rows and columns turn the
+same way as on the printed side (never mirrored), and where the colours tell the board's two ends
+apart (one of cols and rows even, the other odd) the square beyond the first corner is black. Where
+they do not, several numberings are equally right for one camera, and stereo.py chooses the one on
+which the cameras agree.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from rhot.geometry.transforms import Array
 
 
 def turns(cols: int, rows: int) -> list[np.ndarray]:
-    """Every renumbering of a cols x rows grid that a rotation of the board could cause; the first is the identity.
+    """Every renumbering of a cols x rows grid that a rotation of the board could cause; the first
+    is the identity.
 
     corners[turn] are the corners as the turned board numbers them. 2 turns, or 4 for a square grid.
     """
@@ -46,7 +49,8 @@ def _area(cols: int, rows: int, corners: Array) -> float:
 
 
 def _first_is_white(image: np.ndarray, cols: int, rows: int, corners: Array) -> bool:
-    """Whether the square diagonally inside the first corner is white, by all squares between the corners.
+    """Whether the square diagonally inside the first corner is white, by all squares between the
+    corners.
 
     That one has the colour of the square beyond the corner.
     """
@@ -57,6 +61,7 @@ def _first_is_white(image: np.ndarray, cols: int, rows: int, corners: Array) -> 
     y = np.clip(np.round(centres[..., 1]).astype(np.int64), 0, height - 1)
     brightness = image[y, x].astype(np.float64)
     sign = 1.0 - 2.0 * (np.add.outer(np.arange(rows - 1), np.arange(cols - 1)) % 2)
-    # Shadows fall across the board: each square is compared with the mean of its neighbourhood, the row.
+    # Shadows fall across the board: each square is compared with the mean of its neighbourhood, the
+    # row.
     contrast = brightness - brightness.mean(axis=1, keepdims=True)
     return float(np.sum(contrast * sign)) > 0.0

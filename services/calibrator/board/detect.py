@@ -1,8 +1,10 @@
-"""Finding a board in a picture. Pure: a picture goes in, numbered sub-pixel corners come out, or None where there is no whole board.
+"""Finding a board in a picture. Pure: a picture goes in, numbered sub-pixel corners come out, or
+None where there is no whole board.
 
-Which detector finds the corners does not matter for accuracy, since refine.py places them. So detectors are tried until one
-finds the board: the sector-based one stands blur and noise, the classic one steep views (each misses pictures the other one finds).
-A chessboard must be seen whole; of a ChArUco board any part will do.
+Which detector finds the corners does not matter for accuracy, since refine.py places them. So
+detectors are tried until one finds the board: the sector-based one stands blur and noise, the
+classic one steep views (each misses pictures the other one finds). A chessboard must be seen whole;
+of a ChArUco board any part will do.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from services.calibrator.board.board import Board
 from services.calibrator.board.corner_order import normalised
 from services.calibrator.board.corner_refinement import is_regular, refine, spacing
 
-# Detectors work at most this wide: a board that fills a tenth of the picture still has squares of 10 px, and 5 Mpx take seconds.
+# Detectors work at most this wide: a board that fills a tenth of the picture still has squares of
+# 10 px, and 5 Mpx take seconds.
 _SEARCH_PX = 1280
 # A ChArUco view with fewer corners fixes no pose.
 _MIN_CHARUCO = 6
@@ -39,9 +42,11 @@ class Detection:
 
 
 def detect(image: np.ndarray, board: Board, *, quick: bool = False) -> Detection | None:
-    """Find the board in a picture (h, w) or (h, w, 3) uint8; None if it is not there as a whole (ChArUco: in part).
+    """Find the board in a picture (h, w) or (h, w, 3) uint8; None if it is not there as a whole
+    (ChArUco: in part).
 
-    quick tries the two fastest detectors only: they miss one picture in twenty, and a picture without a board costs a fifth.
+    quick tries the two fastest detectors only: they miss one picture in twenty, and a picture
+    without a board costs a fifth.
     """
     grey = as_grey(image)
     found = _charuco(grey, board) if board.kind == "charuco" else _chessboard(grey, board, quick)
@@ -64,7 +69,9 @@ def as_grey(image: np.ndarray) -> np.ndarray:
 
 
 def reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
-    """The picture at most _SEARCH_PX wide, and how many pixels of the original one of its pixels is."""
+    """The picture at most _SEARCH_PX wide, and how many pixels of the original one of its pixels
+    is.
+    """
     factor = max(grey.shape) / _SEARCH_PX
     if factor <= 1.0:
         return grey, 1.0
@@ -81,7 +88,10 @@ def _chessboard(grey: np.ndarray, board: Board, quick: bool) -> tuple[np.ndarray
 
 
 def _candidates(grey: np.ndarray, board: Board, quick: bool) -> Iterator[Array]:
-    """What each detector finds, cheapest first (2 to 30 ms at 640x480, then 60 ms and more); without a board, all are tried."""
+    """What each detector finds, cheapest first (2 to 30 ms at 640x480, then 60 ms and more).
+
+    Without a board, all are tried.
+    """
     small, factor = reduced(grey)
     pattern = (board.cols, board.rows)
     yield from _classic(small, pattern, factor)
@@ -97,7 +107,9 @@ def _candidates(grey: np.ndarray, board: Board, quick: bool) -> Iterator[Array]:
         yield from _classic(double, pattern, 0.5)
 
 
-def _sector_based(image: np.ndarray, pattern: tuple[int, int], flags: int, factor: float) -> Iterator[Array]:
+def _sector_based(
+    image: np.ndarray, pattern: tuple[int, int], flags: int, factor: float
+) -> Iterator[Array]:
     found, corners = cv2.findChessboardCornersSB(image, pattern, flags=flags)
     if found:
         yield _rescaled(corners, factor)
@@ -110,7 +122,10 @@ def _classic(image: np.ndarray, pattern: tuple[int, int], factor: float) -> Iter
 
 
 def _rescaled(corners: np.ndarray, factor: float) -> Array:
-    """Corners of a picture whose pixels are `factor` of the original's, as original pixels; pixel centres are whole numbers."""
+    """Corners of a picture whose pixels are `factor` of the original's, as original pixels.
+
+    Pixel centres are whole numbers.
+    """
     # OpenCV 4 gives (n, 1, 2), OpenCV 5 (n, 2).
     return (corners.reshape(-1, 2).astype(np.float64) + 0.5) * factor - 0.5
 
@@ -139,6 +154,8 @@ def _charuco_scales(grey: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
 def charuco_board(board: Board) -> cv2.aruco.CharucoBoard:
     """OpenCV's description of a ChArUco board."""
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-    made = cv2.aruco.CharucoBoard((board.cols + 1, board.rows + 1), board.square_m, board.marker * board.square_m, dictionary)
+    made = cv2.aruco.CharucoBoard(
+        (board.cols + 1, board.rows + 1), board.square_m, board.marker * board.square_m, dictionary
+    )
     made.setLegacyPattern(board.legacy)
     return made

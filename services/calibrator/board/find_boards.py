@@ -1,7 +1,8 @@
-"""From a folder of pictures to the boards found in them: what both calibrations begin with. Pure but for reading the files.
+"""From a folder of pictures to the boards found in them: what both calibrations begin with. Pure
+but for reading the files.
 
-Pictures without a whole board are listed with that reason; a folder without any board is refused by the calibration itself, or here
-if the board's size had to be found out.
+Pictures without a whole board are listed with that reason; a folder without any board is refused by
+the calibration itself, or here if the board's size had to be found out.
 """
 
 from __future__ import annotations
@@ -26,24 +27,37 @@ _LOOKS = 4
 _TRIES = 3
 
 
-def find_boards(pictures: PictureSet, board: Board, advance: Advance = lambda _: None) -> tuple[Found, list[LeftOut]]:
-    """The board in every picture (camera -> key -> detection), and the pictures that do not show it as a whole."""
+def find_boards(
+    pictures: PictureSet, board: Board, advance: Advance = lambda _: None
+) -> tuple[Found, list[LeftOut]]:
+    """The board in every picture (camera -> key -> detection), and the pictures that do not show it
+    as a whole.
+    """
     seen: dict[tuple[str, str], Detection | None] = {}
     for camera, files in pictures.files.items():
         for key in files:
             seen[camera, key] = detect(pictures.read(camera, key), board, quick=True)
             advance(1)
     missed = [place for place, detection in seen.items() if detection is None]
-    # Where the quick detectors find nothing at all, it is the wrong board: a few pictures searched thoroughly tell as much.
+    # Where the quick detectors find nothing at all, it is the wrong board: a few pictures searched
+    # thoroughly tell as much.
     for camera, key in missed if len(missed) < len(seen) else missed[:_TRIES]:
         seen[camera, key] = detect(pictures.read(camera, key), board)
-    found: Found = {camera: {key: shown for key in files if (shown := seen[camera, key])} for camera, files in pictures.files.items()}
-    blind = [LeftOut(camera, key, "does not show the whole board") for (camera, key), shown in seen.items() if shown is None]
+    found: Found = {
+        camera: {key: shown for key in files if (shown := seen[camera, key])}
+        for camera, files in pictures.files.items()
+    }
+    blind = [
+        LeftOut(camera, key, "does not show the whole board")
+        for (camera, key), shown in seen.items()
+        if shown is None
+    ]
     return found, blind
 
 
 def the_board(pictures: PictureSet, board: Board | None, square_m: float) -> Board:
-    """The board, counted in the pictures if it is not given, with the ChArUco pattern that these pictures show.
+    """The board, counted in the pictures if it is not given, with the ChArUco pattern that these
+    pictures show.
 
     Raises CalibrationError if no picture shows a chessboard.
     """
@@ -61,7 +75,8 @@ def the_board(pictures: PictureSet, board: Board | None, square_m: float) -> Boa
 def larger_board(pictures: PictureSet, board: Board) -> str:
     """A note if the pictures show a larger chessboard than the one looked for; empty if not.
 
-    A part of a board calibrates, but every picture may show another part, and the outer corners are lost.
+    A part of a board calibrates, but every picture may show another part, and the outer corners are
+    lost.
     """
     if board.kind == "charuco":
         return ""
@@ -72,12 +87,18 @@ def larger_board(pictures: PictureSet, board: Board) -> str:
 
 
 def _pattern(pictures: PictureSet, board: Board) -> Board:
-    """ChArUco boards with an even number of rows of squares come in two patterns; the one that is found more often."""
+    """ChArUco boards with an even number of rows of squares come in two patterns.
+
+    The one that is found more often.
+    """
     if (board.rows + 1) % 2:
         return board
     both = (board, replace(board, legacy=not board.legacy))
     sample = list(_sample(pictures))
-    seen = [sum(len(found.ids) for image in sample[:8] if (found := detect(image, option))) for option in both]
+    seen = [
+        sum(len(found.ids) for image in sample[:8] if (found := detect(image, option)))
+        for option in both
+    ]
     return both[int(np.argmax(seen))]
 
 

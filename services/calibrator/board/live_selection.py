@@ -1,8 +1,8 @@
 """Which live pictures are worth keeping, and what the person with the board should do next. Pure.
 
-Cameras without a common trigger take their pictures tens of milliseconds apart, so a position counts only once the board has stood
-still over two takes in every camera; a position like one that is already there teaches nothing. A camera that does not see the board
-is named.
+Cameras without a common trigger take their pictures tens of milliseconds apart, so a position
+counts only once the board has stood still over two takes in every camera; a position like one that
+is already there teaches nothing. A camera that does not see the board is named.
 """
 
 from __future__ import annotations
@@ -19,11 +19,14 @@ from services.calibrator.board.detect import Detection
 from services.calibrator.bundle.initial_guess import board_pose, centred
 from services.calibrator.bundle.residuals import View
 
-# RMS motion between two takes, px at 640 px width. A board in a steady hand moves .1-.3 px; one pixel of motion is one of error.
+# RMS motion between two takes, px at 640 px width. A board in a steady hand moves .1-.3 px; one
+# pixel of motion is one of error.
 _STILL_PX = 0.5
-# RMS distance of corners from every kept position, as a share of the width: a tenth of it shows the board in another place or turn.
+# RMS distance of corners from every kept position, as a share of the width: a tenth of it shows the
+# board in another place or turn.
 _NEW_SHARE = 0.05
-# Focal length assumed for the tilt, in widths, before there is a calibration: a field of view of 60 degrees.
+# Focal length assumed for the tilt, in widths, before there is a calibration: a field of view of 60
+# degrees.
 _FOCAL = 0.87
 # Tilts wanted before saying so no longer, degrees.
 _TILT_DEG = 20.0
@@ -40,7 +43,9 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Take:
-    """The verdict on one take of all cameras, and the cameras it is about (that do not see the board, that saw it move)."""
+    """The verdict on one take of all cameras, and the cameras it is about (that do not see the
+    board, that saw it move).
+    """
 
     verdict: Verdict
     cameras: tuple[str, ...] = ()
@@ -63,7 +68,11 @@ class Collector:
 
     def offer(self, seen: dict[str, Detection | None]) -> Take:
         """One take: what each camera saw at about the same time."""
-        found = {camera: detection for camera in self.cameras if (detection := seen.get(camera)) is not None}
+        found = {
+            camera: detection
+            for camera in self.cameras
+            if (detection := seen.get(camera)) is not None
+        }
         before, self._before = self._before, found
         blind = tuple(camera for camera in self.cameras if camera not in found)
         if blind:
@@ -71,7 +80,8 @@ class Collector:
         moving = tuple(
             camera
             for camera, now in found.items()
-            if camera not in before or not _apart(now, before[camera]) <= _STILL_PX * now.size_px[0] / 640.0
+            if camera not in before
+            or not _apart(now, before[camera]) <= _STILL_PX * now.size_px[0] / 640.0
         )
         if moving:
             return Take(Verdict.MOVING, moving)
@@ -85,7 +95,10 @@ class Collector:
         views = [position[camera] for position in self.kept]
         size_px = views[0].size_px if views else (1, 1)
         lens = centred(size_px, _FOCAL * size_px[0])
-        poses = [board_pose(lens, View(0, 0, view.ids, self.board.points[view.ids], view.corners))[0] for view in views]
+        poses = [
+            board_pose(lens, View(0, 0, view.ids, self.board.points[view.ids], view.corners))[0]
+            for view in views
+        ]
         return coverage(size_px, [view.corners for view in views], poses)
 
     def text(self, take: Take | None = None) -> str:
@@ -93,8 +106,13 @@ class Collector:
         parts = [f"{len(self.kept)}/{self.wanted} positions"]
         if self.kept:
             seen = {camera: self.coverage(camera) for camera in self.cameras}
-            parts.append("covered " + ", ".join(f"{camera} {100 * each.share:.0f} %" for camera, each in seen.items()))
-            missing = next((f"{camera} {each.missing}" for camera, each in seen.items() if each.missing), "")
+            parts.append(
+                "covered "
+                + ", ".join(f"{camera} {100 * each.share:.0f} %" for camera, each in seen.items())
+            )
+            missing = next(
+                (f"{camera} {each.missing}" for camera, each in seen.items() if each.missing), ""
+            )
             if missing:
                 parts.append(f"missing: {missing}")
             if all(max(each.tilt_deg) < _TILT_DEG for each in seen.values()):
@@ -105,7 +123,10 @@ class Collector:
         return "; ".join(parts)
 
     def _like(self, found: dict[str, Detection], old: dict[str, Detection]) -> bool:
-        return all(_apart(found[camera], old[camera]) < _NEW_SHARE * found[camera].size_px[0] for camera in self.cameras)
+        return all(
+            _apart(found[camera], old[camera]) < _NEW_SHARE * found[camera].size_px[0]
+            for camera in self.cameras
+        )
 
 
 def _apart(a: Detection, b: Detection) -> float:

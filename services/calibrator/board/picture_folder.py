@@ -1,8 +1,10 @@
-"""Picture folders: which file is which camera's view of which board position, found out from the names.
+"""Picture folders: which file is which camera's view of which board position, found out from the
+names.
 
-Understood are a folder per camera (`left/03.png`, `right/03.png`) and names in which one part is the camera and the rest the
-position (`left03.jpg`, `right_03.png`, `03-cam0.png`, `imgL3.png`). Files that do not fit, or that have no partner, are listed, not
-used. A folder whose names say nothing is a CalibrationError with examples of names that work.
+Understood are a folder per camera (`left/03.png`, `right/03.png`) and names in which one part is
+the camera and the rest the position (`left03.jpg`, `right_03.png`, `03-cam0.png`, `imgL3.png`).
+Files that do not fit, or that have no partner, are listed, not used. A folder whose names say
+nothing is a CalibrationError with examples of names that work.
 """
 
 from __future__ import annotations
@@ -20,9 +22,7 @@ from rhot.errors import CalibrationError
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 _TOKEN = re.compile(r"[A-Za-z]+|\d+")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
-_EXAMPLES = (
-    "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera (both views in one picture: --side-by-side)"
-)
+_EXAMPLES = "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera (both views in one picture: --side-by-side)"
 # More cameras than this are never one rig here: the varying part is then the number of the picture.
 _MAX_CAMERAS = 16
 # Two pictures of 4:3 side by side are 2.67 times as wide as high, one of 16:9 is 1.78.
@@ -32,7 +32,8 @@ Key = tuple[str, ...]
 
 @dataclass(frozen=True)
 class PictureSet:
-    """files[camera][key] is a picture; one key is one position of the board. left_out are files that were not understood.
+    """files[camera][key] is a picture; one key is one position of the board. left_out are files
+    that were not understood.
 
     side_by_side: a file holds the pictures of all cameras, the first one on the left.
     """
@@ -56,7 +57,11 @@ class PictureSet:
         Raises CalibrationError if it cannot be read.
         """
         image = read_grey(self.files[camera][key])
-        return split_side_by_side(image, len(self.files))[self.cameras.index(camera)] if self.side_by_side else image
+        return (
+            split_side_by_side(image, len(self.files))[self.cameras.index(camera)]
+            if self.side_by_side
+            else image
+        )
 
 
 def read_grey(path: Path) -> np.ndarray:
@@ -76,16 +81,26 @@ def one_camera(folder: Path, camera: str) -> PictureSet:
     Raises CalibrationError if there is none.
     """
     files = _pictures(folder)
-    own = [path for path in files if camera in (path.parent.name, *_parts(path.relative_to(folder)))] or files
+    own = [
+        path for path in files if camera in (path.parent.name, *_parts(path.relative_to(folder)))
+    ] or files
     return PictureSet({camera: {str(path.relative_to(folder)): path for path in own}})
 
 
 def picture_of(folder: Path, camera: str) -> Path | None:
-    """The first picture in a folder that is named after the camera (`left.png`, `desk_left.jpg`); None without one.
+    """The first picture in a folder that is named after the camera (`left.png`, `desk_left.jpg`);
+    None without one.
 
     Raises CalibrationError if the folder has no pictures at all.
     """
-    return next((path for path in _pictures(folder) if path.stem == camera or camera in _parts(path.relative_to(folder))), None)
+    return next(
+        (
+            path
+            for path in _pictures(folder)
+            if path.stem == camera or camera in _parts(path.relative_to(folder))
+        ),
+        None,
+    )
 
 
 def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
@@ -94,15 +109,19 @@ def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
     Raises CalibrationError if there is none, or only one camera is named.
     """
     if len(cameras) < 2:
-        raise CalibrationError(f"pictures side by side need the names of two cameras or more, e.g. --cameras left,right; got {cameras}")
+        raise CalibrationError(
+            f"pictures side by side need the names of two cameras or more, e.g. --cameras left,right; got {cameras}"
+        )
     files = {str(path.relative_to(folder).with_suffix("")): path for path in _pictures(folder)}
     return PictureSet(dict.fromkeys(cameras, files), side_by_side=True)
 
 
 def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
-    """The pictures of a rig's cameras in a folder; cameras says which names to expect, if they are known.
+    """The pictures of a rig's cameras in a folder; cameras says which names to expect, if they are
+    known.
 
-    Names that tell one series only, of pictures as wide as two, are taken for both views side by side.
+    Names that tell one series only, of pictures as wide as two, are taken for both views side by
+    side.
 
     Raises CalibrationError if the names do not tell cameras and positions apart.
     """
@@ -121,7 +140,9 @@ def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
     if best is None:
         expected = f" of {' and '.join(cameras)}" if cameras else ""
         some = ", ".join(str(path.relative_to(folder)) for path in files[:4])
-        raise CalibrationError(f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); {_EXAMPLES}")
+        raise CalibrationError(
+            f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); {_EXAMPLES}"
+        )
     used = {path for pictures in best.files.values() for path in pictures.values()}
     return PictureSet(_in_step(best.files), tuple(path for path in files if path not in used))
 
@@ -133,18 +154,22 @@ def _is_wide(path: Path) -> bool:
 
 
 def split_side_by_side(image: np.ndarray, count: int) -> list[np.ndarray]:
-    """The pictures of `count` cameras that stand side by side in one; (h, w) -> count times (h, w / count).
+    """The pictures of `count` cameras that stand side by side in one; (h, w) -> count times (h, w /
+    count).
 
     Raises CalibrationError if the width cannot be shared.
     """
     width = image.shape[1]
     if width % count:
-        raise CalibrationError(f"a picture {width} px wide cannot be {count} equal ones side by side")
+        raise CalibrationError(
+            f"a picture {width} px wide cannot be {count} equal ones side by side"
+        )
     return [np.ascontiguousarray(part) for part in np.split(image, count, axis=1)]
 
 
 def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
-    """Pictures named by the time they were taken share no name: as many from each camera are paired in their order.
+    """Pictures named by the time they were taken share no name: as many from each camera are paired
+    in their order.
 
     Wrongly paired ones are found out by the calibration, which refuses them.
     """
@@ -152,7 +177,10 @@ def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
     if len(counts) > 1 or set.intersection(*(set(pictures) for pictures in files.values())):
         return files
     return {
-        camera: {str(number): pictures[key] for number, key in enumerate(sorted(pictures, key=natural), start=1)}
+        camera: {
+            str(number): pictures[key]
+            for number, key in enumerate(sorted(pictures, key=natural), start=1)
+        }
         for camera, pictures in files.items()
     }
 
@@ -160,9 +188,15 @@ def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
 def _pictures(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise CalibrationError(f"{folder}: no such folder; give the folder of the board's pictures")
-    files = [path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file()]
+    files = [
+        path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file()
+    ]
     # Hidden folders hold thumbnails and the like.
-    files = [path for path in files if not any(part.startswith(".") for part in path.relative_to(folder).parts)]
+    files = [
+        path
+        for path in files
+        if not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    ]
     if not files:
         raise CalibrationError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)}); {_EXAMPLES}")
     return sorted(files, key=lambda path: natural(str(path)))
@@ -178,7 +212,9 @@ def _shape(parts: list[str]) -> Key:
 
 
 def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> _Reading | None:
-    """One part of the names as the camera: the one with which the most positions are seen by all cameras."""
+    """One part of the names as the camera: the one with which the most positions are seen by all
+    cameras.
+    """
     best: _Reading | None = None
     for place in range(len(group[0][1])):
         values = Counter(parts[place] for _, parts in group)
@@ -193,19 +229,31 @@ def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> _R
     return best
 
 
-def _by_place(group: list[tuple[Path, list[str]]], place: int, cameras: list[str] | None) -> _Reading | None:
+def _by_place(
+    group: list[tuple[Path, list[str]]], place: int, cameras: list[str] | None
+) -> _Reading | None:
     files: dict[str, dict[str, Path]] = defaultdict(dict)
     for path, parts in group:
-        # A camera's name may be repeated, as in left/left01.png, and its partner's number may have other leading zeros.
-        rest = [part for part in parts[:place] + parts[place + 1 :] if part != parts[place] or part.isdigit()]
+        # A camera's name may be repeated, as in left/left01.png, and its partner's number may have
+        # other leading zeros.
+        rest = [
+            part
+            for part in parts[:place] + parts[place + 1 :]
+            if part != parts[place] or part.isdigit()
+        ]
         key = "-".join(str(int(part)) if part.isdigit() else part for part in rest) or "0"
         if key in files[parts[place]]:
             return None
         files[parts[place]][key] = path
-    named = {_camera_name(group, place, value): pictures for value, pictures in files.items() if cameras is None or value in cameras}
+    named = {
+        _camera_name(group, place, value): pictures
+        for value, pictures in files.items()
+        if cameras is None or value in cameras
+    }
     if len(named) < 2 or not all(_NAME.match(name) for name in named):
         return None
-    # One picture of each is a series of one camera, or pictures side by side, whose numbers are positions.
+    # One picture of each is a series of one camera, or pictures side by side, whose numbers are
+    # positions.
     if len(group) > 2 and all(len(pictures) == 1 for pictures in named.values()):
         return None
     order = cameras or sorted(named, key=lambda name: (_side(name), natural(name)))
@@ -222,14 +270,18 @@ def _camera_name(group: list[tuple[Path, list[str]]], place: int, value: str) ->
 
 @dataclass(frozen=True)
 class _Reading:
-    """One way to read the names: the cameras' pictures, and whether only a number tells the cameras apart."""
+    """One way to read the names: the cameras' pictures, and whether only a number tells the cameras
+    apart.
+    """
 
     files: dict[str, dict[str, Path]]
     numbered: bool
 
 
 def _worth(found: _Reading) -> tuple[int, int, int]:
-    """How much speaks for a reading of the names: positions all cameras share, named rather than numbered, few cameras."""
+    """How much speaks for a reading of the names: positions all cameras share, named rather than
+    numbered, few cameras.
+    """
     shared = set.intersection(*(set(pictures) for pictures in found.files.values()))
     return len(shared) * len(found.files), 0 if found.numbered else 1, -len(found.files)
 
@@ -240,4 +292,7 @@ def _side(name: str) -> int:
 
 def natural(text: str) -> list[tuple[int, int, str]]:
     """Sort key in which 2 comes before 10."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.findall(r"\d+|\D+", text)]
+    return [
+        (0, int(part), "") if part.isdigit() else (1, 0, part)
+        for part in re.findall(r"\d+|\D+", text)
+    ]

@@ -1,9 +1,11 @@
 """Bundle adjustment: lenses, camera places and board poses that explain all corners best. Pure.
 
-Levenberg-Marquardt on the normal equations (Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999), corner by corner
-weighted by soft_l1, rho(s) = 2 (sqrt(1 + s) - 1). Boards are eliminated from the equations, which leaves 15 unknowns per camera; the same
-function calibrates one lens, a rig, or only a board's pose. Rotations are updated by small rotations from the left, exp(w) R, so there
-is no singular angle. A problem that leaves something undetermined still returns, with a large sigma; nothing here refuses.
+Levenberg-Marquardt on the normal equations (Triggs et al., "Bundle Adjustment - A Modern
+Synthesis", 1999), corner by corner weighted by soft_l1, rho(s) = 2 (sqrt(1 + s) - 1). Boards are
+eliminated from the equations, which leaves 15 unknowns per camera; the same function calibrates one
+lens, a rig, or only a board's pose. Rotations are updated by small rotations from the left, exp(w)
+R, so there is no singular angle. A problem that leaves something undetermined still returns, with a
+large sigma; nothing here refuses.
 """
 
 from __future__ import annotations
@@ -26,16 +28,19 @@ from services.calibrator.bundle.residuals import (
     stacked,
 )
 
-# A corner this many pixels off begins to lose weight. Corners of sharp pictures are off by .1-.3 px.
+# A corner this many pixels off begins to lose weight. Corners of sharp pictures are off by .1-.3
+# px.
 _SOFT_PX = 1.0
 _MAX_STEPS = 60
-# Relative change of the cost that ends the search: with 3000 corners the unknowns are then within .02 of their sigma.
+# Relative change of the cost that ends the search: with 3000 corners the unknowns are then within
+# .02 of their sigma.
 _STOP = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """The state found, one error (n, 2) px for each view, one sigma for each lens number (c, 9) and place (c, 6); 0 where held.
+    """The state found, one error (n, 2) px for each view, one sigma for each lens number (c, 9) and
+    place (c, 6); 0 where held.
 
     Places' sigmas are of the small rotation (rad) and the translation (m) of T_camera_from_rig.
     """
@@ -61,8 +66,17 @@ class Free:
     boards: bool = True
 
 
-def adjust(views: list[View], start: State, free: Free, *, soft_px: float = _SOFT_PX, max_steps: int = _MAX_STEPS) -> Adjusted:
-    """Adjust what is free to the views, from a start close enough that boards are in front of their cameras."""
+def adjust(
+    views: list[View],
+    start: State,
+    free: Free,
+    *,
+    soft_px: float = _SOFT_PX,
+    max_steps: int = _MAX_STEPS,
+) -> Adjusted:
+    """Adjust what is free to the views, from a start close enough that boards are in front of their
+    cameras.
+    """
     corners, chosen = stacked(views), _free_unknowns(free)
     state, damping, steps = start, 1e-3, 0
     equations = _equations(corners, state, soft_px)
@@ -86,7 +100,9 @@ def adjust(views: list[View], start: State, free: Free, *, soft_px: float = _SOF
 
 def _free_unknowns(free: Free) -> np.ndarray:
     """Numbers of the camera unknowns that may move."""
-    return np.flatnonzero(np.concatenate([free.lens, np.repeat(free.place[:, None], POSE_SIZE, axis=1)], axis=1))
+    return np.flatnonzero(
+        np.concatenate([free.lens, np.repeat(free.place[:, None], POSE_SIZE, axis=1)], axis=1)
+    )
 
 
 def _cost(corners: Corners, state: State, soft_px: float) -> float:
@@ -102,7 +118,9 @@ def _soft(squared: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Equations:
-    """The cost and its Gauss-Newton equations, cameras (m unknowns) and boards (b of six) apart, over all unknowns, free or not."""
+    """The cost and its Gauss-Newton equations, cameras (m unknowns) and boards (b of six) apart,
+    over all unknowns, free or not.
+    """
 
     cost: float
     cameras: Array  # (m, m)
@@ -114,8 +132,9 @@ class _Equations:
     def step(self, chosen: np.ndarray, boards: bool, damping: float) -> tuple[Array, Array]:
         """The damped step of the cameras (m,) and boards (b, 6); 0 where held.
 
-        Marquardt's scaling: the diagonal is raised by a share of itself, so that units do not matter. Boards are eliminated first
-        (Schur complement), since none of them meets another in any picture.
+        Marquardt's scaling: the diagonal is raised by a share of itself, so that units do not
+        matter. Boards are eliminated first (Schur complement), since none of them meets another in
+        any picture.
         """
         camera_step, board_step = np.zeros(len(self.cameras)), np.zeros_like(self.board_slope)
         V = self.boards + damping * self.boards * np.eye(POSE_SIZE) + 1e-12 * np.eye(POSE_SIZE)
@@ -129,14 +148,20 @@ class _Equations:
                 A = A - np.einsum("bck,bkd->cd", W, through)
                 slope = slope - np.einsum("bkc,bk->c", through, self.board_slope)
             scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-30))
-            camera_step[chosen] = np.linalg.solve(A * scale[:, None] * scale + 1e-13 * np.eye(len(A)), slope * scale) * scale
+            camera_step[chosen] = (
+                np.linalg.solve(A * scale[:, None] * scale + 1e-13 * np.eye(len(A)), slope * scale)
+                * scale
+            )
         if boards:
             right = self.board_slope - np.einsum("bmk,m->bk", self.mixed, camera_step)
             board_step = np.linalg.solve(V, right[..., None])[..., 0]
         return camera_step, board_step
 
     def camera_variance(self, chosen: np.ndarray, boards: bool) -> Array:
-        """Variance (m,) of each camera unknown for errors of one px, all others unknown; 0 where held."""
+        """Variance (m,) of each camera unknown for errors of one px, all others unknown.
+
+        0 where held.
+        """
         variance = np.zeros(len(self.cameras))
         if not len(chosen) or not np.isfinite(self.cost):
             variance[chosen] = np.inf
@@ -144,7 +169,11 @@ class _Equations:
         A = self.cameras[np.ix_(chosen, chosen)]
         if boards:
             W = self.mixed[:, chosen]
-            A = A - np.einsum("bck,bkd->cd", W, np.linalg.solve(self.boards + 1e-12 * np.eye(POSE_SIZE), W.transpose(0, 2, 1)))
+            A = A - np.einsum(
+                "bck,bkd->cd",
+                W,
+                np.linalg.solve(self.boards + 1e-12 * np.eye(POSE_SIZE), W.transpose(0, 2, 1)),
+            )
         scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-30))
         inverse = np.linalg.pinv(A * scale[:, None] * scale, rcond=1e-14, hermitian=True)
         variance[chosen] = np.maximum(np.diag(inverse), 0.0) * scale**2
@@ -153,39 +182,82 @@ class _Equations:
 
 def _equations(corners: Corners, state: State, soft_px: float) -> _Equations:
     m, count = len(state.lenses) * CAMERA_SIZE, len(state.T_rig_from_board)
-    cameras, boards, mixed = np.zeros((m, m)), np.zeros((count, POSE_SIZE, POSE_SIZE)), np.zeros((count, m, POSE_SIZE))
+    cameras, boards, mixed = (
+        np.zeros((m, m)),
+        np.zeros((count, POSE_SIZE, POSE_SIZE)),
+        np.zeros((count, m, POSE_SIZE)),
+    )
     camera_slope, board_slope = np.zeros(m), np.zeros((count, POSE_SIZE))
     error, J = corner_derivatives(corners, state)
     squared = np.sum(error * error, axis=1) / soft_px**2
     weighted = J / np.sqrt(1.0 + squared)[:, None, None]
     begin = 0
     for end in corners.ends:
-        J_view, weighted_view = J[begin:end].reshape(-1, CAMERA_SIZE + POSE_SIZE), weighted[begin:end].reshape(-1, CAMERA_SIZE + POSE_SIZE)
+        J_view, weighted_view = (
+            J[begin:end].reshape(-1, CAMERA_SIZE + POSE_SIZE),
+            weighted[begin:end].reshape(-1, CAMERA_SIZE + POSE_SIZE),
+        )
         H, g = weighted_view.T @ J_view, weighted_view.T @ error[begin:end].reshape(-1)
-        board, here = corners.board[begin], slice(corners.camera[begin] * CAMERA_SIZE, (corners.camera[begin] + 1) * CAMERA_SIZE)
+        board, here = (
+            corners.board[begin],
+            slice(corners.camera[begin] * CAMERA_SIZE, (corners.camera[begin] + 1) * CAMERA_SIZE),
+        )
         cameras[here, here] += H[:CAMERA_SIZE, :CAMERA_SIZE]
         boards[board] += H[CAMERA_SIZE:, CAMERA_SIZE:]
         mixed[board, here] += H[:CAMERA_SIZE, CAMERA_SIZE:]
         camera_slope[here] += g[:CAMERA_SIZE]
         board_slope[board] += g[CAMERA_SIZE:]
         begin = end
-    return _Equations(soft_px**2 * _soft(squared), cameras, boards, mixed, camera_slope, board_slope)
+    return _Equations(
+        soft_px**2 * _soft(squared), cameras, boards, mixed, camera_slope, board_slope
+    )
 
 
 def _moved(state: State, camera_step: Array, board_step: Array) -> State:
     by_camera = camera_step.reshape(len(state.lenses), CAMERA_SIZE)
-    places = np.stack([_turned(T, move) for T, move in zip(state.T_camera_from_rig, by_camera[:, LENS_SIZE:], strict=True)])
-    boards = np.stack([_turned(T, move) for T, move in zip(state.T_rig_from_board, board_step, strict=True)])
-    return replace(state, lenses=state.lenses + by_camera[:, :LENS_SIZE], T_camera_from_rig=places, T_rig_from_board=boards)
+    places = np.stack(
+        [
+            _turned(T, move)
+            for T, move in zip(state.T_camera_from_rig, by_camera[:, LENS_SIZE:], strict=True)
+        ]
+    )
+    boards = np.stack(
+        [_turned(T, move) for T, move in zip(state.T_rig_from_board, board_step, strict=True)]
+    )
+    return replace(
+        state,
+        lenses=state.lenses + by_camera[:, :LENS_SIZE],
+        T_camera_from_rig=places,
+        T_rig_from_board=boards,
+    )
 
 
 def _turned(T: Array, move: Array) -> Array:
-    return transform(rotation_from_vector(move[:3]) @ T[:3, :3], T[:3, 3] + move[3:]) if np.any(move) else T
+    return (
+        transform(rotation_from_vector(move[:3]) @ T[:3, :3], T[:3, 3] + move[3:])
+        if np.any(move)
+        else T
+    )
 
 
-def _result(corners: Corners, state: State, equations: _Equations, chosen: np.ndarray, boards: bool, steps: int) -> Adjusted:
+def _result(
+    corners: Corners,
+    state: State,
+    equations: _Equations,
+    chosen: np.ndarray,
+    boards: bool,
+    steps: int,
+) -> Adjusted:
     error = corner_errors(corners, state)
     unknowns = len(chosen) + (POSE_SIZE * len(state.T_rig_from_board) if boards else 0)
     variance = float(np.sum(error * error)) / max(1, error.size - unknowns)
-    sigma = np.sqrt(variance * equations.camera_variance(chosen, boards)).reshape(len(state.lenses), CAMERA_SIZE)
-    return Adjusted(state, tuple(np.split(error, corners.ends[:-1])), sigma[:, :LENS_SIZE], sigma[:, LENS_SIZE:], steps)
+    sigma = np.sqrt(variance * equations.camera_variance(chosen, boards)).reshape(
+        len(state.lenses), CAMERA_SIZE
+    )
+    return Adjusted(
+        state,
+        tuple(np.split(error, corners.ends[:-1])),
+        sigma[:, :LENS_SIZE],
+        sigma[:, LENS_SIZE:],
+        steps,
+    )

@@ -1,7 +1,9 @@
-"""The camera model as the adjustment needs it: projection with derivatives, and undistortion that converges. Pure.
+"""The camera model as the adjustment needs it: projection with derivatives, and undistortion that
+converges. Pure.
 
-The model is rhot.geometry.camera's (pinhole, Brown-Conrady k1, k2, p1, p2, k3); a lens is one vector of nine numbers. Points behind a camera
-project to NaN; a pixel that no ray of the model reaches undistorts to NaN.
+The model is rhot.geometry.camera's (pinhole, Brown-Conrady k1, k2, p1, p2, k3); a lens is one
+vector of nine numbers. Points behind a camera project to NaN; a pixel that no ray of the model
+reaches undistorts to NaN.
 """
 
 from __future__ import annotations
@@ -16,7 +18,9 @@ FX, FY, CX, CY, K1, K2, P1, P2, K3 = range(9)
 LENS_SIZE = 9
 
 
-def lens_camera(name: str, size_px: tuple[int, int], lens: Array, T_rig_from_camera: Array) -> Camera:
+def lens_camera(
+    name: str, size_px: tuple[int, int], lens: Array, T_rig_from_camera: Array
+) -> Camera:
     """rhot's Camera of a lens vector (9,)."""
     matrix = np.array([[lens[FX], 0.0, lens[CX]], [0.0, lens[FY], lens[CY]], [0.0, 0.0, 1.0]])
     return Camera(name, size_px, matrix, lens[K1:].copy(), T_rig_from_camera)
@@ -24,17 +28,22 @@ def lens_camera(name: str, size_px: tuple[int, int], lens: Array, T_rig_from_cam
 
 def lens_vector(matrix: Array, distortion: Array) -> Array:
     """The lens vector (9,) of a pinhole matrix (3, 3) and (k1, k2, p1, p2, k3)."""
-    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion], dtype=np.float64)
+    return np.array(
+        [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion], dtype=np.float64
+    )
 
 
 def project(lens: Array, p_camera: Array) -> Array:
-    """Pixels (n, 2) of points (n, 3) in the camera frame, of one lens (9,) or a lens for each point (n, 9)."""
+    """Pixels (n, 2) of points (n, 3) in the camera frame, of one lens (9,) or a lens for each point
+    (n, 9).
+    """
     z = np.where(p_camera[:, 2] > 0.0, p_camera[:, 2], np.nan)
     return _pixels(lens, distort(p_camera[:, :2] / z[:, None], lens[..., K1:].T))
 
 
 def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array, Array]:
-    """Pixels (n, 2), their derivatives by the point in the camera frame (n, 2, 3) and by the lens (n, 2, 9).
+    """Pixels (n, 2), their derivatives by the point in the camera frame (n, 2, 3) and by the lens
+    (n, 2, 9).
 
     lens is (n, 9): one row for each point. OpenCV's documentation of calib3d gives the model.
     """
@@ -59,7 +68,10 @@ def project_with_derivatives(lens: Array, p_camera: Array) -> tuple[Array, Array
 
 
 def rays(lens: Array, pixels: Array) -> Array:
-    """Undistorted image points (x/z, y/z) (n, 2) of pixels (n, 2); NaN where the model has no inverse."""
+    """Undistorted image points (x/z, y/z) (n, 2) of pixels (n, 2).
+
+    NaN where the model has no inverse.
+    """
     return undistort((pixels - lens[[CX, CY]]) / lens[[FX, FY]], lens[K1:])
 
 

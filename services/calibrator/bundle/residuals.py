@@ -1,6 +1,8 @@
-"""Views of boards, the state that explains them, and how both depend on each other: the geometry under the adjustment. Pure.
+"""Views of boards, the state that explains them, and how both depend on each other: the geometry
+under the adjustment. Pure.
 
-A corner behind its camera has a NaN error; the adjustment never goes there, and whoever starts there sees it in the cost.
+A corner behind its camera has a NaN error; the adjustment never goes there, and whoever starts
+there sees it in the cost.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ CAMERA_SIZE, POSE_SIZE = LENS_SIZE + 6, 6
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The corners of one board position in one camera's picture: numbers ids (n,), points (n, 3) of the board, pixels (n, 2)."""
+    """The corners of one board position in one camera's picture: numbers ids (n,), points (n, 3) of
+    the board, pixels (n, 2).
+    """
 
     camera: int
     board: int
@@ -29,7 +33,9 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Lens vectors (c, 9), camera places T_camera_from_rig (c, 4, 4), board poses T_rig_from_board (b, 4, 4)."""
+    """Lens vectors (c, 9), camera places T_camera_from_rig (c, 4, 4), board poses T_rig_from_board
+    (b, 4, 4).
+    """
 
     lenses: Array
     T_camera_from_rig: Array
@@ -86,9 +92,11 @@ def corner_errors(corners: Corners, state: State) -> Array:
 
 
 def derivatives(views: list[View], state: State) -> tuple[Array, Array]:
-    """Errors (n, 2) of all corners, and the derivative of the projection (n, 2, 21) by the corner's camera and board.
+    """Errors (n, 2) of all corners, and the derivative of the projection (n, 2, 21) by the corner's
+    camera and board.
 
-    Columns: lens 9, then rotation 3 and translation 3 of T_camera_from_rig, then of T_rig_from_board.
+    Columns: lens 9, then rotation 3 and translation 3 of T_camera_from_rig, then of
+    T_rig_from_board.
     """
     return corner_derivatives(stacked(views), state)
 
@@ -99,7 +107,9 @@ def corner_derivatives(corners: Corners, state: State) -> tuple[Array, Array]:
     R_c = T_cr[:, :3, :3]
     turned = np.einsum("nij,nj->ni", T_rb[:, :3, :3], corners.points)
     rotated = np.einsum("nij,nj->ni", R_c, turned + T_rb[:, :3, 3])
-    pixels, by_point, by_lens = project_with_derivatives(state.lenses[corners.camera], rotated + T_cr[:, :3, 3])
+    pixels, by_point, by_lens = project_with_derivatives(
+        state.lenses[corners.camera], rotated + T_cr[:, :3, 3]
+    )
     J = np.empty((len(turned), 2, CAMERA_SIZE + POSE_SIZE))
     J[:, :, :9] = by_lens
     # d(exp(w) v)/dw = -[v]x, and u^T (-[v]x) = (v x u)^T.

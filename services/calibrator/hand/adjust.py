@@ -1,8 +1,10 @@
-"""Bundle adjustment of a person over the poses of a recording: frames, then takes are eliminated (Schur complements), the rest is small.
+"""Bundle adjustment of a person over the poses of a recording: frames, then takes are eliminated
+(Schur complements), the rest is small.
 
-Levenberg and Marquardt's method (Triggs et al. 2000, section 6). The covariance of the person is that with all poses unknown.
-Data that determine nothing leave the prior, which is proper, so that the equations are always definite; numbers so absurd that they
-are not end the iteration at the best person so far.
+Levenberg and Marquardt's method (Triggs et al. 2000, section 6). The covariance of the person is
+that with all poses unknown. Data that determine nothing leave the prior, which is proper, so that
+the equations are always definite; numbers so absurd that they are not end the iteration at the best
+person so far.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ _DAMPING_START, _DAMPING_DOWN, _DAMPING_UP, _DAMPING_MOST = 1e-3, 0.2, 6.0, 1e8
 
 
 class Adjusted(NamedTuple):
-    """The person x (p,) in prior standard deviations, covariance (p, p), the poses, the equations there, and rounds used."""
+    """The person x (p,) in prior standard deviations, covariance (p, p), the poses, the equations
+    there, and rounds used.
+    """
 
     x: Array
     covariance: Array
@@ -54,8 +58,13 @@ def adjust(problem: Problem, x: Array, poses: Poses) -> Adjusted:
     return Adjusted(x, np.asarray(np.linalg.inv(A), dtype=np.float64), poses, found, used)
 
 
-def _solved(problem: Problem, found: Equations, damping: float) -> tuple[Array, Array, Array, Array]:
-    """Step of the person (p,), the frames (n, k) and the held angles (t, 20); and the person's information (p, p), poses eliminated."""
+def _solved(
+    problem: Problem, found: Equations, damping: float
+) -> tuple[Array, Array, Array, Array]:
+    """Step of the person (p,), the frames (n, k) and the held angles (t, 20).
+
+    And the person's information (p, p), poses eliminated.
+    """
     k, a, p = found.H.shape[1], found.H_held.shape[1], found.X.shape[2]
     H = found.H * (1.0 + damping * np.eye(k))
     # Frames: H y + B h + X x + g = 0.
@@ -72,5 +81,9 @@ def _solved(problem: Problem, found: Equations, damping: float) -> tuple[Array, 
     A = 0.5 * (A + A.T)
     dx = -np.linalg.solve(A + damping * np.diag(np.diag(found.H_person)), b)
     held = -(V[:, :, :p] @ dx) - V[:, :, p]
-    step = -Z[:, :, a + p] - np.einsum("nkp,p->nk", Z[:, :, a : a + p], dx) - np.einsum("nka,na->nk", Z[:, :, :a], held[problem.take_of])
+    step = (
+        -Z[:, :, a + p]
+        - np.einsum("nkp,p->nk", Z[:, :, a : a + p], dx)
+        - np.einsum("nka,na->nk", Z[:, :, :a], held[problem.take_of])
+    )
     return dx, step, held, A

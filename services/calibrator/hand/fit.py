@@ -1,7 +1,8 @@
 """From the frames of a guided recording to a person's hand. Pure and deterministic.
 
-Frames are (m landmarks) points in the rig frame with their sigmas, NaN where a landmark was not measured. Too little data of an
-exercise is a CalibrationError that names the exercise and what was wrong with it.
+Frames are (m landmarks) points in the rig frame with their sigmas, NaN where a landmark was not
+measured. Too little data of an exercise is a CalibrationError that names the exercise and what was
+wrong with it.
 """
 
 from __future__ import annotations
@@ -22,20 +23,24 @@ from services.calibrator.hand.hand_parameters import Shape
 from services.calibrator.hand.landmark_jacobian import marks_of
 from services.calibrator.hand.problem import Poses, Problem, Take
 
-# Frames of each exercise that are used. More are no better: what is wrong with them (held fingers that twitch, neighbours that follow)
-# is the same in all. On four simulated hands the solver's flexion error was 1.47 times that with true bones at 30, 1.31 at 12.
+# Frames of each exercise that are used. More are no better: what is wrong with them (held fingers
+# that twitch, neighbours that follow) is the same in all. On four simulated hands the solver's
+# flexion error was 1.47 times that with true bones at 30, 1.31 at 12.
 FRAMES = 12
-# What a held finger twitches, and skin moves over bone, beside the measurement's own noise: 1.47 times at 1 mm, 1.31 at
-# 2 mm; on six other hands orientation 1.2 times at 2 mm, 1.1 at 3 mm.
+# What a held finger twitches, and skin moves over bone, beside the measurement's own noise: 1.47
+# times at 1 mm, 1.31 at 2 mm; on six other hands orientation 1.2 times at 2 mm, 1.1 at 3 mm.
 _TWITCH_M = 3e-3
-# How straight "straight" is: abduction, first, second and last flexion; and the thumb's rest, which nobody is told.
+# How straight "straight" is: abduction, first, second and last flexion; and the thumb's rest, which
+# nobody is told.
 _STRAIGHT_DEG, _STRAIGHT_SD_DEG = (0.0, 4.0, 4.0, 0.0), (5.0, 6.0, 5.0, 4.0)
 _THUMB_DEG, _THUMB_SD_DEG = (5.0, 0.0, 10.0, 2.0), (10.0, 12.0, 10.0, 8.0)
-# A moving joint may be anywhere in its range; this only keeps one that nothing shows finite. Neighbours follow a little.
+# A moving joint may be anywhere in its range; this only keeps one that nothing shows finite.
+# Neighbours follow a little.
 _FREE_RAD, _FOLLOW_RAD = math.radians(60.0), math.radians(5.0)
 # First guesses of a moving flexion; the one that explains the frame best is the start.
 _GUESSES_DEG = (5.0, 30.0, 55.0, 80.0)
-# Least tip movement (m) against the wrist that tells an exercise from standing still: a bend of a quarter of the way.
+# Least tip movement (m) against the wrist that tells an exercise from standing still: a bend of a
+# quarter of the way.
 _LEAST_MOVE_M = 0.02
 # Of an exercise's frames, how many must show wrist and all tips for its take to count.
 _LEAST_FRAMES = 10
@@ -43,7 +48,9 @@ _LEAST_FRAMES = 10
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of every exercise by name: points (n, m, 3) m, NaN where missing, and sigmas (n, m, 3) m; names (m,) of the landmarks."""
+    """Frames of every exercise by name: points (n, m, 3) m, NaN where missing, and sigmas (n, m, 3)
+    m; names (m,) of the landmarks.
+    """
 
     names: tuple[str, ...]
     points: Mapping[str, Array]
@@ -51,7 +58,10 @@ class Recording:
 
 
 def moving(exercise: Exercise) -> dict[int, float]:
-    """Angles that change during an exercise and their standard deviation, rad; a last joint follows by its coupling."""
+    """Angles that change during an exercise and their standard deviation, rad.
+
+    A last joint follows by its coupling.
+    """
     if exercise.kind == "spread":
         return dict.fromkeys((4, 12, 16), _FREE_RAD)
     column = {"knuckle": 1, "hook": 2, "thumb": 2}.get(exercise.kind)
@@ -59,7 +69,11 @@ def moving(exercise: Exercise) -> dict[int, float]:
         return {}
     angles = {4 * exercise.digit + column: _FREE_RAD}
     if exercise.digit > 0:
-        angles |= {4 * row + 1: _FOLLOW_RAD for row in (exercise.digit - 1, exercise.digit + 1) if 1 <= row <= 4}
+        angles |= {
+            4 * row + 1: _FOLLOW_RAD
+            for row in (exercise.digit - 1, exercise.digit + 1)
+            if 1 <= row <= 4
+        }
     return angles
 
 
@@ -100,20 +114,28 @@ def doubts(recording: Recording) -> list[str]:
         seen = ~np.isnan(points[:, :, 0])
         if exercise.kind != "fist" and int(seen.all(axis=1).sum()) < _LEAST_FRAMES:
             name = recording.names[int(seen.mean(axis=0).argmin())]
-            found.append(f"{exercise.name}: {name} was measured in {int(seen.mean(axis=0).min() * 100)} % of {len(points)} frames only")
+            found.append(
+                f"{exercise.name}: {name} was measured in {int(seen.mean(axis=0).min() * 100)} % of {len(points)} frames only"
+            )
         elif exercise.digit >= 0:
             tip = recording.names.index(TIPS[exercise.digit])
             wrist = recording.names.index("wrist")
             far = np.linalg.norm(points[:, tip] - points[:, wrist], axis=1)
-            if not float(np.nanmax(far) - np.nanmin(far)) > (_LEAST_MOVE_M if exercise.digit else 0.25 * _LEAST_MOVE_M):
-                found.append(f"{exercise.name}: the {TIPS[exercise.digit].replace('_', ' ')} did not move ({exercise.prompt})")
+            if not float(np.nanmax(far) - np.nanmin(far)) > (
+                _LEAST_MOVE_M if exercise.digit else 0.25 * _LEAST_MOVE_M
+            ):
+                found.append(
+                    f"{exercise.name}: the {TIPS[exercise.digit].replace('_', ' ')} did not move ({exercise.prompt})"
+                )
     return found
 
 
 def _chosen(points: Array) -> npt.NDArray[np.int64]:
     """Rows of up to FRAMES frames, evenly over those that show everything."""
     whole = np.nonzero(~np.isnan(points).any(axis=(1, 2)))[0]
-    return whole[np.unique(np.linspace(0, len(whole) - 1, min(FRAMES, len(whole))).round().astype(np.int64))]
+    return whole[
+        np.unique(np.linspace(0, len(whole) - 1, min(FRAMES, len(whole))).round().astype(np.int64))
+    ]
 
 
 def _scale(recording: Recording, table: HandModel) -> float:
@@ -123,11 +145,15 @@ def _scale(recording: Recording, table: HandModel) -> float:
     wrist, points = recording.names.index("wrist"), recording.points["open"]
     ratios = []
     for tip in TIPS[1:]:
-        far = np.nanmedian(np.linalg.norm(points[:, recording.names.index(tip)] - points[:, wrist], axis=1))
+        far = np.nanmedian(
+            np.linalg.norm(points[:, recording.names.index(tip)] - points[:, wrist], axis=1)
+        )
         ratios.append(far / np.linalg.norm(own[tip] - own["wrist"]))
     scale = float(np.mean(ratios))
     if not 0.4 <= scale <= 1.6:
-        raise CalibrationError(f"the open hand is {scale:.2f} times the size of an adult's: are units and markers of rig.toml right?")
+        raise CalibrationError(
+            f"the open hand is {scale:.2f} times the size of an adult's: are units and markers of rig.toml right?"
+        )
     return scale
 
 
@@ -140,18 +166,27 @@ def _take(exercise: Exercise, count: int) -> Take:
 
 
 def first_poses(problem: Problem, x: Array) -> Poses:
-    """Where to begin: of a few bends of what moves, the one whose landmarks fit each frame best, laid on rigidly (Kabsch 1976)."""
+    """Where to begin: of a few bends of what moves, the one whose landmarks fit each frame best,
+    laid on rigidly (Kabsch 1976).
+    """
     n, f = len(problem.points), problem.most
     measures, best = problem.shape.geometry(x), np.full(n, np.inf)
-    # Only the flexion that is exercised is tried bent; a bend of what is spread, or follows, is small.
+    # Only the flexion that is exercised is tried bent; a bend of what is spread, or follows, is
+    # small.
     bends = np.array(
-        [[a % 4 > 0 and sd >= _FREE_RAD for a, sd in take.moving.items()] + [False] * (f - len(take.moving)) for take in problem.takes]
+        [
+            [a % 4 > 0 and sd >= _FREE_RAD for a, sd in take.moving.items()]
+            + [False] * (f - len(take.moving))
+            for take in problem.takes
+        ]
     )
     R, t, moving_rad = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros((n, f))
     for guess in np.deg2rad(_GUESSES_DEG):
         tried = np.where(bends[problem.take_of], guess, 0.0)
         poses = Poses(R, t, tried, problem.expected)
-        marks = marks_of(problem.shape, measures, problem.angles(measures, poses), problem.shape.table.side).points
+        marks = marks_of(
+            problem.shape, measures, problem.angles(measures, poses), problem.shape.table.side
+        ).points
         new_R, new_t, cost = _laid(marks, problem.points, problem.weights[:, :, 0] > 0.0)
         better = cost < best
         R, t = np.where(better[:, None, None], new_R, R), np.where(better[:, None], new_t, t)

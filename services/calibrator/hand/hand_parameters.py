@@ -1,8 +1,10 @@
-"""What differs between two people's hands, as a vector of unknowns that each have the standard deviation 1 before the first look.
+"""What differs between two people's hands, as a vector of unknowns that each have the standard
+deviation 1 before the first look.
 
-x = 0 is the hand of the tables at some size. An unknown's prior is the spread of the population, so a posterior standard
-deviation of 1 means "the recording said nothing of this, it is the table's", and 0.1 "ten times better known than by the table".
-Lengths that were measured by hand are no unknowns. A model without paint for a named landmark is the caller's error (KeyError).
+x = 0 is the hand of the tables at some size. An unknown's prior is the spread of the population, so
+a posterior standard deviation of 1 means "the recording said nothing of this, it is the table's",
+and 0.1 "ten times better known than by the table". Lengths that were measured by hand are no
+unknowns. A model without paint for a named landmark is the caller's error (KeyError).
 """
 
 from __future__ import annotations
@@ -13,25 +15,45 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector, skew
+from rhot.geometry.transforms import (
+    Array,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    skew,
+)
 from rhot.hand import CHAIN_JOINTS, DIGITS, JOINT_INDEX, TIPS, HandModel
 
-# Spread (standard deviation over mean) of the bones of one size of hand: Buryanov & Kotiuk 2010 (n = 66) give these over all
-# sizes, 0.07 to 0.15; hand length over both sexes spreads by 0.065, which is SIZE's part. At least 0.06, for X-rays measure well.
-BONE_SD = ((0.06, 0.073, 0.06), (0.104, 0.091, 0.131), (0.06, 0.093, 0.088), (0.068, 0.110, 0.109), (0.06, 0.122, 0.142))
+# Spread (standard deviation over mean) of the bones of one size of hand: Buryanov & Kotiuk 2010 (n
+# = 66) give these over all sizes, 0.07 to 0.15; hand length over both sexes spreads by 0.065, which
+# is SIZE's part. At least 0.06, for X-rays measure well.
+BONE_SD = (
+    (0.06, 0.073, 0.06),
+    (0.104, 0.091, 0.131),
+    (0.06, 0.093, 0.088),
+    (0.068, 0.110, 0.109),
+    (0.06, 0.122, 0.142),
+)
 METACARPAL_SD = (0.06, 0.067, 0.06, 0.06, 0.06)
 # About the size that the open hand showed, which itself is good to a few percent.
 SIZE_SD = 0.10
-# Where the first joint of a chain sits beside its metacarpal's direction; the thumb's saddle joint in all directions. People differ by
-# more, but how the wrist's frame lies in the hand is a convention: free by 1.5 and 3 mm (and 2 mm of the wrist's paint) it tilts, and
-# the orientation error of the solver was 1.3 instead of 1.2 times that with true bones.
+# Where the first joint of a chain sits beside its metacarpal's direction; the thumb's saddle joint
+# in all directions. People differ by more, but how the wrist's frame lies in the hand is a
+# convention: free by 1.5 and 3 mm (and 2 mm of the wrist's paint) it tilts, and the orientation
+# error of the solver was 1.3 instead of 1.2 times that with true bones.
 _ACROSS_M, _THUMB_BASE_M = 0.0007, 0.002
-# How a chain's straight posture may be turned about its axis of abduction and about its bone, rad. Tight: wrist and tips hardly
-# show it, and a finger whose roll is wrong by 6 deg doubles the solver's error, so that guessing is worse than the table.
+# How a chain's straight posture may be turned about its axis of abduction and about its bone, rad.
+# Tight: wrist and tips hardly show it, and a finger whose roll is wrong by 6 deg doubles the
+# solver's error, so that guessing is worse than the table.
 _TURN_SD, _THUMB_TURN_SD = np.deg2rad([1.5, 1.0]), np.deg2rad([3.0, 3.0])
-# Where a dab of paint is put; the wrist's is part of the convention above. A dipped tip is painted all round:
-# its middle is on the bone's axis (first two coordinates) but for cameras' views, 0.3 radii in the worst case.
-_WRIST_PAINT_M, _PAINT_M, _TIP_PAINT_M = (0.001, 0.001, 0.001), (0.002, 0.002, 0.002), (0.0005, 0.0005, 0.002)
+# Where a dab of paint is put; the wrist's is part of the convention above. A dipped tip is painted
+# all round: its middle is on the bone's axis (first two coordinates) but for cameras' views, 0.3
+# radii in the worst case.
+_WRIST_PAINT_M, _PAINT_M, _TIP_PAINT_M = (
+    (0.001, 0.001, 0.001),
+    (0.002, 0.002, 0.002),
+    (0.0005, 0.0005, 0.002),
+)
 # DIP/PIP of real hands: .68-.74 in strong flexion, less when relaxed (finger study, Fig. 7).
 _COUPLING_SD = 0.05
 
@@ -41,8 +63,9 @@ SIZE, BONES, BASES, TURNS, PAINT = 0, slice(1, 16), slice(16, 31), slice(31, 41)
 class Geometry(NamedTuple):
     """A person's measures in metres, and how they change with the unknowns.
 
-    G has one row per measure: lengths (15), bases (15), metacarpals (15), turns of the chains in the wrist frame (15 rotation
-    vectors' coordinates), offsets (3 per landmark), coupling ratios (5).
+    G has one row per measure: lengths (15), bases (15), metacarpals (15), turns of the chains in
+    the wrist frame (15 rotation vectors' coordinates), offsets (3 per landmark), coupling ratios
+    (5).
     """
 
     lengths: Array  # (5, 3)
@@ -57,20 +80,34 @@ class Geometry(NamedTuple):
 class Shape:
     """The unknowns of one person seen through some landmarks."""
 
-    def __init__(self, table: HandModel, names: Sequence[str], lengths_m: Mapping[tuple[int, int], float] | None = None) -> None:
-        """table: the hand at x = 0; names: landmarks in the recording; lengths_m: (digit, bone) -> metres measured by hand."""
+    def __init__(
+        self,
+        table: HandModel,
+        names: Sequence[str],
+        lengths_m: Mapping[tuple[int, int], float] | None = None,
+    ) -> None:
+        """table: the hand at x = 0; names: landmarks in the recording.
+
+        Lengths_m: (digit, bone) -> metres measured by hand.
+        """
         self.table, self.names = table, tuple(names)
         self.known = dict(lengths_m or {})
         self.unknowns = PAINT + 3 * len(self.names) + 5
         self.measures = 60 + 3 * len(self.names) + 5
-        # Of each landmark: row of its chain and place in it; (-1, 0) wrist, (-1, 1) palm, (-2, row) start of a metacarpal.
+        # Of each landmark: row of its chain and place in it; (-1, 0) wrist, (-1, 1) palm, (-2, row)
+        # start of a metacarpal.
         self.places = [_place(name) for name in self.names]
         self._lengths = table.lengths_m
         self._metacarpals = np.array([digit.metacarpal_m for digit in table.digits])
         self._bases = np.array([digit.base_m for digit in table.digits])
-        self._rotations = np.array([rotation_from_quaternion(digit.base_wxyz) for digit in table.digits])
+        self._rotations = np.array(
+            [rotation_from_quaternion(digit.base_wxyz) for digit in table.digits]
+        )
         self._offsets = np.array([table.paint[name].offset_m for name in self.names])
-        sds = [_WRIST_PAINT_M if name == "wrist" else _TIP_PAINT_M if name in TIPS else _PAINT_M for name in self.names]
+        sds = [
+            _WRIST_PAINT_M if name == "wrist" else _TIP_PAINT_M if name in TIPS else _PAINT_M
+            for name in self.names
+        ]
         self._paint_sd = np.array(sds)
         # Paint on a tip reaches as far from its end on every hand.
         self._grows = np.array([name not in TIPS for name in self.names])
@@ -96,7 +133,10 @@ class Shape:
         return Geometry(lengths, bases, metacarpals, rotations, offsets, ratios, G)
 
     def model(self, x: Array) -> HandModel:
-        """The person x as a hand model; limits and what was not looked at are the table's, at the person's size."""
+        """The person x as a hand model.
+
+        Limits and what was not looked at are the table's, at the person's size.
+        """
         found, size = self.geometry(x), float(np.exp(SIZE_SD * x[SIZE]))
         digits = tuple(
             msgspec.structs.replace(
@@ -104,7 +144,9 @@ class Shape:
                 lengths_m=_vector(found.lengths[row]),
                 base_m=_vector(found.bases[row]),
                 metacarpal_m=_vector(found.metacarpals[row]),
-                base_wxyz=tuple(np.round(quaternion_from_rotation(found.rotations[row]), 9).tolist()),
+                base_wxyz=tuple(
+                    np.round(quaternion_from_rotation(found.rotations[row]), 9).tolist()
+                ),
                 radii_m=_vector(size * np.array(digit.radii_m)),
                 coupling=round(float(found.ratios[row]), 4),
             )
@@ -115,8 +157,13 @@ class Shape:
             offset = (1.0 if name in TIPS else size) * np.array(dab.offset_m)
             if name in self.names:
                 offset = found.offsets[self.names.index(name)]
-            paint[name] = msgspec.structs.replace(dab, offset_m=_vector(offset), radius_m=round(size * dab.radius_m, 6))
-        radii = {name: round(size * getattr(self.table, name), 6) for name in ("wrist_radius_m", "palm_radius_m")}
+            paint[name] = msgspec.structs.replace(
+                dab, offset_m=_vector(offset), radius_m=round(size * dab.radius_m, 6)
+            )
+        radii = {
+            name: round(size * getattr(self.table, name), 6)
+            for name in ("wrist_radius_m", "palm_radius_m")
+        }
         return msgspec.structs.replace(self.table, digits=digits, paint=paint, **radii)
 
     def _grown(self, x: Array, size: float, G: Array) -> Array:
@@ -170,12 +217,19 @@ def _place(name: str) -> tuple[int, int]:
 
 
 def _left_jacobian(turn: Array) -> Array:
-    """J with exp(turn + J^-1 w) = exp(w) exp(turn) to first order in w (Sola et al. 2018, eq. 145); (3,) -> (3, 3)."""
+    """J with exp(turn + J^-1 w) = exp(w) exp(turn) to first order in w (Sola et al. 2018, eq.
+
+    145); (3,) -> (3, 3).
+    """
     angle = float(np.linalg.norm(turn))
     cross = skew(turn)
     if angle < 1e-4:
         return np.eye(3) + 0.5 * cross + cross @ cross / 6.0
-    return np.eye(3) + (1.0 - np.cos(angle)) / angle**2 * cross + (angle - np.sin(angle)) / angle**3 * (cross @ cross)
+    return (
+        np.eye(3)
+        + (1.0 - np.cos(angle)) / angle**2 * cross
+        + (angle - np.sin(angle)) / angle**3 * (cross @ cross)
+    )
 
 
 def _vector(values: Array) -> tuple:  # micrometres

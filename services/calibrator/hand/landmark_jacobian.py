@@ -1,7 +1,8 @@
 """Where the landmarks of many frames are for given angles, with derivatives.
 
-All in the wrist frame. A frame's 26 unknowns are a small turn and shift of the wrist (both in the wrist frame) and the 20 angles;
-the person's are the measures of shape.Geometry. Plain numpy over all frames at once: a calibration looks at a hundred.
+All in the wrist frame. A frame's 26 unknowns are a small turn and shift of the wrist (both in the
+wrist frame) and the 20 angles; the person's are the measures of shape.Geometry. Plain numpy over
+all frames at once: a calibration looks at a hundred.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from rhot.geometry.transforms import Array
 from services.calibrator.hand.hand_parameters import Geometry, Shape
 
 UNKNOWNS = 26
-# The joint about whose root each of a chain's angles turns: abduction and first flexion share theirs.
+# The joint about whose root each of a chain's angles turns: abduction and first flexion share
+# theirs.
 _ROOT = (0, 0, 1, 2)
 
 
@@ -53,7 +55,9 @@ def marks_of(shape: Shape, measures: Geometry, angles: Array, side: float) -> Ma
 
 
 def _chains(measures: Geometry, angles: Array, side: float) -> tuple[Array, Array, Array]:
-    """Roots (n, 5, 4, 3) and axes (n, 5, 4, 3) of the joints, and the bones' frames (n, 5, 3, 3, 3)."""
+    """Roots (n, 5, 4, 3) and axes (n, 5, 4, 3) of the joints, and the bones' frames (n, 5, 3, 3,
+    3).
+    """
     n = len(angles)
     roots, axes, frames = np.empty((n, 5, 4, 3)), np.empty((n, 5, 4, 3)), np.empty((n, 5, 3, 3, 3))
     for row in range(5):
@@ -88,4 +92,6 @@ def _cross_columns(v: Array) -> Array:
     """Columns e_j x v; (n, 3) -> (n, 3, 3)."""
     zero = np.zeros(len(v))
     x, y, z = v.T
-    return np.stack([np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], axis=2)
+    return np.stack(
+        [np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], axis=2
+    )

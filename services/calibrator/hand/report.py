@@ -1,6 +1,7 @@
 """What a calibration found, as numbers for a file and lines for a person. Pure.
 
-A length is called determined by how much of the tables' spread the recording took away; what it left is the table's.
+A length is called determined by how much of the tables' spread the recording took away; what it
+left is the table's.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from services.calibrator.hand.fit import FRAMES
 from services.calibrator.hand.hand_parameters import SIZE, Shape
 from services.calibrator.hand.problem import Problem
 
-# Share of the spread that the tables leave at a known size of the hand: at 0.6 the recording weighs twice what the table does.
+# Share of the spread that the tables leave at a known size of the hand: at 0.6 the recording weighs
+# twice what the table does.
 _DETERMINED, _PARTLY = 0.6, 0.85
 _BONES = (("metacarpal", "proximal", "distal"), *(("proximal", "middle", "distal"),) * 4)
 
@@ -47,17 +49,25 @@ class HandFile(HandModel, frozen=True, kw_only=True):
     frames: int = 0
     residual_m: float = 0.0
     lengths: list[Length] = msgspec.field(default_factory=list)
-    # Largest angles the exercises showed, deg: of each finger at the knuckle and at its middle joint.
+    # Largest angles the exercises showed, deg: of each finger at the knuckle and at its middle
+    # joint.
     reached_deg: dict[str, float] = msgspec.field(default_factory=dict)
 
 
-def hand_file(problem: Problem, found: Adjusted, table: HandModel, *, date: str, inputs: str) -> HandFile:
-    """Everything that goes into the file; table is the hand that the estimates are compared with."""
+def hand_file(
+    problem: Problem, found: Adjusted, table: HandModel, *, date: str, inputs: str
+) -> HandFile:
+    """Everything that goes into the file.
+
+    Table is the hand that the estimates are compared with.
+    """
     shape = problem.shape
     model = shape.model(found.x)
     distances = found.found.distances
     # Whitened distances back to metres, per coordinate.
-    residual = float(np.sqrt((distances**2 / np.maximum(problem.weights.mean(axis=2), 1.0)).mean() / 3.0))
+    residual = float(
+        np.sqrt((distances**2 / np.maximum(problem.weights.mean(axis=2), 1.0)).mean() / 3.0)
+    )
     reached = _reached(problem, found)
     digits = tuple(_widened(digit, reached) for digit in model.digits)
     fields = {name: getattr(model, name) for name in model.__struct_fields__}
@@ -85,9 +95,15 @@ def report_text(made: HandFile) -> str:
         lines.append(f"{length.name:26} {numbers}  {_WORDS[length.source]}")
     reached = ", ".join(f"{name} {angle:.0f}" for name, angle in made.reached_deg.items())
     lines.append(f"bends reached (deg): {reached}")
-    paint = ", ".join(f"{name.removesuffix('_tip')} {1e3 * made.paint[name].offset_m[2]:.1f}" for name in TIPS)
-    lines.append(f"middle of the paint, mm before the end of the finger: {paint} (tips alone show only bone minus paint)")
-    lines.append(f"{made.frames} frames (at most {FRAMES} an exercise), residual {1e3 * made.residual_m:.2f} mm per coordinate")
+    paint = ", ".join(
+        f"{name.removesuffix('_tip')} {1e3 * made.paint[name].offset_m[2]:.1f}" for name in TIPS
+    )
+    lines.append(
+        f"middle of the paint, mm before the end of the finger: {paint} (tips alone show only bone minus paint)"
+    )
+    lines.append(
+        f"{made.frames} frames (at most {FRAMES} an exercise), residual {1e3 * made.residual_m:.2f} mm per coordinate"
+    )
     return "\n".join(lines)
 
 
@@ -101,8 +117,24 @@ def _lengths(shape: Shape, found: Adjusted, table: HandModel, G: Array) -> list[
     def add(name: str, was: float, now: float, row: Array, by_hand: bool = False) -> None:
         sigma, prior = (float(np.sqrt(np.maximum(row @ C @ row, 0.0))) for C in (after, before))
         left = sigma / prior if prior > 0.0 else 0.0
-        source: Source = "by hand" if by_hand else "data" if left < _DETERMINED else "partly" if left < _PARTLY else "table"
-        rows.append(Length(name=name, table_m=round(was, 6), estimate_m=round(now, 6), sigma_m=round(sigma, 6), source=source))
+        source: Source = (
+            "by hand"
+            if by_hand
+            else "data"
+            if left < _DETERMINED
+            else "partly"
+            if left < _PARTLY
+            else "table"
+        )
+        rows.append(
+            Length(
+                name=name,
+                table_m=round(was, 6),
+                estimate_m=round(now, 6),
+                sigma_m=round(sigma, 6),
+                source=source,
+            )
+        )
 
     for d, digit in enumerate(DIGITS):
         own, tip = np.zeros(len(G)), shape.names.index(TIPS[d])
@@ -112,11 +144,19 @@ def _lengths(shape: Shape, found: Adjusted, table: HandModel, G: Array) -> list[
             row = np.zeros(len(G))
             row[15 + 3 * d : 18 + 3 * d] = along / np.linalg.norm(along)
             row[30 + 3 * d : 33 + 3 * d] = -along / np.linalg.norm(along)
-            add(f"{digit} metacarpal", float(np.linalg.norm(was)), float(np.linalg.norm(along)), row)
+            add(
+                f"{digit} metacarpal", float(np.linalg.norm(was)), float(np.linalg.norm(along)), row
+            )
         for bone, name in enumerate(_BONES[d]):
             row = np.zeros(len(G))
             row[3 * d + bone] = own[3 * d + bone] = 1.0
-            add(f"{digit} {name}", table.digits[d].lengths_m[bone], model.digits[d].lengths_m[bone], row, (d, bone) in shape.known)
+            add(
+                f"{digit} {name}",
+                table.digits[d].lengths_m[bone],
+                model.digits[d].lengths_m[bone],
+                row,
+                (d, bone) in shape.known,
+            )
         own[60 + 3 * tip + 2] = -1.0
         sums = [sum(m.digits[d].lengths_m) - m.paint[TIPS[d]].offset_m[2] for m in (table, model)]
         add(f"{digit}, root to paint", sums[0], sums[1], own)
@@ -130,12 +170,17 @@ def _reached(problem: Problem, found: Adjusted) -> dict[str, float]:
         if take.name.endswith(("_knuckle", "_hook")):
             # The first moving angle of these takes is the exercised one.
             bends = found.poses.moving[problem.take_of == number, 0]
-            reached[take.name.replace("_", " ")] = round(float(np.rad2deg(np.percentile(bends, 99))), 1)
+            reached[take.name.replace("_", " ")] = round(
+                float(np.rad2deg(np.percentile(bends, 99))), 1
+            )
     return reached
 
 
 def _widened(digit: Digit, reached: dict[str, float]) -> Digit:
-    """Limits grow to what was reached; what was not asked to its end says nothing, so they never shrink."""
+    """Limits grow to what was reached.
+
+    What was not asked to its end says nothing, so they never shrink.
+    """
     limits = list(digit.limits_rad)
     for column, kind in ((1, "knuckle"), (2, "hook")):
         high = np.deg2rad(min(reached.get(f"{digit.name} {kind}", 0.0), 130.0))

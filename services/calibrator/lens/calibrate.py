@@ -1,8 +1,10 @@
-"""`rhot calibrate lens`: one camera's lens from pictures of a board, with the error it has on pictures it was not made from. Pure.
+"""`rhot calibrate lens`: one camera's lens from pictures of a board, with the error it has on
+pictures it was not made from. Pure.
 
-Pictures that contradict the others are left out and named. What cannot be calibrated - too few pictures, a board never tilted, one
-corner of the image only - is refused with a CalibrationError that says what is wrong and what to do: a lens that fits its pictures
-and is wrong elsewhere would be worse than none.
+Pictures that contradict the others are left out and named. What cannot be calibrated - too few
+pictures, a board never tilted, one corner of the image only - is refused with a CalibrationError
+that says what is wrong and what to do: a lens that fits its pictures and is wrong elsewhere would
+be worse than none.
 """
 
 from __future__ import annotations
@@ -19,7 +21,16 @@ from services.calibrator.bundle.adjust import Adjusted, Free, adjust
 from services.calibrator.bundle.initial_guess import calibrate_lens, with_poses
 from services.calibrator.bundle.lens_model import rays
 from services.calibrator.bundle.residuals import State, View, board_rms, rms
-from services.calibrator.bundle.views import LeftOut, alone, hurting, others, pull_percent, same_size, subset, view_of
+from services.calibrator.bundle.views import (
+    LeftOut,
+    alone,
+    hurting,
+    others,
+    pull_percent,
+    same_size,
+    subset,
+    view_of,
+)
 from services.calibrator.lens.checks import check_fit, check_lens, check_views, contradicting
 from services.calibrator.lens.model_selection import USUAL, LensModel, choose, folds
 
@@ -29,9 +40,11 @@ _ROUNDS = 4
 
 @dataclass(frozen=True)
 class PictureError:
-    """One picture: error of its corners in the calibration, and in the calibration from all other pictures.
+    """One picture: error of its corners in the calibration, and in the calibration from all other
+    pictures.
 
-    pull_percent is by how much this picture raises the error of all others, on average; hurts marks pictures to look at.
+    pull_percent is by how much this picture raises the error of all others, on average; hurts marks
+    pictures to look at.
     """
 
     key: str
@@ -80,7 +93,9 @@ def calibrate_camera(camera: str, detections: dict[str, Detection], board: Board
     model, _ = choose(lambda model: _held_out_rms(fit, model))
     fit = Fit(fit.keys, fit.views, _refit(fit, model))
     pictures = _picture_errors(fit, model, board)
-    seen = coverage(size_px, [view.pixels for view in fit.views], list(fit.found.state.T_rig_from_board))
+    seen = coverage(
+        size_px, [view.pixels for view in fit.views], list(fit.found.state.T_rig_from_board)
+    )
     result = LensResult(
         camera,
         size_px,
@@ -94,11 +109,19 @@ def calibrate_camera(camera: str, detections: dict[str, Detection], board: Board
         tuple(pictures),
         (*left_out, *contrary),
     )
-    return replace(result, warnings=check_lens(camera, size_px, result.lens, result.sigma, result.held_out_squares, seen))
+    return replace(
+        result,
+        warnings=check_lens(
+            camera, size_px, result.lens, result.sigma, result.held_out_squares, seen
+        ),
+    )
 
 
-def fit_lens(camera: str, size_px: tuple[int, int], detections: dict[str, Detection], board: Board) -> tuple[Fit, list[LeftOut]]:
-    """The usual lens model fitted to the pictures that agree with each other, and those that do not.
+def fit_lens(
+    camera: str, size_px: tuple[int, int], detections: dict[str, Detection], board: Board
+) -> tuple[Fit, list[LeftOut]]:
+    """The usual lens model fitted to the pictures that agree with each other, and those that do
+    not.
 
     Raises CalibrationError if too few are left.
     """
@@ -112,18 +135,35 @@ def fit_lens(camera: str, size_px: tuple[int, int], detections: dict[str, Detect
         bad = contradicting(errors, size_px[0])
         if not bad:
             break
-        left_out += [LeftOut(camera, keys[k], f"its corners are {errors[k]:.1f} px off, the others' {np.median(errors):.2f}") for k in bad]
+        left_out += [
+            LeftOut(
+                camera,
+                keys[k],
+                f"its corners are {errors[k]:.1f} px off, the others' {np.median(errors):.2f}",
+            )
+            for k in bad
+        ]
         keep = [k for k in range(len(keys)) if k not in bad]
         check_views(camera, len(keep), left_out)
-        keys, views = [keys[k] for k in keep], [replace(views[k], board=number) for number, k in enumerate(keep)]
+        keys, views = (
+            [keys[k] for k in keep],
+            [replace(views[k], board=number) for number, k in enumerate(keep)],
+        )
         found = calibrate_lens(size_px, views, USUAL.free)
     return Fit(keys, views, found), left_out
 
 
 def _refit(fit: Fit, model: LensModel) -> Adjusted:
-    """The fit with another model, beginning with the lens there is; numbers the model lacks are zero."""
+    """The fit with another model, beginning with the lens there is.
+
+    Numbers the model lacks are zero.
+    """
     lens = np.where(model.free, fit.found.state.lenses[0], 0.0)
-    return adjust(fit.views, replace(fit.found.state, lenses=lens[None]), Free(model.free[None], np.array([False])))
+    return adjust(
+        fit.views,
+        replace(fit.found.state, lenses=lens[None]),
+        Free(model.free[None], np.array([False])),
+    )
 
 
 def _held_out_rms(fit: Fit, model: LensModel) -> float:
@@ -153,15 +193,27 @@ def _picture_errors(fit: Fit, model: LensModel, board: Board) -> list[PictureErr
     for k, (key, view) in enumerate(zip(fit.keys, fit.views, strict=True)):
         rest, start = subset(fit.views, state, others(len(fit.views), np.array([k])))
         without = adjust(rest, start, Free(model.free[None], np.array([False])))
-        pull = pull_percent(errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rest)))
+        pull = pull_percent(
+            errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rest))
+        )
         lens = without.state.lenses[0]
-        pictures.append(PictureError(key, errors[k], rms(_pose_errors(lens, view)), _on_board(lens, view) / board.square_m, pull))
+        pictures.append(
+            PictureError(
+                key,
+                errors[k],
+                rms(_pose_errors(lens, view)),
+                _on_board(lens, view) / board.square_m,
+                pull,
+            )
+        )
     bad = hurting(errors, [picture.pull_percent for picture in pictures])
     return [replace(picture, hurts=hurts) for picture, hurts in zip(pictures, bad, strict=True)]
 
 
 def _on_board(lens: Array, view: View) -> float:
-    """RMS distance in metres, on the board's plane, between its corners and where the pixels' rays meet the plane."""
+    """RMS distance in metres, on the board's plane, between its corners and where the pixels' rays
+    meet the plane.
+    """
     T = with_poses(lens, [alone(view)], np.zeros(9, dtype=bool)).state.T_rig_from_board[0]
     seen = rays(lens, view.pixels)
     directions = np.concatenate([seen, np.ones((len(seen), 1))], axis=1) @ T[:3, :3]

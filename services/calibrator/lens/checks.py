@@ -13,21 +13,27 @@ from services.calibrator.bundle.views import LeftOut
 
 # Zhang (2000) needs three views in theory; with three, none can be held out.
 MIN_VIEWS = 4
-# A picture is left out if its corners are this many times as far off as the median picture's, and further than _OFF_PX at 640 px width.
+# A picture is left out if its corners are this many times as far off as the median picture's, and
+# further than _OFF_PX at 640 px width.
 _OFF_TIMES, _OFF_PX = 4.0, 0.6
 # More pictures than this share are never left out: then the median is not to be trusted either.
 _OFF_SHARE = 0.34
-# One sigma of the focal length: 1 % of it is 1 % of every distance. The real pairs reach .08 %, a board never tilted 5 % and more.
+# One sigma of the focal length: 1 % of it is 1 % of every distance. The real pairs reach .08 %, a
+# board never tilted 5 % and more.
 _FOCAL_REFUSED, _FOCAL_WARNED = 0.02, 0.004
-# RMS of the fit, px at 640 px width. The real pairs reach .17; blurred and moving boards stay below 1.
+# RMS of the fit, px at 640 px width. The real pairs reach .17; blurred and moving boards stay below
+# 1.
 _RMS_REFUSED = 3.0
-# Focal lengths in picture widths of lenses that this model describes: fields of view of 130 to 3 degrees.
+# Focal lengths in picture widths of lenses that this model describes: fields of view of 130 to 3
+# degrees.
 _FOCALS = (0.23, 20.0)
 # Boards this parallel leave focal length and distance inseparable. The real pairs span 60 degrees.
 _PARALLEL_DEG = 10.0
-# Share of the image cells with corners. The real pairs fill .7; below a fifth all views are in one place.
+# Share of the image cells with corners. The real pairs fill .7; below a fifth all views are in one
+# place.
 _COVERED_REFUSED, _COVERED_WARNED = 0.2, 0.6
-# Held-out error on the board in squares. The real pairs reach .005; a wrong count of corners or a bent board gives more than .1.
+# Held-out error on the board in squares. The real pairs reach .005; a wrong count of corners or a
+# bent board gives more than .1.
 _SQUARES_REFUSED, _SQUARES_WARNED = 0.1, 0.03
 
 _HOW_TO = (
@@ -54,7 +60,9 @@ def contradicting(errors: list[float], width_px: int) -> list[int]:
 
 
 def check_fit(camera: str, size_px: tuple[int, int], fit: Adjusted, corners: list[Array]) -> None:
-    """Raise CalibrationError, with the reason, if a lens fitted to these corners (n, 2) by view must not be used."""
+    """Raise CalibrationError, with the reason, if a lens fitted to these corners (n, 2) by view
+    must not be used.
+    """
     if not fit.rms_px <= _RMS_REFUSED * size_px[0] / 640.0:
         raise CalibrationError(
             f"camera {camera!r}: no lens explains the pictures; their corners are {fit.rms_px:.1f} px off (.2 is good). Is "
@@ -65,7 +73,12 @@ def check_fit(camera: str, size_px: tuple[int, int], fit: Adjusted, corners: lis
 
 
 def check_lens(
-    camera: str, size_px: tuple[int, int], lens: Array, sigma: Array, held_out_squares: float, seen: Coverage
+    camera: str,
+    size_px: tuple[int, int],
+    lens: Array,
+    sigma: Array,
+    held_out_squares: float,
+    seen: Coverage,
 ) -> tuple[str, ...]:
     """Warnings about a lens (9,) with sigmas (9,).
 
@@ -76,12 +89,18 @@ def check_lens(
     _refuse_geometry(camera, size_px, lens, focal, seen)
     warnings = []
     if focal > _FOCAL_WARNED:
-        warnings.append(f"the focal length is known to {100 * focal:.1f} % only; add pictures with the board tilted more")
+        warnings.append(
+            f"the focal length is known to {100 * focal:.1f} % only; add pictures with the board tilted more"
+        )
     if seen.share < _COVERED_WARNED or seen.missing:
         where = f" (missing: {seen.missing})" if seen.missing else ""
-        warnings.append(f"corners cover {100 * seen.share:.0f} % of the image{where}; lens errors are larger where they are missing")
+        warnings.append(
+            f"corners cover {100 * seen.share:.0f} % of the image{where}; lens errors are larger where they are missing"
+        )
     if held_out_squares > _SQUARES_WARNED:
-        warnings.append(f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were the pictures sharp?")
+        warnings.append(
+            f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were the pictures sharp?"
+        )
     border = _border(size_px)
     if not np.all(np.isfinite(rays(lens, border))):
         warnings.append(
@@ -99,9 +118,13 @@ def _refuse_fit(camera: str, held_out_squares: float) -> None:
         )
 
 
-def _refuse_geometry(camera: str, size_px: tuple[int, int], lens: Array, focal: float, seen: Coverage) -> None:
+def _refuse_geometry(
+    camera: str, size_px: tuple[int, int], lens: Array, focal: float, seen: Coverage
+) -> None:
     inside = 0 <= lens[CX] < size_px[0] and 0 <= lens[CY] < size_px[1]
-    if not (inside and all(_FOCALS[0] <= lens[name] / size_px[0] <= _FOCALS[1] for name in (FX, FY))):
+    if not (
+        inside and all(_FOCALS[0] <= lens[name] / size_px[0] <= _FOCALS[1] for name in (FX, FY))
+    ):
         raise CalibrationError(
             f"camera {camera!r}: the pictures do not determine the lens: the best fit has its centre at {lens[CX]:.0f}, {lens[CY]:.0f} px "
             f"and a focal length of {lens[FX]:.0f} px, which no camera has. Was the board never tilted? {_HOW_TO}"

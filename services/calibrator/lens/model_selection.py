@@ -1,7 +1,8 @@
-"""How many lens numbers the data supports: five nested models, chosen by the error on held-out pictures. Pure.
+"""How many lens numbers the data supports: five nested models, chosen by the error on held-out
+pictures. Pure.
 
-More numbers always lower the error on the pictures they were fitted to; on pictures left out they may raise it. The simplest model
-that comes within a hundredth of the best held-out error wins.
+More numbers always lower the error on the pictures they were fitted to; on pictures left out they
+may raise it. The simplest model that comes within a hundredth of the best held-out error wins.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from services.calibrator.bundle.lens_model import CX, CY, FX, FY, K1, K2, K3, P1
 
 # A simpler model may be this much worse: differences below are chance with 6..20 pictures.
 _SLACK = 1.01
-# Parts into which pictures are divided to choose a model: with ten, nine tenths of the pictures calibrate.
+# Parts into which pictures are divided to choose a model: with ten, nine tenths of the pictures
+# calibrate.
 _FOLDS = 10
 
 
@@ -45,12 +47,21 @@ USUAL = MODELS[3]
 
 
 def folds(count: int, parts: int = _FOLDS) -> list[np.ndarray]:
-    """Numbers 0..count-1 dealt into parts, neighbours into different ones; one each if there are fewer than parts."""
-    return [part for k in range(min(count, parts)) if len(part := np.arange(k, count, min(count, parts)))]
+    """Numbers 0..count-1 dealt into parts, neighbours into different ones.
+
+    One each if there are fewer than parts.
+    """
+    return [
+        part
+        for k in range(min(count, parts))
+        if len(part := np.arange(k, count, min(count, parts)))
+    ]
 
 
 def choose(held_out: Callable[[LensModel], float]) -> tuple[LensModel, dict[str, float]]:
-    """The simplest model whose held-out error is within a hundredth of the best, and every model's error."""
+    """The simplest model whose held-out error is within a hundredth of the best, and every model's
+    error.
+    """
     errors = {model.name: held_out(model) for model in MODELS}
     best = min(errors.values())
     chosen = next((model for model in MODELS if errors[model.name] <= _SLACK * best), USUAL)

@@ -1,4 +1,7 @@
-"""What `rhot calibrate` prints: the figures that matter first, then picture by picture. Pure text."""
+"""What `rhot calibrate` prints: the figures that matter first, then picture by picture.
+
+Pure text.
+"""
 
 from __future__ import annotations
 
@@ -50,12 +53,16 @@ def rig_text(result: RigResult) -> str:
     ]
     for k, name in enumerate(result.cameras):
         known = f"distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px"
-        lines.append(f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, {known}")
+        lines.append(
+            f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, {known}"
+        )
         if k:
             lines.append(f"    {_place(result.state.T_camera_from_rig[k], result.place_sigma[k])}")
         lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")
         lines += ["      " + row for row in result.coverage[k].drawing().splitlines()]
-    lines.append("  position          RMS px   held out: squares   square side   epipolar px   at mm   pull on the others")
+    lines.append(
+        "  position          RMS px   held out: squares   square side   epipolar px   at mm   pull on the others"
+    )
     for position in result.positions:
         error = position.held_out
         figures = (
@@ -63,7 +70,9 @@ def rig_text(result: RigResult) -> str:
             if error
             else f"{'seen by one camera only':>55}"
         )
-        lines.append(f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.hurts)}")
+        lines.append(
+            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.hurts)}"
+        )
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 
 
@@ -74,12 +83,20 @@ def refined_text(result: Refined) -> str:
         f"  held-out epipolar    {result.epipolar_px:.3f} px, before {result.epipolar_before_px:.3f} px",
     ]
     if result.wand_mm is not None:
-        lines.append(f"  held-out wand        {result.wand_mm[1]:.2f} mm off, before {result.wand_mm[0]:.2f} mm")
+        lines.append(
+            f"  held-out wand        {result.wand_mm[1]:.2f} mm off, before {result.wand_mm[0]:.2f} mm"
+        )
     else:
-        lines.append("  scale                kept: the distance of the first two cameras is taken as it was (a wand would measure it)")
+        lines.append(
+            "  scale                kept: the distance of the first two cameras is taken as it was (a wand would measure it)"
+        )
     for name, moved in result.moved.items():
         turned, shifted = (
-            _three(*pair) for pair in ((moved.turned_deg, moved.turned_sigma_deg), (moved.shifted_mm, moved.shifted_sigma_mm))
+            _three(*pair)
+            for pair in (
+                (moved.turned_deg, moved.turned_sigma_deg),
+                (moved.shifted_mm, moved.shifted_sigma_mm),
+            )
         )
         lines.append(
             f"  camera {name}: turned about its x, y, z by {turned} deg, shifted by {shifted} mm; stamps late by {moved.late_ms:.2f} ms"
@@ -88,18 +105,24 @@ def refined_text(result: Refined) -> str:
 
 
 def _three(values: Array, sigmas: Array) -> str:
-    return ", ".join(f"{value:.2f} +- {sigma:.2f}" for value, sigma in zip(values, sigmas, strict=True))
+    return ", ".join(
+        f"{value:.2f} +- {sigma:.2f}" for value, sigma in zip(values, sigmas, strict=True)
+    )
 
 
 def _lens(lens: Array, sigma: Array) -> str:
     known = f" +- {max(sigma[FX], sigma[FY]):.1f}" if np.any(sigma) else ""
     k = " ".join(f"{value:.3g}" for value in lens[K1:])
-    return f"f {lens[FX]:.1f}, {lens[FY]:.1f}{known} px, centre {lens[2]:.1f}, {lens[3]:.1f} px, ({k})"
+    return (
+        f"f {lens[FX]:.1f}, {lens[FY]:.1f}{known} px, centre {lens[2]:.1f}, {lens[3]:.1f} px, ({k})"
+    )
 
 
 def _place(T_camera_from_rig: Array, sigma: Array) -> str:
     p = 1e3 * inverse(T_camera_from_rig)[:3, 3]
-    angle = np.degrees(np.arccos(np.clip((np.trace(T_camera_from_rig[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+    angle = np.degrees(
+        np.arccos(np.clip((np.trace(T_camera_from_rig[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))
+    )
     return (
         f"at {p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f} mm (+- {1e3 * sigma[3:].max():.1f}), {np.linalg.norm(p):.1f} mm from the first camera, "
         f"turned {angle:.2f} degrees"
@@ -115,5 +138,7 @@ def _hurts(hurts: bool) -> str:
 
 
 def _notes(left_out: Sequence[LeftOut], warnings: Sequence[str]) -> list[str]:
-    lines = [f"  left out: {f'{item.camera} {item.key}'.strip()}: {item.reason}" for item in left_out]
+    lines = [
+        f"  left out: {f'{item.camera} {item.key}'.strip()}: {item.reason}" for item in left_out
+    ]
     return lines + [f"  warning: {warning}" for warning in warnings]

@@ -1,8 +1,10 @@
-"""The bundle adjustment under `rhot calibrate refine`: places of cameras that explain what they saw of moving markers. Pure.
+"""The bundle adjustment under `rhot calibrate refine`: places of cameras that explain what they saw
+of moving markers. Pure.
 
-The points are eliminated: for every trial of the places each marker instant is triangulated, and what is left in the pictures is
-minimised (Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6), robustly against wrong markers. Whatever the
-data, something finite comes out: the old places count as known to PRIOR_*, and a sigma near the prior's says that the data told nothing.
+The points are eliminated: for every trial of the places each marker instant is triangulated, and
+what is left in the pictures is minimised (Triggs et al., "Bundle Adjustment - A Modern Synthesis",
+1999, section 6), robustly against wrong markers. Whatever the data, something finite comes out: the
+old places count as known to PRIOR_*, and a sigma near the prior's says that the data told nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from services.calibrator.recalibrate.marker_tracks import Looks, Recording, look
 PRIOR_RAD, PRIOR_M = 0.05, 0.02
 # Clocks are known better than this, or the markers are useless.
 PRIOR_LATE_S = 0.02
-# Unknowns of each camera but the first: a turn about its own axes (3) rad, a shift in the rig frame (3) m, its stamps' lateness s.
+# Unknowns of each camera but the first: a turn about its own axes (3) rad, a shift in the rig frame
+# (3) m, its stamps' lateness s.
 SIZE = 7
 # Residuals beyond this lose weight, px: painted blobs of a moving hand scatter by .1-.3 px.
 _SOFT_PX = 0.5
@@ -41,14 +44,17 @@ def _cauchy(z: Array) -> Array:
     return np.stack([np.log(t), 1.0 / t, -1.0 / t**2])
 
 
-# Rounds of interpolating to the corrected clocks, within which tracks are taken as straight. The first must find its way from afar; to the
-# last, a wrong marker's four interpolated looks (1 % of wrong markers: 8 % of wrong looks) are as good as absent.
+# Rounds of interpolating to the corrected clocks, within which tracks are taken as straight. The
+# first must find its way from afar; to the last, a wrong marker's four interpolated looks (1 % of
+# wrong markers: 8 % of wrong looks) are as good as absent.
 _ROUNDS = (_soft_l1, _cauchy, _cauchy)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A recording, the places T_camera_from_rig (C, 4, 4) to begin with, focal lengths (C,), and two colours' numbers length_m apart."""
+    """A recording, the places T_camera_from_rig (C, 4, 4) to begin with, focal lengths (C,), and
+    two colours' numbers length_m apart.
+    """
 
     T: Array
     focals_px: Array
@@ -59,7 +65,10 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The unknowns (C - 1, SIZE) and their sigmas (C - 1, SIZE), 0 where held; and the places (C, 4, 4) they make."""
+    """The unknowns (C - 1, SIZE) and their sigmas (C - 1, SIZE), 0 where held.
+
+    And the places (C, 4, 4) they make.
+    """
 
     x: Array
     sigma: Array
@@ -88,7 +97,11 @@ def _moved(T: Array, x: Array) -> Array:
 def fit(problem: Problem, *, clocks_only: bool = False) -> Solution:
     """The places and clocks that explain the recording best; clocks_only: the places stay."""
     shape = (len(problem.T) - 1, SIZE)
-    free = np.tile(np.arange(SIZE) == SIZE - 1, (shape[0], 1)) if clocks_only else np.ones(shape, dtype=bool)
+    free = (
+        np.tile(np.arange(SIZE) == SIZE - 1, (shape[0], 1))
+        if clocks_only
+        else np.ones(shape, dtype=bool)
+    )
     x, sigma = np.zeros(shape), np.zeros(shape)
     for robust in _ROUNDS:
         start = x.copy()
@@ -102,12 +115,24 @@ def fit(problem: Problem, *, clocks_only: bool = False) -> Solution:
         def loss(z: Array, robust: Callable[[Array], Array] = robust) -> Array:
             # The last are priors and scale, which no outlier touches.
             n = len(z) - x.size - 1
-            return np.concatenate([robust(z[:n]), np.stack([z[n:], np.ones(len(z) - n), np.zeros(len(z) - n)])], axis=1)
+            return np.concatenate(
+                [robust(z[:n]), np.stack([z[n:], np.ones(len(z) - n), np.zeros(len(z) - n)])],
+                axis=1,
+            )
 
-        found = least_squares(residuals, x[free], x_scale=_scales(shape)[free], loss=loss, f_scale=_SOFT_PX, max_nfev=30)
+        found = least_squares(
+            residuals,
+            x[free],
+            x_scale=_scales(shape)[free],
+            loss=loss,
+            f_scale=_SOFT_PX,
+            max_nfev=30,
+        )
         x[free] = found.x
         variance = 2.0 * found.cost / max(len(found.fun) - len(found.x), 1)
-        sigma[free] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance, 0.0))
+        sigma[free] = np.sqrt(
+            np.maximum(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance, 0.0)
+        )
     return Solution(x, sigma, _moved(problem.T, x))
 
 
@@ -117,7 +142,10 @@ def _scales(shape: tuple[int, ...]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Located:
-    """Rays (C, n, 2) with weights (C, n) px, 0 where none, and the points (n, 3) they meet in; n = instants x markers."""
+    """Rays (C, n, 2) with weights (C, n) px, 0 where none, and the points (n, 3) they meet in.
+
+    N = instants x markers.
+    """
 
     rays: Array
     weights: Array
@@ -135,7 +163,9 @@ def _locate(problem: Problem, given: Looks, late_s: Array, T: Array) -> _Located
 
 
 def _residuals(problem: Problem, given: Looks, start: Array, x: Array) -> Array:
-    """Pixels left of every look, of the wand's length (px at its distance), of the scale, and of the priors; given is of start's clocks."""
+    """Pixels left of every look, of the wand's length (px at its distance), of the scale, and of
+    the priors; given is of start's clocks.
+    """
     T = _moved(problem.T, x)
     located = _locate(problem, given, _late_s(x) - _late_s(start), T)
     p_camera = np.einsum("cij,nj->cni", T[:, :3, :3], located.points) + T[:, None, :3, 3]
@@ -154,26 +184,46 @@ def _distance_m(T: Array) -> float:
     return float(np.linalg.norm(inverse(T[1])[:3, 3] - inverse(T[0])[:3, 3]))
 
 
-def _lengths(problem: Problem, ends: tuple[int, int], given: Looks, T: Array, located: _Located) -> tuple[Array, Array]:
-    """Error of the wand's length in m wherever both ends are located, and what a px in one picture makes of it."""
+def _lengths(
+    problem: Problem, ends: tuple[int, int], given: Looks, T: Array, located: _Located
+) -> tuple[Array, Array]:
+    """Error of the wand's length in m wherever both ends are located, and what a px in one picture
+    makes of it.
+    """
     several = given.seen.sum(axis=0) >= 2
     at = several[:, ends[0]] & several[:, ends[1]]
     points = located.points.reshape(*several.shape, 3)
     first, second = points[at, ends[0]], points[at, ends[1]]
     along, middle = second - first, 0.5 * (first + second) - inverse(T[0])[:3, 3]
-    length, distance = np.maximum(np.linalg.norm(along, axis=1), 1e-6), np.maximum(np.linalg.norm(middle, axis=1), 1e-3)
-    # What of the wand points away from the cameras is known as depth is, the rest as places in the picture are.
+    length, distance = (
+        np.maximum(np.linalg.norm(along, axis=1), 1e-6),
+        np.maximum(np.linalg.norm(middle, axis=1), 1e-3),
+    )
+    # What of the wand points away from the cameras is known as depth is, the rest as places in the
+    # picture are.
     share = np.abs(np.sum(along * middle, axis=1)) / (length * distance)
-    sigma = distance / problem.focals_px[0] * np.hypot(1.0, share * distance / max(_distance_m(T), 1e-3))
+    sigma = (
+        distance
+        / problem.focals_px[0]
+        * np.hypot(1.0, share * distance / max(_distance_m(T), 1e-3))
+    )
     return length - problem.length_m, sigma
 
 
 def points_of(problem: Problem, solution: Solution) -> tuple[Array, Array]:
-    """All located points (k, 3) in the first camera's frame, and the errors (j,) m of the wand's length (none without a wand)."""
+    """All located points (k, 3) in the first camera's frame, and the errors (j,) m of the wand's
+    length (none without a wand).
+    """
     given = looks(problem.recorded, solution.late_s)
     located = _locate(problem, given, np.zeros(len(problem.T)), solution.T)
-    points = located.points[located.weights.any(axis=0)] @ solution.T[0, :3, :3].T + solution.T[0, :3, 3]
-    errors = np.zeros(0) if problem.ends is None else _lengths(problem, problem.ends, given, solution.T, located)[0]
+    points = (
+        located.points[located.weights.any(axis=0)] @ solution.T[0, :3, :3].T + solution.T[0, :3, 3]
+    )
+    errors = (
+        np.zeros(0)
+        if problem.ends is None
+        else _lengths(problem, problem.ends, given, solution.T, located)[0]
+    )
     return points, errors
 
 
@@ -183,10 +233,14 @@ def epipolar(problem: Problem, solution: Solution) -> Array:
     for c in range(1, len(solution.T)):
         at = given.seen[0] & given.seen[c]
         between = solution.T[c] @ inverse(solution.T[0])
-        found.append(epipolar_px(between, given.rays[0][at], given.rays[c][at], float(problem.focals_px[c])))
+        found.append(
+            epipolar_px(between, given.rays[0][at], given.rays[c][at], float(problem.focals_px[c]))
+        )
     return np.concatenate(found)
 
 
 def scatter(values: Array) -> float:
-    """RMS of values (n,) as their median size tells it, as if normal about 0: a wrong marker now and then does not count. 0 of none."""
+    """RMS of values (n,) as their median size tells it, as if normal about 0: a wrong marker now
+    and then does not count. 0 of none.
+    """
     return 1.4826 * float(np.median(np.abs(values))) if len(values) else 0.0

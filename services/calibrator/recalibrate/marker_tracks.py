@@ -1,8 +1,11 @@
-"""Markers that several cameras followed, brought to common instants: what the rig's refinement works on. Pure.
+"""Markers that several cameras followed, brought to common instants: what the rig's refinement
+works on. Pure.
 
-Cameras run freely and read row by row, so every marker has its own instant. All tracks are interpolated to the instants of the first
-camera's middle row, by the cubic through four samples. Markers without a ray in the lens model, and instants inside a gap, count as
-not seen; cameras that are not in the rig are passed over; a picture size other than the lens calibration's is a CalibrationError.
+Cameras run freely and read row by row, so every marker has its own instant. All tracks are
+interpolated to the instants of the first camera's middle row, by the cubic through four samples.
+Markers without a ray in the lens model, and instants inside a gap, count as not seen; cameras that
+are not in the rig are passed over; a picture size other than the lens calibration's is a
+CalibrationError.
 """
 
 from __future__ import annotations
@@ -22,14 +25,17 @@ from services.calibrator.bundle.lens_model import lens_vector, rays
 
 # Samples further apart than this many usual steps enclose nobody knows what: a lost frame is 2.
 _GAP_STEPS = 2.5
-# Leaps are this many times the usual deviation from the neighbours, of which motion is a part; 5 px at the usual lens are none.
+# Leaps are this many times the usual deviation from the neighbours, of which motion is a part; 5 px
+# at the usual lens are none.
 _LEAP, _LEAP_MIN = 8.0, 0.01
 # Half the step of the numerical speed, s: short against a frame.
 _STEP_S = 1e-3
 
 
 def _cubic(times_s: Array, samples: Array, at_s: Array) -> Array:
-    """Values (m, 2) at instants (m,) of the cubics through four samples (m, 4, 2) at times (m, 4) each (Lagrange)."""
+    """Values (m, 2) at instants (m,) of the cubics through four samples (m, 4, 2) at times (m, 4)
+    each (Lagrange).
+    """
     weights = np.ones_like(times_s)
     for i in range(4):
         for j in range(4):
@@ -40,7 +46,9 @@ def _cubic(times_s: Array, samples: Array, at_s: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One marker in one camera: times (n,) s on the master's clock, ascending, and undistorted rays (n, 2)."""
+    """One marker in one camera: times (n,) s on the master's clock, ascending, and undistorted rays
+    (n, 2).
+    """
 
     times_s: Array
     rays: Array
@@ -64,7 +72,9 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """The colours (k), every camera's tracks by colour in the order of the rig, and the instants (m,) s that they are compared at."""
+    """The colours (k), every camera's tracks by colour in the order of the rig, and the instants
+    (m,) s that they are compared at.
+    """
 
     colors: list[str]
     tracks: list[dict[str, Track]]
@@ -73,7 +83,9 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Looks:
-    """What C cameras saw of k markers at m instants: rays and their derivatives by time (1/s), (C, m, k, 2), where seen (C, m, k)."""
+    """What C cameras saw of k markers at m instants: rays and their derivatives by time (1/s), (C,
+    m, k, 2), where seen (C, m, k).
+    """
 
     seen: npt.NDArray[np.bool_]
     rays: Array
@@ -85,7 +97,9 @@ def recording(frames: Iterable[MarkerFrame], cameras: Mapping[str, Camera]) -> R
 
     Raises CalibrationError for frames of another picture size than their camera's lens.
     """
-    found: dict[str, dict[str, list[tuple[float, float, float]]]] = {name: defaultdict(list) for name in cameras}
+    found: dict[str, dict[str, list[tuple[float, float, float]]]] = {
+        name: defaultdict(list) for name in cameras
+    }
     reference, instants_s = next(iter(cameras)), []
     begin_ns: int | None = None
     for frame in frames:
@@ -99,14 +113,24 @@ def recording(frames: Iterable[MarkerFrame], cameras: Mapping[str, Camera]) -> R
             )
         begin_ns = frame.stamp_ns if begin_ns is None else begin_ns
         # Relative to the first frame: float64 cannot hold nanoseconds since 1970.
-        start_s, row_s = (frame.stamp_ns - frame.clock_offset_ns - begin_ns) * 1e-9, frame.row_time_ns * 1e-9
+        start_s, row_s = (
+            (frame.stamp_ns - frame.clock_offset_ns - begin_ns) * 1e-9,
+            frame.row_time_ns * 1e-9,
+        )
         if frame.camera == reference:
             instants_s.append(start_s + 0.5 * camera.size_px[1] * row_s)
         for marker in frame.markers:
-            found[frame.camera][marker.color].append((start_s + marker.y_px * row_s, marker.x_px, marker.y_px))
+            found[frame.camera][marker.color].append(
+                (start_s + marker.y_px * row_s, marker.x_px, marker.y_px)
+            )
     colors = sorted({color for tracks in found.values() for color in tracks})
-    lenses = {name: lens_vector(camera.matrix, camera.distortion) for name, camera in cameras.items()}
-    tracks = [{color: _track(lenses[name], rows) for color, rows in by_color.items()} for name, by_color in found.items()]
+    lenses = {
+        name: lens_vector(camera.matrix, camera.distortion) for name, camera in cameras.items()
+    }
+    tracks = [
+        {color: _track(lenses[name], rows) for color, rows in by_color.items()}
+        for name, by_color in found.items()
+    ]
     return Recording(colors, tracks, np.unique(instants_s))
 
 
@@ -121,26 +145,42 @@ def _track(lens: Array, rows: list[tuple[float, float, float]]) -> Track:
 
 
 def _without_leaps(track: Track) -> Track:
-    """The track without samples that lie far from where their four neighbours expect them, as wrong markers do."""
+    """The track without samples that lie far from where their four neighbours expect them, as wrong
+    markers do.
+    """
     n = len(track.times_s)
     if n < 5:
         return track
     middle = np.clip(np.arange(n), 2, n - 3)
     around = middle[:, None] + np.array([-2, -1, 1, 2])
-    error = np.linalg.norm(_cubic(track.times_s[around], track.rays[around], track.times_s[middle]) - track.rays[middle], axis=1)
+    error = np.linalg.norm(
+        _cubic(track.times_s[around], track.rays[around], track.times_s[middle])
+        - track.rays[middle],
+        axis=1,
+    )
     keep = error <= max(_LEAP * float(np.median(error)), _LEAP_MIN)
     return Track(track.times_s[keep], track.rays[keep])
 
 
 def looks(recorded: Recording, late_s: Array) -> Looks:
-    """All cameras' views at the recording's instants; late_s (C,) is by how much each camera's stamps are late."""
+    """All cameras' views at the recording's instants.
+
+    late_s (C,) is by how much each camera's stamps are late.
+    """
     shape = (len(recorded.tracks), len(recorded.instants_s), len(recorded.colors))
     rays_at, speeds = np.full((*shape, 2), np.nan), np.full((*shape, 2), np.nan)
     for camera, tracks in enumerate(recorded.tracks):
         times_s = recorded.instants_s + late_s[camera]
         for number, color in enumerate(recorded.colors):
             if color in tracks:
-                before, now, after = (tracks[color].at(times_s + step_s) for step_s in (-_STEP_S, 0.0, _STEP_S))
-                rays_at[camera, :, number], speeds[camera, :, number] = now, (after - before) / (2.0 * _STEP_S)
+                before, now, after = (
+                    tracks[color].at(times_s + step_s) for step_s in (-_STEP_S, 0.0, _STEP_S)
+                )
+                rays_at[camera, :, number], speeds[camera, :, number] = (
+                    now,
+                    (after - before) / (2.0 * _STEP_S),
+                )
     seen = np.isfinite(rays_at).all(axis=3) & np.isfinite(speeds).all(axis=3)
-    return Looks(seen, np.where(seen[..., None], rays_at, 0.0), np.where(seen[..., None], speeds, 0.0))
+    return Looks(
+        seen, np.where(seen[..., None], rays_at, 0.0), np.where(seen[..., None], speeds, 0.0)
+    )

@@ -1,8 +1,11 @@
-"""`rhot calibrate stereo`: lenses and places of 2..N cameras from one board they saw together. Pure.
+"""`rhot calibrate stereo`: lenses and places of 2..N cameras from one board they saw together.
+Pure.
 
-First each camera's lens from its own pictures, then pairs of cameras, then one adjustment of everything. Every position of the board
-is left out once, and the calibration from the others triangulates it: the report's figures are those held-out errors. Pictures that
-contradict the others are left out and named. Data that cannot support a calibration are refused with a CalibrationError that says why.
+First each camera's lens from its own pictures, then pairs of cameras, then one adjustment of
+everything. Every position of the board is left out once, and the calibration from the others
+triangulates it: the report's figures are those held-out errors. Pictures that contradict the others
+are left out and named. Data that cannot support a calibration are refused with a CalibrationError
+that says why.
 """
 
 from __future__ import annotations
@@ -20,7 +23,15 @@ from services.calibrator.board.picture_folder import natural
 from services.calibrator.bundle.adjust import Adjusted, Free, adjust
 from services.calibrator.bundle.initial_guess import board_pose
 from services.calibrator.bundle.residuals import State, View, board_rms, pixel_errors, rms
-from services.calibrator.bundle.views import LeftOut, hurting, others, pull_percent, same_size, subset, view_of
+from services.calibrator.bundle.views import (
+    LeftOut,
+    hurting,
+    others,
+    pull_percent,
+    same_size,
+    subset,
+    view_of,
+)
 from services.calibrator.lens.calibrate import fit_lens
 from services.calibrator.lens.checks import check_fit, contradicting
 from services.calibrator.lens.model_selection import USUAL, LensModel, choose, folds
@@ -34,10 +45,11 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class PositionError:
-    """One position of the board: RMS px of its corners in the calibration, its error held out, and how much it hurts the others.
+    """One position of the board: RMS px of its corners in the calibration, its error held out, and
+    how much it hurts the others.
 
-    held_out is None where no two cameras see it. pull_percent is by how much this position raises the error of all others;
-    hurts marks positions to look at.
+    held_out is None where no two cameras see it. pull_percent is by how much this position raises
+    the error of all others; hurts marks positions to look at.
     """
 
     key: str
@@ -49,11 +61,12 @@ class PositionError:
 
 @dataclass(frozen=True, eq=False)
 class RigResult:
-    """The calibrated rig: cameras, sizes (w, h), lenses (c, 9) and T_camera_from_rig (c, 4, 4) with sigmas, and its errors.
+    """The calibrated rig: cameras, sizes (w, h), lenses (c, 9) and T_camera_from_rig (c, 4, 4) with
+    sigmas, and its errors.
 
-    rms_px is over all corners of all cameras. held_out_squares is the RMS over all corners of all held-out boards, triangulated;
-    held_out_px their RMS in the pictures; square_ratio the mean side of their squares over the true one, square_worst the position
-    farthest from 1.
+    rms_px is over all corners of all cameras. held_out_squares is the RMS over all corners of all
+    held-out boards, triangulated; held_out_px their RMS in the pictures; square_ratio the mean side
+    of their squares over the true one, square_worst the position farthest from 1.
     """
 
     board: Board
@@ -89,11 +102,16 @@ class Rig:
 
 
 def calibrate_rig(
-    detections: dict[str, dict[str, Detection]], board: Board, lenses: dict[str, Array] | None = None, say: Progress = lambda _: None
+    detections: dict[str, dict[str, Detection]],
+    board: Board,
+    lenses: dict[str, Array] | None = None,
+    say: Progress = lambda _: None,
 ) -> RigResult:
-    """Calibrate a rig from the boards found in each camera's pictures (camera -> key -> detection); equal keys are one instant.
+    """Calibrate a rig from the boards found in each camera's pictures (camera -> key -> detection);
+    equal keys are one instant.
 
-    lenses (camera -> (9,)) are taken as they are if given, else found as well. The first camera is the rig frame.
+    lenses (camera -> (9,)) are taken as they are if given, else found as well. The first camera is
+    the rig frame.
 
     Raises CalibrationError, with the reason, if the pictures cannot support a calibration.
     """
@@ -113,7 +131,9 @@ def calibrate_rig(
     return replace(result, warnings=check_rig(result))
 
 
-def _start(detections: dict[str, dict[str, Detection]], board: Board, lenses: dict[str, Array] | None) -> tuple[Rig, list[LeftOut]]:
+def _start(
+    detections: dict[str, dict[str, Detection]], board: Board, lenses: dict[str, Array] | None
+) -> tuple[Rig, list[LeftOut]]:
     """Every lens by itself, then the cameras' places by pairs."""
     names = list(detections)
     sizes, left_out, good, found = [], [], [], []
@@ -132,12 +152,22 @@ def _start(detections: dict[str, dict[str, Detection]], board: Board, lenses: di
         good.append(kept)
     keys = [key for key in _ordered(detections) if any(key in kept for kept in good)]
     number = {key: k for k, key in enumerate(keys)}
-    views = [view_of(board, shown, camera, number[key]) for camera, kept in enumerate(good) for key, shown in kept.items()]
+    views = [
+        view_of(board, shown, camera, number[key])
+        for camera, kept in enumerate(good)
+        for key, shown in kept.items()
+    ]
     all_lenses = np.stack(found)
     places, views = place_cameras(names, sizes, all_lenses, views, board)
     poses = np.stack([_pose(k, views, all_lenses, places) for k in range(len(keys))])
     state = State(all_lenses, places, poses)
-    return Rig(names, sizes, keys, views, Adjusted(state, (), np.zeros_like(all_lenses), np.zeros((len(names), 6)), 0)), left_out
+    return Rig(
+        names,
+        sizes,
+        keys,
+        views,
+        Adjusted(state, (), np.zeros_like(all_lenses), np.zeros((len(names), 6)), 0),
+    ), left_out
 
 
 def _ordered(detections: dict[str, dict[str, Detection]]) -> list[str]:
@@ -159,12 +189,19 @@ def _pose(number: int, views: list[View], lenses: Array, places: Array) -> Array
 
 
 def _errors(views: list[View], state: State) -> list[Array]:
-    return [np.nan_to_num(error, nan=1e6) for error in pixel_errors([replace(view, board=0) for view in views], state)]
+    return [
+        np.nan_to_num(error, nan=1e6)
+        for error in pixel_errors([replace(view, board=0) for view in views], state)
+    ]
 
 
 def _free(rig: Rig, model: LensModel, lenses: dict[str, Array] | None) -> Free:
     cameras = len(rig.names)
-    lens = np.zeros((cameras, 9), dtype=bool) if lenses is not None else np.tile(model.free, (cameras, 1))
+    lens = (
+        np.zeros((cameras, 9), dtype=bool)
+        if lenses is not None
+        else np.tile(model.free, (cameras, 1))
+    )
     return Free(lens, np.arange(cameras) > 0)
 
 
@@ -180,11 +217,18 @@ def _settle(rig: Rig, free: Free) -> tuple[Rig, list[LeftOut]]:
             break
         median = float(np.median(errors))
         left_out += [
-            LeftOut("", rig.keys[k], f"the cameras disagree by {errors[k]:.1f} px, else by {median:.2f}: did it move?") for k in bad
+            LeftOut(
+                "",
+                rig.keys[k],
+                f"the cameras disagree by {errors[k]:.1f} px, else by {median:.2f}: did it move?",
+            )
+            for k in bad
         ]
         keep = [k for k in range(len(rig.keys)) if k not in bad]
         views, state = subset(rig.views, found.state, keep)
-        rig = replace(rig, keys=[rig.keys[k] for k in keep], views=views, found=replace(found, state=state))
+        rig = replace(
+            rig, keys=[rig.keys[k] for k in keep], views=views, found=replace(found, state=state)
+        )
     return rig, left_out
 
 
@@ -205,7 +249,9 @@ def _held_out_squares(rig: Rig, board: Board, model: LensModel) -> float:
     for part in folds(len(rig.keys)):
         rest, start = subset(rig.views, found.state, others(len(rig.keys), part))
         state = adjust(rest, start, _free(rig, model, None)).state
-        errors = [fit_squares([view for view in rig.views if view.board == k], state, board) for k in part]
+        errors = [
+            fit_squares([view for view in rig.views if view.board == k], state, board) for k in part
+        ]
         squares += [error**2 for error in errors if error is not None]
     return float(np.sqrt(np.mean(squares))) if squares else float("inf")
 
@@ -216,7 +262,9 @@ def _positions(rig: Rig, board: Board, free: Free) -> list[PositionError]:
     for k, key in enumerate(rig.keys):
         rest, start = subset(rig.views, rig.found.state, others(len(rig.keys), np.array([k])))
         without = adjust(rest, start, free)
-        pull = pull_percent(errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rig.keys) - 1))
+        pull = pull_percent(
+            errors[:k] + errors[k + 1 :], board_rms(rest, without.errors, len(rig.keys) - 1)
+        )
         mine = [view for view in rig.views if view.board == k]
         result.append(PositionError(key, errors[k], board_error(mine, without.state, board), pull))
     bad = hurting(errors, [position.pull_percent for position in result])
@@ -224,15 +272,26 @@ def _positions(rig: Rig, board: Board, free: Free) -> list[PositionError]:
 
 
 def _result(
-    rig: Rig, board: Board, model: LensModel, positions: list[PositionError], left_out: tuple[LeftOut, ...], lenses_given: bool
+    rig: Rig,
+    board: Board,
+    model: LensModel,
+    positions: list[PositionError],
+    left_out: tuple[LeftOut, ...],
+    lenses_given: bool,
 ) -> RigResult:
     held_out = [position.held_out for position in positions if position.held_out]
     ratios = np.array([error.square_ratio for error in held_out])
     state = rig.found.state
     seen, camera_rms = [], []
     for camera, size_px in enumerate(rig.sizes):
-        mine = [(view, error) for view, error in zip(rig.views, rig.found.errors, strict=True) if view.camera == camera]
-        poses = [state.T_camera_from_rig[camera] @ state.T_rig_from_board[view.board] for view, _ in mine]
+        mine = [
+            (view, error)
+            for view, error in zip(rig.views, rig.found.errors, strict=True)
+            if view.camera == camera
+        ]
+        poses = [
+            state.T_camera_from_rig[camera] @ state.T_rig_from_board[view.board] for view, _ in mine
+        ]
         seen.append(coverage(size_px, [view.pixels for view, _ in mine], poses))
         camera_rms.append(rms(np.concatenate([error for _, error in mine])))
     return RigResult(
@@ -249,7 +308,9 @@ def _result(
         held_out_squares=_root_mean([error.fit_squares for error in held_out]),
         held_out_px=_root_mean([error.reprojection_px for error in held_out]),
         square_ratio=float(ratios.mean()) if len(ratios) else float("nan"),
-        square_worst=float(ratios[np.argmax(np.abs(ratios - 1.0))]) if len(ratios) else float("nan"),
+        square_worst=float(ratios[np.argmax(np.abs(ratios - 1.0))])
+        if len(ratios)
+        else float("nan"),
         epipolar_px=_root_mean([error.epipolar_px for error in held_out]),
         coverage=tuple(seen),
         positions=tuple(positions),

@@ -14,13 +14,16 @@ from services.calibrator.lens.checks import check_lens
 if TYPE_CHECKING:
     from services.calibrator.rig.calibrate import RigResult
 
-# Boards that two cameras both see. Each gives six equations more than its pose has; below four nothing can be left out.
+# Boards that two cameras both see. Each gives six equations more than its pose has; below four
+# nothing can be left out.
 _MIN_HELD_OUT = 4
 # Below this, held-out errors are themselves uncertain by a third.
 _GOOD = 8
-# Held-out error in the pictures, px at 640 px width: the real pairs reach .2. At 2 px a board is bent, or moved, or a camera did.
+# Held-out error in the pictures, px at 640 px width: the real pairs reach .2. At 2 px a board is
+# bent, or moved, or a camera did.
 _PX_REFUSED, _PX_WARNED = 2.0, 0.6
-# Held-out board fit in squares: the real pairs reach .011. It contains the depth noise, which far, small boards and short baselines raise.
+# Held-out board fit in squares: the real pairs reach .011. It contains the depth noise, which far,
+# small boards and short baselines raise.
 _SQUARES_WARNED = 0.06
 # Side of the triangulated squares. Depth is off by the same share.
 _SIDE_REFUSED, _SIDE_WARNED = 0.02, 0.005
@@ -29,9 +32,13 @@ _PLACE_REFUSED = 0.02
 
 
 def check_shared(detections: dict[str, dict[str, Detection]]) -> None:
-    """Raise CalibrationError if there are not two cameras with a board in at least one picture each."""
+    """Raise CalibrationError if there are not two cameras with a board in at least one picture
+    each.
+    """
     if len(detections) < 2:
-        raise CalibrationError(f"a rig needs pictures of two cameras or more; found {list(detections) or 'none'}")
+        raise CalibrationError(
+            f"a rig needs pictures of two cameras or more; found {list(detections) or 'none'}"
+        )
     blind = [camera for camera, found in detections.items() if not found]
     if blind:
         raise CalibrationError(
@@ -48,10 +55,19 @@ def check_rig(result: RigResult) -> tuple[str, ...]:
     _refuse(result)
     warnings = []
     if len(result.positions) < _GOOD:
-        warnings.append(f"{len(result.positions)} positions of the board are few; 12 to 20 make the errors above trustworthy")
+        warnings.append(
+            f"{len(result.positions)} positions of the board are few; 12 to 20 make the errors above trustworthy"
+        )
     for k, name in enumerate(result.cameras):
         if not result.lenses_given:
-            said = check_lens(name, result.sizes[k], result.state.lenses[k], result.lens_sigma[k], 0.0, result.coverage[k])
+            said = check_lens(
+                name,
+                result.sizes[k],
+                result.state.lenses[k],
+                result.lens_sigma[k],
+                0.0,
+                result.coverage[k],
+            )
             warnings += [f"{name}: {warning}" for warning in said]
     if result.held_out_px > _PX_WARNED * _scale(result):
         warnings.append(
@@ -64,7 +80,9 @@ def check_rig(result: RigResult) -> tuple[str, ...]:
             "show the board nearer, use larger squares, or set the cameras farther apart"
         )
     if abs(result.square_ratio - 1.0) > _SIDE_WARNED:
-        warnings.append(f"triangulated squares are {100 * (result.square_ratio - 1.0):+.2f} % off; take more pictures")
+        warnings.append(
+            f"triangulated squares are {100 * (result.square_ratio - 1.0):+.2f} % off; take more pictures"
+        )
     worst = [position.key for position in result.positions if position.hurts]
     if worst:
         warnings.append(
@@ -112,8 +130,12 @@ def _sides(result: RigResult) -> tuple[str, ...]:
     sides = {name.lower(): k for k, name in enumerate(result.cameras)}
     if not {"left", "right"} <= set(sides):
         return ()
-    left, right = (inverse(result.state.T_camera_from_rig[sides[side]]) for side in ("left", "right"))
+    left, right = (
+        inverse(result.state.T_camera_from_rig[sides[side]]) for side in ("left", "right")
+    )
     across = float((right[:3, 3] - left[:3, 3]) @ left[:3, 0])
     if across >= 0.0:
         return ()
-    return ("camera 'left' stands to the right of 'right': are the names swapped, or both pictures mirrored?",)
+    return (
+        "camera 'left' stands to the right of 'right': are the names swapped, or both pictures mirrored?",
+    )

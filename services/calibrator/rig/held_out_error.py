@@ -1,4 +1,5 @@
-"""How right a rig is about boards it was not calibrated with: triangulate them, and compare with the rigid board. Pure.
+"""How right a rig is about boards it was not calibrated with: triangulate them, and compare with
+the rigid board. Pure.
 
 A board seen by one camera only cannot be triangulated and does not count.
 """
@@ -19,8 +20,10 @@ from services.calibrator.bundle.triangulate import RigidFit, epipolar_px, rigid_
 
 @dataclass(frozen=True)
 class BoardError:
-    """One triangulated board: RMS distance of its corners from the best rigid board in squares, the side of its squares against the
-    true one, RMS px of the best rigid board in the pictures, RMS epipolar distance in px, mean distance from the first camera in m."""
+    """One triangulated board: RMS distance of its corners from the best rigid board in squares, the
+    side of its squares against the true one, RMS px of the best rigid board in the pictures, RMS
+    epipolar distance in px, mean distance from the first camera in m.
+    """
 
     fit_squares: float
     square_ratio: float
@@ -30,12 +33,18 @@ class BoardError:
 
 
 def board_error(views: list[View], state: State, board: Board) -> BoardError | None:
-    """The error of one board position, whose views these are; None if no two cameras see the same six corners."""
+    """The error of one board position, whose views these are.
+
+    None if no two cameras see the same six corners.
+    """
     measured = _measured(views, state, board)
     if measured is None:
         return None
     fit, error = measured
-    return replace(error, reprojection_px=_reprojection(views, state, transform(fit.R_measured_from_board, fit.t)))
+    return replace(
+        error,
+        reprojection_px=_reprojection(views, state, transform(fit.R_measured_from_board, fit.t)),
+    )
 
 
 def fit_squares(views: list[View], state: State, board: Board) -> float | None:
@@ -60,7 +69,10 @@ def _measured(views: list[View], state: State, board: Board) -> tuple[RigidFit, 
     points = triangulate(places, seen, focals)
     fit = rigid_fit(board.points[ids], points)
     epipolar = [
-        epipolar_px(places[k] @ inverse(places[0]), seen[0], seen[k], float(np.sqrt(focals[0] * focals[k]))) for k in range(1, len(views))
+        epipolar_px(
+            places[k] @ inverse(places[0]), seen[0], seen[k], float(np.sqrt(focals[0] * focals[k]))
+        )
+        for k in range(1, len(views))
     ]
     distance = float(np.linalg.norm(points - inverse(places[0])[:3, 3], axis=1).mean())
     return fit, BoardError(

@@ -1,8 +1,10 @@
-"""Where the cameras of a rig stand to each other, from boards they saw together; and why not, where it cannot be. Pure.
+"""Where the cameras of a rig stand to each other, from boards they saw together; and why not, where
+it cannot be. Pure.
 
-Cameras are joined one after the other to those already placed, each through the partner with which it shares most boards. A pair that no
-guess fits is looked at for the usual causes - a mirrored picture, pictures paired one off, a board that moved between the exposures - and
-refused with a CalibrationError that names the cause.
+Cameras are joined one after the other to those already placed, each through the partner with which
+it shares most boards. A pair that no guess fits is looked at for the usual causes - a mirrored
+picture, pictures paired one off, a board that moved between the exposures - and refused with a
+CalibrationError that names the cause.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from services.calibrator.bundle.residuals import State, View, rms
 
 # Two poses fix the relation, further ones test it; with fewer than this a wrong one goes unnoticed.
 MIN_SHARED = 4
-# Median error of a pair of cameras, px at 640 px width: .2 on the real pairs; wrong pairings give 10 and more.
+# Median error of a pair of cameras, px at 640 px width: .2 on the real pairs; wrong pairings give
+# 10 and more.
 _FITS_PX = 3.0
 # Pairing errors looked for: a picture more or less on one side.
 _SHIFTS = (1, -1, 2, -2)
@@ -30,11 +33,13 @@ _SHIFTS = (1, -1, 2, -2)
 def place_cameras(
     names: list[str], sizes: list[tuple[int, int]], lenses: Array, views: list[View], board: Board
 ) -> tuple[Array, list[View]]:
-    """T_camera_from_rig (c, 4, 4) with the first camera as the rig, and the views with one numbering of the board for all cameras.
+    """T_camera_from_rig (c, 4, 4) with the first camera as the rig, and the views with one
+    numbering of the board for all cameras.
 
     lenses is (c, 9).
 
-    Raises CalibrationError if a camera shares too few boards with the others, or cannot be fitted to them.
+    Raises CalibrationError if a camera shares too few boards with the others, or cannot be fitted
+    to them.
     """
     places = {0: np.eye(4)}
     renumbered = [view for view in views if view.camera == 0]
@@ -44,7 +49,9 @@ def place_cameras(
         relation = _related((lenses[anchor], lenses[camera]), pairs, _turns(board))
         limit = _FITS_PX * max(sizes[camera][0] / 640.0, 1.0)
         if not relation.median_px <= limit:
-            raise CalibrationError(_why(names, sizes, (anchor, camera), lenses, pairs, board, relation, limit))
+            raise CalibrationError(
+                _why(names, sizes, (anchor, camera), lenses, pairs, board, relation, limit)
+            )
         places[camera] = relation.T_second_from_first @ places[anchor]
         turned = {pair[1].board: turn for pair, turn in zip(pairs, relation.turns, strict=True)}
         # Boards the anchor did not see are numbered against any other camera that is placed.
@@ -52,15 +59,22 @@ def place_cameras(
     return np.stack([places[k] for k in range(len(names))]), renumbered
 
 
-def _related(lenses: tuple[Array, Array], pairs: list[tuple[View, View]], turned: list[np.ndarray]) -> Relation:
-    """The best guess, adjusted to all pairs: single views of small or distant boards guess several pixels off."""
+def _related(
+    lenses: tuple[Array, Array], pairs: list[tuple[View, View]], turned: list[np.ndarray]
+) -> Relation:
+    """The best guess, adjusted to all pairs: single views of small or distant boards guess several
+    pixels off.
+    """
     guess = relate(lenses, pairs, turned)
     if not np.isfinite(guess.median_px):
         return guess
     views = []
     for number, ((first, second), turn) in enumerate(zip(pairs, guess.turns, strict=True)):
         pixels = second.pixels[turned[turn]] if len(turned) > 1 else second.pixels
-        views += [replace(first, camera=0, board=number), replace(second, camera=1, board=number, pixels=pixels)]
+        views += [
+            replace(first, camera=0, board=number),
+            replace(second, camera=1, board=number, pixels=pixels),
+        ]
     poses = np.stack([board_pose(lenses[0], first)[0] for first, _ in pairs])
     start = State(np.stack(lenses), np.stack([np.eye(4), guess.T_second_from_first]), poses)
     found = adjust(views, start, Free(np.zeros((2, 9), dtype=bool), np.array([False, True])))
@@ -71,12 +85,21 @@ def _related(lenses: tuple[Array, Array], pairs: list[tuple[View, View]], turned
 
 def _next(names: list[str], places: dict[int, Array], views: list[View]) -> tuple[int, int]:
     """The placed camera and the other one that share most boards."""
-    boards = {camera: {view.board for view in views if view.camera == camera} for camera in range(len(names))}
-    shared = {
-        (anchor, camera): len(boards[anchor] & boards[camera]) for anchor in places for camera in range(len(names)) if camera not in places
+    boards = {
+        camera: {view.board for view in views if view.camera == camera}
+        for camera in range(len(names))
     }
-    # On a draw the earliest camera, so that the result does not depend on the order of a dictionary.
-    (anchor, camera), count = max(shared.items(), key=lambda item: (item[1], -item[0][1], -item[0][0]))
+    shared = {
+        (anchor, camera): len(boards[anchor] & boards[camera])
+        for anchor in places
+        for camera in range(len(names))
+        if camera not in places
+    }
+    # On a draw the earliest camera, so that the result does not depend on the order of a
+    # dictionary.
+    (anchor, camera), count = max(
+        shared.items(), key=lambda item: (item[1], -item[0][1], -item[0][0])
+    )
     if count < MIN_SHARED:
         raise CalibrationError(
             f"cameras {names[anchor]!r} and {names[camera]!r} see the board together in {count} pictures only, at least {MIN_SHARED} are "
@@ -86,9 +109,13 @@ def _next(names: list[str], places: dict[int, Array], views: list[View]) -> tupl
     return anchor, camera
 
 
-def _pairs(placed: list[View], views: list[View], anchor: int, camera: int) -> list[tuple[View, View]]:
+def _pairs(
+    placed: list[View], views: list[View], anchor: int, camera: int
+) -> list[tuple[View, View]]:
     first = {view.board: view for view in placed if view.camera == anchor}
-    return [(first[view.board], view) for view in views if view.camera == camera and view.board in first]
+    return [
+        (first[view.board], view) for view in views if view.camera == camera and view.board in first
+    ]
 
 
 def _turns(board: Board) -> list[np.ndarray]:
@@ -97,7 +124,13 @@ def _turns(board: Board) -> list[np.ndarray]:
 
 
 def _renumbered(
-    views: list[View], camera: int, turned: dict[int, int], placed: list[View], places: dict[int, Array], lenses: Array, board: Board
+    views: list[View],
+    camera: int,
+    turned: dict[int, int],
+    placed: list[View],
+    places: dict[int, Array],
+    lenses: Array,
+    board: Board,
 ) -> list[View]:
     known = {view.board: view for view in reversed(placed)}
     numbered = []
@@ -107,14 +140,23 @@ def _renumbered(
         partner = known.get(view.board)
         if view.board not in turned and partner is not None and len(options) > 1:
             turn = _turn_by(partner, view, places, lenses, options)
-        numbered.append(replace(view, pixels=view.pixels[options[turn]]) if len(options) > 1 else view)
+        numbered.append(
+            replace(view, pixels=view.pixels[options[turn]]) if len(options) > 1 else view
+        )
     return numbered
 
 
-def _turn_by(partner: View, view: View, places: dict[int, Array], lenses: Array, options: list[np.ndarray]) -> int:
-    T_rig_from_board = np.linalg.inv(places[partner.camera]) @ board_pose(lenses[partner.camera], partner)[0]
+def _turn_by(
+    partner: View, view: View, places: dict[int, Array], lenses: Array, options: list[np.ndarray]
+) -> int:
+    T_rig_from_board = (
+        np.linalg.inv(places[partner.camera]) @ board_pose(lenses[partner.camera], partner)[0]
+    )
     expected = places[view.camera] @ T_rig_from_board
-    poses = [board_pose(lenses[view.camera], replace(view, pixels=view.pixels[turn]))[0] for turn in options]
+    poses = [
+        board_pose(lenses[view.camera], replace(view, pixels=view.pixels[turn]))[0]
+        for turn in options
+    ]
     return int(np.argmin([np.linalg.norm(pose[:3, :2] - expected[:3, :2]) for pose in poses]))
 
 

@@ -1,7 +1,8 @@
 """`rhot calibrate world`: the rig's frame laid onto a desk by a board that lies there. Pure.
 
-The frame: origin in the board's first inner corner, x along its rows, z up from the desk. All calibrated cameras that see the board
-share in finding it; one is enough. A board that is not seen, or that does not fit, is a CalibrationError.
+The frame: origin in the board's first inner corner, x along its rows, z up from the desk. All
+calibrated cameras that see the board share in finding it; one is enough. A board that is not seen,
+or that does not fit, is a CalibrationError.
 """
 
 from __future__ import annotations
@@ -25,13 +26,17 @@ from services.calibrator.output.calibration_files import rows
 
 # The board's z points into the desk; half a turn about x makes it point up and leaves x alone.
 _BOARD_FROM_DESK = np.diag([1.0, -1.0, -1.0, 1.0])
-# Corners of a board that is where it seems to be are off by tenths of a pixel; a wrong calibration gives many.
+# Corners of a board that is where it seems to be are off by tenths of a pixel; a wrong calibration
+# gives many.
 _FITS_PX = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Desk:
-    """T_desk_from_rig (4, 4), where rig is the frame of rig.json; the cameras that saw the board; RMS error of its corners in px."""
+    """T_desk_from_rig (4, 4), where rig is the frame of rig.json; the cameras that saw the board.
+
+    RMS error of its corners in px.
+    """
 
     T_desk_from_rig: Array
     cameras: tuple[str, ...]
@@ -41,26 +46,37 @@ class Desk:
 def find_desk(cameras: dict[str, Camera], detections: dict[str, Detection], board: Board) -> Desk:
     """The desk from what calibrated cameras (in the frame of rig.json) saw of the board on it.
 
-    Raises CalibrationError if no camera sees it, sizes differ from the calibration's, or the views do not agree.
+    Raises CalibrationError if no camera sees it, sizes differ from the calibration's, or the views
+    do not agree.
     """
     names = [name for name in cameras if name in detections]
     if not names:
-        raise CalibrationError("no camera sees the whole board on the desk; lay it where at least the first camera sees all of it")
+        raise CalibrationError(
+            "no camera sees the whole board on the desk; lay it where at least the first camera sees all of it"
+        )
     for name in names:
         if detections[name].size_px != cameras[name].size_px:
             raise CalibrationError(
                 f"camera {name!r}: the picture is {detections[name].size_px}, its lens was calibrated at {cameras[name].size_px}; "
                 "take the picture at that size, or calibrate again"
             )
-    lenses = np.stack([lens_vector(cameras[name].matrix, cameras[name].distortion) for name in names])
+    lenses = np.stack(
+        [lens_vector(cameras[name].matrix, cameras[name].distortion) for name in names]
+    )
     places = np.stack([cameras[name].T_camera_from_rig for name in names])
     views = [view_of(board, detections[name], k, 0) for k, name in enumerate(names)]
     free = Free(np.zeros((len(names), 9), dtype=bool), np.zeros(len(names), dtype=bool))
     first = inverse(places[0]) @ board_pose(lenses[0], alone(views[0]))[0]
-    options = turns(board.cols, board.rows) if board.kind == "chessboard" else [np.arange(board.size)]
+    options = (
+        turns(board.cols, board.rows) if board.kind == "chessboard" else [np.arange(board.size)]
+    )
     for k in range(1, len(views)):
-        # Boards that look the same turned around: the numbering that agrees with the first camera's.
-        poses = [inverse(places[k]) @ board_pose(lenses[k], alone(_turned(views[k], turn, options)))[0] for turn in options]
+        # Boards that look the same turned around: the numbering that agrees with the first
+        # camera's.
+        poses = [
+            inverse(places[k]) @ board_pose(lenses[k], alone(_turned(views[k], turn, options)))[0]
+            for turn in options
+        ]
         nearest = int(np.argmin([np.linalg.norm(pose[:3, :2] - first[:3, :2]) for pose in poses]))
         views[k] = _turned(views[k], options[nearest], options)
     found = adjust(views, State(lenses, places, first[None]), free)
@@ -74,7 +90,9 @@ def find_desk(cameras: dict[str, Camera], detections: dict[str, Detection], boar
 
 
 def desk_text(desk: Desk, first: Camera) -> str:
-    """The table for rig.toml: T_rig_from_camera of the first camera, with the desk as the new rig frame."""
+    """The table for rig.toml: T_rig_from_camera of the first camera, with the desk as the new rig
+    frame.
+    """
     T = desk.T_desk_from_rig @ first.T_rig_from_camera
     lines = ",\n".join("  [" + ", ".join(f"{value:.9g}" for value in row) + "]" for row in rows(T))
     position = T[:3, 3]

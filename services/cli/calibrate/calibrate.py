@@ -1,4 +1,6 @@
-"""`rhot calibrate ...`: everything a rig must know about itself, each command in the file of its name (camera and colors: eye.py)."""
+"""`rhot calibrate ...`: everything a rig must know about itself, each command in the file of its
+name (camera and colors: eye.py).
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
-"""`rhot calibrate camera NAME` and `rhot calibrate colors NAME`: what a camera must know before it can see paint, from any machine.
+"""`rhot calibrate camera NAME` and `rhot calibrate colors NAME`: what a camera must know before it
+can see paint, from any machine.
 
-With a running rig, pictures and results cross the bus, and the camera's tracker writes its own files; with --video, a recording is used and
-the file is written here. A camera that does not answer, and places that show no paint, are errors that say so; warnings do not stop it.
+With a running rig, pictures and results cross the bus, and the camera's tracker writes its own
+files; with --video, a recording is used and the file is written here. A camera that does not
+answer, and places that show no paint, are errors that say so; warnings do not stop it.
 """
 
 from __future__ import annotations
@@ -22,25 +24,53 @@ from services.cli.router_session import reach, rig_and_endpoints
 
 Name = Annotated[str, typer.Argument(help="the camera's name in rig.toml")]
 # Ways of saying what is paint; all may be repeated.
-Boxes = Annotated[list[str] | None, typer.Option("--box", metavar="COLOR=X,Y,W,H", help="a marker in the pictures; repeatable")]
-Clicks = Annotated[list[str] | None, typer.Option("--click", metavar="COLOR=X,Y", help="the middle of a marker; repeatable")]
+Boxes = Annotated[
+    list[str] | None,
+    typer.Option("--box", metavar="COLOR=X,Y,W,H", help="a marker in the pictures; repeatable"),
+]
+Clicks = Annotated[
+    list[str] | None,
+    typer.Option("--click", metavar="COLOR=X,Y", help="the middle of a marker; repeatable"),
+]
 Ats = Annotated[
-    list[str] | None, typer.Option("--at", metavar="FRAME:COLOR=X,Y[,W,H]", help="a marker in one frame of --video; repeatable")
+    list[str] | None,
+    typer.Option(
+        "--at", metavar="FRAME:COLOR=X,Y[,W,H]", help="a marker in one frame of --video; repeatable"
+    ),
 ]
 
 
 def camera(
     name: Name,
     config: options.ConfigOption = None,
-    auto: Annotated[bool, typer.Option("--auto", help="run the camera's automatics once, on what it sees now, and freeze them")] = False,
-    exposure_us: Annotated[float | None, typer.Option(min=1.0, max=1e6, help="exposure time in microseconds")] = None,
+    auto: Annotated[
+        bool,
+        typer.Option(
+            "--auto", help="run the camera's automatics once, on what it sees now, and freeze them"
+        ),
+    ] = False,
+    exposure_us: Annotated[
+        float | None, typer.Option(min=1.0, max=1e6, help="exposure time in microseconds")
+    ] = None,
     gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="analogue gain")] = None,
-    red_gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of red")] = None,
-    blue_gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of blue")] = None,
+    red_gain: Annotated[
+        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of red")
+    ] = None,
+    blue_gain: Annotated[
+        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of blue")
+    ] = None,
     connect: ConnectOption = None,
 ) -> None:
-    """Set exposure, gain and white balance of a running camera; without options, show and judge what is in force."""
-    by_hand = ExposureControl(exposure_us=exposure_us or 0.0, gain=gain or 0.0, red_gain=red_gain or 0.0, blue_gain=blue_gain or 0.0)
+    """Set exposure, gain and white balance of a running camera.
+
+    Without options, show and judge what is in force.
+    """
+    by_hand = ExposureControl(
+        exposure_us=exposure_us or 0.0,
+        gain=gain or 0.0,
+        red_gain=red_gain or 0.0,
+        blue_gain=blue_gain or 0.0,
+    )
     rig, endpoints = rig_and_endpoints(config, connect)
     rig.camera_named(name)
     # First what the camera finds, then what the person knows better.
@@ -49,7 +79,9 @@ def camera(
     uvloop.run(_camera(rig, endpoints, name, wanted))
 
 
-async def _camera(rig: RigConfig, endpoints: list[str], name: str, wanted: list[ExposureControl]) -> None:
+async def _camera(
+    rig: RigConfig, endpoints: list[str], name: str, wanted: list[ExposureControl]
+) -> None:
     from services.cli.calibrate.camera_text import exposure_text, light_text
     from services.cli.calibrate.pictures import live
     from services.pi_tracker.colors.exposure_advice import advice, assess
@@ -58,7 +90,9 @@ async def _camera(rig: RigConfig, endpoints: list[str], name: str, wanted: list[
         client = RigClient(bus)
         state = await client.exposure(name)
         for one in wanted:
-            typer.echo("running the automatics ..." if one.mode == "auto" else "setting ...", err=True)
+            typer.echo(
+                "running the automatics ..." if one.mode == "auto" else "setting ...", err=True
+            )
             state = await client.set_exposure(name, one)
         light = assess(await live(bus, name, 3))
     typer.echo(f"camera {name}: {exposure_text(state)}")
@@ -76,23 +110,53 @@ def colors(
     box: Boxes = None,
     click: Clicks = None,
     at: Ats = None,
-    auto: Annotated[bool, typer.Option("--auto", help="propose what stands out, named by its hue")] = False,
-    video: Annotated[Path | None, typer.Option(help="a recording instead of the running camera: video, capture or folder")] = None,
-    frames: Annotated[str | None, typer.Option(help="with --video: frames for --box, --click and --auto, e.g. 10,200,500")] = None,
-    pictures: Annotated[int, typer.Option(min=1, max=20, help="how many pictures to take while the hand is held still")] = 5,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="propose what stands out, named by its hue")
+    ] = False,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="a recording instead of the running camera: video, capture or folder"),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(help="with --video: frames for --box, --click and --auto, e.g. 10,200,500"),
+    ] = None,
+    pictures: Annotated[
+        int,
+        typer.Option(min=1, max=20, help="how many pictures to take while the hand is held still"),
+    ] = 5,
     out: options.OutOption = None,
-    picture: Annotated[Path | None, typer.Option(help="write a picture of what was taken for paint")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="only report; put nothing in force, write no calibration")] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="write a picture of what was taken for paint")
+    ] = None,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="only report; put nothing in force, write no calibration"),
+    ] = False,
     connect: ConnectOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Fit colour ranges to painted markers: in the page (rhot-viewer), or by boxes, clicks or --auto here."""
+    """Fit colour ranges to painted markers: in the page (rhot-viewer), or by boxes, clicks or
+    --auto here.
+    """
     # Not above: OpenCV takes longer to import than other commands take to run.
     from services.cli.calibrate.colors import Request, from_camera, from_recording
 
     if not (box or click or at or auto):
-        raise CalibrationError("nothing is pointed at; give --box, --click or --auto, or use the page of rhot-viewer (calibrate colours)")
-    request = Request(name, tuple(box or ()), tuple(click or ()), tuple(at or ()), auto, out, picture, dry_run, as_json)
+        raise CalibrationError(
+            "nothing is pointed at; give --box, --click or --auto, or use the page of rhot-viewer (calibrate colours)"
+        )
+    request = Request(
+        name,
+        tuple(box or ()),
+        tuple(click or ()),
+        tuple(at or ()),
+        auto,
+        out,
+        picture,
+        dry_run,
+        as_json,
+    )
     if video is not None:
         from_recording(request, options.rig_if_named(config), video, frames)
         return

@@ -1,4 +1,6 @@
-"""What `rhot calibrate colors` and `camera` say, and the picture that shows what was taken for paint. Pure."""
+"""What `rhot calibrate colors` and `camera` say, and the picture that shows what was taken for
+paint. Pure.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ from services.pi_tracker.image.yuv_planes import picture
 
 def range_text(span: ColorRange) -> str:
     """hue, saturation and value from to, as OpenCV has them."""
-    return " ".join(f"{name} {low:3d}..{high:3d}" for name, low, high in zip("hsv", span.hsv_low, span.hsv_high, strict=True))
+    return " ".join(
+        f"{name} {low:3d}..{high:3d}"
+        for name, low, high in zip("hsv", span.hsv_low, span.hsv_high, strict=True)
+    )
 
 
 def report_text(report: Report, fitted: dict[str, ColorRange]) -> str:
@@ -29,7 +34,11 @@ def report_text(report: Report, fitted: dict[str, ColorRange]) -> str:
     for one in report.colors:
         line = f"{one.color:10s} {range_text(fitted[one.color])}   takes {100 * one.inside:.0f} % of {4 * one.cells} px in {one.pictures}"
         line += " picture" + ("s" if one.pictures > 1 else "")
-        pairs = [pair for pair in report.pairs if one.color in (pair.a, pair.b) and pair.separation >= 0.0]
+        pairs = [
+            pair
+            for pair in report.pairs
+            if one.color in (pair.a, pair.b) and pair.separation >= 0.0
+        ]
         if pairs:
             near = min(pairs, key=lambda pair: pair.separation)
             line += f"; nearest {near.b if near.a == one.color else near.a}, d' {near.separation}"
@@ -42,15 +51,29 @@ def proposals_text(proposals: Sequence[Proposal], suggestions: Sequence[Suggesti
     """What stands out, ready to be given as --box or --at, and what else would."""
     lines = ["these patches stand out:"]
     for one in proposals:
-        x, y, w, h = (round(v) for v in (one.boxes[0].x_px, one.boxes[0].y_px, one.boxes[0].width_px, one.boxes[0].height_px))
-        lines.append(f"  {one.color:10s} hue {one.hue:5.1f}, seen in {one.pictures} picture(s), e.g. --box {one.color}={x},{y},{w},{h}")
+        x, y, w, h = (
+            round(v)
+            for v in (
+                one.boxes[0].x_px,
+                one.boxes[0].y_px,
+                one.boxes[0].width_px,
+                one.boxes[0].height_px,
+            )
+        )
+        lines.append(
+            f"  {one.color:10s} hue {one.hue:5.1f}, seen in {one.pictures} picture(s), e.g. --box {one.color}={x},{y},{w},{h}"
+        )
     free = ", ".join(f"{one.color} ({one.clearance:.0f} hues clear)" for one in suggestions)
-    lines.append(f"further paints that would stand out from skin, room and these: {free or 'none of the common ones'}")
+    lines.append(
+        f"further paints that would stand out from skin, room and these: {free or 'none of the common ones'}"
+    )
     return "\n".join(lines)
 
 
 def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
-    """The pictures one below the other: what the ranges take in white, boxes around what was pointed at."""
+    """The pictures one below the other: what the ranges take in white, boxes around what was
+    pointed at.
+    """
     names = sorted(colors.colors)
     table = compile_colors(colors, names)
     shown = []
@@ -58,15 +81,32 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
         image = picture(frame)
         luma, chroma = image.cells((0, 0, *image.size))
         labels = table.classify(luma, chroma)
-        bgr = frame.image.copy() if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
-        mask = cv2.resize((labels > 0).astype(np.uint8), (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST)
+        bgr = (
+            frame.image.copy()
+            if frame.layout == "bgr"
+            else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+        )
+        mask = cv2.resize(
+            (labels > 0).astype(np.uint8),
+            (bgr.shape[1], bgr.shape[0]),
+            interpolation=cv2.INTER_NEAREST,
+        )
         bgr[mask > 0] = 255
         for color, samples in study.samples.items():
             for swatch in samples.swatches:
                 if swatch.frame == number:
                     x, y, w, h = swatch.box_px
                     cv2.rectangle(bgr, (x - 2, y - 2), (x + w + 1, y + h + 1), (0, 0, 255), 1)
-                    cv2.putText(bgr, color, (x, max(y - 6, 10)), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 255), 1, cv2.LINE_AA)
+                    cv2.putText(
+                        bgr,
+                        color,
+                        (x, max(y - 6, 10)),
+                        cv2.FONT_HERSHEY_SIMPLEX,
+                        0.4,
+                        (0, 0, 255),
+                        1,
+                        cv2.LINE_AA,
+                    )
         shown.append(bgr)
     return np.vstack(shown)
 

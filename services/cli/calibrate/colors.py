@@ -1,4 +1,6 @@
-"""The work of `rhot calibrate colors`: pictures and places in, ranges and a report out, into force or into a file."""
+"""The work of `rhot calibrate colors`: pictures and places in, ranges and a report out, into force
+or into a file.
+"""
 
 from __future__ import annotations
 
@@ -45,21 +47,34 @@ class Request:
     as_json: bool
 
 
-def from_recording(request: Request, rig: RigConfig | None, video: Path, frames: str | None) -> None:
+def from_recording(
+    request: Request, rig: RigConfig | None, video: Path, frames: str | None
+) -> None:
     """Fit to frames of a recording and write the file."""
     if request.out is None and rig is None and not request.dry_run:
-        raise CalibrationError("say where the result goes: --out DIR, or --config rig.toml, whose calibration folder is taken")
+        raise CalibrationError(
+            "say where the result goes: --out DIR, or --config rig.toml, whose calibration folder is taken"
+        )
     path = options.out_folder(request.out, rig) / f"{request.camera}.colors.json"
     numbers, pointers = at(request.at)
     first = len(numbers)
     numbers += numbers_of(frames) if frames else []
     if not numbers:
         if not request.auto:
-            raise CalibrationError("say which frames the places are in: --frames 10,200,500, or --at FRAME:color=x,y,width,height")
+            raise CalibrationError(
+                "say which frames the places are in: --frames 10,200,500, or --at FRAME:color=x,y,width,height"
+            )
         numbers = pictures.spread(request.camera, video, _AUTO_FRAMES)
     pointers += everywhere(request.boxes, request.clicks, range(first, len(numbers)))
     taken = pictures.recorded(request.camera, video, numbers)
-    made = fitted(request, taken, pointers, _known(path), rig.colors if rig else [], {"recording": video.name, "frames": numbers})
+    made = fitted(
+        request,
+        taken,
+        pointers,
+        _known(path),
+        rig.colors if rig else [],
+        {"recording": video.name, "frames": numbers},
+    )
     if not request.dry_run:
         save(path, made)
         typer.echo(f"written: {path}", err=True)
@@ -67,7 +82,11 @@ def from_recording(request: Request, rig: RigConfig | None, video: Path, frames:
 
 def _known(path: Path) -> dict[str, ColorRange]:
     """Ranges of other colours that are in the file already, and stay."""
-    return load_colors(path.parent, path.name.removesuffix(".colors.json")).colors if path.exists() else {}
+    return (
+        load_colors(path.parent, path.name.removesuffix(".colors.json")).colors
+        if path.exists()
+        else {}
+    )
 
 
 async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], count: int) -> None:
@@ -77,7 +96,9 @@ async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], co
         in_force = await client.colors(request.camera)
         taken = await pictures.live(bus, request.camera, count)
         pointers = everywhere(request.boxes, request.clicks, range(count))
-        made = await asyncio.to_thread(fitted, request, taken, pointers, in_force.colors, rig.colors, {"pictures": count})
+        made = await asyncio.to_thread(
+            fitted, request, taken, pointers, in_force.colors, rig.colors, {"pictures": count}
+        )
         if request.dry_run:
             return
         if request.out is not None:
@@ -86,7 +107,9 @@ async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], co
             typer.echo(f"written: {path}", err=True)
             return
         await client.set_colors(request.camera, made)
-    typer.echo(f"in force, and written to {request.camera}.colors.json on the camera's machine", err=True)
+    typer.echo(
+        f"in force, and written to {request.camera}.colors.json on the camera's machine", err=True
+    )
 
 
 def fitted(
@@ -97,30 +120,47 @@ def fitted(
     wanted: Sequence[str],
     inputs: dict[str, Any],
 ) -> Colors:
-    """Fit, judge, print; the file to be written. Raises CalibrationError if what is pointed at, or stands out, is no paint."""
+    """Fit, judge, print; the file to be written.
+
+    Raises CalibrationError if what is pointed at, or stands out, is no paint.
+    """
     if request.auto:
         given = {pointer.color for pointer in pointers}
-        pointers = pointers + [box for box in _proposed(frames, wanted, request) if box.color not in given]
+        pointers = pointers + [
+            box for box in _proposed(frames, wanted, request) if box.color not in given
+        ]
     study = gather(frames, pointers)
     ranges = fit(study.samples)
     others = {name: span for name, span in known.items() if name not in ranges}
     report = examine(study, ranges, others)
     inputs = {**inputs, "places": [str(pointer) for pointer in pointers]}
-    made = colors_file(report, ranges, others, date=options.now_text(), tool="rhot calibrate colors", inputs=inputs)
-    typer.echo(msgspec.json.format(msgspec.json.encode(made), indent=1).decode() if request.as_json else report_text(report, ranges))
+    made = colors_file(
+        report, ranges, others, date=options.now_text(), tool="rhot calibrate colors", inputs=inputs
+    )
+    typer.echo(
+        msgspec.json.format(msgspec.json.encode(made), indent=1).decode()
+        if request.as_json
+        else report_text(report, ranges)
+    )
     for note in study.notes:
         typer.echo(f"note: {note}", err=True)
     for warning in report.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    if request.picture is not None and not cv2.imwrite(str(request.picture), overlay(study, frames, made)):
-        raise CalibrationError(f"--picture {request.picture} cannot be written; name a .png in a folder that exists")
+    if request.picture is not None and not cv2.imwrite(
+        str(request.picture), overlay(study, frames, made)
+    ):
+        raise CalibrationError(
+            f"--picture {request.picture} cannot be written; name a .png in a folder that exists"
+        )
     return made
 
 
 def _proposed(frames: Sequence[Frame], wanted: Sequence[str], request: Request) -> list[Pointer]:
     proposals, suggestions = propose(frames, wanted)
     if not proposals:
-        raise CalibrationError("no patch of saturated colour stands out in these pictures; point at the markers with --box or --click")
+        raise CalibrationError(
+            "no patch of saturated colour stands out in these pictures; point at the markers with --box or --click"
+        )
     typer.echo(proposals_text(proposals, suggestions), err=True)
     if not wanted:
         return boxes_of(proposals)

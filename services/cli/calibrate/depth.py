@@ -1,4 +1,6 @@
-"""`rhot calibrate depth bench.csv`: k, z and phi of the seed's depth law from measured distances, or from its bench, simulated."""
+"""`rhot calibrate depth bench.csv`: k, z and phi of the seed's depth law from measured distances,
+or from its bench, simulated.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +19,34 @@ from services.cli.calibrate.options import JsonOption
 
 
 def depth(
-    table: Annotated[Path | None, typer.Argument(metavar="CSV", help="columns distance_cm,disparity_px")] = None,
-    config: Annotated[Path | None, typer.Option("--config", help="rig.toml, for focal length and baseline; default: the seed's")] = None,
-    simulate: Annotated[bool, typer.Option("--simulate", help="the seed's bench, simulated, instead of a CSV")] = False,
-    divergence_deg: Annotated[float, typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other")] = 0.0,
-    zero_mm: Annotated[float, typer.Option(min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras")] = 0.0,
-    noise_px: Annotated[float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")] = 0.1,
-    tape_mm: Annotated[float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")] = 1.0,
+    table: Annotated[
+        Path | None, typer.Argument(metavar="CSV", help="columns distance_cm,disparity_px")
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config", help="rig.toml, for focal length and baseline; default: the seed's"
+        ),
+    ] = None,
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="the seed's bench, simulated, instead of a CSV")
+    ] = False,
+    divergence_deg: Annotated[
+        float,
+        typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other"),
+    ] = 0.0,
+    zero_mm: Annotated[
+        float,
+        typer.Option(
+            min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras"
+        ),
+    ] = 0.0,
+    noise_px: Annotated[
+        float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")
+    ] = 0.1,
+    tape_mm: Annotated[
+        float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")
+    ] = 1.0,
     seed: Annotated[int, typer.Option(min=0, help="of the simulated noise")] = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -31,7 +54,9 @@ def depth(
     from services.calibrator.depth_law import fit as laws
 
     if (table is None) == (not simulate):
-        raise CalibrationError(f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench")
+        raise CalibrationError(
+            f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench"
+        )
     focal_px, baseline_cm, width_px = _geometry(config)
     if table is not None:
         distances, disparities = laws.read_bench(table)
@@ -50,7 +75,9 @@ def depth(
 
 
 def _geometry(config: Path | None) -> tuple[float, float, int]:
-    """Focal length px, baseline cm and picture width px of a rig's first two cameras, or of the seed's."""
+    """Focal length px, baseline cm and picture width px of a rig's first two cameras, or of the
+    seed's.
+    """
     from services.calibrator.depth_law.fit import SEED_BASELINE_CM, SEED_FOCAL_PX, SEED_WIDTH_PX
 
     if config is None:

@@ -1,7 +1,9 @@
-"""`rhot calibrate hand right`: a person's bone lengths from a short guided recording, live from the rig or from a recording.
+"""`rhot calibrate hand right`: a person's bone lengths from a short guided recording, live from the
+rig or from a recording.
 
-Live, it says which exercise is due and which markers are missing. A recording that cannot support a calibration is refused with the
-reason, and nothing is written. Lengths measured by hand stay possible (--length) and are kept as given.
+Live, it says which exercise is due and which markers are missing. A recording that cannot support a
+calibration is refused with the reason, and nothing is written. Lengths measured by hand stay
+possible (--length) and are kept as given.
 """
 
 from __future__ import annotations
@@ -40,19 +42,36 @@ _SILENT_S = 5.0
 
 def hand(
     which: Annotated[HandName, typer.Argument(metavar="HAND", help="left or right")] = "right",
-    recording: Annotated[Path | None, typer.Option("--from", help="a capture, a result of rhot track, points.jsonl or .mcap")] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option("--from", help="a capture, a result of rhot track, points.jsonl or .mcap"),
+    ] = None,
     config: options.ConfigOption = None,
     out: options.OutOption = None,
     connect: ConnectOption = None,
-    start: Annotated[float | None, typer.Option(min=0.0, help="with --from: second at which the exercises begin; default: found")] = None,
-    length: Annotated[list[str] | None, typer.Option(metavar="DIGIT:BONE=MM", help="measured by hand; repeatable")] = None,
+    start: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, help="with --from: second at which the exercises begin; default: found"
+        ),
+    ] = None,
+    length: Annotated[
+        list[str] | None, typer.Option(metavar="DIGIT:BONE=MM", help="measured by hand; repeatable")
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="only report, write nothing")] = False,
     exercises: Annotated[bool, typer.Option("--list", help="show the exercises")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Measure a hand from a guided recording: follow the exercises, live, or give a recording of them."""
+    """Measure a hand from a guided recording: follow the exercises, live, or give a recording of
+    them.
+    """
     if exercises:
-        typer.echo("\n".join(f"{EXERCISE_S * n:3.0f} s  {exercise.prompt}" for n, exercise in enumerate(EXERCISES)))
+        typer.echo(
+            "\n".join(
+                f"{EXERCISE_S * n:3.0f} s  {exercise.prompt}"
+                for n, exercise in enumerate(EXERCISES)
+            )
+        )
         return
     known = lengths_of(length or [])
     if recording is None:
@@ -81,7 +100,9 @@ def _fit(
     from services.calibrator.hand.report import hand_file, report_text
 
     if not messages:
-        raise CalibrationError(f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?")
+        raise CalibrationError(
+            f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?"
+        )
     table = default_hand(which)
     problem, found = fit_person(recording_of(messages, table, start_s=start), table, known)
     made = hand_file(problem, found, table, date=options.now_text(), inputs=source)
@@ -92,7 +113,9 @@ def _fit(
         return
     typer.echo(report_text(made))
     if not dry_run:
-        typer.echo(f"written: {target}; running services read it when they start: restart rhot-fusion and rhot-solver")
+        typer.echo(
+            f"written: {target}; running services read it when they start: restart rhot-fusion and rhot-solver"
+        )
 
 
 def lengths_of(texts: list[str]) -> dict[tuple[int, int], float]:
@@ -126,7 +149,9 @@ def recorded(path: Path, which: HandName, config: Path | None) -> list[HandPoint
         from services.recorder.reader import read
 
         messages = [
-            msgspec.json.decode(record.payload, type=HandPoints) for record in read(path) if record.encoding == topics.POINTS.encoding
+            msgspec.json.decode(record.payload, type=HandPoints)
+            for record in read(path)
+            if record.encoding == topics.POINTS.encoding
         ]
     elif path.is_file():
         messages = list(read_lines(path, HandPoints))
@@ -153,7 +178,9 @@ async def _live(rig: RigConfig, endpoints: list[str], which: HandName) -> list[H
     teller, messages, shown = Teller(), [], -1
     async with reach(rig.rig.name, endpoints) as bus:
         stream = RigClient(bus).hand_points(which, queue=256)
-        teller.line(f"{CYCLE_S:.0f} s of exercises begin in {_READY_S:.0f} s: {EXERCISES[0].prompt}")
+        teller.line(
+            f"{CYCLE_S:.0f} s of exercises begin in {_READY_S:.0f} s: {EXERCISES[0].prompt}"
+        )
         await asyncio.sleep(_READY_S)
         began_s = time.monotonic()
         while (passed_s := time.monotonic() - began_s) < CYCLE_S:

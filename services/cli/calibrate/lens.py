@@ -1,4 +1,6 @@
-"""`rhot calibrate lens NAME DIR`: one camera's lens from a folder of board pictures, or live from the running camera."""
+"""`rhot calibrate lens NAME DIR`: one camera's lens from a folder of board pictures, or live from
+the running camera.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,10 @@ from services.cli.options import ConnectOption, ProgressOption
 
 def lens(
     name: Annotated[str, typer.Argument(help="the camera's name in rig.toml")],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="pictures of the board; with --live they are put there")],
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="pictures of the board; with --live they are put there"),
+    ],
     board: options.BoardOption = None,
     square: options.SquareOption = None,
     kind: options.KindOption = Kind.CHESSBOARD,

@@ -1,7 +1,8 @@
-"""Board pictures from the running cameras: asked for at the same time, kept when they teach something, written as PNG.
+"""Board pictures from the running cameras: asked for at the same time, kept when they teach
+something, written as PNG.
 
-A camera that does not answer, or a person who shows nothing new for two minutes, ends it with an error; Ctrl-C ends the collecting, and
-what was collected is used.
+A camera that does not answer, or a person who shows nothing new for two minutes, ends it with an
+error; Ctrl-C ends the collecting, and what was collected is used.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
 # A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
 _ANSWER_S = 5.0
-# Asked again this often, a fifth of a second later, then two: a router knows of a tracker that has just come up by then.
+# Asked again this often, a fifth of a second later, then two: a router knows of a tracker that has
+# just come up by then.
 _ATTEMPTS = 3
 # Without anything new for so long, nobody is there or the board cannot be seen.
 _PATIENCE_S = 120.0
@@ -37,17 +39,29 @@ _PATIENCE_S = 120.0
 _PAUSE_S = 0.1
 
 
-def collect(rig: RigConfig, names: list[str], folder: Path, board: Board | None, square_m: float, count: int, connect: str | None) -> Board:
-    """Collect `count` positions of the board into the folder as <camera><number>.png; returns the board, counted if not given.
+def collect(
+    rig: RigConfig,
+    names: list[str],
+    folder: Path,
+    board: Board | None,
+    square_m: float,
+    count: int,
+    connect: str | None,
+) -> Board:
+    """Collect `count` positions of the board into the folder as <camera><number>.png; returns the
+    board, counted if not given.
 
-    Raises BusError if a camera does not answer, CalibrationError if nothing new is shown for two minutes.
+    Raises BusError if a camera does not answer, CalibrationError if nothing new is shown for two
+    minutes.
     """
     names = names or [camera.name for camera in rig.camera]
     for name in names:
         rig.camera_named(name)
     folder.mkdir(parents=True, exist_ok=True)
     teller = Teller()
-    teller.line(f"show the board to {' and '.join(names)} and hold it still; pictures go to {folder}; Ctrl-C ends early")
+    teller.line(
+        f"show the board to {' and '.join(names)} and hold it still; pictures go to {folder}; Ctrl-C ends early"
+    )
     job = _Job(rig, names, folder, square_m, count, teller)
     try:
         uvloop.run(job.run(board, [connect] if connect else list(rig.bus.connect)))
@@ -80,20 +94,32 @@ async def _one_each(rig: RigConfig, names: list[str], endpoints: list[str]) -> d
             if len(pictures) == len(names):
                 break
     if not pictures:
-        raise BusError(f"no camera of {', '.join(names)} answers; are their trackers running? `rhot top` shows them")
+        raise BusError(
+            f"no camera of {', '.join(names)} answers; are their trackers running? `rhot top` shows them"
+        )
     return pictures
 
 
 async def _ask(bus: Bus, names: list[str]) -> dict[str, bytes]:
     """One picture of every camera that answers, asked for at the same time."""
-    answers = await asyncio.gather(*(bus.get(topics.FRAME, timeout_s=_ANSWER_S, camera=name) for name in names))
+    answers = await asyncio.gather(
+        *(bus.get(topics.FRAME, timeout_s=_ANSWER_S, camera=name) for name in names)
+    )
     return {name: answer[0] for name, answer in zip(names, answers, strict=True) if answer}
 
 
 class _Job:
     """One collecting, from the first picture to the last."""
 
-    def __init__(self, rig: RigConfig, names: list[str], folder: Path, square_m: float, count: int, teller: Teller) -> None:
+    def __init__(
+        self,
+        rig: RigConfig,
+        names: list[str],
+        folder: Path,
+        square_m: float,
+        count: int,
+        teller: Teller,
+    ) -> None:
         self.board: Board | None = None
         self._rig, self._names, self._folder = rig, names, folder
         self._square_m, self._count, self._teller = square_m, count, teller
@@ -109,12 +135,20 @@ class _Job:
             news_s = time.monotonic()
             while collector is None or not collector.done:
                 pictures = await self._pictures(bus)
-                images = {name: await asyncio.to_thread(_decoded, name, picture) for name, picture in pictures.items()}
+                images = {
+                    name: await asyncio.to_thread(_decoded, name, picture)
+                    for name, picture in pictures.items()
+                }
                 if collector is None:
                     board = board or await asyncio.to_thread(self._counted, images)
                     collector = Collector(self._names, board, self._count) if board else None
                 if collector is not None:
-                    take = collector.offer({name: await asyncio.to_thread(_seen, image, collector) for name, image in images.items()})
+                    take = collector.offer(
+                        {
+                            name: await asyncio.to_thread(_seen, image, collector)
+                            for name, image in images.items()
+                        }
+                    )
                     if take.verdict is Verdict.KEPT:
                         self.board = collector.board
                         self._keep(pictures)
@@ -129,7 +163,9 @@ class _Job:
         pictures = await _ask(bus, self._names)
         silent = [name for name in self._names if name not in pictures]
         if silent:
-            raise BusError(f"camera {' and '.join(silent)} sends no picture; is its tracker running? `rhot top` shows it")
+            raise BusError(
+                f"camera {' and '.join(silent)} sends no picture; is its tracker running? `rhot top` shows it"
+            )
         return pictures
 
     def _counted(self, images: dict[str, np.ndarray]) -> Board | None:
@@ -172,5 +208,9 @@ def _decoded(name: str, picture: bytes) -> np.ndarray:
 
 def _first_free(folder: Path, names: list[str]) -> int:
     """The first number no picture of these cameras has: pictures of an earlier try stay and count."""
-    taken = [path.stem.removeprefix(f"{name}_") for name in names for path in folder.glob(f"{name}_*.png")]
+    taken = [
+        path.stem.removeprefix(f"{name}_")
+        for name in names
+        for path in folder.glob(f"{name}_*.png")
+    ]
     return max((int(number) for number in taken if number.isdigit()), default=0) + 1

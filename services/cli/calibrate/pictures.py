@@ -1,6 +1,8 @@
-"""Where `rhot calibrate camera` and `colors` get their pictures: a recording's frames by number, or the running camera's.
+"""Where `rhot calibrate camera` and `colors` get their pictures: a recording's frames by number, or
+the running camera's.
 
-A camera that does not answer is a BusError, a recording without those frames a CaptureError; both say what there is.
+A camera that does not answer is a BusError, a recording without those frames a CaptureError; both
+say what there is.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ _PAUSE_S = 0.2
 
 
 def recorded(camera: str, path: Path, numbers: Sequence[int]) -> list[Frame]:
-    """Frames of a video, a folder of images or a capture, by their numbers from 0, in the order of numbers."""
+    """Frames of a video, a folder of images or a capture, by their numbers from 0, in the order of
+    numbers.
+    """
     wanted, found, count = set(numbers), dict[int, Frame](), 0
     reader = _reader(camera, path)
     reader.open()
@@ -71,7 +75,9 @@ async def live(bus: Bus, camera: str, count: int) -> list[Frame]:
     while len(frames) < count:
         answers = await bus.get(topics.FRAME, timeout_s=_ANSWER_S, camera=camera)
         if not answers:
-            raise BusError(f"camera {camera!r} sends no picture; is its tracker running? `rhot top` shows it")
+            raise BusError(
+                f"camera {camera!r} sends no picture; is its tracker running? `rhot top` shows it"
+            )
         frames.append(_decoded(answers[0], camera, len(frames)))
         await asyncio.sleep(_PAUSE_S if len(frames) < count else 0.0)
     return frames

@@ -1,4 +1,6 @@
-"""What `rhot calibrate colors` is told of places in pictures: --box, --click and --at, as text, to pointers. Pure."""
+"""What `rhot calibrate colors` is told of places in pictures: --box, --click and --at, as text, to
+pointers. Pure.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,16 @@ def numbers_of(text: str) -> list[int]:
     return list(dict.fromkeys(int(part) for part in parts))
 
 
-def places(texts: Sequence[str], option: str, sizes: Sequence[int]) -> list[tuple[str, tuple[float, ...]]]:
+def places(
+    texts: Sequence[str], option: str, sizes: Sequence[int]
+) -> list[tuple[str, tuple[float, ...]]]:
     """`color=x,y` or `color=x,y,width,height`, whose count of numbers must be one of sizes."""
     return [_place(text, text, option, sizes) for text in texts]
 
 
-def _place(text: str, whole: str, option: str, sizes: Sequence[int]) -> tuple[str, tuple[float, ...]]:
+def _place(
+    text: str, whole: str, option: str, sizes: Sequence[int]
+) -> tuple[str, tuple[float, ...]]:
     color, equals, rest = text.partition("=")
     form = " or ".join("color=" + "x,y,width,height"[: 3 if size == 2 else None] for size in sizes)
     try:
@@ -52,7 +58,9 @@ def at(texts: Sequence[str]) -> tuple[list[int], list[Pointer]]:
     for text in texts:
         number, colon, rest = text.partition(":")
         if not colon or not number.strip().isdigit():
-            raise CalibrationError(f"--at {text!r}: expected FRAME:color=x,y,width,height, e.g. 100:green=290,180,40,40")
+            raise CalibrationError(
+                f"--at {text!r}: expected FRAME:color=x,y,width,height, e.g. 100:green=290,180,40,40"
+            )
         color, values = _place(rest, text, "--at", (2, 4))
         if int(number) not in frames:
             frames.append(int(number))

@@ -1,7 +1,9 @@
-"""`rhot calibrate refine RECORDING --config rig.toml`: the cameras' places once more, from markers that moved before them.
+"""`rhot calibrate refine RECORDING --config rig.toml`: the cameras' places once more, from markers
+that moved before them.
 
-RECORDING is a result folder of `rhot track`, its markers.jsonl, or an MCAP of `rhot record`. Only rig.json is written, and only if the
-new places explain seconds that they were not made from better than the old ones do.
+RECORDING is a result folder of `rhot track`, its markers.jsonl, or an MCAP of `rhot record`. Only
+rig.json is written, and only if the new places explain seconds that they were not made from better
+than the old ones do.
 """
 
 from __future__ import annotations
@@ -24,13 +26,25 @@ if TYPE_CHECKING:
 
 
 def refine(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="result folder of `rhot track`, markers.jsonl, or .mcap")],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING", help="result folder of `rhot track`, markers.jsonl, or .mcap"
+        ),
+    ],
     config: Annotated[Path, typer.Option("--config", help="rig.toml of the calibrated rig")],
-    wand: Annotated[str | None, typer.Option(help="two colours and the distance of their centres in metres: blue,green=0.2")] = None,
+    wand: Annotated[
+        str | None,
+        typer.Option(
+            help="two colours and the distance of their centres in metres: blue,green=0.2"
+        ),
+    ] = None,
     out: options.OutOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Adjust the cameras' places to moving markers: a wand waved before all cameras, or a painted hand."""
+    """Adjust the cameras' places to moving markers: a wand waved before all cameras, or a painted
+    hand.
+    """
     from services.calibrator.output.calibration_files import refined_of
     from services.calibrator.output.report import refined_text
     from services.calibrator.recalibrate import marker_tracks
@@ -38,10 +52,18 @@ def refine(
 
     rig = options.rig_if_named(config)
     if rig is None or len(rig.camera) < 2:
-        raise CalibrationError(f"{config}: two cameras or more are needed; it has {len(rig.camera) if rig else 0}")
+        raise CalibrationError(
+            f"{config}: two cameras or more are needed; it has {len(rig.camera) if rig else 0}"
+        )
     known = _wand(wand)
     cameras = load_cameras(rig.calibration_dir, [camera.name for camera in rig.camera])
-    result = refine_rig(marker_tracks.recording(messages(recording, topics.MARKERS, MarkerFrame, "markers"), cameras), cameras, known)
+    result = refine_rig(
+        marker_tracks.recording(
+            messages(recording, topics.MARKERS, MarkerFrame, "markers"), cameras
+        ),
+        cameras,
+        known,
+    )
     geometry = refined_of(result, options.now_text(), str(recording), wand or "")
     path = options.out_folder(out, rig) / "rig.json"
     save(path, geometry)
@@ -62,4 +84,6 @@ def _wand(text: str | None) -> Wand | None:
     try:
         return Wand(first.strip(), second.strip(), float(length))
     except ValueError:
-        raise CalibrationError(f"--wand {text!r} is not understood; write two colours and metres, e.g. --wand blue,green=0.2") from None
+        raise CalibrationError(
+            f"--wand {text!r} is not understood; write two colours and metres, e.g. --wand blue,green=0.2"
+        ) from None

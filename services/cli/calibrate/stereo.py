@@ -1,4 +1,6 @@
-"""`rhot calibrate stereo DIR`: lenses and places of all cameras of a rig, from pictures of one board that all of them saw."""
+"""`rhot calibrate stereo DIR`: lenses and places of all cameras of a rig, from pictures of one
+board that all of them saw.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,28 @@ if TYPE_CHECKING:
 
 
 def stereo(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="pictures named <camera><number>, or a folder per camera")],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="pictures named <camera><number>, or a folder per camera"
+        ),
+    ],
     board: options.BoardOption = None,
     square: options.SquareOption = None,
     kind: options.KindOption = Kind.CHESSBOARD,
     marker: options.MarkerOption = 0.7,
     dictionary: options.DictionaryOption = "DICT_4X4_50",
-    cameras: Annotated[str | None, typer.Option(help="names, comma-separated, the rig frame's first; default: found out")] = None,
-    side_by_side: Annotated[bool, typer.Option("--side-by-side", help="each picture holds all cameras' views, left to right")] = False,
-    keep_lenses: Annotated[bool, typer.Option("--keep-lenses", help="use the <camera>.lens.json there are")] = False,
+    cameras: Annotated[
+        str | None,
+        typer.Option(help="names, comma-separated, the rig frame's first; default: found out"),
+    ] = None,
+    side_by_side: Annotated[
+        bool,
+        typer.Option("--side-by-side", help="each picture holds all cameras' views, left to right"),
+    ] = False,
+    keep_lenses: Annotated[
+        bool, typer.Option("--keep-lenses", help="use the <camera>.lens.json there are")
+    ] = False,
     out: options.OutOption = None,
     config: options.ConfigOption = None,
     live: options.LiveOption = False,
@@ -38,7 +53,9 @@ def stereo(
     progress: ProgressOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Find where the cameras stand to each other, and their lenses, from pictures of a board that all of them see."""
+    """Find where the cameras stand to each other, and their lenses, from pictures of a board that
+    all of them see.
+    """
     from services.calibrator.output.calibration_files import given_lenses
     from services.calibrator.rig.calibrate import calibrate_rig
 
@@ -51,7 +68,9 @@ def stereo(
 
         known = collect(rig, names or [], folder, known, square or options.SQUARE_M, count, connect)
     pictures = _pictures(folder, names, side_by_side)
-    kept = {camera: load_lens(target, camera) for camera in pictures.cameras} if keep_lenses else None
+    kept = (
+        {camera: load_lens(target, camera) for camera in pictures.cameras} if keep_lenses else None
+    )
     known, found, blind = options.detect_all(pictures, known, square or options.SQUARE_M, progress)
     result = calibrate_rig(found, known, given_lenses(kept, found) if kept else None)
     result = replace(result, left_out=(*blind, *result.left_out))
@@ -73,7 +92,10 @@ def _pictures(folder: Path, names: list[str] | None, side_by_side: bool) -> Pict
         return picture_folder.side_by_side(folder, names or ["left", "right"])
     found = picture_folder.find_pictures(folder, names)
     if found.side_by_side:
-        typer.echo(f"note: each picture is taken for the views of {' and '.join(found.cameras)} side by side (--side-by-side)", err=True)
+        typer.echo(
+            f"note: each picture is taken for the views of {' and '.join(found.cameras)} side by side (--side-by-side)",
+            err=True,
+        )
     return found
 
 
@@ -82,7 +104,9 @@ def _write(result: RigResult, target: Path, folder: Path, as_json: bool) -> None
     from services.calibrator.output.report import rig_text
 
     date = options.now_text()
-    files = {f"{name}.lens.json": made for name, made in lenses_of(result, date, str(folder)).items()}
+    files = {
+        f"{name}.lens.json": made for name, made in lenses_of(result, date, str(folder)).items()
+    }
     geometry = rig_of(result, date, str(folder))
     for name, made in files.items():
         save(target / name, made)

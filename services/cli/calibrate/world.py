@@ -1,4 +1,6 @@
-"""`rhot calibrate world DIR --config rig.toml`: the rig's frame laid onto the desk, from one picture per camera of a board lying there."""
+"""`rhot calibrate world DIR --config rig.toml`: the rig's frame laid onto the desk, from one
+picture per camera of a board lying there.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,12 @@ from services.cli.options import ConnectOption
 
 
 def world(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="a picture per camera, named after it: left.png, right.png")],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="a picture per camera, named after it: left.png, right.png"
+        ),
+    ],
     config: Annotated[Path, typer.Option("--config", help="rig.toml of the calibrated rig")],
     board: options.BoardOption = None,
     square: options.SquareOption = None,
@@ -41,7 +48,9 @@ def world(
         one_each(rig, names, folder, connect)
     files = {name: {"desk": path} for name in names if (path := picture_of(folder, name))}
     if not files:
-        raise CalibrationError(f"{folder}: has no picture of {' or '.join(names)}; name them left.png, right.png, ... or add --live")
+        raise CalibrationError(
+            f"{folder}: has no picture of {' or '.join(names)}; name them left.png, right.png, ... or add --live"
+        )
     known, found, _ = options.detect_all(PictureSet(files), known, square or options.SQUARE_M, None)
     desk = find_desk(cameras, {name: seen["desk"] for name, seen in found.items() if seen}, known)
     typer.echo(desk_text(desk, cameras[names[0]]))

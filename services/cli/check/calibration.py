@@ -1,6 +1,8 @@
-"""Whether calibration/ holds what a rig.toml needs, and whether the two fit: lenses, places, colours, exposures, objects.
+"""Whether calibration/ holds what a rig.toml needs, and whether the two fit: lenses, places,
+colours, exposures, objects.
 
-Every missing or broken file is told with the command that makes it; a hand nobody has measured is a note, as tables stand in.
+Every missing or broken file is told with the command that makes it; a hand nobody has measured is a
+note, as tables stand in.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ T = TypeVar("T")
 
 # Sources that are real cameras, which want a fixed exposure.
 _REAL = ("picamera2", "v4l2")
-# Depth error grows as 1 / baseline: at 20 mm and 0.6 m, 34 mm per pixel, which no filter mends (9.1 mm at 75 mm).
+# Depth error grows as 1 / baseline: at 20 mm and 0.6 m, 34 mm per pixel, which no filter mends (9.1
+# mm at 75 mm).
 _MIN_BASELINE_M = 0.020
 
 
@@ -54,15 +57,11 @@ def _colors(config: RigConfig, camera: CameraTable) -> list[Problem]:
     for name in wanted:
         if name not in colors.colors:
             has = ", ".join(sorted(colors.colors)) or "none"
-            text = (
-                f"colour {name!r} of rig.toml's markers is missing; the file has {has}. Add it with `rhot calibrate colors {camera.name}`"
-            )
+            text = f"colour {name!r} of rig.toml's markers is missing; the file has {has}. Add it with `rhot calibrate colors {camera.name}`"
             problems.append(error(path, text))
     for a, b in combinations([name for name in wanted if name in colors.colors], 2):
         if overlap(colors.colors[a], colors.colors[b]):
-            text = (
-                f"the ranges of {a!r} and {b!r} overlap: a blob of one may be taken for the other; narrow them with `rhot calibrate colors`"
-            )
+            text = f"the ranges of {a!r} and {b!r} overlap: a blob of one may be taken for the other; narrow them with `rhot calibrate colors`"
             problems.append(warning(path, text))
     return problems
 
@@ -121,13 +120,16 @@ def _places(config: RigConfig) -> list[Problem]:
     cameras: dict[str, Camera] = {}
     for name in names:
         if name not in absent and (config.calibration_dir / f"{name}.lens.json").exists():
-            cameras |= _tried(lambda name=name: load_cameras(config.calibration_dir, [name]), problems, path) or {}  # type: ignore[misc]
+            cameras |= (
+                _tried(
+                    lambda name=name: load_cameras(config.calibration_dir, [name]), problems, path
+                )
+                or {}
+            )  # type: ignore[misc]
     for a, b in combinations(cameras.values(), 2):
         baseline_m = float(np.linalg.norm(a.centre_rig - b.centre_rig))
         if baseline_m < _MIN_BASELINE_M:
-            text = (
-                f"cameras {a.name!r} and {b.name!r} are {1e3 * baseline_m:.1f} mm apart; depth needs {1e3 * _MIN_BASELINE_M:.0f} mm or more"
-            )
+            text = f"cameras {a.name!r} and {b.name!r} are {1e3 * baseline_m:.1f} mm apart; depth needs {1e3 * _MIN_BASELINE_M:.0f} mm or more"
             problems.append(error(path, text))
     return problems
 
@@ -142,7 +144,9 @@ def _hands(config: RigConfig) -> list[Problem]:
         model = _tried(lambda hand=hand: load_hand(config.calibration_dir, hand), problems, path)  # type: ignore[misc]
         if model is not None:
             problems += [
-                error(path, f"says nothing of the paint of landmark {name!r}") for name in table.markers if name not in model.paint
+                error(path, f"says nothing of the paint of landmark {name!r}")
+                for name in table.markers
+                if name not in model.paint
             ]
     return problems
 
@@ -159,7 +163,11 @@ def _objects(config: RigConfig) -> list[Problem]:
     if objects is not None:
         absent = [table.name for table in config.object if table.name not in objects.objects]
         problems += [
-            warning(path, f"has no offset for object {name!r}: its pose is the tracker's. Run `rhot calibrate objects`") for name in absent
+            warning(
+                path,
+                f"has no offset for object {name!r}: its pose is the tracker's. Run `rhot calibrate objects`",
+            )
+            for name in absent
         ]
     return problems
 
@@ -169,7 +177,10 @@ def _tried(load: Callable[[], T], problems: list[Problem], path: Path) -> T | No
         return load()
     except CalibrationError as broken:
         text = str(broken)
-        where = next((name for name in (path, path.parent / "rig.json") if text.startswith(f"{name}: ")), path)
+        where = next(
+            (name for name in (path, path.parent / "rig.json") if text.startswith(f"{name}: ")),
+            path,
+        )
         problems.append(error(where, text.removeprefix(f"{where}: ")))
         return None
 

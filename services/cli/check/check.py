@@ -1,6 +1,7 @@
 """`rhot check CONFIG`: every problem of a rig.toml and of all it refers to, before anything runs.
 
-Exit code 0 if nothing stands in the way (warnings and notes do not), 1 if there is an error; --strict counts warnings too.
+Exit code 0 if nothing stands in the way (warnings and notes do not), 1 if there is an error;
+--strict counts warnings too.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ def check(
 ) -> None:
     """List every problem of a rig.toml: keys, colours, calibrations, sources, network."""
     found = check_config(config)
-    typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode() if as_json else report_text(found))
+    typer.echo(
+        msgspec.json.format(msgspec.json.encode(found), indent=1).decode()
+        if as_json
+        else report_text(found)
+    )
     if found.count("error") or (strict and found.count("warning")):
         raise typer.Exit(1)
 
@@ -41,6 +46,12 @@ def check_config(config: Path) -> Report:
 def report_text(found: Report) -> str:
     """One line per finding, and a sum."""
     width = max((len(problem.severity) for problem in found.problems), default=0)
-    lines = [f"{problem.severity.ljust(width)}  {problem.where}: {problem.what}" for problem in found.problems]
-    counts = [f"{found.count(severity)} {severity}{'' if found.count(severity) == 1 else 's'}" for severity in ("error", "warning", "note")]
+    lines = [
+        f"{problem.severity.ljust(width)}  {problem.where}: {problem.what}"
+        for problem in found.problems
+    ]
+    counts = [
+        f"{found.count(severity)} {severity}{'' if found.count(severity) == 1 else 's'}"
+        for severity in ("error", "warning", "note")
+    ]
     return "\n".join([*lines, f"{found.config}: {', '.join(counts)}"])

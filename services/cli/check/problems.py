@@ -14,8 +14,8 @@ _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 class Problem(msgspec.Struct, frozen=True, kw_only=True):
     """One finding.
 
-    error: the rig will not run as configured; warning: it will run worse than it could, or less safely than it should;
-    note: worth knowing.
+    error: the rig will not run as configured; warning: it will run worse than it could, or less
+    safely than it should; note: worth knowing.
     """
 
     severity: Severity
@@ -38,7 +38,10 @@ def report(config: str, problems: Iterable[Problem]) -> Report:
     """Errors first, else in the order found; each finding once."""
     unique = list(dict.fromkeys((p.severity, p.where, p.what) for p in problems))
     ordered = sorted(unique, key=lambda found: _ORDER.index(found[0]))
-    return Report(config=config, problems=[Problem(severity=s, where=where, what=what) for s, where, what in ordered])
+    return Report(
+        config=config,
+        problems=[Problem(severity=s, where=where, what=what) for s, where, what in ordered],
+    )
 
 
 def error(where: object, what: str) -> Problem:

@@ -1,7 +1,7 @@
 """Every mistake in a rig.toml, not only the first: what rhot.files.config would reject, key by key.
 
-Values that are wrong are taken out, so that the rest of the file can still be looked at. A file that is missing or is not TOML
-has one problem and no configuration.
+Values that are wrong are taken out, so that the rest of the file can still be looked at. A file
+that is missing or is not TOML has one problem and no configuration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ from services.cli.check.problems import Problem, error
 
 
 def read_rig(path: Path) -> tuple[RigConfig | None, list[Problem]]:
-    """The configuration without its wrong values, and what is wrong with them; None if nothing can be read at all."""
+    """The configuration without its wrong values, and what is wrong with them.
+
+    None if nothing can be read at all.
+    """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
@@ -44,7 +47,10 @@ def _clean(value: Any, kind: Any, at: str, path: str, problems: list[Problem]) -
     if table is not None and isinstance(value, dict):
         return _clean_table(value, table, at, path, problems)
     if origin is list and isinstance(value, list):
-        items = [_clean(item, of[0], f"{at}[{number}]", path, problems) for number, item in enumerate(value)]
+        items = [
+            _clean(item, of[0], f"{at}[{number}]", path, problems)
+            for number, item in enumerate(value)
+        ]
         return [item for item in items if item is not msgspec.UNSET]
     if origin is dict and isinstance(value, dict):
         return _clean_dict(value, of[0], of[1], at, path, problems)
@@ -55,7 +61,9 @@ def _clean(value: Any, kind: Any, at: str, path: str, problems: list[Problem]) -
     return msgspec.UNSET
 
 
-def _clean_table(value: dict[str, Any], table: type[msgspec.Struct], at: str, path: str, problems: list[Problem]) -> Any:
+def _clean_table(
+    value: dict[str, Any], table: type[msgspec.Struct], at: str, path: str, problems: list[Problem]
+) -> Any:
     fields = {field.encode_name: field for field in msgspec.structs.fields(table)}
     if table is RigConfig:
         # Filled in by the reader, never written by people.
@@ -63,21 +71,29 @@ def _clean_table(value: dict[str, Any], table: type[msgspec.Struct], at: str, pa
     kept = {}
     for key, inner in value.items():
         if key not in fields:
-            problems.append(error(path, _unknown(key, list(fields), f"[{at}]" if at else "top level", "key")))
+            problems.append(
+                error(path, _unknown(key, list(fields), f"[{at}]" if at else "top level", "key"))
+            )
             continue
         inner = _clean(inner, fields[key].type, f"{at}.{key}" if at else key, path, problems)
         if inner is not msgspec.UNSET:
             kept[key] = inner
     absent = [name for name, field in fields.items() if field.required and name not in kept]
-    problems += [error(path, f"[{at}]: `{name}` is missing") for name in absent if name not in value]
+    problems += [
+        error(path, f"[{at}]: `{name}` is missing") for name in absent if name not in value
+    ]
     return msgspec.UNSET if absent else kept
 
 
-def _clean_dict(value: dict[str, Any], keys: Any, values: Any, at: str, path: str, problems: list[Problem]) -> dict[str, Any]:
+def _clean_dict(
+    value: dict[str, Any], keys: Any, values: Any, at: str, path: str, problems: list[Problem]
+) -> dict[str, Any]:
     kept = {}
     for key, inner in value.items():
         if _wrong(key, keys) is not None:
-            problems.append(error(path, _unknown(key, [str(name) for name in get_args(keys)], f"[{at}]", "key")))
+            problems.append(
+                error(path, _unknown(key, [str(name) for name in get_args(keys)], f"[{at}]", "key"))
+            )
             continue
         inner = _clean(inner, values, f"{at}.{key}", path, problems)
         if inner is not msgspec.UNSET:
@@ -86,15 +102,28 @@ def _clean_dict(value: dict[str, Any], keys: Any, values: Any, at: str, path: st
 
 
 def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]:
-    """What rhot.files.config._check says of one thing at a time, said of all; known are the problems so far."""
+    """What rhot.files.config._check says of one thing at a time, said of all.
+
+    Known are the problems so far.
+    """
     problems = []
     colors: Counter[str] = Counter()
     for hand, table in config.hand.items():
         where = f"[hand.{hand}.markers]"
-        problems += [error(path, _unknown(name, list(LANDMARKS), where, "landmark")) for name in table.markers if name not in LANDMARKS]
+        problems += [
+            error(path, _unknown(name, list(LANDMARKS), where, "landmark"))
+            for name in table.markers
+            if name not in LANDMARKS
+        ]
         # A table is not called empty for what was taken out of it.
-        if not table.markers and not any(f"hand.{hand}.markers" in problem.what for problem in known):
-            problems.append(error(path, f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'))
+        if not table.markers and not any(
+            f"hand.{hand}.markers" in problem.what for problem in known
+        ):
+            problems.append(
+                error(
+                    path, f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'
+                )
+            )
         colors.update(table.markers.values())
     for what, names in (
         ("[[camera]] name", Counter(c.name for c in config.camera)),
@@ -103,7 +132,9 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
         ("colour", colors),
     ):
         problems += [
-            error(path, f"{what} {name!r} is used {count} times; each must be its own") for name, count in names.items() if count > 1
+            error(path, f"{what} {name!r} is used {count} times; each must be its own")
+            for name, count in names.items()
+            if count > 1
         ]
     return problems
 
@@ -133,7 +164,14 @@ def _unknown(name: str, valid: list[str], where: str, what: str) -> str:
 
 def _table_of(kind: Any) -> type[msgspec.Struct] | None:
     """The table itself, or the one inside `Table | None`."""
-    return next((one for one in (kind, *get_args(kind)) if get_origin(kind) not in (list, dict) and _is_struct(one)), None)
+    return next(
+        (
+            one
+            for one in (kind, *get_args(kind))
+            if get_origin(kind) not in (list, dict) and _is_struct(one)
+        ),
+        None,
+    )
 
 
 def _is_struct(kind: Any) -> bool:

@@ -1,6 +1,8 @@
-"""`rhot plot DIR`: the result of `rhot track` as PNG pictures, to see at a glance where a marker was lost or a joint jumped.
+"""`rhot plot DIR`: the result of `rhot track` as PNG pictures, to see at a glance where a marker
+was lost or a joint jumped.
 
-What a result does not hold (no second camera, no hand) is not drawn; an empty or interrupted result is an error.
+What a result does not hold (no second camera, no hand) is not drawn; an empty or interrupted result
+is an error.
 """
 
 from __future__ import annotations
@@ -16,12 +18,19 @@ from rhot.errors import ConfigError
 
 def plot(
     result: Annotated[Path, typer.Argument(metavar="DIR", help="folder written by `rhot track`")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for the pictures; default: DIR itself")] = None,
-    truth: Annotated[Path | None, typer.Option(metavar="CAPTURE", help="capture whose truth is drawn beside")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="folder for the pictures; default: DIR itself"),
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="CAPTURE", help="capture whose truth is drawn beside")
+    ] = None,
 ) -> None:
     """Draw marker tracks, 3D points, joint angles, residuals and objects."""
     if find_spec("matplotlib") is None:
-        raise ConfigError("`rhot plot` needs matplotlib, which is not installed; `pip install 'rhot[study]'`")
+        raise ConfigError(
+            "`rhot plot` needs matplotlib, which is not installed; `pip install 'rhot[study]'`"
+        )
     # Not above: matplotlib takes longer to import than other commands take to run.
     from services.cli.evaluate.plot_result import plot_result
 

@@ -1,4 +1,5 @@
-"""The pictures of `rhot plot`: arrays in, matplotlib figures out. No pyplot, no global state, no window.
+"""The pictures of `rhot plot`: arrays in, matplotlib figures out. No pyplot, no global state, no
+window.
 
 Lines break at NaN. A figure without any value is still a figure: callers leave it out.
 """
@@ -31,7 +32,9 @@ class Track:
     values: Array
 
 
-def markers_figure(camera: str, size_px: tuple[int, int], tracks: Mapping[str, Track], counts: Track) -> Figure:
+def markers_figure(
+    camera: str, size_px: tuple[int, int], tracks: Mapping[str, Track], counts: Track
+) -> Figure:
     """One camera: x and y of each colour over time, markers per frame, and the paths in the image."""
     figure = _figure(f"markers, camera {camera}", (13.0, 7.5))
     grid = figure.add_gridspec(3, 2, width_ratios=(3, 2), height_ratios=(3, 3, 1))
@@ -41,8 +44,23 @@ def markers_figure(camera: str, size_px: tuple[int, int], tracks: Mapping[str, T
     for number, (color, track) in enumerate(tracks.items()):
         ink = color if is_color_like(color) else _INKS[number % len(_INKS)]
         for axes, column in ((x, 0), (y, 1)):
-            axes.plot(track.times_s, track.values[:, column], color=ink, linewidth=0.8, marker=".", markersize=2.5)
-        image.plot(track.values[:, 0], track.values[:, 1], color=ink, linewidth=0.6, marker=".", markersize=2.5, label=color)
+            axes.plot(
+                track.times_s,
+                track.values[:, column],
+                color=ink,
+                linewidth=0.8,
+                marker=".",
+                markersize=2.5,
+            )
+        image.plot(
+            track.values[:, 0],
+            track.values[:, 1],
+            color=ink,
+            linewidth=0.6,
+            marker=".",
+            markersize=2.5,
+            label=color,
+        )
     count.step(counts.times_s, counts.values[:, 0], color="black", linewidth=0.7, where="mid")
     count.set_ylim(-0.2, max(float(np.max(counts.values)), 1.0) + 0.4)
     _label(x, "x / px", last=False)
@@ -55,12 +73,16 @@ def markers_figure(camera: str, size_px: tuple[int, int], tracks: Mapping[str, T
     _plain(image)
     image.set_title("paths in the image", fontsize=9)
     if tracks:
-        image.legend(fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=4, frameon=False)
+        image.legend(
+            fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=4, frameon=False
+        )
     return figure
 
 
 def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bool_]]]) -> Figure:
-    """One hand: x, y, z of each landmark over time (predicted ones as circles), and the paths seen from the front and from above."""
+    """One hand: x, y, z of each landmark over time (predicted ones as circles), and the paths seen
+    from the front and from above.
+    """
     figure = _figure(f"3D points, {hand} hand, rig frame", (13.0, 8.0))
     grid = figure.add_gridspec(1, 2, width_ratios=(3, 2))
     left, right = (figure.add_subfigure(grid[0, column]) for column in range(2))
@@ -70,13 +92,25 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
         ink, mm = _INKS[number % len(_INKS)], 1e3 * track.values
         for row, axes in enumerate(over_time):
             axes.plot(track.times_s, mm[:, row], color=ink, linewidth=1.0, label=name)
-            axes.plot(track.times_s[predicted], mm[predicted, row], "o", color=ink, markersize=3.5, markerfacecolor="none")
+            axes.plot(
+                track.times_s[predicted],
+                mm[predicted, row],
+                "o",
+                color=ink,
+                markersize=3.5,
+                markerfacecolor="none",
+            )
         front.plot(mm[:, 0], mm[:, 1], color=ink, linewidth=0.8)
         above.plot(mm[:, 0], mm[:, 2], color=ink, linewidth=0.8)
     for row, axes in enumerate(over_time):
         _label(axes, f"{'xyz'[row]} / mm", last=row == 2)
-    over_time[0].legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, frameon=False)
-    for axes, title, vertical in ((front, "from the front", "y / mm"), (above, "from above", "z / mm")):
+    over_time[0].legend(
+        fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, frameon=False
+    )
+    for axes, title, vertical in (
+        (front, "from the front", "y / mm"),
+        (above, "from above", "z / mm"),
+    ):
         axes.set_title(f"{title} (x to the right, mm)", fontsize=9)
         axes.set_ylabel(vertical, fontsize=8)
         axes.set_aspect("equal", adjustable="datalim")
@@ -87,7 +121,10 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
 
 def angles_figure(hand: str, found: Track, truth: Track | None) -> Figure:
     """One hand: the four angles of each digit in deg, values (n, 20); truth dashed."""
-    figure = _figure(f"joint angles, {hand} hand" + (", dashed: truth" if truth is not None else ""), (12.0, 11.0))
+    figure = _figure(
+        f"joint angles, {hand} hand" + (", dashed: truth" if truth is not None else ""),
+        (12.0, 11.0),
+    )
     rows = figure.subplots(5, 1, sharex=True)
     for row, (digit, names) in enumerate(zip(DIGITS, DIGIT_ANGLES, strict=True)):
         axes = rows[row]
@@ -95,14 +132,25 @@ def angles_figure(hand: str, found: Track, truth: Track | None) -> Figure:
             ink, index = _INKS[column], 4 * row + column
             axes.plot(found.times_s, found.values[:, index], color=ink, linewidth=1.2, label=name)
             if truth is not None:
-                axes.plot(truth.times_s, truth.values[:, index], color=ink, linewidth=0.9, linestyle="--", alpha=0.8)
+                axes.plot(
+                    truth.times_s,
+                    truth.values[:, index],
+                    color=ink,
+                    linewidth=0.9,
+                    linestyle="--",
+                    alpha=0.8,
+                )
         _label(axes, f"{digit} / deg", last=row == 4)
         axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
 
 
-def residuals_figure(hand: str, residuals: Track, iterations: Array, unsure: npt.NDArray[np.bool_]) -> Figure:
-    """One hand: what the solver left over per digit in mm (n, 5), crosses where it did not call it solved, and its iterations."""
+def residuals_figure(
+    hand: str, residuals: Track, iterations: Array, unsure: npt.NDArray[np.bool_]
+) -> Figure:
+    """One hand: what the solver left over per digit in mm (n, 5), crosses where it did not call it
+    solved, and its iterations.
+    """
     figure = _figure(f"solver, {hand} hand", (12.0, 7.0))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for row, digit in enumerate(DIGITS):
@@ -123,9 +171,17 @@ def objects_figure(tracks: Mapping[str, Track], truth: Mapping[str, Track]) -> F
     for number, (name, track) in enumerate(tracks.items()):
         ink = _INKS[number % len(_INKS)]
         for row, axes in enumerate(rows):
-            axes.plot(track.times_s, 1e3 * track.values[:, row], color=ink, linewidth=1.0, label=name)
+            axes.plot(
+                track.times_s, 1e3 * track.values[:, row], color=ink, linewidth=1.0, label=name
+            )
             if name in truth:
-                axes.plot(truth[name].times_s, 1e3 * truth[name].values[:, row], color="black", linewidth=0.8, linestyle="--")
+                axes.plot(
+                    truth[name].times_s,
+                    1e3 * truth[name].values[:, row],
+                    color="black",
+                    linewidth=0.8,
+                    linestyle="--",
+                )
     for row, axes in enumerate(rows):
         _label(axes, f"{'xyz'[row]} / mm", last=row == 2)
     rows[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, frameon=False)

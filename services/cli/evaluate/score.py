@@ -1,6 +1,8 @@
-"""`rhot score CAPTURE RESULT`: how far the poses of a result are from the truth of the capture it was made from.
+"""`rhot score CAPTURE RESULT`: how far the poses of a result are from the truth of the capture it
+was made from.
 
-A capture without truth.jsonl, an interrupted result, or one of another capture is an error that says so.
+A capture without truth.jsonl, an interrupted result, or one of another capture is an error that
+says so.
 """
 
 from __future__ import annotations
@@ -15,15 +17,25 @@ from rhot.files.capture import Capture
 
 
 def score(
-    capture: Annotated[Path, typer.Argument(help="folder written by `rhot simulate`, with truth.jsonl")],
+    capture: Annotated[
+        Path, typer.Argument(help="folder written by `rhot simulate`, with truth.jsonl")
+    ],
     result: Annotated[Path, typer.Argument(help="folder written by `rhot track`")],
-    stages: Annotated[bool, typer.Option("--stages", help="also say how much error markers and 3D points have")] = False,
+    stages: Annotated[
+        bool, typer.Option("--stages", help="also say how much error markers and 3D points have")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of tables")] = False,
 ) -> None:
-    """Compare tracked poses with the simulator's truth: tips, angles, orientation, dropouts, limits, delay."""
+    """Compare tracked poses with the simulator's truth: tips, angles, orientation, dropouts,
+    limits, delay.
+    """
     # Not above: scipy takes longer to import than the other commands take to run.
     from services.cli.evaluate.score_result import score_result
     from services.cli.evaluate.score_table import score_text
 
     found = score_result(Capture(capture), result, stages=stages)
-    typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode() if as_json else score_text(found))
+    typer.echo(
+        msgspec.json.format(msgspec.json.encode(found), indent=1).decode()
+        if as_json
+        else score_text(found)
+    )

@@ -1,7 +1,9 @@
-"""Poses against truth: the numbers behind `rhot score`. Pure maths; files are score_result.py's matter.
+"""Poses against truth: the numbers behind `rhot score`. Pure maths; files are score_result.py's
+matter.
 
-Frames: everything in the rig frame. An estimate is compared with the truth at its own stamp, so lateness of the estimate's
-content shows as `delay_ms` and in the errors, lateness of its delivery does not. No estimate inside the truth: CaptureError.
+Frames: everything in the rig frame. An estimate is compared with the truth at its own stamp, so
+lateness of the estimate's content shows as `delay_ms` and in the errors, lateness of its delivery
+does not. No estimate inside the truth: CaptureError.
 """
 
 from __future__ import annotations
@@ -15,8 +17,24 @@ from rhot.errors import CaptureError
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINT_INDEX, TIPS, HandModel
 from rhot.messages import HandPose, ObjectPose
-from services.cli.evaluate.score_types import AngleError, Coverage, HandScore, ObjectScore, PointError, TurnError, Vec3, Violations
-from services.cli.evaluate.truth_track import HandTrack, ObjectTrack, Stamps, angle_rows, cubic, inside
+from services.cli.evaluate.score_types import (
+    AngleError,
+    Coverage,
+    HandScore,
+    ObjectScore,
+    PointError,
+    TurnError,
+    Vec3,
+    Violations,
+)
+from services.cli.evaluate.truth_track import (
+    HandTrack,
+    ObjectTrack,
+    Stamps,
+    angle_rows,
+    cubic,
+    inside,
+)
 
 _TIP_ROWS = [JOINT_INDEX[tip] for tip in TIPS]
 # Angles are rounded to 1e-6 rad in messages: a joint at its limit may lie half of that outside.
@@ -24,11 +42,14 @@ _LIMIT_SLACK_RAD = 1e-6
 # The lag is searched in +-120 ms, four frames at 30 fps: more is not a delay but another motion.
 _LAG_REACH_S = 0.120
 _LAG_STEP_S = 0.002
-# A lag is told only if shifting by one frame (33 ms) changes the error by more than 0.1 mm RMS; a still hand has none.
+# A lag is told only if shifting by one frame (33 ms) changes the error by more than 0.1 mm RMS; a
+# still hand has none.
 _LAG_CONTRAST_M = 1e-4
 
 
-def score_hand(poses: Sequence[HandPose], truth: HandTrack, model: HandModel, period_ns: float) -> HandScore:
+def score_hand(
+    poses: Sequence[HandPose], truth: HandTrack, model: HandModel, period_ns: float
+) -> HandScore:
     """One hand's poses against its truth.
 
     period_ns is one frame: an instant of truth without a pose within half of it is missed.
@@ -38,7 +59,9 @@ def score_hand(poses: Sequence[HandPose], truth: HandTrack, model: HandModel, pe
     estimate = estimate_track(ordered)
     within = inside(truth, estimate.stamps_ns)
     if not within.any():
-        raise CaptureError(_apart(estimate.stamps_ns, truth.stamps_ns, f"poses of the {model.hand} hand"))
+        raise CaptureError(
+            _apart(estimate.stamps_ns, truth.stamps_ns, f"poses of the {model.hand} hand")
+        )
     real = truth.at(estimate.stamps_ns[within])
     tips = estimate.tips_m[within] - real.tips_m  # (n, 5, 3)
     angles = estimate.angles_rad[within] - real.angles_rad  # (n, 5, 4)
@@ -56,13 +79,24 @@ def score_hand(poses: Sequence[HandPose], truth: HandTrack, model: HandModel, pe
         orientation=turn_error(estimate.wrist_wxyz[within], real.wrist_wxyz),
         coverage=coverage(estimate.stamps_ns, truth.stamps_ns, period_ns),
         violations=violations(estimate.angles_rad, model),
-        delay_ms=delay_ms(estimate.stamps_ns, estimate.tips_m.reshape(-1, 15), truth.stamps_ns, truth.tips_m.reshape(-1, 15)),
+        delay_ms=delay_ms(
+            estimate.stamps_ns,
+            estimate.tips_m.reshape(-1, 15),
+            truth.stamps_ns,
+            truth.tips_m.reshape(-1, 15),
+        ),
     )
 
 
 def score_object(poses: Sequence[ObjectPose], truth: ObjectTrack, period_ns: float) -> ObjectScore:
-    """One object's poses against its truth; errors are None if no registered pose lies inside the truth."""
-    registered = sorted((pose for pose in poses if pose.registered and pose.tracking == "ok"), key=lambda pose: pose.stamp_ns)
+    """One object's poses against its truth.
+
+    Errors are None if no registered pose lies inside the truth.
+    """
+    registered = sorted(
+        (pose for pose in poses if pose.registered and pose.tracking == "ok"),
+        key=lambda pose: pose.stamp_ns,
+    )
     stamps = np.array([pose.stamp_ns for pose in registered], dtype=np.int64)
     position = np.array([pose.position_m for pose in registered]).reshape(-1, 3)
     wxyz = np.array([pose.orientation_wxyz for pose in registered]).reshape(-1, 4)
@@ -86,8 +120,12 @@ def estimate_track(poses: Sequence[HandPose]) -> HandTrack:
         np.array([pose.stamp_ns for pose in poses], dtype=np.int64),
         np.array([pose.wrist.position_m for pose in poses]).reshape(-1, 3),
         np.array([pose.wrist.orientation_wxyz for pose in poses]).reshape(-1, 4),
-        np.array([[pose.joints[row].position_m for row in _TIP_ROWS] for pose in poses]).reshape(-1, 5, 3),
-        np.array([angle_rows([finger.angles_rad for finger in pose.fingers]) for pose in poses]).reshape(-1, 5, 4),
+        np.array([[pose.joints[row].position_m for row in _TIP_ROWS] for pose in poses]).reshape(
+            -1, 5, 3
+        ),
+        np.array(
+            [angle_rows([finger.angles_rad for finger in pose.fingers]) for pose in poses]
+        ).reshape(-1, 5, 4),
     )
 
 
@@ -106,15 +144,22 @@ def turn_error(a_wxyz: Array, b_wxyz: Array) -> TurnError:
     """Angles between orientations (n, 4) and (n, 4), n > 0."""
     a = a_wxyz / np.linalg.norm(a_wxyz, axis=1, keepdims=True)
     b = b_wxyz / np.linalg.norm(b_wxyz, axis=1, keepdims=True)
-    # From the chord |a -+ b| = 2 sin(angle / 4): exact for small angles, where arccos of the dot product is not.
+    # From the chord |a -+ b| = 2 sin(angle / 4): exact for small angles, where arccos of the dot
+    # product is not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
     deg = np.rad2deg(4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
-    return TurnError(mean_deg=_round(float(deg.mean())), rms_deg=_round(float(np.sqrt(np.mean(deg**2)))), max_deg=_round(float(deg.max())))
+    return TurnError(
+        mean_deg=_round(float(deg.mean())),
+        rms_deg=_round(float(np.sqrt(np.mean(deg**2)))),
+        max_deg=_round(float(deg.max())),
+    )
 
 
 def coverage(stamps_ns: Stamps, truth_ns: Stamps, period_ns: float) -> Coverage:
     """How well sorted stamps (m,) cover the instants of truth (n,), n > 0."""
-    within = stamps_ns[(stamps_ns >= truth_ns[0] - period_ns / 2) & (stamps_ns <= truth_ns[-1] + period_ns / 2)]
+    within = stamps_ns[
+        (stamps_ns >= truth_ns[0] - period_ns / 2) & (stamps_ns <= truth_ns[-1] + period_ns / 2)
+    ]
     ends = np.concatenate([truth_ns[:1], within, truth_ns[-1:]])
     if len(within):
         after = np.clip(np.searchsorted(within, truth_ns), 0, len(within) - 1)
@@ -146,9 +191,11 @@ def violations(angles_rad: Array, model: HandModel) -> Violations:
 
 
 def delay_ms(stamps_ns: Stamps, values: Array, truth_ns: Stamps, truth: Array) -> float | None:
-    """How late the content is: the lag in ms for which values(t) fits truth(t - lag) best; (m, k) against (n, k).
+    """How late the content is: the lag in ms for which values(t) fits truth(t - lag) best; (m, k)
+    against (n, k).
 
-    Constant offsets are taken out first, so that a bias is not read as a lag. None where the motion does not tell.
+    Constant offsets are taken out first, so that a bias is not read as a lag. None where the motion
+    does not tell.
     """
     reach_ns = int(1e9 * _LAG_REACH_S)
     inner = (stamps_ns - reach_ns >= truth_ns[0]) & (stamps_ns + reach_ns <= truth_ns[-1])
@@ -179,7 +226,9 @@ def _lowest(lags: Array, residual: Callable[[float], float]) -> float | None:
     return _round(1e3 * float(lags[best] + shift * _LAG_STEP_S))
 
 
-def _angle_errors(error_rad: Array, free: npt.NDArray[np.bool_]) -> dict[str, dict[str, AngleError]]:
+def _angle_errors(
+    error_rad: Array, free: npt.NDArray[np.bool_]
+) -> dict[str, dict[str, AngleError]]:
     """Per digit and joint from errors (n, 5, 4)."""
     deg = np.rad2deg(error_rad)
     return {

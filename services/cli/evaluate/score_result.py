@@ -1,7 +1,8 @@
-"""A result folder against the capture it was made from: reads both, and asks scoring.py and stages.py for the figures.
+"""A result folder against the capture it was made from: reads both, and asks scoring.py and
+stages.py for the figures.
 
-Only simulated captures have a truth; any other one, an interrupted result, or a result of another capture is a CaptureError
-that says so.
+Only simulated captures have a truth; any other one, an interrupted result, or a result of another
+capture is a CaptureError that says so.
 """
 
 from __future__ import annotations
@@ -25,31 +26,58 @@ from services.cli.offline.results import check_result
 def score_result(capture: Capture, result: Path, *, stages: bool = False) -> Score:
     """Score one result.
 
-    Raises CaptureError if the capture has no truth, the result no poses, or if they do not belong together.
+    Raises CaptureError if the capture has no truth, the result no poses, or if they do not belong
+    together.
     """
     if not capture.folder.is_dir():
-        raise CaptureError(f"{capture.folder}: no such folder; make a capture with `rhot simulate fist --out {capture.folder}`")
+        raise CaptureError(
+            f"{capture.folder}: no such folder; make a capture with `rhot simulate fist --out {capture.folder}`"
+        )
     if not capture.truth.is_file():
-        raise CaptureError(f"{capture.folder}: has no truth.jsonl; only captures of `rhot simulate` can be scored")
+        raise CaptureError(
+            f"{capture.folder}: has no truth.jsonl; only captures of `rhot simulate` can be scored"
+        )
     check_result(result, "poses", "objects", *(("markers", "points") if stages else ()))
     config = load_rig(capture.rig_toml)
     truth = list(read_lines(capture.truth, Truth))
     poses = list(read_lines(result / "poses.jsonl", HandPose))
     period_ns = 1e9 / (config.rate_hz(Rate.HAND) or 30.0)
     models = _models(config, truth)
-    notes = [] if models else ["truth.jsonl knows no hand that rig.toml configures; no hand was scored"]
-    notes += [f"no pose of the {hand} hand, which truth.jsonl knows" for hand in models if not any(p.hand == hand for p in poses)]
+    notes = (
+        [] if models else ["truth.jsonl knows no hand that rig.toml configures; no hand was scored"]
+    )
+    notes += [
+        f"no pose of the {hand} hand, which truth.jsonl knows"
+        for hand in models
+        if not any(p.hand == hand for p in poses)
+    ]
     tracks = {hand: hand_track(truth, hand) for hand in models}
     seen = [hand for hand in models if any(pose.hand == hand for pose in poses)]
     if models and not seen:
-        raise CaptureError(f"{result}: has no pose of the {' or '.join(models)} hand; see {result / 'summary.json'} for the reason")
-    hands = {hand: score_hand([p for p in poses if p.hand == hand], tracks[hand], models[hand], period_ns) for hand in seen}
+        raise CaptureError(
+            f"{result}: has no pose of the {' or '.join(models)} hand; see {result / 'summary.json'} for the reason"
+        )
+    hands = {
+        hand: score_hand(
+            [p for p in poses if p.hand == hand], tracks[hand], models[hand], period_ns
+        )
+        for hand in seen
+    }
     objects = list(read_lines(result / "objects.jsonl", ObjectPose))
-    names = sorted({name for line in truth for name in line.objects} & {table.name for table in config.object})
+    names = sorted(
+        {name for line in truth for name in line.objects} & {table.name for table in config.object}
+    )
     return Score(
         hands={str(hand): one for hand, one in hands.items()},
-        objects={name: score_object([o for o in objects if o.object == name], object_track(truth, name), period_ns) for name in names},
-        stages={hand: _stages(config, hand, models[hand], tracks[hand], result) for hand in models} if stages else {},
+        objects={
+            name: score_object(
+                [o for o in objects if o.object == name], object_track(truth, name), period_ns
+            )
+            for name in names
+        },
+        stages={hand: _stages(config, hand, models[hand], tracks[hand], result) for hand in models}
+        if stages
+        else {},
         notes=notes,
     )
 
@@ -58,11 +86,15 @@ def _models(config: RigConfig, truth: list[Truth]) -> dict[HandName, HandModel]:
     """The hands that rig.toml configures and the truth knows."""
     known = {hand for line in truth for hand in line.hands}
     return {
-        hand: load_hand(config.calibration_dir, hand, config.hand[hand].scale) for hand in HANDS if hand in config.hand and hand in known
+        hand: load_hand(config.calibration_dir, hand, config.hand[hand].scale)
+        for hand in HANDS
+        if hand in config.hand and hand in known
     }
 
 
-def _stages(config: RigConfig, hand: HandName, model: HandModel, track: HandTrack, result: Path) -> Stages:
+def _stages(
+    config: RigConfig, hand: HandName, model: HandModel, track: HandTrack, result: Path
+) -> Stages:
     landmark_of = {color: landmark for landmark, color in config.hand[hand].markers.items()}
     points = landmark_truth(model, track, landmark_of.values())
     cameras = load_rig_cameras(config)

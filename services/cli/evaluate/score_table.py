@@ -1,10 +1,20 @@
-"""Scores as text: plain tables that line up in a terminal, a log or a mail. Numbers that were not measured show as `-`."""
+"""Scores as text: plain tables that line up in a terminal, a log or a mail.
+
+Numbers that were not measured show as `-`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from services.cli.evaluate.score_types import Coverage, HandScore, ObjectScore, PointError, Score, Stages
+from services.cli.evaluate.score_types import (
+    Coverage,
+    HandScore,
+    ObjectScore,
+    PointError,
+    Score,
+    Stages,
+)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -12,7 +22,12 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     cells = [list(header), *(list(row) for row in rows)]
     widths = [max(len(row[column]) for row in cells) for column in range(len(header))]
     lines = [
-        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))]).rstrip()
+        "  ".join(
+            [
+                row[0].ljust(widths[0]),
+                *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True)),
+            ]
+        ).rstrip()
         for row in cells
     ]
     lines.insert(1, "  ".join("-" * width for width in widths))
@@ -33,7 +48,12 @@ def hand_text(hand: str, score: HandScore) -> str:
     """One hand: tips, angles, orientation, dropouts, limits, delay."""
     tips = [(name, *_point(error)) for name, error in {**score.tips, "wrist": score.wrist}.items()]
     angles = [
-        (f"{digit} {joint}", _number(error.bias_deg, 1), _number(error.mean_deg, 1), _number(error.max_deg, 1))
+        (
+            f"{digit} {joint}",
+            _number(error.bias_deg, 1),
+            _number(error.mean_deg, 1),
+            _number(error.max_deg, 1),
+        )
         for digit, joints in score.angles.items()
         for joint, error in joints.items()
         if not error.fixed
@@ -49,7 +69,11 @@ def hand_text(hand: str, score: HandScore) -> str:
         ("wrist position, RMS", f"{score.wrist.total_rms_mm:.2f} mm", ""),
         ("dropouts", f"{100 * score.coverage.missed_share:.1f} %", coverage_text(score.coverage)),
         ("limit violations", str(score.violations.count), _worst(score)),
-        ("delay", "-" if score.delay_ms is None else f"{score.delay_ms:.1f} ms", "of the content; - where the motion does not tell"),
+        (
+            "delay",
+            "-" if score.delay_ms is None else f"{score.delay_ms:.1f} ms",
+            "of the content; - where the motion does not tell",
+        ),
     ]
     count = f"{score.scored} of {score.poses} poses inside the truth"
     if score.predicted:
@@ -57,7 +81,20 @@ def hand_text(hand: str, score: HandScore) -> str:
     return "\n\n".join(
         [
             f"{hand} hand: {count}",
-            table(("point", "bias x", "bias y", "bias z", "RMS x", "RMS y", "RMS z", "RMS mm", "max mm"), tips),
+            table(
+                (
+                    "point",
+                    "bias x",
+                    "bias y",
+                    "bias z",
+                    "RMS x",
+                    "RMS y",
+                    "RMS z",
+                    "RMS mm",
+                    "max mm",
+                ),
+                tips,
+            ),
             table(("angle", "bias", "mean", "max deg"), angles),
             plain(lines),
         ]
@@ -98,20 +135,47 @@ def objects_text(objects: dict[str, ObjectScore]) -> str:
 def stages_text(hand: str, stages: Stages) -> str:
     """Markers and points, one row each."""
     markers = [
-        (f"{camera} {name}", f"{100 * one.found_share:.1f}", str(one.strays), *(_number(v) for v in (*one.bias_px, *one.rms_px)))
+        (
+            f"{camera} {name}",
+            f"{100 * one.found_share:.1f}",
+            str(one.strays),
+            *(_number(v) for v in (*one.bias_px, *one.rms_px)),
+        )
         for camera, rows in stages.markers.items()
         for name, one in rows.items()
     ]
     points = [
-        (name, f"{100 * one.found_share:.1f}", f"{100 * one.predicted_share:.1f}", *_point(one.error))
+        (
+            name,
+            f"{100 * one.found_share:.1f}",
+            f"{100 * one.predicted_share:.1f}",
+            *_point(one.error),
+        )
         for name, one in stages.points.items()
     ]
     return "\n\n".join(
         [
             f"{hand} hand, markers against the projected truth:",
-            table(("marker", "found %", "strays", "bias x", "bias y", "RMS x", "RMS y px"), markers),
+            table(
+                ("marker", "found %", "strays", "bias x", "bias y", "RMS x", "RMS y px"), markers
+            ),
             f"{hand} hand, points against the truth's landmarks:",
-            table(("point", "found %", "pred. %", "bias x", "bias y", "bias z", "RMS x", "RMS y", "RMS z", "RMS mm", "max mm"), points),
+            table(
+                (
+                    "point",
+                    "found %",
+                    "pred. %",
+                    "bias x",
+                    "bias y",
+                    "bias z",
+                    "RMS x",
+                    "RMS y",
+                    "RMS z",
+                    "RMS mm",
+                    "max mm",
+                ),
+                points,
+            ),
         ]
     )
 
@@ -125,7 +189,10 @@ def coverage_text(coverage: Coverage) -> str:
 def plain(rows: Sequence[Sequence[str]]) -> str:
     """Rows without a header."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
 
 
 def _worst(score: HandScore) -> str:

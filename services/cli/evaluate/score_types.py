@@ -1,6 +1,7 @@
 """What `rhot score` finds: frozen results, in the units people read (mm, deg, ms), ready for JSON.
 
-A value that could not be measured is None, never zero: a delay of a hand that does not move, angles when no pose was scored.
+A value that could not be measured is None, never zero: a delay of a hand that does not move, angles
+when no pose was scored.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PointError(Result, frozen=True, kw_only=True):
-    """Error of one point along the rig's x, y, z in mm: its mean (bias), its RMS, and the RMS and maximum of its length."""
+    """Error of one point along the rig's x, y, z in mm: its mean (bias), its RMS, and the RMS and
+    maximum of its length.
+    """
 
     bias_mm: Vec3
     rms_mm: Vec3
@@ -24,7 +27,10 @@ class PointError(Result, frozen=True, kw_only=True):
 
 
 class AngleError(Result, frozen=True, kw_only=True):
-    """Error of one joint angle in deg: signed mean (bias), mean and maximum of its size. A fixed joint has no freedom to err."""
+    """Error of one joint angle in deg: signed mean (bias), mean and maximum of its size.
+
+    A fixed joint has no freedom to err.
+    """
 
     bias_deg: float
     mean_deg: float
@@ -43,8 +49,9 @@ class TurnError(Result, frozen=True, kw_only=True):
 class Coverage(Result, frozen=True, kw_only=True):
     """How much of the truth was answered.
 
-    expected: instants of truth; missed: those without a pose within half a frame; longest_gap_ms: longest time between two poses
-    (or from the first or to the last truth); outside: poses before or after the truth, which are not scored.
+    expected: instants of truth; missed: those without a pose within half a frame; longest_gap_ms:
+    longest time between two poses (or from the first or to the last truth); outside: poses before
+    or after the truth, which are not scored.
     """
 
     expected: int
@@ -55,7 +62,9 @@ class Coverage(Result, frozen=True, kw_only=True):
 
 
 class Violations(Result, frozen=True, kw_only=True):
-    """Joint angles beyond the limits of the hand: how many (poses times joints), the worst excess and where it is."""
+    """Joint angles beyond the limits of the hand: how many (poses times joints), the worst excess
+    and where it is.
+    """
 
     count: int
     worst_deg: float
@@ -81,7 +90,10 @@ class HandScore(Result, frozen=True, kw_only=True):
 
 
 class ObjectScore(Result, frozen=True, kw_only=True):
-    """One object against its truth; unregistered poses (lighthouse frame) are counted and not scored."""
+    """One object against its truth.
+
+    Unregistered poses (lighthouse frame) are counted and not scored.
+    """
 
     poses: int
     scored: int
@@ -105,7 +117,9 @@ class MarkerError(Result, frozen=True, kw_only=True):
 
 
 class PointStage(Result, frozen=True, kw_only=True):
-    """3D points of one landmark against its truth: share of instants that hold it, and of those the share only predicted."""
+    """3D points of one landmark against its truth: share of instants that hold it, and of those the
+    share only predicted.
+    """
 
     found_share: float
     predicted_share: float

@@ -1,7 +1,9 @@
-"""Where the error of a result comes from: markers against the projected truth, 3D points against the truth's landmarks.
+"""Where the error of a result comes from: markers against the projected truth, 3D points against
+the truth's landmarks.
 
-Poses are the third stage and are scored by scoring.py. A landmark's truth is the point that stands for its paint
-(rhot.hand.landmark_point), not the joint: that is what fusion reports. Instants outside the truth are left out.
+Poses are the third stage and are scored by scoring.py. A landmark's truth is the point that stands
+for its paint (rhot.hand.landmark_point), not the joint: that is what fusion reports. Instants
+outside the truth are left out.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from services.cli.evaluate.score_math import point_error
 from services.cli.evaluate.score_types import MarkerError, PointStage
 from services.cli.evaluate.truth_track import HandTrack, Stamps, cubic
 
-# A blob further than this from where its landmark is (3 % of the image's width, two finger widths at 0.5 m) is another thing.
+# A blob further than this from where its landmark is (3 % of the image's width, two finger widths
+# at 0.5 m) is another thing.
 _STRAY_PX = 20.0
 
 
@@ -28,7 +31,12 @@ def landmark_truth(model: HandModel, truth: HandTrack, names: Iterable[str]) -> 
     names = list(names)
     points = np.zeros((len(names), len(truth.stamps_ns), 3))
     for i in range(len(truth.stamps_ns)):
-        joints = forward(model, rotation_from_quaternion(truth.wrist_wxyz[i]), truth.wrist_m[i], truth.angles_rad[i])
+        joints = forward(
+            model,
+            rotation_from_quaternion(truth.wrist_wxyz[i]),
+            truth.wrist_m[i],
+            truth.angles_rad[i],
+        )
         for row, name in enumerate(names):
             points[row, i] = landmark_point(model, name, *joints)
     return dict(zip(names, points, strict=True))
@@ -41,14 +49,19 @@ def marker_errors(
     stamps_ns: Stamps,
     points: Mapping[str, Array],
 ) -> dict[str, dict[str, MarkerError]]:
-    """Per camera and landmark: pixels between the blob and the projected landmark at the blob's own instant.
+    """Per camera and landmark: pixels between the blob and the projected landmark at the blob's own
+    instant.
 
-    landmark_of maps colours to landmarks, stamps_ns (n,) and points {landmark: (n, 3)} are the truth.
+    landmark_of maps colours to landmarks, stamps_ns (n,) and points {landmark: (n, 3)} are the
+    truth.
     """
     counts: dict[str, int] = defaultdict(int)
     errors: dict[tuple[str, str], list[Array]] = defaultdict(list)
     for frame in frames:
-        if frame.camera not in cameras or not stamps_ns[0] <= frame.stamp_ns - frame.clock_offset_ns <= stamps_ns[-1]:
+        if (
+            frame.camera not in cameras
+            or not stamps_ns[0] <= frame.stamp_ns - frame.clock_offset_ns <= stamps_ns[-1]
+        ):
             continue
         counts[frame.camera] += 1
         for marker in frame.markers:
@@ -60,12 +73,16 @@ def marker_errors(
             pixel = cameras[frame.camera].project(place)[0]
             errors[frame.camera, landmark].append(np.array([marker.x_px, marker.y_px]) - pixel)
     return {
-        camera: {landmark: _marker_error(errors[camera, landmark], frames) for landmark in sorted(points)}
+        camera: {
+            landmark: _marker_error(errors[camera, landmark], frames) for landmark in sorted(points)
+        }
         for camera, frames in counts.items()
     }
 
 
-def point_errors(lines: Iterable[HandPoints], stamps_ns: Stamps, points: Mapping[str, Array]) -> dict[str, PointStage]:
+def point_errors(
+    lines: Iterable[HandPoints], stamps_ns: Stamps, points: Mapping[str, Array]
+) -> dict[str, PointStage]:
     """Per landmark: 3D points against the truth's landmark points."""
     found: dict[str, list[tuple[int, Array]]] = defaultdict(list)
     predicted: dict[str, int] = defaultdict(int)
@@ -81,9 +98,15 @@ def point_errors(lines: Iterable[HandPoints], stamps_ns: Stamps, points: Mapping
     result = {}
     for name in sorted(found):
         at = np.array([stamp for stamp, _ in found[name]], dtype=np.int64)
-        error = np.array([position for _, position in found[name]]) - cubic(stamps_ns, points[name], at)
+        error = np.array([position for _, position in found[name]]) - cubic(
+            stamps_ns, points[name], at
+        )
         share = round(len(at) / count, 4)
-        result[name] = PointStage(found_share=share, predicted_share=round(predicted[name] / len(at), 4), error=point_error(error))
+        result[name] = PointStage(
+            found_share=share,
+            predicted_share=round(predicted[name] / len(at), 4),
+            error=point_error(error),
+        )
     return result
 
 

@@ -1,8 +1,10 @@
-"""The simulator's truth as functions of time: what hand and objects did at the instant a pose speaks of.
+"""The simulator's truth as functions of time: what hand and objects did at the instant a pose
+speaks of.
 
-Truth comes as one line per instant; poses have stamps of their own. Positions are interpolated by a cubic spline, angles
-linearly, orientations along the shortest arc. Nothing is extrapolated: an instant before the first or after the last line is
-`outside`, and the scores say how many those were. A capture with fewer than two lines of truth cannot be scored.
+Truth comes as one line per instant; poses have stamps of their own. Positions are interpolated by a
+cubic spline, angles linearly, orientations along the shortest arc. Nothing is extrapolated: an
+instant before the first or after the last line is `outside`, and the scores say how many those
+were. A capture with fewer than two lines of truth cannot be scored.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ Stamps = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class HandTrack:
-    """One hand's truth: stamps_ns (n,), wrist and tips in metres, orientation wxyz, angles (n, 5, 4) in rad."""
+    """One hand's truth: stamps_ns (n,), wrist and tips in metres, orientation wxyz, angles (n, 5,
+    4) in rad.
+    """
 
     stamps_ns: Stamps  # (n,)
     wrist_m: Array  # (n, 3)
@@ -45,7 +49,9 @@ class HandTrack:
 
 @dataclass(frozen=True, eq=False)
 class ObjectTrack:
-    """One object's truth or estimate: stamps_ns (n,), position (n, 3) in metres, orientation (n, 4) wxyz."""
+    """One object's truth or estimate: stamps_ns (n,), position (n, 3) in metres, orientation (n, 4)
+    wxyz.
+    """
 
     stamps_ns: Stamps
     position_m: Array
@@ -54,12 +60,20 @@ class ObjectTrack:
     def at(self, stamps_ns: Stamps) -> ObjectTrack:
         """The object at other instants (m,), all of them inside the span of the truth."""
         position = cubic(self.stamps_ns, self.position_m, stamps_ns)
-        return ObjectTrack(stamps_ns, position, slerp(self.stamps_ns, self.orientation_wxyz, stamps_ns))
+        return ObjectTrack(
+            stamps_ns, position, slerp(self.stamps_ns, self.orientation_wxyz, stamps_ns)
+        )
 
 
 def hand_track(lines: Sequence[Truth], hand: str) -> HandTrack:
-    """The truth of one hand from all lines that hold it; raises CaptureError if fewer than two do."""
-    found = sorted(((line.stamp_ns, line.hands[hand]) for line in lines if hand in line.hands), key=lambda pair: pair[0])
+    """The truth of one hand from all lines that hold it.
+
+    Raises CaptureError if fewer than two do.
+    """
+    found = sorted(
+        ((line.stamp_ns, line.hands[hand]) for line in lines if hand in line.hands),
+        key=lambda pair: pair[0],
+    )
     stamps = _increasing([stamp for stamp, _ in found], f"truth of the {hand} hand")
     hands = [truth for _, truth in found]
     return HandTrack(
@@ -73,15 +87,26 @@ def hand_track(lines: Sequence[Truth], hand: str) -> HandTrack:
 
 def object_track(lines: Sequence[Truth], name: str) -> ObjectTrack:
     """The truth of one object; raises CaptureError if fewer than two lines hold it."""
-    found: list[tuple[int, ObjectTruth]] = [(line.stamp_ns, line.objects[name]) for line in lines if name in line.objects]
+    found: list[tuple[int, ObjectTruth]] = [
+        (line.stamp_ns, line.objects[name]) for line in lines if name in line.objects
+    ]
     found.sort(key=lambda pair: pair[0])
     stamps = _increasing([stamp for stamp, _ in found], f"truth of object {name!r}")
-    return ObjectTrack(stamps, np.array([o.position_m for _, o in found]), np.array([o.orientation_wxyz for _, o in found]))
+    return ObjectTrack(
+        stamps,
+        np.array([o.position_m for _, o in found]),
+        np.array([o.orientation_wxyz for _, o in found]),
+    )
 
 
 def angle_rows(fingers: Sequence[FingerAngles]) -> Array:
     """(5, 4) in the order of DIGIT_ANGLES from the angles of the five digits."""
-    return np.array([[getattr(f, joint) for joint in joints] for f, joints in zip(fingers, DIGIT_ANGLES, strict=True)])
+    return np.array(
+        [
+            [getattr(f, joint) for joint in joints]
+            for f, joints in zip(fingers, DIGIT_ANGLES, strict=True)
+        ]
+    )
 
 
 def inside(track: HandTrack | ObjectTrack, stamps_ns: Stamps) -> npt.NDArray[np.bool_]:
@@ -91,7 +116,9 @@ def inside(track: HandTrack | ObjectTrack, stamps_ns: Stamps) -> npt.NDArray[np.
 
 def cubic(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
     """Cubic spline through (n, ...) at (m,) -> (m, ...)."""
-    return np.asarray(CubicSpline(_seconds(stamps_ns, stamps_ns), values, axis=0)(_seconds(at_ns, stamps_ns)))
+    return np.asarray(
+        CubicSpline(_seconds(stamps_ns, stamps_ns), values, axis=0)(_seconds(at_ns, stamps_ns))
+    )
 
 
 def linear(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
@@ -113,7 +140,11 @@ def slerp(stamps_ns: Stamps, wxyz: Array, at_ns: Stamps) -> Array:
     # Below 1e-6 rad the arc is its chord.
     small = sine < 1e-6
     safe = np.where(small, 1.0, sine)
-    q = np.where(small, a * (1 - share) + b * share, (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / safe)
+    q = np.where(
+        small,
+        a * (1 - share) + b * share,
+        (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / safe,
+    )
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     return np.where(q[:, :1] < 0.0, -q, q)
 
@@ -121,16 +152,22 @@ def slerp(stamps_ns: Stamps, wxyz: Array, at_ns: Stamps) -> Array:
 def _tips(truth: HandTruth) -> Array:
     missing = [tip for tip in TIPS if tip not in truth.points_m]
     if missing:
-        raise CaptureError(f"truth.jsonl: points_m lacks {missing}; simulate the capture again with `rhot simulate`")
+        raise CaptureError(
+            f"truth.jsonl: points_m lacks {missing}; simulate the capture again with `rhot simulate`"
+        )
     return np.array([truth.points_m[tip] for tip in TIPS])
 
 
 def _increasing(stamps: list[int], what: str) -> Stamps:
     if len(stamps) < 2:
-        raise CaptureError(f"{what}: {len(stamps)} line(s) in truth.jsonl; at least 2 are needed to score against it")
+        raise CaptureError(
+            f"{what}: {len(stamps)} line(s) in truth.jsonl; at least 2 are needed to score against it"
+        )
     array = np.array(stamps, dtype=np.int64)
     if np.any(np.diff(array) <= 0):
-        raise CaptureError(f"{what}: two lines of truth.jsonl have the same stamp_ns; simulate the capture again")
+        raise CaptureError(
+            f"{what}: two lines of truth.jsonl have the same stamp_ns; simulate the capture again"
+        )
     return array
 
 

@@ -1,4 +1,6 @@
-"""`rhot demo`: router, simulated rig, all services and the live view, on one machine, until Ctrl-C or for N seconds."""
+"""`rhot demo`: router, simulated rig, all services and the live view, on one machine, until Ctrl-C
+or for N seconds.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,20 @@ from services.cli.live.up import children_of
 from services.cli.options import VerboseOption
 from services.cli.terminal import Teller
 
-# Without a pose by then something is wrong: numba's first compilation takes most of a minute on a slow machine.
+# Without a pose by then something is wrong: numba's first compilation takes most of a minute on a
+# slow machine.
 _FIRST_POSE_S = 120.0
 
 
 def demo(
-    config: Annotated[Path | None, typer.Option(help="rig.toml of a simulated rig; default: the one rhot brings along")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary")] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(help="rig.toml of a simulated rig; default: the one rhot brings along"),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary"),
+    ] = None,
     viewer: Annotated[bool, typer.Option(help="show the hand in a browser")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
     verbose: VerboseOption = False,
@@ -41,21 +50,35 @@ def demo(
     elif seconds is not None or summary.poses:
         typer.echo(_text(summary))
     if not summary.poses:
-        typer.echo("rhot demo: no pose came; `rhot demo --verbose` shows what the services say", err=True)
+        typer.echo(
+            "rhot demo: no pose came; `rhot demo --verbose` shows what the services say", err=True
+        )
         raise typer.Exit(1)
 
 
-async def _demo(config: RigConfig, path: Path, seconds: float | None, viewer: bool, teller: Teller) -> Summary:
+async def _demo(
+    config: RigConfig, path: Path, seconds: float | None, viewer: bool, teller: Teller
+) -> Summary:
     stopping = stop_on_signals()
     supervisor, figures = Supervisor(teller.child), LiveFigures()
     endpoint = _free_endpoint(config.bus.listen[0])
     with cancelled_by(stopping):
         async with asyncio.TaskGroup() as tasks:
-            keepers = [tasks.create_task(supervisor.keep(child)) for child in children_of(config, path, viewer=viewer, endpoint=[endpoint])]
-            teller.line(f"rig {config.rig.name!r}, scene {config.simulator.scene!r}, router at {endpoint}; Ctrl-C ends everything")
+            keepers = [
+                tasks.create_task(supervisor.keep(child))
+                for child in children_of(config, path, viewer=viewer, endpoint=[endpoint])
+            ]
+            teller.line(
+                f"rig {config.rig.name!r}, scene {config.simulator.scene!r}, router at {endpoint}; Ctrl-C ends everything"
+            )
             try:
-                async with open_bus(config.rig.name, [endpoint]) as bus, asyncio.TaskGroup() as watchers:
-                    watching = [watchers.create_task(watch) for watch in _watch(bus, figures, teller)]
+                async with (
+                    open_bus(config.rig.name, [endpoint]) as bus,
+                    asyncio.TaskGroup() as watchers,
+                ):
+                    watching = [
+                        watchers.create_task(watch) for watch in _watch(bus, figures, teller)
+                    ]
                     await _until_done(figures, seconds, teller)
                     for task in watching:
                         task.cancel()
@@ -97,17 +120,27 @@ async def _until_done(figures: LiveFigures, seconds: float | None, teller: Telle
         waited_s += step_s
         if not figures.poses and waited_s >= _FIRST_POSE_S and seconds is not None:
             return
-        if seconds is not None and figures.poses and clock.now_ns() - figures.first_ns >= seconds * 1e9:
+        if (
+            seconds is not None
+            and figures.poses
+            and clock.now_ns() - figures.first_ns >= seconds * 1e9
+        ):
             return
         if waited_s % 1.0 == 0.0:
             error_mm = figures.tip_error_mm(last=30)
             error = "" if error_mm is None else f", tips {error_mm:.1f} mm from truth"
-            teller.status(f"{figures.poses - last} poses/s{error}" if figures.poses else "waiting for the first pose ...")
+            teller.status(
+                f"{figures.poses - last} poses/s{error}"
+                if figures.poses
+                else "waiting for the first pose ..."
+            )
             last = figures.poses
 
 
 def _free_endpoint(wanted: str) -> str:
-    """The wanted loopback endpoint, or one on a free port if another router has it: a demo should not fail for that."""
+    """The wanted loopback endpoint, or one on a free port if another router has it: a demo should
+    not fail for that.
+    """
     protocol, _, address = wanted.partition("/")
     host, _, port = address.rpartition(":")
     with socket.socket() as probe:

@@ -1,7 +1,8 @@
-"""Figures of a running rig for `rhot demo`: rate, glass-to-pose latency, tip error against the simulator's truth. Pure.
+"""Figures of a running rig for `rhot demo`: rate, glass-to-pose latency, tip error against the
+simulator's truth. Pure.
 
-Poses without truth about them count in rate and latency only. Poses from before `begin` are left out: the summary speaks of
-the time in which everything ran.
+Poses without truth about them count in rate and latency only. Poses from before `begin` are left
+out: the summary speaks of the time in which everything ran.
 """
 
 from __future__ import annotations
@@ -74,11 +75,15 @@ class LiveFigures:
         return Summary(
             seconds=round(seconds, 2),
             poses=self.poses,
-            poses_per_s=round((self.poses - 1) / seconds, 1) if self.poses > 1 and seconds > 0.0 else 0.0,
+            poses_per_s=round((self.poses - 1) / seconds, 1)
+            if self.poses > 1 and seconds > 0.0
+            else 0.0,
             latency_p50_ms=p50_ms if self.poses else None,
             latency_p99_ms=p99_ms if self.poses else None,
             tip_error_rms_mm=None if rms_mm is None else round(rms_mm, 2),
-            tip_error_median_mm=round(float(np.sqrt(np.median(self._squared_mm2))), 2) if self._squared_mm2 else None,
+            tip_error_median_mm=round(float(np.sqrt(np.median(self._squared_mm2))), 2)
+            if self._squared_mm2
+            else None,
             object_poses=self.objects,
             restarts=restarts,
         )
@@ -93,8 +98,15 @@ class LiveFigures:
     def _tips_at(self, pose: HandPose) -> np.ndarray | None:
         """True tips (5, 3) at the pose's instant, on the line between the truths about it."""
         for before, after in zip(self._truth, list(self._truth)[1:], strict=False):
-            if before.stamp_ns <= pose.stamp_ns <= after.stamp_ns and pose.hand in before.hands and pose.hand in after.hands:
-                a, b = (np.array([t.hands[pose.hand].points_m[name] for name in TIPS]) for t in (before, after))
+            if (
+                before.stamp_ns <= pose.stamp_ns <= after.stamp_ns
+                and pose.hand in before.hands
+                and pose.hand in after.hands
+            ):
+                a, b = (
+                    np.array([t.hands[pose.hand].points_m[name] for name in TIPS])
+                    for t in (before, after)
+                )
                 share = (pose.stamp_ns - before.stamp_ns) / max(1, after.stamp_ns - before.stamp_ns)
                 return a + share * (b - a)
         return None

@@ -1,4 +1,7 @@
-"""`rhot router`: a Zenoh router inside Python, so that no other binary is needed. A stock zenohd serves as well."""
+"""`rhot router`: a Zenoh router inside Python, so that no other binary is needed.
+
+A stock zenohd serves as well.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,9 @@ async def running_router(listen: Sequence[str]) -> AsyncIterator[None]:
 
 def router(
     config: Annotated[Path | None, typer.Option(help="rig.toml whose [bus] listen counts")] = None,
-    listen: Annotated[list[str] | None, typer.Option(help="endpoint, e.g. tcp/0.0.0.0:7447 for the whole network")] = None,
+    listen: Annotated[
+        list[str] | None, typer.Option(help="endpoint, e.g. tcp/0.0.0.0:7447 for the whole network")
+    ] = None,
 ) -> None:
     """Run a Zenoh router until Ctrl-C (loopback only, unless told otherwise)."""
     endpoints = listen or (list(load_rig(config).bus.listen) if config else [LOOPBACK])

@@ -24,7 +24,9 @@ class Action(StrEnum):
 
 
 def session(
-    action: Annotated[Action, typer.Argument(help="start or stop all trackers, or show whether they run")] = Action.SHOW,
+    action: Annotated[
+        Action, typer.Argument(help="start or stop all trackers, or show whether they run")
+    ] = Action.SHOW,
     config: RunningRigOption = None,
     connect: ConnectOption = None,
 ) -> None:

@@ -1,8 +1,9 @@
-"""Child processes that are restarted when they end, and all ended together: what systemd does for an installed rig.
+"""Child processes that are restarted when they end, and all ended together: what systemd does for
+an installed rig.
 
-Each child leads its own session (Ctrl-C reaches only the supervisor, which ends them in order) and is killed by the
-kernel should the supervisor die without a word. Their JSON log lines come out as one line of text each, warnings only unless
-asked for more.
+Each child leads its own session (Ctrl-C reaches only the supervisor, which ends them in order) and
+is killed by the kernel should the supervisor die without a word. Their JSON log lines come out as
+one line of text each, warnings only unless asked for more.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from rhot.process.lifecycle import EXIT_USER
 
 # As systemd's RestartSec of the installed units: poses are back within a second of a crash.
 _RESTART_S = 0.5
-# A service that stops with a message for the user will say the same at once; asking again every five seconds is enough.
+# A service that stops with a message for the user will say the same at once; asking again every
+# five seconds is enough.
 _RESTART_AFTER_USER_ERROR_S = 5.0
 # A service ends within a second of SIGTERM; five are for a loaded machine.
 _STOP_S = 5.0
@@ -58,7 +60,11 @@ class Supervisor:
             pause_s = _RESTART_AFTER_USER_ERROR_S if code == EXIT_USER else _RESTART_S
             self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
             lived_s = time.monotonic() - started_s
-            self._say(child.name, "warning", f"ended with {_describe(code)} after {lived_s:.1f} s, starting again in {pause_s:g} s")
+            self._say(
+                child.name,
+                "warning",
+                f"ended with {_describe(code)} after {lived_s:.1f} s, starting again in {pause_s:g} s",
+            )
             await asyncio.sleep(pause_s)
 
     async def _run_once(self, child: Child) -> int:

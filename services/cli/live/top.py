@@ -1,4 +1,6 @@
-"""`rhot top`: services alive, rates against the topics table, drops, and latencies of each hop and from glass to pose."""
+"""`rhot top`: services alive, rates against the topics table, drops, and latencies of each hop and
+from glass to pose.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ _LISTEN_S = 2.2
 def top(
     config: RunningRigOption = None,
     connect: ConnectOption = None,
-    once: Annotated[bool, typer.Option(help="print one table and end; exit code 1 if something is missing or slow")] = False,
+    once: Annotated[
+        bool,
+        typer.Option(help="print one table and end; exit code 1 if something is missing or slow"),
+    ] = False,
     seconds: Annotated[float | None, typer.Option(min=1.0, help="end after so long")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object a table")] = False,
 ) -> None:
@@ -36,12 +41,17 @@ def top(
         raise typer.Exit(1)
 
 
-async def _top(rig: RigConfig, endpoints: list[str], once: bool, seconds: float | None, as_json: bool) -> Board | None:
+async def _top(
+    rig: RigConfig, endpoints: list[str], once: bool, seconds: float | None, as_json: bool
+) -> Board | None:
     stopping = stop_on_signals()
     watcher, board = Watcher(rig.rig.name, expected_services(rig)), None
     with cancelled_by(stopping):
         async with reach(rig.rig.name, endpoints) as bus, asyncio.TaskGroup() as tasks:
-            listeners = [tasks.create_task(_beats(bus, watcher)), tasks.create_task(_tokens(bus, watcher))]
+            listeners = [
+                tasks.create_task(_beats(bus, watcher)),
+                tasks.create_task(_tokens(bus, watcher)),
+            ]
             left_s = _LISTEN_S if once else seconds
             await asyncio.sleep(_LISTEN_S)
             while True:

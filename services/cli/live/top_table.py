@@ -1,7 +1,7 @@
 """What `rhot top` shows, from health beats and liveliness. Pure: time is an argument.
 
-A service whose beat is missing for three seconds is `silent`, one whose token is gone is `gone`, one that rig.toml expects and
-that never came is `absent`.
+A service whose beat is missing for three seconds is `silent`, one whose token is gone is `gone`,
+one that rig.toml expects and that never came is `absent`.
 """
 
 from __future__ import annotations
@@ -35,12 +35,18 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def healthy(self) -> bool:
         """Every service running, every stream at its rate."""
-        return all(row.state == "running" and row.health and all(s.ok for s in row.health.streams) for row in self.services)
+        return all(
+            row.state == "running" and row.health and all(s.ok for s in row.health.streams)
+            for row in self.services
+        )
 
 
 def expected_services(config: RigConfig) -> list[tuple[str, str]]:
     """(service, instance) of everything rig.toml calls for, viewer and recorder left to the user."""
-    expected = [("pi_tracker", camera.name) for camera in config.camera] + [("fusion", "main"), ("solver", "main")]
+    expected = [("pi_tracker", camera.name) for camera in config.camera] + [
+        ("fusion", "main"),
+        ("solver", "main"),
+    ]
     if any(camera.source == "simulator" for camera in config.camera):
         expected.insert(0, ("simulator", "main"))
     return expected + ([("object_tracker", "main")] if config.object else [])
@@ -73,13 +79,20 @@ class Watcher:
         beat_ns, health = self._beats.get((service, instance), (0, None))
         if health is None and (service, instance) not in self._alive:
             state = "absent"
-        elif not self._alive.get((service, instance), False) and (health is None or health.state == "running"):
+        elif not self._alive.get((service, instance), False) and (
+            health is None or health.state == "running"
+        ):
             state = "gone"
         elif health is None or now_ns - beat_ns > _SILENT_NS:
             state = "silent"
         else:
             state = health.state
-        return ServiceRow(service=service, instance=instance, state=state, health=health if state != "gone" else None)
+        return ServiceRow(
+            service=service,
+            instance=instance,
+            state=state,
+            health=health if state != "gone" else None,
+        )
 
 
 def _glass_to_pose(rows: list[ServiceRow]) -> dict[str, tuple[float, float]]:
@@ -94,7 +107,10 @@ def _glass_to_pose(rows: list[ServiceRow]) -> dict[str, tuple[float, float]]:
 
 def text(board: Board) -> str:
     """The table for people."""
-    lines = [f"rig {board.rig}", f"{'service':<24} {'state':<10} {'up s':>7} {'cpu %':>6} {'MB':>6} {'errors':>6}"]
+    lines = [
+        f"rig {board.rig}",
+        f"{'service':<24} {'state':<10} {'up s':>7} {'cpu %':>6} {'MB':>6} {'errors':>6}",
+    ]
     for row in board.services:
         lines.append(_service_line(row))
         lines += [_stream_line(stream) for stream in (row.health.streams if row.health else [])]
@@ -115,9 +131,19 @@ def _service_line(row: ServiceRow) -> str:
 
 def _stream_line(stream: StreamHealth) -> str:
     key = stream.key.split("/", 2)[-1]
-    rate = f"{stream.rate_hz:6.1f} Hz" + (f" of {stream.expected_hz:g}" if stream.expected_hz else "")
-    latency = f"p50 {stream.latency_p50_ms:.1f} p99 {stream.latency_p99_ms:.1f} ms" if stream.latency_p50_ms >= 0.0 else ""
+    rate = f"{stream.rate_hz:6.1f} Hz" + (
+        f" of {stream.expected_hz:g}" if stream.expected_hz else ""
+    )
+    latency = (
+        f"p50 {stream.latency_p50_ms:.1f} p99 {stream.latency_p99_ms:.1f} ms"
+        if stream.latency_p50_ms >= 0.0
+        else ""
+    )
     what = "age" if stream.direction == "out" else "hop"
     flag = " " if stream.ok else "!"
-    losses = f"dropped {stream.dropped} rejected {stream.rejected}" if stream.dropped or stream.rejected else ""
+    losses = (
+        f"dropped {stream.dropped} rejected {stream.rejected}"
+        if stream.dropped or stream.rejected
+        else ""
+    )
     return f"  {flag} {stream.direction:<3} {key:<32} {rate:<18} {what + ' ' + latency if latency else '':<30} {losses}".rstrip()

@@ -1,6 +1,8 @@
-"""`rhot up CONFIG`: the master's processes of a real rig, supervised: router, fusion, solver, objects, viewer, recorder.
+"""`rhot up CONFIG`: the master's processes of a real rig, supervised: router, fusion, solver,
+objects, viewer, recorder.
 
-Cameras whose `host` is empty are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there.
+Cameras whose `host` is empty are tracked on this machine too; those of other hosts run
+`rhot-pi-tracker` there.
 """
 
 from __future__ import annotations
@@ -20,15 +22,23 @@ from services.cli.options import VerboseOption
 from services.cli.terminal import Teller
 
 
-def children_of(config: RigConfig, path: Path, *, viewer: bool, endpoint: Sequence[str] = ()) -> list[Child]:
-    """Everything that `rhot up` and `rhot demo` run for a rig. endpoint replaces the endpoints of rig.toml."""
+def children_of(
+    config: RigConfig, path: Path, *, viewer: bool, endpoint: Sequence[str] = ()
+) -> list[Child]:
+    """Everything that `rhot up` and `rhot demo` run for a rig.
+
+    endpoint replaces the endpoints of rig.toml.
+    """
     common = ["--config", str(path), *(option for e in endpoint for option in ("--connect", e))]
     listen = [option for e in (endpoint or config.bus.listen) for option in ("--listen", e)]
     children = [Child("router", service_argv("cli", "router", *listen))]
     local = [camera for camera in config.camera if not camera.host]
     if any(camera.source == "simulator" for camera in local):
         children.append(Child("simulator", service_argv("simulator", *common)))
-    children += [Child(f"pi_tracker/{c.name}", service_argv("pi_tracker", *common, "--camera", c.name)) for c in local]
+    children += [
+        Child(f"pi_tracker/{c.name}", service_argv("pi_tracker", *common, "--camera", c.name))
+        for c in local
+    ]
     children += [Child(name, service_argv(name, *common)) for name in ("fusion", "solver")]
     if config.object:
         children.append(Child("object_tracker", service_argv("object_tracker", *common)))

@@ -1,7 +1,8 @@
-"""`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast as all later ones.
+"""`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast
+as all later ones.
 
-Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or ~/.cache/rhot (rhot.process.numba_cache); running it again
-costs a second.
+Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or
+~/.cache/rhot (rhot.process.numba_cache); running it again costs a second.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from services.cli.defaults import sim_toml
 
 
 def warm(
-    config: Annotated[Path | None, typer.Option(help="rig.toml; default: the simulated rig's")] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="rig.toml; default: the simulated rig's")
+    ] = None,
 ) -> None:
     """Compile all kernels once, ahead of the first start."""
     # Only here: `rhot --help` must not wait for numba.
@@ -31,7 +34,9 @@ def warm(
 
     started_s = time.monotonic()
     rig = load_rig(config or sim_toml())
-    hands = {name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()}
+    hands = {
+        name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()
+    }
     names = [camera.name for camera in rig.camera]
     warm_solver(rig, hands)
     warm_fusion(rig, load_rig_cameras(rig), hands)

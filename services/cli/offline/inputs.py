@@ -1,7 +1,8 @@
 """What `rhot track` reads: a capture folder, or CAM=VIDEO pairs with a rig.toml.
 
-A video that breaks off gives its frames up to there and a warning; one that gives none at all is an error. Stamps come from the
-capture's csv, from VIDEO's own csv beside it (left.mp4, left.csv), or from the frame rate.
+A video that breaks off gives its frames up to there and a warning; one that gives none at all is an
+error. Stamps come from the capture's csv, from VIDEO's own csv beside it (left.mp4, left.csv), or
+from the frame rate.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.video import VideoReader
 
-# Stamps in a csv are on one clock, to what synchronised clocks of a rig keep; separate videos share none.
+# Stamps in a csv are on one clock, to what synchronised clocks of a rig keep; separate videos share
+# none.
 _CSV_SIGMA_NS, _UNKNOWN_SIGMA_NS = 500_000, -1
 
 
@@ -35,7 +37,10 @@ class _Reader(Protocol):
 
 @dataclass
 class Input:
-    """One camera's recording. warnings fill while it is read; total is 0 where the number of frames is unknown; notes are for people."""
+    """One camera's recording. warnings fill while it is read.
+
+    Total is 0 where the number of frames is unknown; notes are for people.
+    """
 
     camera: str
     reader: _Reader
@@ -71,7 +76,10 @@ class Input:
 
 
 class StampedReader:
-    """A video whose stamps come from a csv beside it; the shorter of the two counts, and a difference is a CaptureError at the end."""
+    """A video whose stamps come from a csv beside it.
+
+    The shorter of the two counts, and a difference is a CaptureError at the end.
+    """
 
     def __init__(self, video: VideoReader, path: Path, stamps: list[FrameStamp]) -> None:
         self._video, self._path, self._stamps = video, path, stamps
@@ -87,9 +95,13 @@ class StampedReader:
         if frame is None:
             return None
         if frame.seq >= count:
-            raise CaptureError(f"{self._path}: has stamps of {count} frames, the video has more; the rest was left out")
+            raise CaptureError(
+                f"{self._path}: has stamps of {count} frames, the video has more; the rest was left out"
+            )
         stamp = self._stamps[frame.seq]
-        return replace(frame, seq=stamp.frame, stamp_ns=stamp.stamp_ns, row_time_ns=stamp.row_time_ns)
+        return replace(
+            frame, seq=stamp.frame, stamp_ns=stamp.stamp_ns, row_time_ns=stamp.row_time_ns
+        )
 
     def close(self) -> None:
         """As Reader.close."""
@@ -113,26 +125,44 @@ def job_of(sources: Sequence[str], config: Path | None) -> Job:
     if any("=" in source and not Path(source).is_dir() for source in sources):
         return _videos(sources, config)
     if len(sources) != 1:
-        raise ConfigError(f"expected one CAPTURE folder or CAM=VIDEO pairs, got {' '.join(sources)!r}; e.g. left=l.mp4 right=r.mp4")
+        raise ConfigError(
+            f"expected one CAPTURE folder or CAM=VIDEO pairs, got {' '.join(sources)!r}; e.g. left=l.mp4 right=r.mp4"
+        )
     return _capture(Capture(Path(sources[0])), config)
 
 
 def _capture(capture: Capture, config: Path | None) -> Job:
     if not capture.folder.is_dir():
         kind = "is a file" if capture.folder.exists() else "no such folder"
-        raise CaptureError(f"{capture.folder}: {kind}; give a capture folder, or a video as CAM={capture.folder} with --config rig.toml")
+        raise CaptureError(
+            f"{capture.folder}: {kind}; give a capture folder, or a video as CAM={capture.folder} with --config rig.toml"
+        )
     if config is None and not capture.rig_toml.is_file():
-        raise CaptureError(f"{capture.folder}: is no capture, it has no rig.toml; give --config rig.toml")
+        raise CaptureError(
+            f"{capture.folder}: is no capture, it has no rig.toml; give --config rig.toml"
+        )
     rig = load_rig(config or capture.rig_toml)
     if not rig.camera:
-        raise ConfigError(f"{config or capture.rig_toml}: has no [[camera]]; a capture's rig.toml names its cameras")
-    inputs = [Input(c.name, CaptureReader(c.name, capture.folder), _CSV_SIGMA_NS, _count(capture.stamps(c.name))) for c in rig.camera]
+        raise ConfigError(
+            f"{config or capture.rig_toml}: has no [[camera]]; a capture's rig.toml names its cameras"
+        )
+    inputs = [
+        Input(
+            c.name,
+            CaptureReader(c.name, capture.folder),
+            _CSV_SIGMA_NS,
+            _count(capture.stamps(c.name)),
+        )
+        for c in rig.camera
+    ]
     return Job(rig, inputs, capture.objects if capture.objects.exists() else None)
 
 
 def _videos(sources: Sequence[str], path: Path | None) -> Job:
     if path is None:
-        raise ConfigError("CAM=VIDEO needs --config rig.toml, whose calibration/CAM.colors.json has the colours")
+        raise ConfigError(
+            "CAM=VIDEO needs --config rig.toml, whose calibration/CAM.colors.json has the colours"
+        )
     config = load_rig(path)
     pairs = [_pair(source) for source in sources]
     names = [name for name, _ in pairs]
@@ -155,7 +185,9 @@ def _pair(source: str) -> tuple[str, Path]:
     try:
         msgspec.convert({"name": name}, CameraTable)
     except msgspec.ValidationError:
-        raise ConfigError(f"{name!r} cannot name a camera; use letters, digits, '_', '-' and '.', e.g. left={video}") from None
+        raise ConfigError(
+            f"{name!r} cannot name a camera; use letters, digits, '_', '-' and '.', e.g. left={video}"
+        ) from None
     return name, Path(video)
 
 
@@ -175,7 +207,10 @@ def _input(table: CameraTable, path: Path) -> Input:
 
 
 def _count(stamps: Path) -> int:
-    """Frames to expect, for the progress only; what is wrong with the file is told when it is read."""
+    """Frames to expect, for the progress only.
+
+    What is wrong with the file is told when it is read.
+    """
     try:
         return len(read_stamps(stamps))
     except RhotError:

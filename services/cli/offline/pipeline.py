@@ -1,8 +1,10 @@
-"""The whole rig without its processes: frames of all cameras in, markers, points and poses out, in the order of time.
+"""The whole rig without its processes: frames of all cameras in, markers, points and poses out, in
+the order of time.
 
-The step objects are the services' own; here they only meet without a bus. Pure: the same frames give the same messages. With one
-camera, without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame whose size is not its
-lens calibration's is a CalibrationError at once, as nothing could be made of it.
+The step objects are the services' own; here they only meet without a bus. Pure: the same frames
+give the same messages. With one camera, without a hand or without geometry there are markers only
+(`Pipeline.hands` is then empty). A frame whose size is not its lens calibration's is a
+CalibrationError at once, as nothing could be made of it.
 """
 
 from __future__ import annotations
@@ -36,9 +38,16 @@ class Pipeline:
     """Trackers of all cameras, fusion and solver."""
 
     def __init__(
-        self, config: RigConfig, trackers: dict[str, TrackerStep], clock_sigma_ns: dict[str, int], cameras: dict[str, Camera] | None
+        self,
+        config: RigConfig,
+        trackers: dict[str, TrackerStep],
+        clock_sigma_ns: dict[str, int],
+        cameras: dict[str, Camera] | None,
     ) -> None:
-        """trackers and the uncertainty of their stamps (-1: unknown) by camera; cameras as `geometry` returns them."""
+        """trackers and the uncertainty of their stamps (-1: unknown) by camera.
+
+        Cameras as `geometry` returns them.
+        """
         self._trackers = trackers
         self._clock_sigma_ns = clock_sigma_ns
         self._cameras = cameras or {}
@@ -46,7 +55,10 @@ class Pipeline:
         self._fusion: FusionStep | None = None
         self._solver: SolverStep | None = None
         if cameras is not None:
-            self.hands = {hand: load_hand(config.calibration_dir, hand, table.scale) for hand, table in config.hand.items()}
+            self.hands = {
+                hand: load_hand(config.calibration_dir, hand, table.scale)
+                for hand, table in config.hand.items()
+            }
             self._fusion = FusionStep(config, cameras, self.hands)
             self._solver = SolverStep(config, self.hands)
 
@@ -64,7 +76,9 @@ class Pipeline:
                 f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, its lens was calibrated at "
                 f"{camera.size_px[0]} x {camera.size_px[1]}; use images of that size, or run `rhot calibrate lens {frame.camera}`"
             )
-        markers = self._trackers[frame.camera].step(frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera])
+        markers = self._trackers[frame.camera].step(
+            frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera]
+        )
         points = self._fusion.step(markers) if self._fusion is not None else []
         return Output([markers], points, self._solve(points))
 
@@ -85,10 +99,14 @@ class Pipeline:
 def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | None, str]:
     """The calibrated cameras that 3D needs, or None and the reason why there will be markers only.
 
-    Raises CalibrationError, naming the command that helps, if hands are configured, two cameras are there and one is uncalibrated.
+    Raises CalibrationError, naming the command that helps, if hands are configured, two cameras are
+    there and one is uncalibrated.
     """
     if not config.hand:
-        return None, "markers only: rig.toml has no [hand.right.markers] table that says which colour is which landmark"
+        return (
+            None,
+            "markers only: rig.toml has no [hand.right.markers] table that says which colour is which landmark",
+        )
     if len(names) < 2:
         return None, f"markers only: 3D needs two cameras, this is {names[0]!r} alone"
     return load_rig_cameras(config, names), ""

@@ -1,8 +1,10 @@
-"""The folder `rhot track` writes: markers, points, poses and objects as .jsonl in wire format, and summary.json last of all.
+"""The folder `rhot track` writes: markers, points, poses and objects as .jsonl in wire format, and
+summary.json last of all.
 
-Each file is written as NAME.partial and gets its name when all are complete. A run that fails takes its .partial files away and
-leaves what was there before; one that is interrupted leaves them, and readers recognise that. A folder that holds anything else is
-refused, so that nobody's files are lost.
+Each file is written as NAME.partial and gets its name when all are complete. A run that fails takes
+its .partial files away and leaves what was there before; one that is interrupted leaves them, and
+readers recognise that. A folder that holds anything else is refused, so that nobody's files are
+lost.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from rhot.errors import CaptureError, RhotError
 STREAMS = ("markers", "points", "poses", "objects")
 SUMMARY = "summary.json"
 PARTIAL = ".partial"
-# What `rhot plot` leaves beside them; a second run may overwrite the folder although it holds pictures of the first.
+# What `rhot plot` leaves beside them; a second run may overwrite the folder although it holds
+# pictures of the first.
 PICTURES = ".png"
 
 
@@ -34,10 +37,11 @@ class CameraSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
-    """What a run of `rhot track` did. No times of day and no durations: the same input writes the same bytes.
+    """What a run of `rhot track` did. No times of day and no durations: the same input writes the
+    same bytes.
 
-    refusals counts what fusion could not use, by reason; complete is false if a recording could not be read to its end, and
-    warnings say which; notes say what was left out or looks odd.
+    refusals counts what fusion could not use, by reason; complete is false if a recording could not
+    be read to its end, and warnings say which; notes say what was left out or looks odd.
     """
 
     rig: str
@@ -69,7 +73,12 @@ class ResultWriter:
             self._files[name] = self._stack.enter_context(path.open("wb"))
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._stack.close()
         if kind is not None and issubclass(kind, RhotError):
             for path in self.folder.glob(f"*{PARTIAL}"):
@@ -86,7 +95,8 @@ class ResultWriter:
     def finish(self, summary: Summary) -> None:
         """Give the files their names and write summary.json."""
         self._stack.close()
-        # Without its summary a result counts as incomplete, so that old and new files are never taken for one.
+        # Without its summary a result counts as incomplete, so that old and new files are never
+        # taken for one.
         (self.folder / SUMMARY).unlink(missing_ok=True)
         for name in STREAMS:
             (self.folder / f"{name}.jsonl{PARTIAL}").replace(self.folder / f"{name}.jsonl")
@@ -98,14 +108,22 @@ class ResultWriter:
 def check_result(folder: Path, *streams: str) -> None:
     """Raises CaptureError unless the folder holds a complete result with these streams."""
     if not folder.is_dir():
-        raise CaptureError(f"{folder}: no such folder; make it with `rhot track CAPTURE --out {folder}`")
+        raise CaptureError(
+            f"{folder}: no such folder; make it with `rhot track CAPTURE --out {folder}`"
+        )
     if any(folder.glob(f"*{PARTIAL}")):
-        raise CaptureError(f"{folder}: holds {PARTIAL} files of a run that was interrupted; run `rhot track` into it again")
+        raise CaptureError(
+            f"{folder}: holds {PARTIAL} files of a run that was interrupted; run `rhot track` into it again"
+        )
     if not (folder / SUMMARY).is_file():
-        raise CaptureError(f"{folder}: has no {SUMMARY}, so it is no complete result; make one with `rhot track CAPTURE --out {folder}`")
+        raise CaptureError(
+            f"{folder}: has no {SUMMARY}, so it is no complete result; make one with `rhot track CAPTURE --out {folder}`"
+        )
     for stream in streams:
         if not (folder / f"{stream}.jsonl").is_file():
-            raise CaptureError(f"{folder}: has no {stream}.jsonl; make it with `rhot track CAPTURE --out {folder}`")
+            raise CaptureError(
+                f"{folder}: has no {stream}.jsonl; make it with `rhot track CAPTURE --out {folder}`"
+            )
 
 
 def _prepare(folder: Path) -> None:
@@ -113,7 +131,11 @@ def _prepare(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         present = sorted(path.name for path in folder.iterdir())
-        foreign = [name for name in present if name.removesuffix(PARTIAL) not in own and not name.endswith(PICTURES)]
+        foreign = [
+            name
+            for name in present
+            if name.removesuffix(PARTIAL) not in own and not name.endswith(PICTURES)
+        ]
         if foreign:
             raise CaptureError(
                 f"{folder}: holds files that are not a result of `rhot track` ({', '.join(foreign[:3])}); give --out another folder"

@@ -1,4 +1,5 @@
-"""One run of `rhot track`: reads the recordings frame by frame, lets the pipeline work, writes the result folder.
+"""One run of `rhot track`: reads the recordings frame by frame, lets the pipeline work, writes the
+result folder.
 
 An error leaves no result, an interruption .partial files (results.py).
 """
@@ -29,7 +30,9 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
     names = [one.camera for one in job.inputs]
     cameras, note = geometry(job.config, names)
     trackers = {name: _tracker(job.config, name) for name in names}
-    pipeline = Pipeline(job.config, trackers, {one.camera: one.clock_sigma_ns for one in job.inputs}, cameras)
+    pipeline = Pipeline(
+        job.config, trackers, {one.camera: one.clock_sigma_ns for one in job.inputs}, cameras
+    )
     tallies = {name: _Tally() for name in names}
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
     with ResultWriter(out) as writer:
@@ -46,7 +49,11 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
         finally:
             shown.end()
         broken = [warning for one in job.inputs for warning in one.warnings]
-        notes = [*([note] if note else []), *(told for one in job.inputs for told in one.notes), *objects]
+        notes = [
+            *([note] if note else []),
+            *(told for one in job.inputs for told in one.notes),
+            *objects,
+        ]
         summary = Summary(
             rig=job.config.rig.name,
             cameras={name: tally.summary() for name, tally in tallies.items()},
@@ -65,8 +72,12 @@ def summary_text(summary: Summary, out: Path) -> str:
     lines = []
     for name, camera in summary.cameras.items():
         colors = ", ".join(f"{color} {count}" for color, count in camera.colors.items())
-        lines.append(f"{name}: {camera.frames} frames, markers in {camera.frames_with_markers} ({colors or 'none'})")
-    lines.append(f"{out}: {summary.points} sets of points, {summary.poses} hand poses, {summary.objects} object poses")
+        lines.append(
+            f"{name}: {camera.frames} frames, markers in {camera.frames_with_markers} ({colors or 'none'})"
+        )
+    lines.append(
+        f"{out}: {summary.points} sets of points, {summary.poses} hand poses, {summary.objects} object poses"
+    )
     return "\n".join(lines)
 
 
@@ -97,9 +108,19 @@ def _tracker(config: RigConfig, name: str) -> TrackerStep:
     # Without a hand nobody says which colours matter: all of them do.
     wanted = config.colors or sorted(colors.colors)
     if not wanted:
-        raise CalibrationError(f"{path}: has no colour; add one with `rhot calibrate colors {name}`")
+        raise CalibrationError(
+            f"{path}: has no colour; add one with `rhot calibrate colors {name}`"
+        )
     lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
-    return TrackerStep(name, colors, config.tracker, config.camera_named(name).size_px, wanted, colors_path=path, lens=lens)
+    return TrackerStep(
+        name,
+        colors,
+        config.tracker,
+        config.camera_named(name).size_px,
+        wanted,
+        colors_path=path,
+        lens=lens,
+    )
 
 
 def _write(writer: ResultWriter, output: Output) -> None:
@@ -121,10 +142,14 @@ def _objects(job: Job, writer: ResultWriter) -> list[str]:
             writer.write("objects", [pose])
     notes = []
     if places is None:
-        notes.append("objects stay in the lighthouse frame: calibration/objects.json is missing; make it with `rhot calibrate objects`")
+        notes.append(
+            "objects stay in the lighthouse frame: calibration/objects.json is missing; make it with `rhot calibrate objects`"
+        )
     if step.unknown:
         serials = ", ".join(sorted(step.unknown_serials))
-        notes.append(f"{step.unknown} poses of devices that no [[object]] of rig.toml names: {serials}")
+        notes.append(
+            f"{step.unknown} poses of devices that no [[object]] of rig.toml names: {serials}"
+        )
     return notes
 
 

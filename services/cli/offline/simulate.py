@@ -1,6 +1,8 @@
-"""`rhot simulate SCENE --seconds 10 --seed 1 --out DIR`: a virtual rig's recording, with the truth beside it.
+"""`rhot simulate SCENE --seconds 10 --seed 1 --out DIR`: a virtual rig's recording, with the truth
+beside it.
 
-The same scene, seed and rig give the same bytes. A folder that is not empty is an error, and an unknown scene lists the valid ones.
+The same scene, seed and rig give the same bytes. A folder that is not empty is an error, and an
+unknown scene lists the valid ones.
 """
 
 from __future__ import annotations
@@ -30,23 +32,41 @@ class Simulated(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def simulate(
-    scene: Annotated[str | None, typer.Argument(help="a scene's name; `rhot simulate --list` shows them")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="new folder for the capture")] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="duration of the recording")] = 10.0,
+    scene: Annotated[
+        str | None, typer.Argument(help="a scene's name; `rhot simulate --list` shows them")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="new folder for the capture")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=3600.0, help="duration of the recording")
+    ] = 10.0,
     seed: Annotated[int | None, typer.Option(min=0, help="default: of rig.toml")] = None,
-    config: Annotated[Path | None, typer.Option(help="rig.toml of the simulated rig; default: the one rhot brings along")] = None,
-    fps: Annotated[float | None, typer.Option(min=1.0, max=240.0, help="frame rate of all cameras; default: of rig.toml")] = None,
-    speed: Annotated[float | None, typer.Option(min=0.05, max=10.0, help="of the motion; default: of rig.toml")] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(help="rig.toml of the simulated rig; default: the one rhot brings along"),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(min=1.0, max=240.0, help="frame rate of all cameras; default: of rig.toml"),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=0.05, max=10.0, help="of the motion; default: of rig.toml")
+    ] = None,
     scenes: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
     progress: ProgressOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print what was written, or the scenes, as JSON")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print what was written, or the scenes, as JSON")
+    ] = False,
 ) -> None:
     """Render a scene through the virtual cameras and write a capture with its truth."""
     if scenes:
         typer.echo(_list(as_json))
         return
     if scene is None or out is None:
-        raise ConfigError(f"`rhot simulate SCENE --out DIR` needs a scene and a folder; scenes: {', '.join(SCENES)}")
+        raise ConfigError(
+            f"`rhot simulate SCENE --out DIR` needs a scene and a folder; scenes: {', '.join(SCENES)}"
+        )
     made = _write(_rig(config, fps), scene, seconds, seed, speed, out, progress)
     text = f"{out}: {seconds:g} s of {scene!r}, {made.pictures} pictures; next: rhot track {out} --out result"
     typer.echo(msgspec.json.encode(made).decode() if as_json else text)
@@ -56,11 +76,19 @@ def _rig(path: Path | None, fps: float | None) -> RigConfig:
     config = load_rig(path or sim_toml())
     if fps is None:
         return config
-    return msgspec.structs.replace(config, camera=[msgspec.structs.replace(camera, fps=fps) for camera in config.camera])
+    return msgspec.structs.replace(
+        config, camera=[msgspec.structs.replace(camera, fps=fps) for camera in config.camera]
+    )
 
 
 def _write(
-    config: RigConfig, name: str, seconds: float, seed: int | None, speed: float | None, out: Path, progress: bool | None
+    config: RigConfig,
+    name: str,
+    seconds: float,
+    seed: int | None,
+    speed: float | None,
+    out: Path,
+    progress: bool | None,
 ) -> Simulated:
     # Not above: the renderer's numba takes longer to import than other commands take to run.
     from services.simulator.files.capture_writer import write_capture
@@ -79,7 +107,9 @@ def _write(
         pictures = write_capture(scene, seconds, out, advance)
     finally:
         shown.end()
-    return Simulated(capture=str(out), scene=name, seed=scene.seed, seconds=seconds, pictures=pictures)
+    return Simulated(
+        capture=str(out), scene=name, seed=scene.seed, seconds=seconds, pictures=pictures
+    )
 
 
 def _list(as_json: bool) -> str:

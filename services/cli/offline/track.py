@@ -1,7 +1,8 @@
-"""`rhot track CAPTURE --out DIR` or `rhot track left=l.mp4 right=r.mp4 --config rig.toml --out DIR`: the whole rig, offline.
+"""`rhot track CAPTURE --out DIR` or `rhot track left=l.mp4 right=r.mp4 --config rig.toml --out
+DIR`: the whole rig, offline.
 
-As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off is tracked up to there, and
-the summary says so; if no frame at all can be read, the command fails.
+As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off
+is tracked up to there, and the summary says so; if no frame at all can be read, the command fails.
 """
 
 from __future__ import annotations
@@ -16,9 +17,19 @@ from services.cli.options import ProgressOption
 
 
 def track(
-    sources: Annotated[list[str], typer.Argument(metavar="CAPTURE | CAM=VIDEO...", help="a capture folder, or a video per camera")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="folder for markers, points, poses and objects as .jsonl")],
-    config: Annotated[Path | None, typer.Option(help="rig.toml; default: the capture's own")] = None,
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="CAPTURE | CAM=VIDEO...", help="a capture folder, or a video per camera"
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="folder for markers, points, poses and objects as .jsonl"),
+    ],
+    config: Annotated[
+        Path | None, typer.Option(help="rig.toml; default: the capture's own")
+    ] = None,
     progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:

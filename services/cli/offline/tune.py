@@ -1,8 +1,10 @@
 """`rhot tune filter RECORDING`: a 1-Euro filter that suits one's own hand and cameras.
 
-Record the hand held still for some seconds, then moving as fast as it will, with `method = "triangulate"` and `filter = "none"`; the
-RECORDING is the folder that `rhot track` wrote, its points.jsonl, or an MCAP file of `rhot record`. Points that were filtered already
-(another method) still give a proposal, which is then a second filter's. A recording without a still or without a fast stretch is an error.
+Record the hand held still for some seconds, then moving as fast as it will, with `method =
+"triangulate"` and `filter = "none"`; the RECORDING is the folder that `rhot track` wrote, its
+points.jsonl, or an MCAP file of `rhot record`. Points that were filtered already (another method)
+still give a proposal, which is then a second filter's. A recording without a still or without a
+fast stretch is an error.
 """
 
 from __future__ import annotations
@@ -31,15 +33,27 @@ def _group() -> None:
 
 @tune.command(name="filter")
 def tune_filter(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="result folder of `rhot track`, points.jsonl, or .mcap")],
-    jitter: Annotated[float, typer.Option(min=0.05, max=1.0, help="wanted jitter at rest, as a share of the unfiltered one")] = 0.5,
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING", help="result folder of `rhot track`, points.jsonl, or .mcap"
+        ),
+    ],
+    jitter: Annotated[
+        float,
+        typer.Option(
+            min=0.05, max=1.0, help="wanted jitter at rest, as a share of the unfiltered one"
+        ),
+    ] = 0.5,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> None:
     """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
     # Not above: numba and scipy take longer to import than other commands take to run.
     from services.fusion.paired import one_euro_tuning
 
-    proposal = one_euro_tuning.propose(one_euro_tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter)
+    proposal = one_euro_tuning.propose(
+        one_euro_tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter
+    )
     typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
 
 
@@ -58,5 +72,10 @@ def _text(proposal: Proposal) -> str:
             f"{row.lag_ms:8.0f} ms{mark}"
         )
     best = proposal.best
-    lines += ["", "[fusion.one_euro]", f"mincutoff_hz = {best.mincutoff_hz:g}", f"beta = {best.beta:g}"]
+    lines += [
+        "",
+        "[fusion.one_euro]",
+        f"mincutoff_hz = {best.mincutoff_hz:g}",
+        f"beta = {best.beta:g}",
+    ]
     return "\n".join(lines)

@@ -27,25 +27,41 @@ _TELL_S = 1.0
 
 def record(
     config: RunningRigOption = None,
-    out: Annotated[Path | None, typer.Option(help="file (*.mcap) or folder; default: [recorder] folder of rig.toml")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="file (*.mcap) or folder; default: [recorder] folder of rig.toml"),
+    ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="end after so long")] = None,
     connect: ConnectOption = None,
 ) -> None:
     """Record a running rig; the recording plays back with `rhot replay FILE`."""
     rig, endpoints = rig_and_endpoints(config, connect)
-    folder = out if out is not None and out.suffix != ".mcap" else Path(rig.folder) / rig.recorder.folder
+    folder = (
+        out if out is not None and out.suffix != ".mcap" else Path(rig.folder) / rig.recorder.folder
+    )
     path = out if out is not None and out.suffix == ".mcap" else None
     if path is not None and path.exists():
-        raise CaptureError(f"{path}: exists already; recordings are never overwritten, choose another --out")
+        raise CaptureError(
+            f"{path}: exists already; recordings are never overwritten, choose another --out"
+        )
     recorder = Recorder(rig, folder, rhot_version(), follow_sessions=False)
     uvloop.run(_record(rig, endpoints, recorder, path, seconds))
     typer.echo(f"{recorder.messages} messages, {recorder.bytes / 1e6:.2f} MB before compression")
     if recorder.messages == 0:
-        typer.echo(f"rhot record: nothing arrived of rig {rig.rig.name!r}; `rhot top` shows what runs", err=True)
+        typer.echo(
+            f"rhot record: nothing arrived of rig {rig.rig.name!r}; `rhot top` shows what runs",
+            err=True,
+        )
         raise typer.Exit(1)
 
 
-async def _record(rig: RigConfig, endpoints: list[str], recorder: Recorder, path: Path | None, seconds: float | None) -> None:
+async def _record(
+    rig: RigConfig,
+    endpoints: list[str],
+    recorder: Recorder,
+    path: Path | None,
+    seconds: float | None,
+) -> None:
     stopping = stop_on_signals()
     teller = Teller()
     with cancelled_by(stopping):

@@ -1,8 +1,10 @@
-"""One point from the rays of two or more cameras: a linear start, then least squares on what the cameras measured.
+"""One point from the rays of two or more cameras: a linear start, then least squares on what the
+cameras measured.
 
-Hartley & Sturm, "Triangulation", CVIU 68(2), 1997: the linear solution (inhomogeneous, as the points are never at infinity) refined by
-Gauss-Newton on the weighted reprojection error. Only points are undistorted, images are never rectified. Rays that do not
-meet in front of the cameras and within reach are refused by a status, with the numbers that show why.
+Hartley & Sturm, "Triangulation", CVIU 68(2), 1997: the linear solution (inhomogeneous, as the
+points are never at infinity) refined by Gauss-Newton on the weighted reprojection error. Only
+points are undistorted, images are never rectified. Rays that do not meet in front of the cameras
+and within reach are refused by a status, with the numbers that show why.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.kalman.measurement import project
 
-# Gauss-Newton from the linear solution is at rounding error after 3 rounds for rays within 20 sigma of meeting.
+# Gauss-Newton from the linear solution is at rounding error after 3 rounds for rays within 20 sigma
+# of meeting.
 _ROUNDS = 5
 
 
@@ -34,7 +37,8 @@ class TriangulationStatus(Enum):
 class Triangulation:
     """A point in the rig frame with its covariance; both are meaningless unless status is OK.
 
-    residual_sigma is the RMS of the reprojection residuals in units of their sigmas, per degree of freedom: 1 in expectation.
+    residual_sigma is the RMS of the reprojection residuals in units of their sigmas, per degree of
+    freedom: 1 in expectation.
     """
 
     status: TriangulationStatus
@@ -49,21 +53,34 @@ def extrinsics(cameras: tuple[Camera, ...]) -> tuple[Array, Array]:
     return np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3])
 
 
-def triangulate(rays: Array, sigmas: Array, R: Array, t: Array, max_distance_m: float) -> Triangulation:
-    """The point seen along rays (n, 2) with sigmas (n,) by n cameras whose T_camera_from_rig are R (n, 3, 3), t (n, 3)."""
+def triangulate(
+    rays: Array, sigmas: Array, R: Array, t: Array, max_distance_m: float
+) -> Triangulation:
+    """The point seen along rays (n, 2) with sigmas (n,) by n cameras whose T_camera_from_rig are R
+    (n, 3, 3), t (n, 3).
+    """
     position, cov, inverse_cov = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    rays, sigmas = np.ascontiguousarray(rays, dtype=np.float64), np.ascontiguousarray(sigmas, dtype=np.float64)
+    rays, sigmas = (
+        np.ascontiguousarray(rays, dtype=np.float64),
+        np.ascontiguousarray(sigmas, dtype=np.float64),
+    )
     code, chi_squared = _solve(rays, sigmas, R, t, position, cov, inverse_cov)
-    status = (TriangulationStatus.OK, TriangulationStatus.PARALLEL, TriangulationStatus.BEHIND)[code]
+    status = (TriangulationStatus.OK, TriangulationStatus.PARALLEL, TriangulationStatus.BEHIND)[
+        code
+    ]
     if status is TriangulationStatus.OK:
         distances = np.linalg.norm(np.einsum("nij,j->ni", R, position) + t, axis=1)
         if distances.max() > max_distance_m:
             status = TriangulationStatus.BEYOND
-    return Triangulation(status, position, cov, float(np.sqrt(chi_squared / max(2 * len(rays) - 3, 1))))
+    return Triangulation(
+        status, position, cov, float(np.sqrt(chi_squared / max(2 * len(rays) - 3, 1)))
+    )
 
 
 @njit(cache=True)
-def _solve(rays: Array, sigmas: Array, R: Array, t: Array, position: Array, cov: Array, A: Array) -> tuple[int, float]:
+def _solve(
+    rays: Array, sigmas: Array, R: Array, t: Array, position: Array, cov: Array, A: Array
+) -> tuple[int, float]:
     """Fill position and cov; returns a code (0 ok, 1 parallel, 2 behind) and chi squared."""
     n = rays.shape[0]
     b, row = np.zeros(3), np.empty(3)

@@ -1,9 +1,11 @@
-"""Which frames belong to the present: a clock that jumps, a stamp from another year, a frame that comes twice or too late.
+"""Which frames belong to the present: a clock that jumps, a stamp from another year, a frame that
+comes twice or too late.
 
-Cameras' clocks are only as good as their estimates, and a wrong stamp must cost that camera's frames, not the tracking. A frame
-near the newest accepted instant is accepted. Frames far from it wait outside: while others carry on they are refused; when nobody
-else does for a few frames, or two cameras agree on the new time, time itself has moved (a pause, a clock set everywhere) and
-starts anew there.
+Cameras' clocks are only as good as their estimates, and a wrong stamp must cost that camera's
+frames, not the tracking. A frame near the newest accepted instant is accepted. Frames far from it
+wait outside: while others carry on they are refused; when nobody else does for a few frames, or two
+cameras agree on the new time, time itself has moved (a pause, a clock set everywhere) and starts
+anew there.
 """
 
 from __future__ import annotations
@@ -11,9 +13,11 @@ from __future__ import annotations
 from collections import deque
 from enum import Enum
 
-# Frames this far from the newest instant are not of the same time. Longer than any hold, shorter than a second's jump of a clock.
+# Frames this far from the newest instant are not of the same time. Longer than any hold, shorter
+# than a second's jump of a clock.
 WINDOW_NS = 500_000_000
-# Frames of one camera in a row, with no others accepted meanwhile, that move time: 3 are a tenth of a second at 30 fps.
+# Frames of one camera in a row, with no others accepted meanwhile, that move time: 3 are a tenth of
+# a second at 30 fps.
 _INSIST = 3
 # Instants remembered for each camera to know a frame that comes twice: more than any queue holds.
 _REMEMBERED = 64
@@ -51,7 +55,11 @@ class Timeline:
         last_ns, run = self._stray.get(camera, (instant_ns, 0))
         run = run + 1 if 0 < instant_ns - last_ns <= WINDOW_NS else 1
         self._stray[camera] = (instant_ns, run)
-        agreed = any(abs(other_ns - instant_ns) <= WINDOW_NS for c, (other_ns, _) in self._stray.items() if c != camera)
+        agreed = any(
+            abs(other_ns - instant_ns) <= WINDOW_NS
+            for c, (other_ns, _) in self._stray.items()
+            if c != camera
+        )
         return self._restart(camera, instant_ns) if agreed or run >= _INSIST else Verdict.ASTRAY
 
     def _restart(self, camera: int, instant_ns: int) -> Verdict:

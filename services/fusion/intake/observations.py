@@ -1,9 +1,11 @@
-"""From a camera's MarkerFrame to observations: colours become landmarks, pixels become rays, every marker gets its own instant.
+"""From a camera's MarkerFrame to observations: colours become landmarks, pixels become rays, every
+marker gets its own instant.
 
-A rolling shutter reads row by row, so a marker's instant on the master's clock is stamp_ns + y_px * row_time_ns -
-clock_offset_ns. Frames that cannot be used (a camera that is not in the rig, another image size than the calibration's, an
-instant outside the range of stamps) give a Refusal instead of a View; markers that cannot (unknown colour, outside the image,
-absurd numbers) are left out and counted.
+A rolling shutter reads row by row, so a marker's instant on the master's clock is stamp_ns + y_px *
+row_time_ns - clock_offset_ns. Frames that cannot be used (a camera that is not in the rig, another
+image size than the calibration's, an instant outside the range of stamps) give a Refusal instead of
+a View; markers that cannot (unknown colour, outside the image, absurd numbers) are left out and
+counted.
 """
 
 from __future__ import annotations
@@ -23,9 +25,11 @@ from rhot.hand import HANDS, HandName
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.intake import undistortion
 
-# No blob's centre is known better than this (measured: .036 px is the best method's noise in the best picture) nor useful beyond 20 px.
+# No blob's centre is known better than this (measured: .036 px is the best method's noise in the
+# best picture) nor useful beyond 20 px.
 SIGMA_MIN_PX, SIGMA_MAX_PX = 0.03, 20.0
-# A clock off by more than this is as good as unknown; while it is unknown (-1) the estimate must not trust motion either.
+# A clock off by more than this is as good as unknown; while it is unknown (-1) the estimate must
+# not trust motion either.
 CLOCK_SIGMA_MAX_S = 0.02
 _STAMP_MAX = 2**63 - 1
 
@@ -68,10 +72,18 @@ class Observer:
     def __init__(self, config: RigConfig, cameras: Mapping[str, Camera]) -> None:
         self.cameras = tuple(cameras.values())
         self.slots: tuple[Slot, ...] = tuple(
-            Slot(hand, name) for hand in HANDS if hand in config.hand for name in config.hand[hand].markers
+            Slot(hand, name)
+            for hand in HANDS
+            if hand in config.hand
+            for name in config.hand[hand].markers
         )
         self._camera_index = {camera.name: index for index, camera in enumerate(self.cameras)}
-        colors = [color for hand in HANDS if hand in config.hand for color in config.hand[hand].markers.values()]
+        colors = [
+            color
+            for hand in HANDS
+            if hand in config.hand
+            for color in config.hand[hand].markers.values()
+        ]
         self._slot_of = {color: index for index, color in enumerate(colors)}
 
     def view(self, frame: MarkerFrame) -> View | Refusal:
@@ -88,8 +100,12 @@ class Observer:
             return Refusal.ABSURD_STAMP
         markers = self._usable(frame, camera)
         slots = np.array(sorted(markers), dtype=np.int64)
-        pixels = np.array([(markers[s].x_px, markers[s].y_px) for s in slots.tolist()]).reshape(-1, 2)
-        sigma_px = np.array([min(max(markers[s].sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for s in slots.tolist()])
+        pixels = np.array([(markers[s].x_px, markers[s].y_px) for s in slots.tolist()]).reshape(
+            -1, 2
+        )
+        sigma_px = np.array(
+            [min(max(markers[s].sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for s in slots.tolist()]
+        )
         rays, scale, valid = undistortion.rays(camera, pixels)
         return View(
             camera=index,
@@ -119,5 +135,10 @@ class Observer:
 
 
 def clock_sigma_s(clock_sigma_ns: int) -> float:
-    """How far a camera's clock may be off, in s; an unknown offset counts as the most that is still of use."""
-    return CLOCK_SIGMA_MAX_S if clock_sigma_ns < 0 else min(clock_sigma_ns * 1e-9, CLOCK_SIGMA_MAX_S)
+    """How far a camera's clock may be off, in s.
+
+    An unknown offset counts as the most that is still of use.
+    """
+    return (
+        CLOCK_SIGMA_MAX_S if clock_sigma_ns < 0 else min(clock_sigma_ns * 1e-9, CLOCK_SIGMA_MAX_S)
+    )

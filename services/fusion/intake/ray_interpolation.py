@@ -1,9 +1,12 @@
-"""Bringing views to one instant: nearest frame, straight line, or the 4-point Hermite cubic through a camera's track of a landmark.
+"""Bringing views to one instant: nearest frame, straight line, or the 4-point Hermite cubic through
+a camera's track of a landmark.
 
-Two free-running cameras see a moving hand up to half a frame apart, which nearest-frame pairing turns into tens of millimetres of
-depth (depth error = Z * v * dt / B). Interpolation between frames needs later frames: it waits. An instant that the track
-does not enclose yet, or across a gap in the track, gives None: the caller decides whether to wait or to do without. Where one of
-the four points is missing, at the end of a track or as a frame was lost, the parabola through three takes the cubic's place.
+Two free-running cameras see a moving hand up to half a frame apart, which nearest-frame pairing
+turns into tens of millimetres of depth (depth error = Z * v * dt / B). Interpolation between frames
+needs later frames: it waits. An instant that the track does not enclose yet, or across a gap in the
+track, gives None: the caller decides whether to wait or to do without. Where one of the four points
+is missing, at the end of a track or as a frame was lost, the parabola through three takes the
+cubic's place.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ Pairing = Literal["hermite", "linear", "nearest"]
 
 # How many frames later than the wanted instant each kind needs.
 FRAMES_AFTER: dict[Pairing, int] = {"nearest": 0, "linear": 1, "hermite": 2}
-# Samples kept for each landmark and camera: four points, two frames of lag, and room for frames that come out of order.
+# Samples kept for each landmark and camera: four points, two frames of lag, and room for frames
+# that come out of order.
 SAMPLES = 16
 # Between samples further apart than this many frames the path is anybody's guess.
 _GAP_FRAMES = 3.5
@@ -28,7 +32,9 @@ _GAP_FRAMES = 3.5
 
 @dataclass(frozen=True, eq=False)
 class Ray:
-    """A camera's ray (2,) to a landmark at the wanted instant, the sigma of each coordinate, and how many samples it is made from."""
+    """A camera's ray (2,) to a landmark at the wanted instant, the sigma of each coordinate, and
+    how many samples it is made from.
+    """
 
     ray: Array
     sigma: float
@@ -36,10 +42,12 @@ class Ray:
 
 
 def polynomial_weights(times_s: Array, at_s: float) -> Array:
-    """Weights (n,) of n samples at times (n,) in the value at at_s of the polynomial through them (Lagrange).
+    """Weights (n,) of n samples at times (n,) in the value at at_s of the polynomial through them
+    (Lagrange).
 
-    Of four: the Hermite cubic between the middle two whose tangents are those of the cubic through all four, hence exact on cubics; at
-    the middle of even spacing the familiar (-1, 9, 9, -1) / 16, which passes .8 of the samples' noise. Of two: the straight line.
+    Of four: the Hermite cubic between the middle two whose tangents are those of the cubic through
+    all four, hence exact on cubics; at the middle of even spacing the familiar (-1, 9, 9, -1) / 16,
+    which passes .8 of the samples' noise. Of two: the straight line.
     """
     n = len(times_s)
     weights = np.ones(n)
@@ -59,7 +67,10 @@ class RayTrack:
         self._sigmas: list[float] = []
 
     def add(self, time_s: float, ray: Array, sigma: float) -> None:
-        """Put a sample in its place in time; one at an instant already known, or older than all of a full track, is ignored."""
+        """Put a sample in its place in time.
+
+        One at an instant already known, or older than all of a full track, is ignored.
+        """
         place = bisect_right(self._times, time_s)
         known = place > 0 and self._times[place - 1] == time_s
         if known or (place == 0 and len(self._times) >= SAMPLES):
@@ -72,10 +83,20 @@ class RayTrack:
 
     def newest(self, n: int) -> list[tuple[float, Array, float]]:
         """The last n samples, newest first: time, ray (2,), sigma."""
-        return list(zip(self._times[: -n - 1 : -1], self._rays[: -n - 1 : -1], self._sigmas[: -n - 1 : -1], strict=True))
+        return list(
+            zip(
+                self._times[: -n - 1 : -1],
+                self._rays[: -n - 1 : -1],
+                self._sigmas[: -n - 1 : -1],
+                strict=True,
+            )
+        )
 
     def at(self, time_s: float, pairing: Pairing, period_s: float) -> Ray | None:
-        """The ray at an instant; period_s is the camera's frame time, which tells a gap. None if the samples do not give it."""
+        """The ray at an instant; period_s is the camera's frame time, which tells a gap.
+
+        None if the samples do not give it.
+        """
         if not self._times:
             return None
         place = bisect_right(self._times, time_s)
@@ -93,10 +114,17 @@ class RayTrack:
         return Ray(ray, sigma, len(around))
 
     def _nearest(self, k: int, away_s: float, period_s: float) -> Ray | None:
-        """Sample k as it is; its sigma grows by how far it may have moved, judging by its neighbour."""
+        """Sample k as it is.
+
+        Its sigma grows by how far it may have moved, judging by its neighbour.
+        """
         if away_s > 0.75 * period_s:
             return None
         other = k - 1 if k > 0 else min(1, len(self._times) - 1)
         elapsed_s = abs(self._times[k] - self._times[other])
-        speed = float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s if elapsed_s > 0.0 else 0.0
+        speed = (
+            float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s
+            if elapsed_s > 0.0
+            else 0.0
+        )
         return Ray(self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), 1)

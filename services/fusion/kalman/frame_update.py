@@ -1,6 +1,8 @@
-"""One camera's observations into everything the filter keeps of them: looks, tracks (ring.py), resting hands (rest.py).
+"""One camera's observations into everything the filter keeps of them: looks, tracks (ring.py),
+resting hands (rest.py).
 
-One compiled call for a whole frame: calls and small arrays would cost more than the filters. Kernels only; kalman.py owns the arrays.
+One compiled call for a whole frame: calls and small arrays would cost more than the filters.
+Kernels only; kalman.py owns the arrays.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from services.fusion.method import Ints
 
 # What `take_in` tells of a landmark without a track, beside the codes of ring.insert.
 NO_TRACK = -1
-# Looks of each camera that are kept for beginning a track: half a second at 30 fps, so that a camera may be that much later than another.
+# Looks of each camera that are kept for beginning a track: half a second at 30 fps, so that a
+# camera may be that much later than another.
 KEPT = 16
 
 
@@ -45,9 +48,15 @@ def no_looks(slots: int, cameras: int) -> Looks:
 
 
 @njit(cache=True)
-def _remember(looks: Looks, slot: int, camera: int, time_s: float, ray: Array, sigma: float) -> None:
+def _remember(
+    looks: Looks, slot: int, camera: int, time_s: float, ray: Array, sigma: float
+) -> None:
     k = looks.number[slot, camera] % KEPT
-    looks.look_s[slot, camera, k], looks.look[slot, camera, k, :2], looks.look[slot, camera, k, 2] = time_s, ray, sigma
+    (
+        looks.look_s[slot, camera, k],
+        looks.look[slot, camera, k, :2],
+        looks.look[slot, camera, k, 2],
+    ) = time_s, ray, sigma
     looks.number[slot, camera] += 1
     looks.looked_s[slot, camera] = max(looks.looked_s[slot, camera], time_s)
 
@@ -69,7 +78,8 @@ def take_in(
     densities: Array,
     fresh: bool,
 ) -> Ints:
-    """A frame's observations (n,), rays (n, 2) with sigmas (n,): the codes (n,) of ring.insert, NO_TRACK where there is none.
+    """A frame's observations (n,), rays (n, 2) with sigmas (n,): the codes (n,) of ring.insert,
+    NO_TRACK where there is none.
 
     fresh: looks to remember, not remembered ones.
     R (C, 3, 3), t (C, 3) are every camera's T_camera_from_rig.
@@ -82,7 +92,9 @@ def take_in(
         variances[n, 0], variances[n, 1] = sigmas[n] ** 2, clock_sigma_s**2
         codes[n] = NO_TRACK
         if ring.filled[slot] > 0:
-            codes[n] = insert(ring, slot, times_s[n], camera, rays[n], variances[n], gate, R, t, densities)
+            codes[n] = insert(
+                ring, slot, times_s[n], camera, rays[n], variances[n], gate, R, t, densities
+            )
         if codes[n] == ACCEPTED:
             looks.seen_s[slot, camera] = max(looks.seen_s[slot, camera], times_s[n])
     weigh(rest, ring, slots, times_s, codes, camera, rays, variances, R, t)

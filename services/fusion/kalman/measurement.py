@@ -1,9 +1,10 @@
-"""One camera's view of one landmark, taken into the estimate: the update step of an extended Kalman filter.
+"""One camera's view of one landmark, taken into the estimate: the update step of an extended Kalman
+filter.
 
-The measurement is the undistorted ray (x/z, y/z) of a pixel, so lenses are already out of it. Its error has two parts: the
-pixel's own and the camera's clock, which turns the landmark's velocity into an image error along the path. Compiled with numba;
-nothing here raises: a landmark predicted behind the camera, or nearer than NEAR_M, gives NOT_VISIBLE and leaves the estimate as
-it was.
+The measurement is the undistorted ray (x/z, y/z) of a pixel, so lenses are already out of it. Its
+error has two parts: the pixel's own and the camera's clock, which turns the landmark's velocity
+into an image error along the path. Compiled with numba; nothing here raises: a landmark predicted
+behind the camera, or nearer than NEAR_M, gives NOT_VISIBLE and leaves the estimate as it was.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 @njit(cache=True)
 def project(p_rig: Array, R: Array, t: Array, ray: Array, H: Array) -> bool:
-    """Ray (2,) of a point (3,) and its derivative H (2, 3); R (3, 3) and t (3,) are T_camera_from_rig. False if not in front."""
+    """Ray (2,) of a point (3,) and its derivative H (2, 3).
+
+    R (3, 3) and t (3,) are T_camera_from_rig. False if not in front.
+    """
     x = R[0, 0] * p_rig[0] + R[0, 1] * p_rig[1] + R[0, 2] * p_rig[2] + t[0]
     y = R[1, 0] * p_rig[0] + R[1, 1] * p_rig[1] + R[1, 2] * p_rig[2] + t[1]
     z = R[2, 0] * p_rig[0] + R[2, 1] * p_rig[1] + R[2, 2] * p_rig[2] + t[2]
@@ -39,11 +43,22 @@ def project(p_rig: Array, R: Array, t: Array, ray: Array, H: Array) -> bool:
 
 @njit(cache=True)
 def innovate(
-    state: Array, cov: Array, R: Array, t: Array, seen: Array, variances: Array, H: Array, nu: Array, Si: Array, gain: Array
+    state: Array,
+    cov: Array,
+    R: Array,
+    t: Array,
+    seen: Array,
+    variances: Array,
+    H: Array,
+    nu: Array,
+    Si: Array,
+    gain: Array,
 ) -> float:
-    """Innovation nu (2,), the inverse of its covariance Si (2, 2), gain (9, 2) and log-likelihood of seen (2,), not applied yet.
+    """Innovation nu (2,), the inverse of its covariance Si (2, 2), gain (9, 2) and log-likelihood
+    of seen (2,), not applied yet.
 
-    variances (2,): of each ray coordinate, and of the camera's clock in s^2. nu^T Si nu is the normalised innovation squared.
+    variances (2,): of each ray coordinate, and of the camera's clock in s^2. nu^T Si nu is the
+    normalised innovation squared.
     """
     ray, variance, clock_variance = np.empty(2), variances[0], variances[1]
     if not project(state, R, t, ray, H):
@@ -55,9 +70,26 @@ def innovate(
     # Image velocity: what a clock error of one second would shift the ray by.
     du = H[0, 0] * state[3] + H[0, 1] * state[4] + H[0, 2] * state[5]
     dv = H[1, 0] * state[3] + H[1, 1] * state[4] + H[1, 2] * state[5]
-    a = H[0, 0] * gain[0, 0] + H[0, 1] * gain[1, 0] + H[0, 2] * gain[2, 0] + variance + clock_variance * du * du
-    b = H[0, 0] * gain[0, 1] + H[0, 1] * gain[1, 1] + H[0, 2] * gain[2, 1] + clock_variance * du * dv
-    d = H[1, 0] * gain[0, 1] + H[1, 1] * gain[1, 1] + H[1, 2] * gain[2, 1] + variance + clock_variance * dv * dv
+    a = (
+        H[0, 0] * gain[0, 0]
+        + H[0, 1] * gain[1, 0]
+        + H[0, 2] * gain[2, 0]
+        + variance
+        + clock_variance * du * du
+    )
+    b = (
+        H[0, 0] * gain[0, 1]
+        + H[0, 1] * gain[1, 1]
+        + H[0, 2] * gain[2, 1]
+        + clock_variance * du * dv
+    )
+    d = (
+        H[1, 0] * gain[0, 1]
+        + H[1, 1] * gain[1, 1]
+        + H[1, 2] * gain[2, 1]
+        + variance
+        + clock_variance * dv * dv
+    )
     determinant = a * d - b * b
     if not determinant > 0.0:
         return NOT_VISIBLE
@@ -91,10 +123,12 @@ def correct(state: Array, cov: Array, H: Array, nu: Array, gain: Array) -> None:
 
 @njit(cache=True)
 def retract(adjoint: Array, curvature: Array, H: Array, nu: Array, Si: Array, gain: Array) -> None:
-    """The smoother's step back over one measurement, in place: adjoint (9,) and curvature (9, 9) from after it to before it.
+    """The smoother's step back over one measurement, in place: adjoint (9,) and curvature (9, 9)
+    from after it to before it.
 
-    Modified Bryson-Frazier recursion (Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973):
-    the same estimate as Rauch-Tung-Striebel without inverting a covariance.
+    Modified Bryson-Frazier recursion (Bierman, "Fixed interval smoothing with discrete
+    measurements", Int. J. Control 18(1), 1973): the same estimate as Rauch-Tung-Striebel without
+    inverting a covariance.
     """
     AK = np.empty((9, 2))
     for i in range(9):
@@ -119,4 +153,6 @@ def retract(adjoint: Array, curvature: Array, H: Array, nu: Array, Si: Array, ga
             curvature[i, j] -= cross
             curvature[j, i] -= cross
         for j in range(3):
-            curvature[i, j] += H[0, i] * (W[0, 0] * H[0, j] + W[0, 1] * H[1, j]) + H[1, i] * (W[1, 0] * H[0, j] + W[1, 1] * H[1, j])
+            curvature[i, j] += H[0, i] * (W[0, 0] * H[0, j] + W[0, 1] * H[1, j]) + H[1, i] * (
+                W[1, 0] * H[0, j] + W[1, 1] * H[1, j]
+            )

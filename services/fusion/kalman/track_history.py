@@ -1,10 +1,13 @@
-"""The recent observations of every landmark in order of time, filtered forward, and smoothed back to any instant.
+"""The recent observations of every landmark in order of time, filtered forward, and smoothed back
+to any instant.
 
-Each landmark keeps the last NODES observations with the estimate after each. An observation that arrives late is put in its place
-and the later ones are filtered again; one older than the whole ring is refused. Several motion models run side by side, which differ in
-how lively they take the landmark to be (multiple-model adaptive estimation: Magill, IEEE TAC 10(4), 1965); their likelihoods weigh
-them, so that a resting hand is averaged and a fast one is followed, and the covariance is right for both.
-Compiled with numba; the arrays live in a Ring, which kalman.py owns. Nothing here raises; codes tell what happened.
+Each landmark keeps the last NODES observations with the estimate after each. An observation that
+arrives late is put in its place and the later ones are filtered again; one older than the whole
+ring is refused. Several motion models run side by side, which differ in how lively they take the
+landmark to be (multiple-model adaptive estimation: Magill, IEEE TAC 10(4), 1965); their likelihoods
+weigh them, so that a resting hand is averaged and a fast one is followed, and the covariance is
+right for both. Compiled with numba; the arrays live in a Ring, which kalman.py owns. Nothing here
+raises; codes tell what happened.
 """
 
 from __future__ import annotations
@@ -17,22 +20,34 @@ import numpy.typing as npt
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.kalman.measurement import NOT_VISIBLE, correct, distance_squared, innovate, retract
+from services.fusion.kalman.measurement import (
+    NOT_VISIBLE,
+    correct,
+    distance_squared,
+    innovate,
+    retract,
+)
 from services.fusion.kalman.motion_model import predict, retreat, unit_noise
 from services.fusion.method import Ints
 
-# 32 observations are .53 s of two cameras at 30 fps and 90 ms of four at 90 fps: room for two frames of lag and for latency.
+# 32 observations are .53 s of two cameras at 30 fps and 90 ms of four at 90 fps: room for two
+# frames of lag and for latency.
 NODES = 32
 ACCEPTED, GATED, LATE, UNSEEN = 0, 1, 2, 3
-# Share of belief that leaks to the other models at each observation; keeps every model ready to take over within an observation or two.
+# Share of belief that leaks to the other models at each observation; keeps every model ready to
+# take over within an observation or two.
 _LEAK = 0.003
-# Sizes (prior included) at which a track begins again from a better guess: once four, then seven observations tell where it was.
-# Without it, the second and third point of new tracks were off by 3.9 and 1.6 sigmas (one frame of lag), with it by 2.6 and 1.3.
+# Sizes (prior included) at which a track begins again from a better guess: once four, then seven
+# observations tell where it was. Without it, the second and third point of new tracks were off by
+# 3.9 and 1.6 sigmas (one frame of lag), with it by 2.6 and 1.3.
 _YOUNG = (4, 6)
 
 
 class Ring(NamedTuple):
-    """S landmarks, NODES observations, M models. `order` lists a landmark's storage rows by time; node 0 of a new track is its prior."""
+    """S landmarks, NODES observations, M models. `order` lists a landmark's storage rows by time.
+
+    Node 0 of a new track is its prior.
+    """
 
     filled: Ints  # (S,) how many nodes each landmark has
     order: Ints  # (S, NODES)
@@ -73,11 +88,14 @@ def empty_ring(slots: int, models: int) -> Ring:
 
 @njit(cache=True)
 def start(ring: Ring, slot: int, time_s: float, p_rig: Array, sigmas: Array) -> None:
-    """Begin a track at a point (3,) with the prior's sigmas of position, velocity and acceleration (3,); older nodes are forgotten."""
+    """Begin a track at a point (3,) with the prior's sigmas of position, velocity and acceleration
+    (3,); older nodes are forgotten.
+    """
     node = ring.order[slot, 0]
     ring.filled[slot], ring.time_s[slot, node], ring.camera[slot, node] = 1, time_s, -1
     models = ring.belief.shape[2]
-    # The liveliest model first: with equal shares, the second point of new tracks was off by 2.6 of its sigmas, so by 2.1.
+    # The liveliest model first: with equal shares, the second point of new tracks was off by 2.6 of
+    # its sigmas, so by 2.1.
     ring.belief[slot, node] = 0.01
     ring.belief[slot, node, models - 1] = 1.0 - 0.01 * (models - 1)
     ring.state[slot, node], ring.cov[slot, node] = 0.0, 0.0
@@ -98,10 +116,14 @@ def _place(ring: Ring, slot: int, time_s: float) -> int:
 
 
 @njit(cache=True)
-def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Array, noise: Array) -> tuple[float, float]:
-    """Estimate after node `place` from the node before it: smallest normalised innovation squared of all models, and log-likelihood.
+def _filter(
+    ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Array, noise: Array
+) -> tuple[float, float]:
+    """Estimate after node `place` from the node before it: smallest normalised innovation squared
+    of all models, and log-likelihood.
 
-    R (C, 3, 3) and t (C, 3) are every camera's T_camera_from_rig. Infinite when no model has the landmark in front of the camera.
+    R (C, 3, 3) and t (C, 3) are every camera's T_camera_from_rig. Infinite when no model has the
+    landmark in front of the camera.
     """
     last, node = ring.order[slot, place - 1], ring.order[slot, place]
     dt = ring.time_s[slot, node] - ring.time_s[slot, last]
@@ -109,10 +131,27 @@ def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Ar
     camera, models = ring.camera[slot, node], densities.shape[0]
     nearest, best = np.inf, NOT_VISIBLE
     for m in range(models):
-        state, cov, gain = ring.state[slot, node, m], ring.cov[slot, node, m], ring.gain[slot, node, m]
+        state, cov, gain = (
+            ring.state[slot, node, m],
+            ring.cov[slot, node, m],
+            ring.gain[slot, node, m],
+        )
         H, nu, Si = ring.H[slot, node, m], ring.nu[slot, node, m], ring.Si[slot, node, m]
-        predict(ring.state[slot, last, m], ring.cov[slot, last, m], dt, densities[m], noise, state, cov)
-        likelihood = innovate(state, cov, R[camera], t[camera], ring.seen[slot, node], ring.variance[slot, node], H, nu, Si, gain)
+        predict(
+            ring.state[slot, last, m], ring.cov[slot, last, m], dt, densities[m], noise, state, cov
+        )
+        likelihood = innovate(
+            state,
+            cov,
+            R[camera],
+            t[camera],
+            ring.seen[slot, node],
+            ring.variance[slot, node],
+            H,
+            nu,
+            Si,
+            gain,
+        )
         ring.belief[slot, node, m] = likelihood
         if likelihood > NOT_VISIBLE:
             best, nearest = max(best, likelihood), min(nearest, distance_squared(nu, Si))
@@ -122,19 +161,32 @@ def _filter(ring: Ring, slot: int, place: int, R: Array, t: Array, densities: Ar
     total = 0.0
     for m in range(models):
         prior = (1.0 - _LEAK) * ring.belief[slot, last, m] + _LEAK / models
-        ring.belief[slot, node, m] = prior * math.exp(max(ring.belief[slot, node, m] - best, -700.0))
+        ring.belief[slot, node, m] = prior * math.exp(
+            max(ring.belief[slot, node, m] - best, -700.0)
+        )
         total += ring.belief[slot, node, m]
     ring.belief[slot, node] /= total
     return nearest, best + math.log(total)
 
 
 @njit(cache=True)
-def _smooth(ring: Ring, slot: int, place: int, m: int, time_s: float, state: Array, cov: Array) -> None:
-    """Take the observations from `place` on, all later than time_s, into a prediction (9,), (9, 9) to time_s of model m, in place."""
+def _smooth(
+    ring: Ring, slot: int, place: int, m: int, time_s: float, state: Array, cov: Array
+) -> None:
+    """Take the observations from `place` on, all later than time_s, into a prediction (9,), (9, 9)
+    to time_s of model m, in place.
+    """
     adjoint, curvature, product = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
     for k in range(ring.filled[slot] - 1, place - 1, -1):
         node = ring.order[slot, k]
-        retract(adjoint, curvature, ring.H[slot, node, m], ring.nu[slot, node, m], ring.Si[slot, node, m], ring.gain[slot, node, m])
+        retract(
+            adjoint,
+            curvature,
+            ring.H[slot, node, m],
+            ring.nu[slot, node, m],
+            ring.Si[slot, node, m],
+            ring.gain[slot, node, m],
+        )
         before = time_s if k == place else ring.time_s[slot, ring.order[slot, k - 1]]
         retreat(adjoint, curvature, ring.time_s[slot, node] - before)
     for i in range(9):
@@ -154,7 +206,8 @@ def _smooth(ring: Ring, slot: int, place: int, m: int, time_s: float, state: Arr
 
 @njit(cache=True)
 def query(ring: Ring, slot: int, time_s: float, densities: Array, mean: Array, cov: Array) -> bool:
-    """Position and velocity at an instant from all observations, before and after it: mean (6,), cov (6, 6), written in place.
+    """Position and velocity at an instant from all observations, before and after it: mean (6,),
+    cov (6, 6), written in place.
 
     False if the track does not reach back that far, or there is none.
     """
@@ -167,7 +220,15 @@ def query(ring: Ring, slot: int, time_s: float, densities: Array, mean: Array, c
     unit_noise(dt, noise)
     mean[:], cov[:] = 0.0, 0.0
     for m in range(models):
-        predict(ring.state[slot, last, m], ring.cov[slot, last, m], dt, densities[m], noise, states[m], covs[m])
+        predict(
+            ring.state[slot, last, m],
+            ring.cov[slot, last, m],
+            dt,
+            densities[m],
+            noise,
+            states[m],
+            covs[m],
+        )
         if place < count:
             _smooth(ring, slot, place, m, time_s, states[m], covs[m])
         mean += ring.belief[slot, newest, m] * states[m, :6]
@@ -181,12 +242,16 @@ def query(ring: Ring, slot: int, time_s: float, densities: Array, mean: Array, c
 
 @njit(cache=True)
 def _begin_again(ring: Ring, slot: int, R: Array, t: Array, densities: Array) -> None:
-    """Filter a young track once more from a better beginning: where its own observations, smoothed, now put it.
+    """Filter a young track once more from a better beginning: where its own observations, smoothed,
+    now put it.
 
-    Its first rays met centimetres off if the landmark moved between them, and derivatives taken there make the estimate too sure.
+    Its first rays met centimetres off if the landmark moved between them, and derivatives taken
+    there make the estimate too sure.
     """
     node, mean, cov = ring.order[slot, 0], np.empty(6), np.empty((6, 6))
-    if ring.camera[slot, node] >= 0 or not query(ring, slot, ring.time_s[slot, node], densities, mean, cov):
+    if ring.camera[slot, node] >= 0 or not query(
+        ring, slot, ring.time_s[slot, node], densities, mean, cov
+    ):
         return
     ring.state[slot, node, :, :3] = mean[:3]
     for k in range(1, ring.filled[slot]):
@@ -195,9 +260,20 @@ def _begin_again(ring: Ring, slot: int, R: Array, t: Array, densities: Array) ->
 
 @njit(cache=True)
 def insert(
-    ring: Ring, slot: int, time_s: float, camera: int, seen: Array, variances: Array, gate: float, R: Array, t: Array, densities: Array
+    ring: Ring,
+    slot: int,
+    time_s: float,
+    camera: int,
+    seen: Array,
+    variances: Array,
+    gate: float,
+    R: Array,
+    t: Array,
+    densities: Array,
 ) -> int:
-    """Take one observation of a running track into its place in time: ACCEPTED, or GATED, LATE, UNSEEN with the track unchanged."""
+    """Take one observation of a running track into its place in time: ACCEPTED, or GATED, LATE,
+    UNSEEN with the track unchanged.
+    """
     place, count = _place(ring, slot, time_s), ring.filled[slot]
     if place == 0 or (place == 1 and count == NODES):
         return LATE
@@ -228,8 +304,12 @@ def insert(
 
 
 @njit(cache=True)
-def query_all(ring: Ring, time_s: float, densities: Array, means: Array, covs: Array) -> npt.NDArray[np.bool_]:
-    """Every landmark at one instant: which have an estimate (S,), with means (S, 6) and covs (S, 6, 6) written in place."""
+def query_all(
+    ring: Ring, time_s: float, densities: Array, means: Array, covs: Array
+) -> npt.NDArray[np.bool_]:
+    """Every landmark at one instant: which have an estimate (S,), with means (S, 6) and covs (S, 6,
+    6) written in place.
+    """
     found = np.zeros(ring.filled.shape[0], dtype=np.bool_)
     for slot in range(ring.filled.shape[0]):
         if ring.filled[slot] > 0:

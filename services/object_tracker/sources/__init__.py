@@ -1,7 +1,9 @@
-"""Where tracked devices' poses come from: siblings behind one interface, chosen by `[objects] source` in rig.toml.
+"""Where tracked devices' poses come from: siblings behind one interface, chosen by `[objects]
+source` in rig.toml.
 
-steamvr and libsurvive read real lighthouses, replay reads an objects.jsonl; with simulator and network the poses arrive on the bus
-already. A source that cannot be opened, or fails for good, raises SourceError; systemd (or `rhot up`) tries again.
+steamvr and libsurvive read real lighthouses, replay reads an objects.jsonl; with simulator and
+network the poses arrive on the bus already. A source that cannot be opened, or fails for good,
+raises SourceError; systemd (or `rhot up`) tries again.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ class PoseSource(Protocol):
 def open_source(config: RigConfig, report: Report) -> PoseSource | None:
     """The source rig.toml names, or None where poses arrive on the bus already.
 
-    report takes what a user should hear of without the source failing. Raises SourceError for an unknown name.
+    report takes what a user should hear of without the source failing. Raises SourceError for an
+    unknown name.
     """
     kind, _, detail = config.objects.source.partition(":")
     match kind:

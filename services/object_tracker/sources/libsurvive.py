@@ -1,7 +1,8 @@
-"""Poses from libsurvive: its `survive-cli --record-stdout` as a subprocess, whose lines survive_lines reads.
+"""Poses from libsurvive: its `survive-cli --record-stdout` as a subprocess, whose lines
+survive_lines reads.
 
-survive-cli missing or ended raises SourceError. A device that libsurvive loses falls silent. Its own log goes to our standard
-error, that is, to the journal. Cancelling ends the subprocess.
+survive-cli missing or ended raises SourceError. A device that libsurvive loses falls silent. Its
+own log goes to our standard error, that is, to the journal. Cancelling ends the subprocess.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ class LibSurvive:
         self._command = tuple(command)
 
     async def poses(self) -> AsyncGenerator[OpenVrPose]:
-        """Poses of every device libsurvive tracks, stamped by survive-cli's own clock brought to the wall clock."""
+        """Poses of every device libsurvive tracks, stamped by survive-cli's own clock brought to
+        the wall clock.
+        """
         process = await self._start()
         try:
             lines, clocks, seq = SurviveLines(), RunClock(), 0
@@ -48,7 +51,9 @@ class LibSurvive:
 
     async def _start(self) -> Process:
         try:
-            return await asyncio.create_subprocess_exec(*self._command, stdout=PIPE, limit=_LONGEST_LINE)
+            return await asyncio.create_subprocess_exec(
+                *self._command, stdout=PIPE, limit=_LONGEST_LINE
+            )
         except OSError as error:
             raise SourceError(
                 f"cannot start {self._command[0]}: {error.strerror}; install libsurvive so that `survive-cli` is on the PATH,"

@@ -1,6 +1,7 @@
 """Poses from an objects.jsonl, in real time and with their original stamps; ends with the file.
 
-A missing or broken file raises CaptureError with the line's number. Stamps that run backwards are sent at once.
+A missing or broken file raises CaptureError with the line's number. Stamps that run backwards are
+sent at once.
 """
 
 from __future__ import annotations

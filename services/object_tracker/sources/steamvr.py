@@ -1,7 +1,8 @@
 """Poses from a running SteamVR, through the PyPI package openvr (x86 only, imported when needed).
 
-SteamVR missing or quit raises SourceError with what to do (openvr's own message is empty). A device that sleeps or is hidden keeps
-reporting, with bPoseIsValid or bDeviceIsConnected false. When SteamVR moves its origin the registration no longer holds: reported.
+SteamVR missing or quit raises SourceError with what to do (openvr's own message is empty). A device
+that sleeps or is hidden keeps reporting, with bPoseIsValid or bDeviceIsConnected false. When
+SteamVR moves its origin the registration no longer holds: reported.
 """
 
 from __future__ import annotations
@@ -20,11 +21,16 @@ from rhot.errors import SourceError
 from rhot.messages import OpenVrDevice, OpenVrPose
 
 _CLASSES = {1: "HMD", 2: "Controller", 3: "GenericTracker"}
-# ETrackingUniverseOrigin: raw does not follow the user's recentring. EVRApplicationType: background does not start SteamVR.
+# ETrackingUniverseOrigin: raw does not follow the user's recentring. EVRApplicationType: background
+# does not start SteamVR.
 _RAW, _BACKGROUND = 2, 3
 _QUIT = 700
 # Events after which the origin may be elsewhere.
-_MOVED = {801: "ChaperoneUniverseHasChanged", 804: "SeatedZeroPoseReset", 808: "StandingZeroPoseReset"}
+_MOVED = {
+    801: "ChaperoneUniverseHasChanged",
+    804: "SeatedZeroPoseReset",
+    808: "StandingZeroPoseReset",
+}
 # Properties cost a call to SteamVR's server each; batteries change slowly.
 _DEVICE_REFRESH_S = 2.0
 # Digits of float32.
@@ -32,18 +38,26 @@ _DIGITS = 7
 
 
 class SteamVr:
-    """Polls every tracked device at rate_hz in a thread of its own; report hears of a moved origin."""
+    """Polls every tracked device at rate_hz in a thread of its own.
+
+    Report hears of a moved origin.
+    """
 
     def __init__(self, rate_hz: float, report: Callable[[str], None]) -> None:
         self._period_s = 1.0 / rate_hz
         self._report = report
 
     async def poses(self) -> AsyncGenerator[OpenVrPose]:
-        """Poses of headset, controllers and trackers (not of the lighthouses) in SteamVR's raw universe."""
+        """Poses of headset, controllers and trackers (not of the lighthouses) in SteamVR's raw
+        universe.
+        """
         loop = asyncio.get_running_loop()
-        # One thread for all of openvr: init() takes seconds, and nothing promises that it may be called from several.
+        # One thread for all of openvr: init() takes seconds, and nothing promises that it may be
+        # called from several.
         with ThreadPoolExecutor(1, "steamvr") as thread:
-            poller = await loop.run_in_executor(thread, _Poller, lambda text: loop.call_soon_threadsafe(self._report, text))
+            poller = await loop.run_in_executor(
+                thread, _Poller, lambda text: loop.call_soon_threadsafe(self._report, text)
+            )
             try:
                 due_s = loop.time()
                 while True:
@@ -86,7 +100,10 @@ class _Poller:
             self._devices = self._read_devices()
         self._system.getDeviceToAbsoluteTrackingPose(_RAW, 0.0, self._array)
         stamp_ns = clock.now_ns()
-        poses = [openvr_pose(self._array[i], device, self._seq, stamp_ns) for i, device in self._devices.items()]
+        poses = [
+            openvr_pose(self._array[i], device, self._seq, stamp_ns)
+            for i, device in self._devices.items()
+        ]
         self._seq += 1
         return poses
 
@@ -96,7 +113,9 @@ class _Poller:
             if kind == _QUIT:
                 raise SourceError("SteamVR quit; start it again")
             if kind in _MOVED:
-                self._report(f"SteamVR moved its origin ({_MOVED[kind]}): registration is stale; run `rhot calibrate objects` again")
+                self._report(
+                    f"SteamVR moved its origin ({_MOVED[kind]}): registration is stale; run `rhot calibrate objects` again"
+                )
 
     def _read_devices(self) -> dict[int, OpenVrDevice]:
         devices = {}
@@ -105,11 +124,18 @@ class _Poller:
             if name is not None:
                 devices[index] = OpenVrDevice(
                     index=index,
-                    serial=_key_name(self._property("String", index, self._vr.Prop_SerialNumber_String, ""), index),
+                    serial=_key_name(
+                        self._property("String", index, self._vr.Prop_SerialNumber_String, ""),
+                        index,
+                    ),
                     device_class=name,
                     model=self._property("String", index, self._vr.Prop_ModelNumber_String, ""),
-                    battery=self._property("Float", index, self._vr.Prop_DeviceBatteryPercentage_Float, -1.0),
-                    charging=bool(self._property("Bool", index, self._vr.Prop_DeviceIsCharging_Bool, False)),
+                    battery=self._property(
+                        "Float", index, self._vr.Prop_DeviceBatteryPercentage_Float, -1.0
+                    ),
+                    charging=bool(
+                        self._property("Bool", index, self._vr.Prop_DeviceIsCharging_Bool, False)
+                    ),
                 )
         return devices
 

@@ -1,7 +1,9 @@
-"""The bounds of one colour's range, between what was seen of the paint and what it must not take. Pure.
+"""The bounds of one colour's range, between what was seen of the paint and what it must not take.
+Pure.
 
-Bounds lie as far out as another pose, shade and blur need, and are drawn in only where that keeps out something foreign: saturation and
-value, then hue. What cannot be kept out, as a shirt of the same colour, costs no paint: bounds that would not help stay wide.
+Bounds lie as far out as another pose, shade and blur need, and are drawn in only where that keeps
+out something foreign: saturation and value, then hue. What cannot be kept out, as a shirt of the
+same colour, costs no paint: bounds that would not help stay wide.
 """
 
 from __future__ import annotations
@@ -14,25 +16,29 @@ import numpy as np
 from rhot.files.calibration import ColorRange
 from services.pi_tracker.image.chroma import Array, Cells, hue_apart, hue_from, mean_hue
 
-# Share of a patch's cells left outside on each side of a bound: rims, highlights, and what else is no paint.
+# Share of a patch's cells left outside on each side of a bound: rims, highlights, and what else is
+# no paint.
 _TAIL = 0.02
-# Hues beyond those quantiles: another pose, a little less light. Simulated paints turn by 2 to 3 between poses; half of the distance
-# to a neighbour if that is less.
+# Hues beyond those quantiles: another pose, a little less light. Simulated paints turn by 2 to 3
+# between poses; half of the distance to a neighbour if that is less.
 _HUE_MARGIN, _LEAST_HUE_MARGIN = 5.0, 2.0
 # Drawn in, hues end at a quantile of so much; more of the paint would be lost than blobs can spare.
 _HUE_TAIL = 0.10
-# A marker's hues never spread over more than this to each side of their middle; what does is two things.
+# A marker's hues never spread over more than this to each side of their middle; what does is two
+# things.
 _WIDEST = 70.0
 # Noise and compression move chroma by this many grey levels, and hue has 180 / 2 pi steps a radian.
 _CHROMA_NOISE, _HUE_RADIAN = 2.0, 28.65
-# Highlights and rims are pale: a tenth of a patch may stay outside on that side, as a blob's outline is filled.
+# Highlights and rims are pale: a tenth of a patch may stay outside on that side, as a blob's
+# outline is filled.
 _PALE = 0.10
-# Saturation falls in motion blur, value in shade: that share of the quantiles is still taken, and, where something foreign comes near,
-# at least that one is given up.
+# Saturation falls in motion blur, value in shade: that share of the quantiles is still taken, and,
+# where something foreign comes near, at least that one is given up.
 _SATURATION_SHARE, _VALUE_SHARE = (0.65, 0.92), (0.5, 0.75)
 # ... but never lower: below a value of 25 hue is noise; below a saturation of 25, white balance.
 _LEAST_SATURATION, _LEAST_VALUE = 25.0, 25.0
-# Steps in which bounds are drawn in, which share of what could be kept out may stay inside, and how many steps more are taken.
+# Steps in which bounds are drawn in, which share of what could be kept out may stay inside, and how
+# many steps more are taken.
 _STEPS, _SPARE, _CLEARANCE = 10, 0.15, 2
 # Bounds of hue that keep out less than this share do not help: grey noise has all hues.
 _HELP = 0.5
@@ -44,7 +50,9 @@ _STRAY_CELLS = 1.0
 
 @dataclass(frozen=True)
 class Hues:
-    """A paint's hues: middle, and quantiles of their distance from it (the inner ones leave more outside)."""
+    """A paint's hues: middle, and quantiles of their distance from it (the inner ones leave more
+    outside).
+    """
 
     middle: float
     low: float
@@ -62,21 +70,31 @@ def hues_of(paint: Cells) -> Hues:
     order = np.argsort(off)
     share = np.cumsum(weight[order]) / np.sum(weight)
     low, inner_low, inner_high, high = (
-        float(off[order][min(int(np.searchsorted(share, at)), len(order) - 1)]) for at in (_TAIL, _HUE_TAIL, 1.0 - _HUE_TAIL, 1.0 - _TAIL)
+        float(off[order][min(int(np.searchsorted(share, at)), len(order) - 1)])
+        for at in (_TAIL, _HUE_TAIL, 1.0 - _HUE_TAIL, 1.0 - _TAIL)
     )
     return Hues(middle, low, high, inner_low, inner_high)
 
 
-def bounds(paint: Cells, hues: Hues, near: Sequence[Hues], foreign: Cells, pictures: int) -> ColorRange:
-    """The range of a paint (n,) against foreign cells (m,) of as many pictures; near are the other paints' hues."""
+def bounds(
+    paint: Cells, hues: Hues, near: Sequence[Hues], foreign: Cells, pictures: int
+) -> ColorRange:
+    """The range of a paint (n,) against foreign cells (m,) of as many pictures.
+
+    Near are the other paints' hues.
+    """
     return _Fit(paint, hues, near, foreign, _STRAY_CELLS * pictures).range()
 
 
 class _Fit:
-    def __init__(self, paint: Cells, hues: Hues, near: Sequence[Hues], foreign: Cells, stray: float) -> None:
+    def __init__(
+        self, paint: Cells, hues: Hues, near: Sequence[Hues], foreign: Cells, stray: float
+    ) -> None:
         self._hues, self._stray = hues, stray
         _, saturation, value = paint.hsv()
-        self._palest, self._richest = (float(np.quantile(saturation, share)) for share in (_PALE, 1.0 - _TAIL))
+        self._palest, self._richest = (
+            float(np.quantile(saturation, share)) for share in (_PALE, 1.0 - _TAIL)
+        )
         self._darkest = float(np.quantile(value, _TAIL))
         foreign_hue, self._saturation, self._value = foreign.hsv()
         self._off = hue_from(foreign_hue, hues.middle)
@@ -85,7 +103,10 @@ class _Fit:
         self._widest = hues.low - _margin(hues, near, -1), hues.high + _margin(hues, near, 1)
 
     def range(self) -> ColorRange:
-        """Saturation and value first; where they leave something, hue; then as wide in the former as that allows."""
+        """Saturation and value first; where they leave something, hue.
+
+        Then as wide in the former as that allows.
+        """
         low, high = self._widest
         floors = self._floors(low, high)
         if np.count_nonzero(self._inside(low, high, *floors)) > self._stray:
@@ -104,12 +125,21 @@ class _Fit:
         return alike & (self._saturation >= saturation_low) & (self._value >= value_low)
 
     def _floors(self, low: float, high: float) -> tuple[float, float]:
-        """Lower bounds of saturation and value: as low as blur and shade go, raised no more than what is foreign makes necessary."""
-        saturations = np.maximum(np.linspace(*_SATURATION_SHARE, _STEPS) * self._palest, _LEAST_SATURATION)
+        """Lower bounds of saturation and value: as low as blur and shade go, raised no more than
+        what is foreign makes necessary.
+        """
+        saturations = np.maximum(
+            np.linspace(*_SATURATION_SHARE, _STEPS) * self._palest, _LEAST_SATURATION
+        )
         values = np.maximum(np.linspace(*_VALUE_SHARE, _STEPS) * self._darkest, _LEAST_VALUE)
         alike = self._inside(low, high, float(saturations[0]), float(values[0]))
         saturation, value = self._saturation[alike], self._value[alike]
-        inside = np.array([[np.count_nonzero((saturation >= s) & (value >= v)) for v in values] for s in saturations])
+        inside = np.array(
+            [
+                [np.count_nonzero((saturation >= s) & (value >= v)) for v in values]
+                for s in saturations
+            ]
+        )
         if inside[0, 0] <= self._stray:
             return float(saturations[0]), float(values[0])
         good = inside <= max(self._stray, inside[-1, -1] + _SPARE * (inside[0, 0] - inside[-1, -1]))
@@ -123,10 +153,14 @@ class _Fit:
         strong = self._inside(*self._widest, saturation_low, value_low)
         off, turn = self._off[strong], self._turn[strong]
         found = []
-        for widest, tightest, side in zip(self._widest, (self._hues.inner_low, self._hues.inner_high), (-1.0, 1.0), strict=True):
+        for widest, tightest, side in zip(
+            self._widest, (self._hues.inner_low, self._hues.inner_high), (-1.0, 1.0), strict=True
+        ):
             steps = np.linspace(widest, tightest, _STEPS)
             beyond = side * off > 0.0
-            inside = np.array([np.count_nonzero(beyond & (side * off - turn <= side * step)) for step in steps])
+            inside = np.array(
+                [np.count_nonzero(beyond & (side * off - turn <= side * step)) for step in steps]
+            )
             if inside[0] <= self._stray or inside[-1] > (1.0 - _HELP) * inside[0]:
                 found.append(widest)
                 continue
@@ -135,7 +169,9 @@ class _Fit:
         return found[0], found[1]
 
     def _ceiling(self, saturation: Array) -> float:
-        """An upper bound of saturation: none, unless most of what is foreign (n,) is more saturated than the paint and clear of it."""
+        """An upper bound of saturation: none, unless most of what is foreign (n,) is more saturated
+        than the paint and clear of it.
+        """
         above = saturation[saturation > self._richest]
         if above.size <= self._stray or above.size < (1.0 - _USELESS) * saturation.size:
             return 255.0

@@ -1,7 +1,9 @@
-"""Markers that nobody pointed at: patches of saturated colour in the pictures, grouped by hue, named, and proposed as boxes. Pure.
+"""Markers that nobody pointed at: patches of saturated colour in the pictures, grouped by hue,
+named, and proposed as boxes. Pure.
 
-What is as large as furniture, as dull as the wall or the colour of skin is passed over; whatever else of that kind stands in the room is
-proposed as well, so a person looks at the proposal. From skin and room it also follows which further paints would stand out best.
+What is as large as furniture, as dull as the wall or the colour of skin is passed over; whatever
+else of that kind stands in the room is proposed as well, so a person looks at the proposal. From
+skin and room it also follows which further paints would stand out best.
 """
 
 from __future__ import annotations
@@ -13,10 +15,18 @@ import cv2
 import numpy as np
 
 from services.pi_tracker.colors.paint_patch import MIN_CELLS, Pointer
-from services.pi_tracker.image.chroma import Cells, cells_of, hue_apart, hue_from, looks_like_skin, mean_hue
+from services.pi_tracker.image.chroma import (
+    Cells,
+    cells_of,
+    hue_apart,
+    hue_from,
+    looks_like_skin,
+    mean_hue,
+)
 from services.pi_tracker.image.frame import Frame
 
-# Middle hues of acrylic paints by the names people give them, OpenCV 0..180: of colour charts, and of the simulator's paints.
+# Middle hues of acrylic paints by the names people give them, OpenCV 0..180: of colour charts, and
+# of the simulator's paints.
 PAINT_HUES: dict[str, float] = {
     "red": 0.0,
     "orange": 11.0,
@@ -32,14 +42,17 @@ PAINT_HUES: dict[str, float] = {
 _NAME_REACH = 16.0
 # Patches of one marker in several pictures differ less, markers of different paint more.
 _SAME_HUE = 7.0
-# A marker's patch is at least this saturated and this bright, and stands out from the cells around it.
+# A marker's patch is at least this saturated and this bright, and stands out from the cells around
+# it.
 _LEAST_SATURATION, _LEAST_VALUE = 55.0, 35.0
-# Share of the picture a marker covers at most: a hand's palm in paint at 20 cm; and of its bounding box at least.
+# Share of the picture a marker covers at most: a hand's palm in paint at 20 cm; and of its bounding
+# box at least.
 _LARGEST, _FILL = 0.02, 0.35
-# Skin in shade and between fingers: hues about this, within that, less saturated than orange paint is.
+# Skin in shade and between fingers: hues about this, within that, less saturated than orange paint
+# is.
 _SKIN = (10.0, 14.0, 185.0)
-# A marker stands out at least so much against the one that stands out most: the simulator's a quarter, its dark corners a tenth; the
-# gaps between the fingers that hold a pastel ball a ninth.
+# A marker stands out at least so much against the one that stands out most: the simulator's a
+# quarter, its dark corners a tenth; the gaps between the fingers that hold a pastel ball a ninth.
 _LEAST_SHARE = 0.2
 # Hues nearer than this to another paint, to skin or to much of the room are not suggested.
 _CLEAR = 12.0
@@ -49,7 +62,10 @@ _ROOM_SHARE = 0.003
 
 @dataclass(frozen=True)
 class Proposal:
-    """A patch seen in `pictures` pictures, named after its hue; boxes are pointers to it, ready to be fitted."""
+    """A patch seen in `pictures` pictures, named after its hue.
+
+    Boxes are pointers to it, ready to be fitted.
+    """
 
     color: str
     hue: float
@@ -59,7 +75,9 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A paint that is not in the pictures yet, and how many hues it keeps from skin, room and the proposals."""
+    """A paint that is not in the pictures yet, and how many hues it keeps from skin, room and the
+    proposals.
+    """
 
     color: str
     clearance: float
@@ -74,7 +92,9 @@ class _Patch:
     box: tuple[int, int, int, int]  # px
 
 
-def propose(frames: Sequence[Frame], wanted: Sequence[str] = ()) -> tuple[list[Proposal], list[Suggestion]]:
+def propose(
+    frames: Sequence[Frame], wanted: Sequence[str] = ()
+) -> tuple[list[Proposal], list[Suggestion]]:
     """Markers by what the pictures show, strongest first, and further paints, clearest first.
 
     wanted are the colours of rig.toml: patches get their names where the hues fit.
@@ -82,16 +102,34 @@ def propose(frames: Sequence[Frame], wanted: Sequence[str] = ()) -> tuple[list[P
     cells = [cells_of(frame) for frame in frames]
     patches = [patch for number, part in enumerate(cells) for patch in _patches(part, number)]
     # Seen in at least half of the pictures: a reflection or a passing thing is not.
-    groups = [group for group in _grouped(patches) if 2 * len({patch.frame for patch in group}) >= len(frames)]
+    groups = [
+        group
+        for group in _grouped(patches)
+        if 2 * len({patch.frame for patch in group}) >= len(frames)
+    ]
     largest = max(map(_standing_out, groups), default=0.0)
-    groups = [group for group in sorted(groups, key=_standing_out, reverse=True) if _standing_out(group) >= _LEAST_SHARE * largest]
-    groups = [group for number, group in enumerate(groups) if not any(_same_thing(group, other) for other in groups[:number])]
+    groups = [
+        group
+        for group in sorted(groups, key=_standing_out, reverse=True)
+        if _standing_out(group) >= _LEAST_SHARE * largest
+    ]
+    groups = [
+        group
+        for number, group in enumerate(groups)
+        if not any(_same_thing(group, other) for other in groups[:number])
+    ]
     proposals, taken = [], set[str]()
     for group in groups:
-        hue = mean_hue(np.array([patch.hue for patch in group]), np.array([float(patch.cells) for patch in group]))
+        hue = mean_hue(
+            np.array([patch.hue for patch in group]),
+            np.array([float(patch.cells) for patch in group]),
+        )
         name = _name(hue, wanted, taken)
         taken.add(name)
-        boxes = tuple(Pointer(name, patch.frame, *patch.box) for patch in sorted(group, key=lambda patch: patch.frame))
+        boxes = tuple(
+            Pointer(name, patch.frame, *patch.box)
+            for patch in sorted(group, key=lambda patch: patch.frame)
+        )
         proposals.append(Proposal(name, round(hue, 1), len(boxes), boxes))
     return proposals, suggest(cells, [proposal.hue for proposal in proposals])
 
@@ -102,7 +140,8 @@ def _patches(cells: Cells, number: int) -> list[_Patch]:
     found = []
     size = cells.y.size
     for low in range(0, 180, 10):
-        # Overlapping slices of hue, so that touching markers of different paint come apart; doubles are merged below.
+        # Overlapping slices of hue, so that touching markers of different paint come apart; doubles
+        # are merged below.
         mask = vivid & (np.abs(hue_from(hue, low + 5.0)) <= 10.0)
         opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
         _, labels, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=4)
@@ -116,7 +155,15 @@ def _patches(cells: Cells, number: int) -> list[_Patch]:
             if _skinny(middle, float(np.median(part.hsv()[1]))):
                 continue
             if abs(hue_apart(middle, low + 5.0)) <= 5.0:
-                found.append(_Patch(number, middle, count, float(np.median(part.chroma)), (2 * x, 2 * y, 2 * w, 2 * h)))
+                found.append(
+                    _Patch(
+                        number,
+                        middle,
+                        count,
+                        float(np.median(part.chroma)),
+                        (2 * x, 2 * y, 2 * w, 2 * h),
+                    )
+                )
     return found
 
 
@@ -126,7 +173,9 @@ def _skinny(hue: float, saturation: float) -> bool:
 
 
 def _weight(patch: _Patch) -> float:
-    """How much a patch stands out: paint by its chroma, while what is dark is saturated by noise only."""
+    """How much a patch stands out: paint by its chroma, while what is dark is saturated by noise
+    only.
+    """
     return patch.chroma * patch.cells**0.5
 
 
@@ -134,7 +183,10 @@ def _grouped(patches: list[_Patch]) -> list[list[_Patch]]:
     """Patches of like hue, one per picture, those that stand out most first."""
     groups: list[list[_Patch]] = []
     for patch in sorted(patches, key=_weight, reverse=True):
-        near = next((group for group in groups if abs(hue_apart(patch.hue, group[0].hue)) <= _SAME_HUE), None)
+        near = next(
+            (group for group in groups if abs(hue_apart(patch.hue, group[0].hue)) <= _SAME_HUE),
+            None,
+        )
         if near is None:
             groups.append([patch])
         elif all(other.frame != patch.frame for other in near):
@@ -147,10 +199,14 @@ def _standing_out(group: list[_Patch]) -> float:
 
 
 def _same_thing(group: list[_Patch], stronger: list[_Patch]) -> bool:
-    """Whether one thing's light and dark sides were taken for two: their boxes overlap in most pictures."""
+    """Whether one thing's light and dark sides were taken for two: their boxes overlap in most
+    pictures.
+    """
     there = {patch.frame: patch.box for patch in stronger}
     here = {patch.frame: patch.box for patch in group}
-    return 2 * sum(_overlap(box, there[frame]) for frame, box in here.items() if frame in there) > len(here)
+    return 2 * sum(
+        _overlap(box, there[frame]) for frame, box in here.items() if frame in there
+    ) > len(here)
 
 
 def _overlap(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> bool:
@@ -161,7 +217,10 @@ def _overlap(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> bool
 
 
 def _name(hue: float, wanted: Sequence[str], taken: set[str]) -> str:
-    """The nearest name, of rig.toml's colours first; a hue no name is near to, or a name twice, gets its number."""
+    """The nearest name, of rig.toml's colours first.
+
+    A hue no name is near to, or a name twice, gets its number.
+    """
     for names in (wanted, PAINT_HUES):
         known = [name for name in names if name in PAINT_HUES and name not in taken]
         near = min(known, key=lambda name: abs(hue_apart(hue, PAINT_HUES[name])), default=None)
@@ -171,7 +230,10 @@ def _name(hue: float, wanted: Sequence[str], taken: set[str]) -> str:
 
 
 def suggest(cells: Sequence[Cells], used: Sequence[float]) -> list[Suggestion]:
-    """Paints whose hue is clear of skin, of much of the room and of the hues in use; clearest first."""
+    """Paints whose hue is clear of skin, of much of the room and of the hues in use.
+
+    Clearest first.
+    """
     avoid = [*used, *_room_hues(cells)]
     found = []
     for name, hue in PAINT_HUES.items():
@@ -190,7 +252,10 @@ def _room_hues(cells: Sequence[Cells]) -> list[float]:
         hue, saturation, value = part.hsv()
         vivid = (saturation >= _LEAST_SATURATION) & (value >= _LEAST_VALUE)
         total += np.bincount((hue[vivid] // 5).astype(np.int64) % 36, minlength=36) / part.y.size
-    return hues + [5.0 * bin_ + 2.5 for bin_ in np.nonzero(total / max(len(cells), 1) >= _ROOM_SHARE)[0].tolist()]
+    return hues + [
+        5.0 * bin_ + 2.5
+        for bin_ in np.nonzero(total / max(len(cells), 1) >= _ROOM_SHARE)[0].tolist()
+    ]
 
 
 def boxes_of(proposals: Sequence[Proposal]) -> list[Pointer]:

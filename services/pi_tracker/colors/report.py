@@ -1,7 +1,9 @@
-"""How well fitted colours can be told apart: from each other, from skin, from the room; and what a person should be warned of. Pure.
+"""How well fitted colours can be told apart: from each other, from skin, from the room; and what a
+person should be warned of. Pure.
 
-Separation is d', the distance of two clouds of chroma over luma in units of their spread (Fisher's discriminant): at 6 a bound half way
-misjudges one cell in 700, at 4 one in 40, at 2 one in 6. Shading does not change it. What was not in the pictures is not known of.
+Separation is d', the distance of two clouds of chroma over luma in units of their spread (Fisher's
+discriminant): at 6 a bound half way misjudges one cell in 700, at 4 one in 40, at 2 one in 6.
+Shading does not change it. What was not in the pictures is not known of.
 """
 
 from __future__ import annotations
@@ -18,8 +20,9 @@ from services.pi_tracker.colors.fit import Study
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.chroma import Array, Cells, Mask, hue_apart, mean_hue
 
-# Measured: a pastel ball before a pale wall, followed without one false detection: 4.0 from skin, 3.8 from the wall; the simulator's six
-# paints in cluttered light: 4.3 and more. Two dabs of one paint: below 1.
+# Measured: a pastel ball before a pale wall, followed without one false detection: 4.0 from skin,
+# 3.8 from the wall; the simulator's six paints in cluttered light: 4.3 and more. Two dabs of one
+# paint: below 1.
 COLLIDE, CLOSE = 2.5, 3.5
 # Fewer cells than this say nothing about a cloud.
 _FEW = 8
@@ -31,7 +34,9 @@ _TAIL, _LEAST_SPREAD = 0.02, 0.004
 
 @dataclass(frozen=True)
 class ColorResult:
-    """One colour: its patches, its separation from skin (-1: none seen), and the largest foreign blob in its range (px; x, y, picture)."""
+    """One colour: its patches, its separation from skin (-1: none seen), and the largest foreign
+    blob in its range (px; x, y, picture).
+    """
 
     color: str
     cells: int
@@ -45,7 +50,9 @@ class ColorResult:
 
 @dataclass(frozen=True)
 class PairResult:
-    """Two colours: d' of their samples (-1 where one has none) and the gap between their hue ranges (negative: they overlap)."""
+    """Two colours: d' of their samples (-1 where one has none) and the gap between their hue ranges
+    (negative: they overlap).
+    """
 
     a: str
     b: str
@@ -85,8 +92,13 @@ def hue_gap(a: ColorRange, b: ColorRange) -> int:
     return round(apart - (widths[0] + widths[1]) / 2.0)
 
 
-def examine(study: Study, fitted: Mapping[str, ColorRange], known: Mapping[str, ColorRange] | None = None) -> Report:
-    """Judge fitted ranges by the pictures they were fitted to; known are the other colours' ranges, of which there are no samples."""
+def examine(
+    study: Study, fitted: Mapping[str, ColorRange], known: Mapping[str, ColorRange] | None = None
+) -> Report:
+    """Judge fitted ranges by the pictures they were fitted to.
+
+    Known are the other colours' ranges, of which there are no samples.
+    """
     everything = {**(known or {}), **fitted}
     names = sorted(everything)
     labels = [_labels(part, everything, names) for part in study.cells]
@@ -109,14 +121,22 @@ def _between(study: Study, a: str, b: str) -> float:
 def _labels(cells: Cells, ranges: Mapping[str, ColorRange], names: list[str]) -> Array:
     """The class of every cell, as the tracker has it."""
     luma = np.clip(cells.y + 16.0, 0, 255).astype(np.uint8)
-    chroma = np.stack([np.clip(plane + 128.0, 0, 255).astype(np.uint8) for plane in (cells.u, cells.v)], axis=-1)
-    return compile_colors(Colors(colors=dict(ranges)), names).classify(luma, np.ascontiguousarray(chroma))
+    chroma = np.stack(
+        [np.clip(plane + 128.0, 0, 255).astype(np.uint8) for plane in (cells.u, cells.v)], axis=-1
+    )
+    return compile_colors(Colors(colors=dict(ranges)), names).classify(
+        luma, np.ascontiguousarray(chroma)
+    )
 
 
 def _color(study: Study, color: str, number: int, labels: list[Array]) -> ColorResult:
     own = study.samples[color]
     hue, saturation, value = own.paint.hsv()
-    typical = (round(mean_hue(hue, own.paint.chroma)) % 180, round(float(np.median(saturation))), round(float(np.median(value))))
+    typical = (
+        round(mean_hue(hue, own.paint.chroma)) % 180,
+        round(float(np.median(saturation))),
+        round(float(np.median(value))),
+    )
     inside = [labels[swatch.frame][swatch.core] == number for swatch in own.swatches]
     blobs = [(*_largest((labels[k] == number) & ~study.covered[k]), k) for k in own.frames]
     cells, x, y, picture = max(blobs)
@@ -133,30 +153,52 @@ def _color(study: Study, color: str, number: int, labels: list[Array]) -> ColorR
 
 
 def _largest(mask: Mask) -> tuple[int, int, int]:
-    """Cells of the largest connected patch after the tracker's erosion and dilation, and its middle in px."""
+    """Cells of the largest connected patch after the tracker's erosion and dilation, and its middle
+    in px.
+    """
     kernel = np.ones((2, 2), np.uint8)
-    opened = cv2.dilate(cv2.erode(mask.astype(np.uint8), kernel, anchor=(0, 0)), kernel, anchor=(1, 1))
+    opened = cv2.dilate(
+        cv2.erode(mask.astype(np.uint8), kernel, anchor=(0, 0)), kernel, anchor=(1, 1)
+    )
     _, _, stats, middles = cv2.connectedComponentsWithStats(opened)
     if len(stats) < 2:
         return 0, 0, 0
     best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    return int(stats[best, cv2.CC_STAT_AREA]), round(2.0 * middles[best][0]), round(2.0 * middles[best][1])
+    return (
+        int(stats[best, cv2.CC_STAT_AREA]),
+        round(2.0 * middles[best][0]),
+        round(2.0 * middles[best][1]),
+    )
 
 
-def _warnings(results: tuple[ColorResult, ...], pairs: tuple[PairResult, ...], ranges: Mapping[str, ColorRange]) -> list[str]:
+def _warnings(
+    results: tuple[ColorResult, ...],
+    pairs: tuple[PairResult, ...],
+    ranges: Mapping[str, ColorRange],
+) -> list[str]:
     found = []
     for pair in pairs:
         if 0.0 <= pair.separation < COLLIDE:
-            found.append(f"{pair.a} and {pair.b} collide (d' {pair.separation}): they cannot be told apart; repaint one of them")
+            found.append(
+                f"{pair.a} and {pair.b} collide (d' {pair.separation}): they cannot be told apart; repaint one of them"
+            )
         elif 0.0 <= pair.separation < CLOSE:
-            found.append(f"{pair.a} and {pair.b} are close (d' {pair.separation}): expect mix-ups in poor light")
+            found.append(
+                f"{pair.a} and {pair.b} are close (d' {pair.separation}): expect mix-ups in poor light"
+            )
         elif pair.hue_gap < 0 and _levels_meet(ranges[pair.a], ranges[pair.b]):
-            found.append(f"the ranges of {pair.a} and {pair.b} overlap by {-pair.hue_gap} hues; point at both together to part them")
+            found.append(
+                f"the ranges of {pair.a} and {pair.b} overlap by {-pair.hue_gap} hues; point at both together to part them"
+            )
     for result in results:
         if 0.0 <= result.skin < COLLIDE:
-            found.append(f"{result.color} is the colour of skin (d' {result.skin}): fingers will be taken for it; use another paint")
+            found.append(
+                f"{result.color} is the colour of skin (d' {result.skin}): fingers will be taken for it; use another paint"
+            )
         elif 0.0 <= result.skin < CLOSE:
-            found.append(f"{result.color} is close to skin (d' {result.skin}): reflections on fingers may be taken for it")
+            found.append(
+                f"{result.color} is close to skin (d' {result.skin}): reflections on fingers may be taken for it"
+            )
         if result.room_at is not None:
             x, y, picture = result.room_at
             found.append(
@@ -185,11 +227,18 @@ def statistics(report: Report) -> dict[str, Any]:
             }
             for c in report.colors
         },
-        "separation": {f"{p.a}/{p.b}": {"d": p.separation, "hue_gap": p.hue_gap} for p in report.pairs},
+        "separation": {
+            f"{p.a}/{p.b}": {"d": p.separation, "hue_gap": p.hue_gap} for p in report.pairs
+        },
         "warnings": list(report.warnings),
     }
 
 
-def colors_file(report: Report, fitted: Mapping[str, ColorRange], known: Mapping[str, ColorRange], **made: Any) -> Colors:
-    """Fitted ranges beside those of other colours that stay; made is date, tool and inputs of the file."""
+def colors_file(
+    report: Report, fitted: Mapping[str, ColorRange], known: Mapping[str, ColorRange], **made: Any
+) -> Colors:
+    """Fitted ranges beside those of other colours that stay.
+
+    Made is date, tool and inputs of the file.
+    """
     return Colors(colors={**known, **fitted}, residuals=statistics(report), **made)

@@ -1,7 +1,7 @@
 """Whether colour ranges can be put in force. Pure.
 
-Types and bounds are checked where a message is decoded; what is left are ranges that take nothing, names no marker can have, and colours
-that are missing.
+Types and bounds are checked where a message is decoded; what is left are ranges that take nothing,
+names no marker can have, and colours that are missing.
 """
 
 from __future__ import annotations
@@ -19,19 +19,30 @@ MOST_COLORS = 64
 
 
 def check_colors(colors: Colors, wanted: Sequence[str]) -> None:
-    """Raises CalibrationError saying which colour is wrong, and how. wanted are colours that must be there."""
+    """Raises CalibrationError saying which colour is wrong, and how.
+
+    wanted are colours that must be there.
+    """
     if not colors.colors:
         raise CalibrationError("there is no colour in it")
     if len(colors.colors) > MOST_COLORS:
-        raise CalibrationError(f"{len(colors.colors)} colours are in it, at most {MOST_COLORS} are possible")
+        raise CalibrationError(
+            f"{len(colors.colors)} colours are in it, at most {MOST_COLORS} are possible"
+        )
     for name, span in colors.colors.items():
         try:
             msgspec.convert(name, Name)
         except msgspec.ValidationError:
-            raise CalibrationError(f"{name[:80]!r} cannot name a colour; use letters, digits, '_', '-' and '.'") from None
-        for what, low, high in zip(("saturation", "value"), span.hsv_low[1:], span.hsv_high[1:], strict=True):
+            raise CalibrationError(
+                f"{name[:80]!r} cannot name a colour; use letters, digits, '_', '-' and '.'"
+            ) from None
+        for what, low, high in zip(
+            ("saturation", "value"), span.hsv_low[1:], span.hsv_high[1:], strict=True
+        ):
             if low > high:
-                raise CalibrationError(f"colour {name!r}: its lowest {what}, {low}, is above its highest, {high}; only hues wrap")
+                raise CalibrationError(
+                    f"colour {name!r}: its lowest {what}, {low}, is above its highest, {high}; only hues wrap"
+                )
     missing = [name for name in wanted if name not in colors.colors]
     if missing:
         raise CalibrationError(

@@ -1,8 +1,9 @@
-"""Erosion and dilation of a mask by whole-image shifts: on these small masks twice as fast as OpenCV's filters, whose cost is by the
-row.
+"""Erosion and dilation of a mask by whole-image shifts: on these small masks twice as fast as
+OpenCV's filters, whose cost is by the row.
 
-The element is 2x2, and a round of dilation covers the cells to the other side than a round of erosion takes, so that a round of
-each leaves a blob where it was. Nothing lies outside the mask. Pure.
+The element is 2x2, and a round of dilation covers the cells to the other side than a round of
+erosion takes, so that a round of each leaves a blob where it was. Nothing lies outside the mask.
+Pure.
 """
 
 from __future__ import annotations
@@ -16,12 +17,17 @@ _ELEMENT = np.ones((2, 2), np.uint8)
 
 
 def opened(mask: Image, erode: int, dilate: int) -> Image:
-    """A contiguous mask of 0 and 255 after rounds of erosion, then of dilation; (h, w) -> (h, w), a new image unless both are 0."""
+    """A contiguous mask of 0 and 255 after rounds of erosion, then of dilation.
+
+    (h, w) -> (h, w), a new image unless both are 0.
+    """
     height, width = mask.shape
-    # A round of erosion has no answer for the last row and the last cell before it; there would be nothing left of a mask this small.
+    # A round of erosion has no answer for the last row and the last cell before it; there would be
+    # nothing left of a mask this small.
     if erode and mask.size <= erode * (width + 1):
         return np.zeros_like(mask)
-    # Rows run into each other, but that an erosion and a dilation of one row of cells cancel holds for any row, this long one included.
+    # Rows run into each other, but that an erosion and a dilation of one row of cells cancel holds
+    # for any row, this long one included.
     flat, back = mask.ravel(), min(erode, dilate)
     for _ in range(erode):
         pairs = flat[:-1] & flat[1:]
@@ -32,7 +38,11 @@ def opened(mask: Image, erode: int, dilate: int) -> Image:
         flat = np.concatenate((flat, np.zeros(mask.size - flat.size, np.uint8)))
     result = flat.reshape(height, width)
     # Without an erosion to cancel, a blob at the right side would come out at the left.
-    return cv2.dilate(result, _ELEMENT, anchor=(1, 1), iterations=dilate - back) if dilate > back else result
+    return (
+        cv2.dilate(result, _ELEMENT, anchor=(1, 1), iterations=dilate - back)
+        if dilate > back
+        else result
+    )
 
 
 def _spread(flat: Image, step: int) -> Image:

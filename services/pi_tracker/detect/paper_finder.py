@@ -1,7 +1,8 @@
-"""The seed's own pipeline, for comparison: per colour HSV, Gaussian, inRange, erosion, dilation, largest contour, its centroid.
+"""The seed's own pipeline, for comparison: per colour HSV, Gaussian, inRange, erosion, dilation,
+largest contour, its centroid.
 
-RHOT, sections 8 and 9.1. Searched in the last box + margin, or in the whole image where the colour was lost.
-Pure; a colour without a contour has no marker.
+RHOT, sections 8 and 9.1. Searched in the last box + margin, or in the whole image where the colour
+was lost. Pure; a colour without a contour has no marker.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from rhot.messages import Marker
 from services.pi_tracker.detect.color_table import hsv_mask
 from services.pi_tracker.image.frame import Frame, Image
 
-# Standard deviation of a binary contour's centroid, a 9 px tip at sigma 5: .22 px of disparity between two views.
+# Standard deviation of a binary contour's centroid, a 9 px tip at sigma 5: .22 px of disparity
+# between two views.
 _SIGMA_PX = 0.155
 Box = tuple[int, int, int, int]
 
@@ -33,7 +35,11 @@ class SeedFinder:
 
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image."""
-        bgr = frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+        bgr = (
+            frame.image
+            if frame.layout == "bgr"
+            else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+        )
         markers = []
         for name in self._spans:
             found = self._largest(bgr, name)
@@ -59,7 +65,9 @@ class SeedFinder:
         if box is not None:
             x0, y0 = max(box[0] - margin, 0), max(box[1] - margin, 0)
             x1, y1 = min(box[0] + box[2] + margin, width), min(box[1] + box[3] + margin, height)
-        contours, _ = cv2.findContours(self.mask(bgr[y0:y1, x0:x1], name), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        contours, _ = cv2.findContours(
+            self.mask(bgr[y0:y1, x0:x1], name), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
+        )
         contour = max(contours, key=cv2.contourArea, default=None)
         if contour is None:
             return None

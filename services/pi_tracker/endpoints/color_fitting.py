@@ -1,6 +1,8 @@
-"""Fits colour ranges for whoever points at paint in this camera's pictures; the pictures themselves stay here.
+"""Fits colour ranges for whoever points at paint in this camera's pictures; the pictures themselves
+stay here.
 
-Nothing is put in force by it. What is asked for wrongly, or points at a picture that is gone, gets an answer with the reason.
+Nothing is put in force by it. What is asked for wrongly, or points at a picture that is gone, gets
+an answer with the reason.
 """
 
 from __future__ import annotations
@@ -30,22 +32,33 @@ class Fitting:
     def __init__(self, service: Service, album: Album, coloring: Coloring) -> None:
         self._album, self._coloring = album, coloring
         self._wanted = service.config.colors
-        # One at a time: it takes most of a Pi's core for a second, and the tracker goes on beside it.
+        # One at a time: it takes most of a Pi's core for a second, and the tracker goes on beside
+        # it.
         self._lock = asyncio.Lock()
         service.bus.answer_requests(topics.FIT, self._answer, camera=service.instance)
 
     async def _answer(self, payload: bytes) -> FitResult:
         try:
             request = msgspec.json.decode(payload, type=FitRequest)
-            names = list(dict.fromkeys([one.picture for one in request.pointed] + list(request.pictures)))
+            names = list(
+                dict.fromkeys([one.picture for one in request.pointed] + list(request.pictures))
+            )
             frames = [self._album.frame(name) for name in names]
             async with self._lock:
-                return await asyncio.to_thread(answer, request, names, frames, self._wanted, self._coloring.in_force)
+                return await asyncio.to_thread(
+                    answer, request, names, frames, self._wanted, self._coloring.in_force
+                )
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
             return FitResult(error=str(error))
 
 
-def answer(request: FitRequest, names: list[str], frames: Sequence[Frame], wanted: Sequence[str], in_force: Colors) -> FitResult:
+def answer(
+    request: FitRequest,
+    names: list[str],
+    frames: Sequence[Frame],
+    wanted: Sequence[str],
+    in_force: Colors,
+) -> FitResult:
     """The result of a request on pictures of these names; raises CalibrationError."""
     notes = []
     if request.auto:
@@ -54,12 +67,20 @@ def answer(request: FitRequest, names: list[str], frames: Sequence[Frame], wante
             raise CalibrationError("no patch of saturated colour stands out in these pictures")
         pointers = boxes_of(proposals)
         if suggestions:
-            notes.append("further paints that would stand out: " + ", ".join(one.color for one in suggestions))
+            notes.append(
+                "further paints that would stand out: "
+                + ", ".join(one.color for one in suggestions)
+            )
     else:
-        pointers = [Pointer(p.color, names.index(p.picture), p.x_px, p.y_px, p.width_px, p.height_px) for p in request.pointed]
+        pointers = [
+            Pointer(p.color, names.index(p.picture), p.x_px, p.y_px, p.width_px, p.height_px)
+            for p in request.pointed
+        ]
     study = gather(frames, pointers)
     fitted = fit(study.samples)
-    known: dict[str, ColorRange] = {name: span for name, span in in_force.colors.items() if name not in fitted}
+    known: dict[str, ColorRange] = {
+        name: span for name, span in in_force.colors.items() if name not in fitted
+    }
     report = examine(study, fitted, known)
     patches = [
         Patch(color=color, picture=names[swatch.frame], box_px=swatch.box_px)
@@ -67,5 +88,9 @@ def answer(request: FitRequest, names: list[str], frames: Sequence[Frame], wante
         for swatch in samples.swatches
     ]
     return FitResult(
-        colors=fitted, patches=patches, residuals=statistics(report), warnings=list(report.warnings), notes=study.notes + notes
+        colors=fitted,
+        patches=patches,
+        residuals=statistics(report),
+        warnings=list(report.warnings),
+        notes=study.notes + notes,
     )

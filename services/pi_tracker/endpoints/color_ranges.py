@@ -1,8 +1,9 @@
 """The colour ranges in force: from their file, from the bus, watched for drift.
 
-Missing or broken at the start: a recording cannot be tracked and the service ends with the reason; a live camera starts all the same, with
-the colours there are, so that it can be calibrated over the bus. What is put on the bus, or saved by hand, takes effect at once or is
-refused with a reason in health; then the old stays.
+Missing or broken at the start: a recording cannot be tracked and the service ends with the reason;
+a live camera starts all the same, with the colours there are, so that it can be calibrated over the
+bus. What is put on the bus, or saved by hand, takes effect at once or is refused with a reason in
+health; then the old stays.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ log = logging.getLogger("rhot.pi_tracker")
 
 
 class Coloring:
-    """Holds the tracker's step, and renews it when the colours change. Every refused put counts in health's values."""
+    """Holds the tracker's step, and renews it when the colours change.
+
+    Every refused put counts in health's values.
+    """
 
     def __init__(self, service: Service, *, live: bool) -> None:
         self._service = service
@@ -60,7 +64,11 @@ class Coloring:
             return
         self._service.values.update(self._drift.values())
         for drifted in self._drift.drifted():
-            if not 0 <= frame.stamp_ns - self._told_ns.get(drifted.color, -_DRIFT_EVERY_NS) < _DRIFT_EVERY_NS:
+            if (
+                not 0
+                <= frame.stamp_ns - self._told_ns.get(drifted.color, -_DRIFT_EVERY_NS)
+                < _DRIFT_EVERY_NS
+            ):
                 self._told_ns[drifted.color] = frame.stamp_ns
                 self._complain(drifted.text(self._camera.name))
 
@@ -89,9 +97,14 @@ class Coloring:
             colors = msgspec.json.decode(payload, type=Colors)
             made = f" of {colors.date} by {colors.tool}"
             if not colors.date:
-                colors = msgspec.structs.replace(colors, date=datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
+                colors = msgspec.structs.replace(
+                    colors, date=datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+                )
             # Colours may come one after the other, but none that is tracked may go.
-            check_colors(colors, [name for name in self._service.config.colors if name in self.in_force.colors])
+            check_colors(
+                colors,
+                [name for name in self._service.config.colors if name in self.in_force.colors],
+            )
             step = self._made(colors, self._there(colors))
             try:
                 await asyncio.to_thread(save, self._path, colors)
@@ -99,19 +112,25 @@ class Coloring:
                 raise CalibrationError(f"{self._path} cannot be written: {error}") from None
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
             self._service.values["colors_refused"] += 1
-            self._complain(f"colours{made[:120]} put on the bus for camera {self._camera.name!r} are refused: {error}")
+            self._complain(
+                f"colours{made[:120]} put on the bus for camera {self._camera.name!r} are refused: {error}"
+            )
             return
         self._seen_ns = _changed_ns(self._path)
         self._put_in_force(colors, step)
         missing = [name for name in self._service.config.colors if name not in colors.colors]
         if missing:
-            self._complain(f"camera {self._camera.name!r}: {', '.join(missing)} not calibrated yet, and not tracked until then")
+            self._complain(
+                f"camera {self._camera.name!r}: {', '.join(missing)} not calibrated yet, and not tracked until then"
+            )
         log.info("new colours in force%s: %s", made[:120], ", ".join(sorted(colors.colors)))
 
     def _take(self, colors: Colors) -> None:
         """Into force with the next frame; raises CalibrationError and keeps the old."""
         # Without a hand nobody says which colours matter: all of them do.
-        self._put_in_force(colors, self._made(colors, self._service.config.colors or sorted(colors.colors)))
+        self._put_in_force(
+            colors, self._made(colors, self._service.config.colors or sorted(colors.colors))
+        )
 
     def _start_without(self, reason: str) -> None:
         """Into force: those of the wanted colours that there are, none if need be."""
@@ -125,20 +144,28 @@ class Coloring:
 
     def _there(self, colors: Colors) -> list[str]:
         """Those of the wanted colours that there are; without a hand, all."""
-        return [name for name in self._service.config.colors or sorted(colors.colors) if name in colors.colors]
+        return [
+            name
+            for name in self._service.config.colors or sorted(colors.colors)
+            if name in colors.colors
+        ]
 
     def _made(self, colors: Colors, wanted: list[str]) -> TrackerStep:
         config = self._service.config
         name, size_px = self._camera.name, self._camera.size_px
         lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
-        return TrackerStep(name, colors, config.tracker, size_px, wanted, time.perf_counter_ns, self._path, lens)
+        return TrackerStep(
+            name, colors, config.tracker, size_px, wanted, time.perf_counter_ns, self._path, lens
+        )
 
     def _put_in_force(self, colors: Colors, step: TrackerStep) -> None:
         self.in_force, self.step, self._drift = colors, step, Drift(colors)
         self._told_ns.clear()
         if self._service.last_error == self._complaint:
             self._service.last_error = ""
-        for name in [name for name in self._service.values if name.endswith(("_hue_off", "_outside"))]:
+        for name in [
+            name for name in self._service.values if name.endswith(("_hue_off", "_outside"))
+        ]:
             del self._service.values[name]
 
     def _complain(self, text: str) -> None:

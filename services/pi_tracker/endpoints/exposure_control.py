@@ -1,7 +1,9 @@
-"""The exposure in force: asked for and set over the bus, found by the camera's automatics if wished, written to its file.
+"""The exposure in force: asked for and set over the bus, found by the camera's automatics if
+wished, written to its file.
 
-A source without such controls (a file, the simulator) says so and refuses; automatics that do not settle in time are frozen at the
-last values, with a note, and a driver that reports nothing is a refusal. What cannot be is refused, and the old stays.
+A source without such controls (a file, the simulator) says so and refuses; automatics that do not
+settle in time are frozen at the last values, with a note, and a driver that reports nothing is a
+refusal. What cannot be is refused, and the old stays.
 """
 
 from __future__ import annotations
@@ -45,7 +47,9 @@ class Exposing:
             self._state = ExposureControl(adjustable=False, note=note)
             return
         try:
-            self._state = _state(load_exposure(self._path.parent, self._camera.name), controls.note, 0)
+            self._state = _state(
+                load_exposure(self._path.parent, self._camera.name), controls.note, 0
+            )
         except CalibrationError:
             note = "not calibrated: the camera's automatics run all the time, and colours drift with them"
             self._state = ExposureControl(mode="auto", note=note)
@@ -55,10 +59,19 @@ class Exposing:
         async for sample in self._service.bus.raw(topics.EXPOSURE, 4, camera=self._camera.name):
             try:
                 await self._do(msgspec.json.decode(sample.payload, type=ExposureControl))
-            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
-                text = f"exposure put on the bus for camera {self._camera.name!r} is refused: {error}"
+            except (
+                msgspec.DecodeError,
+                UnicodeDecodeError,
+                RecursionError,
+                CalibrationError,
+            ) as error:
+                text = (
+                    f"exposure put on the bus for camera {self._camera.name!r} is refused: {error}"
+                )
                 self._service.error(text)
-                self._state = msgspec.structs.replace(self._state, note=text[:400], changed_ns=clock.now_ns())
+                self._state = msgspec.structs.replace(
+                    self._state, note=text[:400], changed_ns=clock.now_ns()
+                )
 
     async def _do(self, wanted: ExposureControl) -> None:
         if self._controls is None:
@@ -93,19 +106,29 @@ class Exposing:
             self._state = before
             if before.exposure_us > 0.0 and before.mode == "fixed":
                 controls.adjust(_exposure(before))
-            raise CalibrationError(f"the driver reports no exposure within {_PATIENCE_S:.0f} s; set the values by hand")
-        note = controls.note if found else f"the automatics had not settled after {_PATIENCE_S:.0f} s: is the picture still?"
+            raise CalibrationError(
+                f"the driver reports no exposure within {_PATIENCE_S:.0f} s; set the values by hand"
+            )
+        note = (
+            controls.note
+            if found
+            else f"the automatics had not settled after {_PATIENCE_S:.0f} s: is the picture still?"
+        )
         await self._fix(found or last or _exposure(before), controls, "automatics, once", note)
 
     async def _fix(self, exposure: Exposure, controls: Controls, how: str, note: str) -> None:
         date = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        made = msgspec.structs.replace(exposure, date=date, tool="rhot calibrate camera", inputs={"how": how, "note": note})
+        made = msgspec.structs.replace(
+            exposure, date=date, tool="rhot calibrate camera", inputs={"how": how, "note": note}
+        )
         controls.adjust(made)
         try:
             await asyncio.to_thread(save, self._path, made)
         except OSError as error:
             self._state = _state(made, note, 0)
-            raise CalibrationError(f"{self._path} cannot be written: {error}; the values are in force until the tracker ends") from None
+            raise CalibrationError(
+                f"{self._path} cannot be written: {error}; the values are in force until the tracker ends"
+            ) from None
         self._state = _state(made, note, clock.now_ns())
 
     def _answer(self) -> ExposureControl:
@@ -113,7 +136,9 @@ class Exposing:
 
 
 def _unknown(what: str) -> float:
-    raise CalibrationError(f"{what} must be given once: nobody knows what is in force; or run the automatics once")
+    raise CalibrationError(
+        f"{what} must be given once: nobody knows what is in force; or run the automatics once"
+    )
 
 
 def _state(exposure: Exposure, note: str, changed_ns: int) -> ExposureControl:
@@ -128,4 +153,9 @@ def _state(exposure: Exposure, note: str, changed_ns: int) -> ExposureControl:
 
 
 def _exposure(state: ExposureControl) -> Exposure:
-    return Exposure(exposure_us=state.exposure_us, gain=state.gain, red_gain=state.red_gain, blue_gain=state.blue_gain)
+    return Exposure(
+        exposure_us=state.exposure_us,
+        gain=state.gain,
+        red_gain=state.red_gain,
+        blue_gain=state.blue_gain,
+    )

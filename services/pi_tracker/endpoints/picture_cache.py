@@ -1,6 +1,8 @@
-"""Pictures that were asked for, kept for a while: who calibrates points at a picture by its name, and its frame must still be there.
+"""Pictures that were asked for, kept for a while: who calibrates points at a picture by its name,
+and its frame must still be there.
 
-A picture that was not used for long, or was pushed out by many others, is gone; pointing at it is a CalibrationError that says so.
+A picture that was not used for long, or was pushed out by many others, is gone; pointing at it is a
+CalibrationError that says so.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from rhot.errors import CalibrationError
 from services.pi_tracker.endpoints.preview import Pictures, png
 from services.pi_tracker.image.frame import Frame
 
-# The page asks four times a second: pictures somebody may still click on, and those that were clicked on. 0.5 MB each at 640x480.
+# The page asks four times a second: pictures somebody may still click on, and those that were
+# clicked on. 0.5 MB each at 640x480.
 _RECENT, _USED = 16, 24
 # Large sensors get fewer of each, as a Pi 3 has 1 GB.
 _MOST_BYTES = 24_000_000
@@ -29,7 +32,10 @@ class Album(Pictures):
         self._used: OrderedDict[str, Frame] = OrderedDict()
 
     def frame(self, name: str) -> Frame:
-        """The frame of a picture, which is kept longer from now on; CalibrationError if it is gone."""
+        """The frame of a picture, which is kept longer from now on.
+
+        CalibrationError if it is gone.
+        """
         frame = self._used.get(name) or self._recent.get(name)
         if frame is None:
             raise CalibrationError(f"picture {name} is not kept any more: point at a newer one")

@@ -1,6 +1,8 @@
-"""The camera's pictures for people: a JPEG preview while somebody watches, and the last frame, lossless, when somebody asks.
+"""The camera's pictures for people: a JPEG preview while somebody watches, and the last frame,
+lossless, when somebody asks.
 
-Encoding runs in a worker thread: a preview never delays a marker. No frame yet: a request gets no answer.
+Encoding runs in a worker thread: a preview never delays a marker. No frame yet: a request gets no
+answer.
 """
 
 from __future__ import annotations
@@ -16,13 +18,16 @@ from services.pi_tracker.image.frame import Frame, Image
 # Previews are for people: 5 a second look alive and cost 2 % of a Pi's core each.
 _PREVIEW_PERIOD_NS = 200_000_000
 _JPEG_QUALITY = 80
-# PNG level 1: half the size of level 9's time budget is not worth a second of waiting for one frame.
+# PNG level 1: half the size of level 9's time budget is not worth a second of waiting for one
+# frame.
 _PNG_LEVEL = 1
 
 
 def bgr(frame: Frame) -> Image:
     """The frame as BGR (h, w, 3)."""
-    return frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+    return (
+        frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+    )
 
 
 def jpeg(frame: Frame) -> bytes:
@@ -50,7 +55,11 @@ class Pictures:
         """Remember the frame; send it if a preview is wanted and due."""
         self._last = frame
         # A clock that was set back counts as due.
-        if self._busy or 0 <= now_ns - self._sent_ns < _PREVIEW_PERIOD_NS or not self._publisher.wanted:
+        if (
+            self._busy
+            or 0 <= now_ns - self._sent_ns < _PREVIEW_PERIOD_NS
+            or not self._publisher.wanted
+        ):
             return
         self._busy = True
         self._sent_ns = now_ns

@@ -1,7 +1,7 @@
 """Waits for the start broadcast, and after a restart asks whether it has been given.
 
-Late or missing: it asks every second until somebody answers, so a tracker that restarts, or starts before its master, carries on by itself.
-A broadcast that says stop pauses the tracker.
+Late or missing: it asks every second until somebody answers, so a tracker that restarts, or starts
+before its master, carries on by itself. A broadcast that says stop pauses the tracker.
 """
 
 from __future__ import annotations

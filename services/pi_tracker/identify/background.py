@@ -1,8 +1,10 @@
-"""What stands in the room in a marker's colour, cell by cell: taken away from blobs, so that a marker before it or beside it is seen.
+"""What stands in the room in a marker's colour, cell by cell: taken away from blobs, so that a
+marker before it or beside it is seen.
 
-Pure. Only what was not taken for a marker is learnt, where it stood still for a few sightings; what looks otherwise than it is something
-else, such as a marker that passes before it. Nothing is known at the start; a thing that is taken away is forgotten; where the light
-changes, or the camera is pushed, everything is learnt anew. A picture of another size is another room.
+Pure. Only what was not taken for a marker is learnt, where it stood still for a few sightings; what
+looks otherwise than it is something else, such as a marker that passes before it. Nothing is known
+at the start; a thing that is taken away is forgotten; where the light changes, or the camera is
+pushed, everything is learnt anew. A picture of another size is another room.
 """
 
 from __future__ import annotations
@@ -17,19 +19,23 @@ from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, Rect
 
-# Sightings in a row before a cell counts as standing: a tenth of a second at 30 fps, too long for a moving finger; and how many are
-# remembered, so that a thing is known at once when the hand before it goes.
+# Sightings in a row before a cell counts as standing: a tenth of a second at 30 fps, too long for a
+# moving finger; and how many are remembered, so that a thing is known at once when the hand before
+# it goes.
 _SIGHTINGS, _MOST = 4, 16
 # What looks otherwise counts against it twice.
 _AGAINST = 2
-# A cell looks as it did when luma, U and V are this many of their standard deviations from the mean, and a little for shadows; five,
-# because of the thousand cells of a thing not one should stand out.
+# A cell looks as it did when luma, U and V are this many of their standard deviations from the
+# mean, and a little for shadows; five, because of the thousand cells of a thing not one should
+# stand out.
 _ALIKE, _SHADOW = 5.0, 3.0
 # Share of what is new in what is remembered.
 _NEW = 0.2
-# A blob of which less than this share stands in the room is a marker whose rim touches it: left as it is.
+# A blob of which less than this share stands in the room is a marker whose rim touches it: left as
+# it is.
 _RIM = 0.1
-# Cells around a marker in which nothing is learnt: its own rim, in the colours of blur and of light from the side.
+# Cells around a marker in which nothing is learnt: its own rim, in the colours of blur and of light
+# from the side.
 _CLEAR = 4
 # What is left of a blob, in cells, to be looked at: shadows and the shimmer of edges leave less.
 _LEAST_CELLS = 6
@@ -53,12 +59,23 @@ class Room:
         self.settled = True
 
     def without(self, image: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Blob]:
-        """What of the blobs does not stand in the room; those that have nothing to do with it are the same objects."""
+        """What of the blobs does not stand in the room.
+
+        Those that have nothing to do with it are the same objects.
+        """
         if self._empty or image.size != self._size:
             return list(blobs)
         return [part for blob in blobs for part in self._moved(image, blob, noise)]
 
-    def learn(self, image: Picture, region: Rect, blobs: Sequence[Blob], markers: Sequence[Rect], noise: Noise, stamp_ns: int) -> None:
+    def learn(
+        self,
+        image: Picture,
+        region: Rect,
+        blobs: Sequence[Blob],
+        markers: Sequence[Rect],
+        noise: Noise,
+        stamp_ns: int,
+    ) -> None:
         """Take in all blobs found in a region, as they were found, but for where markers are."""
         if image.size != self._size:
             self._begin(image.size, stamp_ns)
@@ -120,7 +137,9 @@ class Room:
             return [blob]
         if cells < _LEAST_CELLS:
             return []
-        left = cv2.dilate(cv2.erode(left, _SQUARE, anchor=(0, 0), borderValue=0), _SQUARE, anchor=(1, 1))
+        left = cv2.dilate(
+            cv2.erode(left, _SQUARE, anchor=(0, 0), borderValue=0), _SQUARE, anchor=(1, 1)
+        )
         contours, _ = cv2.findContours(left, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         found = []
         for x, y, w, h in map(cv2.boundingRect, contours):
@@ -128,7 +147,17 @@ class Room:
             cells = cv2.countNonZero(mask)
             if cells >= _LEAST_CELLS:
                 rect = (x0 + x, y0 + y, x0 + x + w, y0 + y + h)
-                found.append(Blob(blob.color, rect, mask, cells, 4.0 * cells, 2.0 * x0 + 2 * x + w - 0.5, 2.0 * y0 + 2 * y + h - 0.5))
+                found.append(
+                    Blob(
+                        blob.color,
+                        rect,
+                        mask,
+                        cells,
+                        4.0 * cells,
+                        2.0 * x0 + 2 * x + w - 0.5,
+                        2.0 * y0 + 2 * y + h - 0.5,
+                    )
+                )
         return found
 
 
@@ -142,7 +171,11 @@ def _alike(seen: Image, look: Image, noise: Noise) -> Image:
     """Which cells look as they did; (h, w)."""
     off = np.abs(seen - look)
     chroma = _ALIKE * noise.chroma + _SHADOW
-    return (off[..., 0] <= _ALIKE * noise.luma + _SHADOW) & (off[..., 1] <= chroma) & (off[..., 2] <= chroma)
+    return (
+        (off[..., 0] <= _ALIKE * noise.luma + _SHADOW)
+        & (off[..., 1] <= chroma)
+        & (off[..., 2] <= chroma)
+    )
 
 
 def _clear(inside: Image, rect: Rect, marker: Rect) -> None:

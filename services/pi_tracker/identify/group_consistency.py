@@ -1,7 +1,9 @@
-"""Markers keep company: those of one hand lie within a hand's reach of each other and are of one size.
+"""Markers keep company: those of one hand lie within a hand's reach of each other and are of one
+size.
 
-Pure. Which blob of each colour belongs to the hand is decided for all colours together, as things in the room keep company, too: the set
-whose members fit each other best wins. With one colour only there is no company, and the likeliest blob wins.
+Pure. Which blob of each colour belongs to the hand is decided for all colours together, as things
+in the room keep company, too: the set whose members fit each other best wins. With one colour only
+there is no company, and the likeliest blob wins.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ from dataclasses import dataclass
 
 from services.pi_tracker.detect.blob_search import Blob
 
-# Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm wide: markers lie within
-# 14 patch widths, mostly within 10.
+# Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm
+# wide: markers lie within 14 patch widths, mostly within 10.
 _REACH_WIDTHS = 14.0
 # Tips seen end on or half hidden and a dab on the wrist seen in full differ in area up to this.
 _SIZE_RATIO = 4.0
@@ -22,7 +24,8 @@ _SIZE_RATIO = 4.0
 class Candidate:
     """A blob with what its own track says of it, 0..1.
 
-    whole_px2 is the area with which it keeps company, where another marker hides part of it; 0: its own.
+    whole_px2 is the area with which it keeps company, where another marker hides part of it; 0: its
+    own.
     """
 
     blob: Blob
@@ -36,12 +39,15 @@ class Candidate:
 
 
 def best_set(candidates: Sequence[Sequence[Candidate]]) -> list[tuple[Candidate, float] | None]:
-    """One candidate of each colour, or None where there is none, with its fit to the others of the set, 0..1 (1 if alone).
+    """One candidate of each colour, or None where there is none, with its fit to the others of the
+    set, 0..1 (1 if alone).
 
-    Each candidate in turn gathers the best of every other colour about itself; the gathering with the largest sum of pairwise fits,
-    each weighted with both priors, wins.
+    Each candidate in turn gathers the best of every other colour about itself; the gathering with
+    the largest sum of pairwise fits, each weighted with both priors, wins.
     """
-    best: list[Candidate | None] = [max(own, key=lambda c: c.prior, default=None) for own in candidates]
+    best: list[Candidate | None] = [
+        max(own, key=lambda c: c.prior, default=None) for own in candidates
+    ]
     best_score = -1.0
     for anchor in (candidate for own in candidates for candidate in own):
         members = [_gathered(anchor, own) for own in candidates]
@@ -72,13 +78,17 @@ def _total(members: Sequence[Candidate]) -> float:
 
 
 def _support(member: Candidate, members: Sequence[Candidate | None]) -> float:
-    return support(member.company, [other.company for other in members if other is not None and other is not member])
+    return support(
+        member.company,
+        [other.company for other in members if other is not None and other is not member],
+    )
 
 
 def _fit(a: Blob, b: Blob) -> float:
     area_a, area_b = a.area_px, b.area_px
     smaller, larger = (area_a, area_b) if area_a < area_b else (area_b, area_a)
     apart2 = (a.x_px - b.x_px) ** 2 + (a.y_px - b.y_px) ** 2
-    # Of two sizes the smaller one is less often wrong: things in the room and blur make blobs large.
+    # Of two sizes the smaller one is less often wrong: things in the room and blur make blobs
+    # large.
     near = 1.0 / (1.0 + (apart2 / (_REACH_WIDTHS**2 * smaller)) ** 2)
     return near * min(1.0, _SIZE_RATIO * smaller / larger)

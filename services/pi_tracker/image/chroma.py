@@ -1,6 +1,8 @@
-"""Colours of all cells of a picture: hue, saturation and value as the lookup table understands them, and chroma free of shading. Pure.
+"""Colours of all cells of a picture: hue, saturation and value as the lookup table understands
+them, and chroma free of shading. Pure.
 
-A cell without light has no colour: its hue and saturation are those of noise, and whoever uses them must ask for some value first.
+A cell without light has no colour: its hue and saturation are those of noise, and whoever uses them
+must ask for some value first.
 """
 
 from __future__ import annotations
@@ -18,16 +20,21 @@ from services.pi_tracker.image.yuv_planes import picture
 Array = npt.NDArray[Any]
 Mask = npt.NDArray[np.bool_]
 
-# As in colors.py: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U', L = 1.164 (Y - 16).
+# As in colors.py: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U', L = 1.164 (Y -
+# 16).
 _LUMA_GAIN = 255.0 / 219.0
 _RED_V, _GREEN_U, _GREEN_V, _BLUE_U = 1.596027, -0.391762, -0.812968, 2.017232
-# Below this luma (of 219) a cell counts as dark, so that its chroma is not divided by next to nothing.
+# Below this luma (of 219) a cell counts as dark, so that its chroma is not divided by next to
+# nothing.
 _DARK = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of 2x2 pixels: y is luma less 16, u and v are chroma less 128; all of one shape, (h, w) or (n,)."""
+    """Cells of 2x2 pixels: y is luma less 16, u and v are chroma less 128.
+
+    All of one shape, (h, w) or (n,).
+    """
 
     y: Array
     u: Array
@@ -49,14 +56,24 @@ class Cells:
         return np.stack([self.u * scale, self.v * scale], axis=-1)
 
     def hsv(self) -> tuple[Array, Array, Array]:
-        """OpenCV hue (0..180), saturation and value (0..255), not rounded and, as in the lookup table, not clipped to RGB."""
+        """OpenCV hue (0..180), saturation and value (0..255), not rounded and, as in the lookup
+        table, not clipped to RGB.
+        """
         red, green, blue = _RED_V * self.v, _GREEN_U * self.u + _GREEN_V * self.v, _BLUE_U * self.u
         top = np.maximum(np.maximum(red, green), blue)
         spread = top - np.minimum(np.minimum(red, green), blue)
         safe = np.maximum(spread, 1e-9)
-        sector = np.where(top == red, (green - blue) / safe, np.where(top == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe))
+        sector = np.where(
+            top == red,
+            (green - blue) / safe,
+            np.where(top == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe),
+        )
         value = np.maximum(_LUMA_GAIN * self.y + top, 1.0)
-        return np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0), np.minimum(255.0 * spread / value, 255.0), np.minimum(value, 255.0)
+        return (
+            np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0),
+            np.minimum(255.0 * spread / value, 255.0),
+            np.minimum(value, 255.0),
+        )
 
     def __getitem__(self, where: Any) -> Cells:
         return Cells(self.y[where], self.u[where], self.v[where])
@@ -67,7 +84,11 @@ def cells_of(frame: Frame) -> Cells:
     image = picture(frame)
     width, height = image.size
     luma, chroma = image.cells((0, 0, width, height))
-    return Cells(luma.astype(np.float64) - 16.0, chroma[..., 0].astype(np.float64) - 128.0, chroma[..., 1].astype(np.float64) - 128.0)
+    return Cells(
+        luma.astype(np.float64) - 16.0,
+        chroma[..., 0].astype(np.float64) - 128.0,
+        chroma[..., 1].astype(np.float64) - 128.0,
+    )
 
 
 def joined(parts: list[Cells]) -> Cells:
@@ -92,10 +113,24 @@ def hue_apart(hue: float, other: float) -> float:
 def mean_hue(hue: Array, weight: Array) -> float:
     """Circular mean of OpenCV hues, 0..180; 0 of none."""
     angle = hue * (np.pi / 90.0)
-    return float(np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle))) * (90.0 / np.pi) % 180.0)
+    return float(
+        np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle)))
+        * (90.0 / np.pi)
+        % 180.0
+    )
 
 
 def looks_like_skin(cells: Cells) -> Mask:
-    """Cells whose chroma is that of skin of any complexion, after Chai and Ngan (IEEE Trans. CSVT 1999): Cb 77..127, Cr 133..173."""
+    """Cells whose chroma is that of skin of any complexion, after Chai and Ngan (IEEE Trans.
+
+    CSVT 1999): Cb 77..127, Cr 133..173.
+    """
     # Near grey everything is a little like everything: skin has at least this much chroma.
-    return (cells.u >= -51.0) & (cells.u <= -1.0) & (cells.v >= 5.0) & (cells.v <= 45.0) & (cells.chroma >= 9.0) & (cells.y >= 20.0)
+    return (
+        (cells.u >= -51.0)
+        & (cells.u <= -1.0)
+        & (cells.v >= 5.0)
+        & (cells.v <= 45.0)
+        & (cells.chroma >= 9.0)
+        & (cells.y >= 20.0)
+    )

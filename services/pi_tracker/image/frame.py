@@ -1,6 +1,7 @@
 """One image of one camera with its instant: what every source yields and the tracker's step takes.
 
-Pure data. A source that does not know its rolling shutter says row_time_ns = 0, and every row then counts as taken at stamp_ns.
+Pure data. A source that does not know its rolling shutter says row_time_ns = 0, and every row then
+counts as taken at stamp_ns.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ Layout = Literal["i420", "bgr"]
 class Frame:
     """One image.
 
-    stamp_ns is mid-exposure of row 0 on the camera's own clock, row_time_ns the time from one image row to the next.
-    image is (height * 3 / 2, width) for "i420" (planes Y, U, V without padding; BT.601, Y in 16..235) and
-    (height, width, 3) for "bgr"; size_px is (width, height).
+    stamp_ns is mid-exposure of row 0 on the camera's own clock, row_time_ns the time from one image
+    row to the next. image is (height * 3 / 2, width) for "i420" (planes Y, U, V without padding;
+    BT.601, Y in 16..235) and (height, width, 3) for "bgr"; size_px is (width, height).
     """
 
     camera: str

@@ -1,8 +1,8 @@
 """How noisy a camera's cells are: the scale of every marker's sigma.
 
-Immerkaer's idea (Fast noise variance estimation, CVIU 1996) on a few rows of cells: second differences cancel what the scene does
-slowly, and their median is blind to edges. Pure. A scene textured all over is taken for noise, which makes sigmas too large,
-never too small.
+Immerkaer's idea (Fast noise variance estimation, CVIU 1996) on a few rows of cells: second
+differences cancel what the scene does slowly, and their median is blind to edges. Pure. A scene
+textured all over is taken for noise, which makes sigmas too large, never too small.
 """
 
 from __future__ import annotations
@@ -14,15 +14,17 @@ import numpy as np
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.yuv_planes import Picture
 
-# Rows of cells looked at, and frames from one look to the next: noise changes with the light, in seconds.
+# Rows of cells looked at, and frames from one look to the next: noise changes with the light, in
+# seconds.
 _ROWS, _EVERY = 8, 16
 # Share of a new estimate in the running one.
 _NEW = 0.3
-# Edges are cut off at three medians, two standard deviations of noise; what is left of a normal distribution has a mean size of
-# 0.725 standard deviations (the median alone would know whole levels only). A second difference has sqrt(1 + 4 + 1) times the noise.
+# Edges are cut off at three medians, two standard deviations of noise; what is left of a normal
+# distribution has a mean size of 0.725 standard deviations (the median alone would know whole
+# levels only). A second difference has sqrt(1 + 4 + 1) times the noise.
 _CUT, _MEAN = 3.0, 0.725 * 6.0**0.5
-# Demosaicing makes neighbours alike, so that differences show too little noise: 1.17 measured on bilinear interpolation, 1.05 on white
-# noise.
+# Demosaicing makes neighbours alike, so that differences show too little noise: 1.17 measured on
+# bilinear interpolation, 1.05 on white noise.
 _ALIKE = 1.15
 # Rounding to whole grey levels is noise, too: 1 / sqrt(12).
 _ROUNDING = 0.29
@@ -40,7 +42,10 @@ class Noise:
         """Take in a frame; most are passed over."""
         if self._frames % _EVERY == 0:
             width, height = picture.size
-            rows = [picture.cells((0, y, width, y + 1)) for y in range(height // (2 * _ROWS), height, max(1, height // _ROWS))]
+            rows = [
+                picture.cells((0, y, width, y + 1))
+                for y in range(height // (2 * _ROWS), height, max(1, height // _ROWS))
+            ]
             luma = np.concatenate([row[0] for row in rows]).astype(np.int16)
             chroma = np.concatenate([row[1] for row in rows]).astype(np.int16)
             share = _NEW if self._frames else 1.0

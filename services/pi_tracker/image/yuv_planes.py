@@ -1,8 +1,9 @@
 """Any frame as luma and chroma: the one form in which colours are looked up and blobs are measured.
 
-Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it; a BGR image is averaged 2x2 first, never sampled (one
-pixel's chroma costs .87 px of centroid, the average .41). Only the part asked for is converted. An odd last row or column is left out.
-Cells are 2x2 pixels: cell (i, j) covers pixels 2i..2i+1, 2j..2j+1, so its centre lies at pixel 2i + 0.5.
+Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it; a BGR image is averaged
+2x2 first, never sampled (one pixel's chroma costs .87 px of centroid, the average .41). Only the
+part asked for is converted. An odd last row or column is left out. Cells are 2x2 pixels: cell (i,
+j) covers pixels 2i..2i+1, 2j..2j+1, so its centre lies at pixel 2i + 0.5.
 
 An image that does not have the shape its frame claims raises SourceError.
 """
@@ -20,7 +21,8 @@ from services.pi_tracker.image.frame import Frame, Image
 # (x0, y0, x1, y1) in cells, the end excluded.
 Rect = tuple[int, int, int, int]
 
-# BT.601, Y in 16..235, chroma about 128, from B, G, R in 0..255; the inverse of OpenCV's COLOR_YUV2BGR_I420.
+# BT.601, Y in 16..235, chroma about 128, from B, G, R in 0..255; the inverse of OpenCV's
+# COLOR_YUV2BGR_I420.
 _Y_FROM_BGR = (0.097906, 0.504129, 0.256788)
 _U_FROM_BGR = (0.439216, -0.290993, -0.148223)
 _V_FROM_BGR = (-0.071427, -0.367788, 0.439216)
@@ -34,10 +36,15 @@ class Picture(Protocol):
     size: tuple[int, int]  # cells (width, height)
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
-        """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle; with a step, of its first and every step-th row."""
+        """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle.
+
+        With a step, of its first and every step-th row.
+        """
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of every cell (2, h, w)."""
+        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of
+        every cell (2, h, w).
+        """
 
 
 class _Planar:
@@ -52,9 +59,16 @@ class _Planar:
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
-        luma = cv2.resize(self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+        luma = cv2.resize(
+            self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1],
+            (x1 - x0, y1 - y0),
+            interpolation=cv2.INTER_AREA,
+        )
         # Merging copies of the parts is three times faster than merging the parts.
-        u, v = np.ascontiguousarray(self._u[y0:y1:step, x0:x1]), np.ascontiguousarray(self._v[y0:y1:step, x0:x1])
+        u, v = (
+            np.ascontiguousarray(self._u[y0:y1:step, x0:x1]),
+            np.ascontiguousarray(self._v[y0:y1:step, x0:x1]),
+        )
         return luma[::step], cv2.merge((u, v))
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
@@ -73,7 +87,11 @@ class _Packed:
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
-        bgr = cv2.resize(self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+        bgr = cv2.resize(
+            self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1],
+            (x1 - x0, y1 - y0),
+            interpolation=cv2.INTER_AREA,
+        )
         return cv2.transform(bgr[::step], _LUMA), cv2.transform(bgr[::step], _CHROMA)
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
@@ -81,7 +99,9 @@ class _Packed:
         w, h = x1 - x0, y1 - y0
         bgr = self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
         luma[: 2 * h, : 2 * w] = cv2.transform(bgr, _LUMA)
-        chroma[:, :h, :w] = cv2.split(cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA))
+        chroma[:, :h, :w] = cv2.split(
+            cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA)
+        )
 
 
 def picture(frame: Frame) -> Picture:

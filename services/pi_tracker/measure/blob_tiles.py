@@ -1,7 +1,8 @@
-"""The surroundings of several blobs in one image, side by side, so that one call of OpenCV or numpy works on all.
+"""The surroundings of several blobs in one image, side by side, so that one call of OpenCV or numpy
+works on all.
 
-Side by side, not one below the other: OpenCV's filters cost by the row. Pure. Where the image ends, a tile ends: what is not
-`inside` counts nowhere.
+Side by side, not one below the other: OpenCV's filters cost by the row. Pure. Where the image ends,
+a tile ends: what is not `inside` counts nowhere.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ _GAP = 2
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """n tiles of h x w cells; an image of all of them is (h, n, w), and OpenCV sees it as one of h x (n w)."""
+    """n tiles of h x w cells.
+
+    An image of all of them is (h, n, w), and OpenCV sees it as one of h x (n w).
+    """
 
     size: tuple[int, int]  # of the image, in cells
     origins: list[tuple[int, int]]  # top left cell of each tile in the image
@@ -65,20 +69,30 @@ def flat(images: Image) -> Image:
 
 
 def doubled(images: Image, interpolation: int = cv2.INTER_LINEAR) -> Image:
-    """Images of cells as ones of pixels; (h, ..., w) -> (2h, ..., 2w). Tiles are apart by more than interpolation reaches."""
+    """Images of cells as ones of pixels; (h, ..., w) -> (2h, ..., 2w).
+
+    Tiles are apart by more than interpolation reaches.
+    """
     h, *between, w = images.shape
     image = flat(images)
-    return cv2.resize(image, (2 * image.shape[1], 2 * h), interpolation=interpolation).reshape(2 * h, *between, 2 * w)
+    return cv2.resize(image, (2 * image.shape[1], 2 * h), interpolation=interpolation).reshape(
+        2 * h, *between, 2 * w
+    )
 
 
 def halved(images: Image) -> Image:
     """Images of pixels as means of cells; (2h, n, 2w) -> (h, n, w)."""
     h, n, w = images.shape
-    return cv2.resize(flat(images), (n * w // 2, h // 2), interpolation=cv2.INTER_AREA).reshape(h // 2, n, w // 2)
+    return cv2.resize(flat(images), (n * w // 2, h // 2), interpolation=cv2.INTER_AREA).reshape(
+        h // 2, n, w // 2
+    )
 
 
 def moments(images: Image, order: int) -> Image:
-    """Sums of each image times y^i x^j up to an order; (h, n, w) -> (order + 1, n, order + 1) indexed [i, :, j]."""
+    """Sums of each image times y^i x^j up to an order.
+
+    (h, n, w) -> (order + 1, n, order + 1) indexed [i, :, j].
+    """
     h, n, w = images.shape
     rows = _powers(h, order).T @ flat(images)
     return np.asarray(rows.reshape(order + 1, n, w) @ _powers(w, order))
@@ -93,7 +107,9 @@ def sums(images: Image) -> Image:
 
 @functools.lru_cache(maxsize=256)
 def own(width: int) -> Image:
-    """1 for the columns of a tile, next to nothing for those between it and the next, so that sums there are not 0; (w,)."""
+    """1 for the columns of a tile, next to nothing for those between it and the next, so that sums
+    there are not 0; (w,).
+    """
     return np.repeat(np.array([1.0, 1e-6], np.float32), (width - _GAP, _GAP))
 
 
@@ -104,4 +120,9 @@ def _powers(count: int, order: int) -> Image:
 
 def _grown(rect: Rect, size: tuple[int, int]) -> Rect:
     x0, y0, x1, y1 = rect
-    return (max(x0 - MARGIN, 0), max(y0 - MARGIN, 0), min(x1 + MARGIN, size[0]), min(y1 + MARGIN, size[1]))
+    return (
+        max(x0 - MARGIN, 0),
+        max(y0 - MARGIN, 0),
+        min(x1 + MARGIN, size[0]),
+        min(y1 + MARGIN, size[1]),
+    )

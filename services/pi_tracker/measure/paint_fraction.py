@@ -1,16 +1,18 @@
 """The share of paint in a cell that shows paint and what lies behind, both in lights of their own.
 
-Light mixes, not grey levels: a lens blurs light, and a camera encodes it afterwards, with a power of about 1 / 2.2 (IEC 61966-2-1).
-Half paint and half of a wall four times brighter looks like more than half a wall when grey levels are taken for light. So levels
-are decoded first. In light, with chroma C = (U, V) and luma Y, the paint's chroma per luma p and the background's s (both free of
+Light mixes, not grey levels: a lens blurs light, and a camera encodes it afterwards, with a power
+of about 1 / 2.2 (IEC 61966-2-1). Half paint and half of a wall four times brighter looks like more
+than half a wall when grey levels are taken for light. So levels are decoded first. In light, with
+chroma C = (U, V) and luma Y, the paint's chroma per luma p and the background's s (both free of
 shading), the luma that the paint contributes is
     a = (C - s Y) . (p - s) / |p - s|^2,
-what is left, Y - a, comes from behind. With the lumas of pure paint Yp and pure background Yb, the share of paint that fits both
-best is
+what is left, Y - a, comes from behind. With the lumas of pure paint Yp and pure background Yb, the
+share of paint that fits both best is
     (a Yp + (Yb - (Y - a)) Yb) / (Yp^2 + Yb^2).
-p, Yp, s and Yb are those of the nearest cells that show paint alone or background alone: skin lies on one side and the room, which is
-another one in each camera, on the others; and a highlight whitens the middle of a tip, not its edge (Shafer, Using color to separate
-reflection components, 1985). Pure.
+p, Yp, s and Yb are those of the nearest cells that show paint alone or background alone: skin lies
+on one side and the room, which is another one in each camera, on the others; and a highlight
+whitens the middle of a tip, not its edge (Shafer, Using color to separate reflection components,
+1985). Pure.
 """
 
 from __future__ import annotations
@@ -24,26 +26,33 @@ from services.pi_tracker.measure.blob_tiles import flat, own, sums
 
 # BT.601 in limited range: Y - 16, U - 128, V - 128 to R, G, B in 0..255, and back.
 _RGB = np.array([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]], np.float32)
-# Levels 0..255 to the power of 1.5, on the same scale. Decoding all the way (2.2) suits the mixture better, but a dark side of a finger,
-# whose shade is never known well, weighs more there: disparity error without noise, hands resting at 1.0 and 0.5 m, and scatter at 1.0 m:
-# power 1 .094, .069, .065 px; 1.5 .070, .055, .060; 2 .074, .065, .063.
+# Levels 0..255 to the power of 1.5, on the same scale. Decoding all the way (2.2) suits the mixture
+# better, but a dark side of a finger, whose shade is never known well, weighs more there: disparity
+# error without noise, hands resting at 1.0 and 0.5 m, and scatter at 1.0 m: power 1 .094, .069,
+# .065 px; 1.5 .070, .055, .060; 2 .074, .065, .063.
 _YUV_FROM_POWER = (np.linalg.inv(_RGB) / 255.0**0.5).astype(np.float32)
 # Both for what ends with a 1, which they leave.
 _RGB1, _YUV1_FROM_POWER = np.eye(4, dtype=np.float32), np.eye(4, dtype=np.float32)
 _RGB1[:3, :3], _YUV1_FROM_POWER[:3, :3] = _RGB, _YUV_FROM_POWER
 # Of x^1.5 the derivative is 1.5 x^.5.
 _POWER_SLOPES = 1.5 * _YUV_FROM_POWER.T
-# The background of a cell is that of its next neighbours (Gaussian of so many cells). Its paint's luma, which falls off across a finger,
-# is the mean of 3 x 3 cells, its colour that of 5 x 5: with 3 there is more noise, with all of a large marker's cells its highlight.
+# The background of a cell is that of its next neighbours (Gaussian of so many cells). Its paint's
+# luma, which falls off across a finger, is the mean of 3 x 3 cells, its colour that of 5 x 5: with
+# 3 there is more noise, with all of a large marker's cells its highlight.
 _NEAR_CELLS, _LUMA, _COLOR = 0.6, np.full(3, 1 / 3, np.float32), np.full(5, 1 / 5, np.float32)
-# Weight of the mean of all known cells beside that of near ones: nothing where there are any, everything where there are none.
+# Weight of the mean of all known cells beside that of near ones: nothing where there are any,
+# everything where there are none.
 _FAINT = 1e-5
-# Luma, of 255, below which a ratio of chroma to luma is noise. (1, so that a sum of weighted lumas may be compared with that of weights.)
+# Luma, of 255, below which a ratio of chroma to luma is noise. (1, so that a sum of weighted lumas
+# may be compared with that of weights.)
 _DARKEST = 1.0
 
 
 class Light:
-    """Cells in linear light: Y, U, V of it, 0..255 from black to white, and 1; (4, h, n, w), and beside each other: rows, (h, 4, n, w)."""
+    """Cells in linear light: Y, U, V of it, 0..255 from black to white, and 1.
+
+    (4, h, n, w), and beside each other: rows, (h, 4, n, w).
+    """
 
     def __init__(self, cells: Image) -> None:
         """Cells as cameras encode them: Y - 16, U - 128, V - 128 and 1, float32 (4, h, n, w)."""
@@ -66,7 +75,9 @@ class Mixture:
     """What is paint and what background around every cell, given where either is seen alone."""
 
     def __init__(self, light: Light, alone: Image, *, rough: bool = False) -> None:
-        """alone: weights (2, h, n, w) of the cells that show nothing but background, nothing but paint; rough: shade less local."""
+        """alone: weights (2, h, n, w) of the cells that show nothing but background, nothing but
+        paint; rough: shade less local.
+        """
         self._light = light
         known, self._means = _known(light.rows, alone)
         s, self._y_b = _seen(_near(known[0]))
@@ -88,7 +99,9 @@ class Mixture:
         self._luma -= light.cells[0] * self._by_luma
 
     def ratio(self) -> Image:
-        """The share of paint, 0..1, for paint and background in the same shade, which may be another one than where they are seen alone."""
+        """The share of paint, 0..1, for paint and background in the same shade, which may be
+        another one than where they are seen alone.
+        """
         paint = np.maximum(self._luma, 0.0)
         paint /= self._y_p
         behind = self._light.cells[0] - self._luma
@@ -99,8 +112,9 @@ class Mixture:
         return np.asarray(paint / behind)
 
     def share(self, noise: Noise) -> tuple[Image, Image, Image]:
-        """The share of paint that fits its luma and the background's best, noisy about 0 and 1; its derivative by luma as encoded; its
-        variance for a cell's noise; (h, n, w) each."""
+        """The share of paint that fits its luma and the background's best, noisy about 0 and 1; its
+        derivative by luma as encoded; its variance for a cell's noise; (h, n, w) each.
+        """
         norm = self._y_p * self._y_p
         norm += self._y_b * self._y_b
         behind = self._y_b / norm
@@ -122,13 +136,17 @@ class Mixture:
         return share, slopes[0], variance
 
     def contrast(self) -> Image:
-        """How far the paint's chroma per luma lies from what is around the blob, on average, in light; (n,)."""
+        """How far the paint's chroma per luma lies from what is around the blob, on average, in
+        light; (n,).
+        """
         around, paint = self._means[:, 1:3] / np.maximum(self._means[:, :1], _DARKEST)
         return np.hypot(*(paint - around))
 
 
 def _near(image: Image) -> Image:
-    return cv2.GaussianBlur(flat(image), (3, 3), _NEAR_CELLS, borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
+    return cv2.GaussianBlur(
+        flat(image), (3, 3), _NEAR_CELLS, borderType=cv2.BORDER_CONSTANT
+    ).reshape(image.shape)
 
 
 def _next(image: Image) -> Image:
@@ -140,27 +158,33 @@ def _wide(image: Image) -> Image:
 
 
 def _mean(image: Image, row: Image) -> Image:
-    # Not cv2.blur, whose running sums leave rounding errors where there is next to nothing: weights would not stay above 0.
-    return cv2.sepFilter2D(flat(image), -1, row, row, borderType=cv2.BORDER_CONSTANT).reshape(image.shape)
+    # Not cv2.blur, whose running sums leave rounding errors where there is next to nothing: weights
+    # would not stay above 0.
+    return cv2.sepFilter2D(flat(image), -1, row, row, borderType=cv2.BORDER_CONSTANT).reshape(
+        image.shape
+    )
 
 
 def _known(rows: Image, weights: Image) -> tuple[Image, Image]:
-    """Cells (h, 4, n, w) times each weight (2, h, n, w), with their weighted mean faintly everywhere, (2, h, 4, n, w), and those means, of
-    which the last is 1, (2, 4, n)."""
+    """Cells (h, 4, n, w) times each weight (2, h, n, w), with their weighted mean faintly
+    everywhere, (2, h, 4, n, w), and those means, of which the last is 1, (2, 4, n).
+    """
     h, c, n, w = rows.shape
     known = rows * weights[:, :, None]
     mean = sums(known)
     mean /= np.maximum(mean[:, 3:], 1e-6)
     mean[:, 3] = 1.0
-    # Nothing between tiles, lest windows see the next one's; in runs as long as rows: half the time of short ones.
+    # Nothing between tiles, lest windows see the next one's; in runs as long as rows: half the time
+    # of short ones.
     runs = known.reshape(2, h, c * n * w)
     runs += ((_FAINT * mean)[..., None] * own(w)).reshape(2, 1, c * n * w)
     return known, mean
 
 
 def _seen(spread: Image) -> tuple[Image, Image]:
-    """Chroma per luma (2, h, n, w) and luma (h, n, w) of what a window carries on from where it is known: Y, U, V and weight, summed,
-    (h, 4, n, w)."""
+    """Chroma per luma (2, h, n, w) and luma (h, n, w) of what a window carries on from where it is
+    known: Y, U, V and weight, summed, (h, 4, n, w).
+    """
     h, _, n, w = spread.shape
     luma = np.maximum(spread[:, 0], spread[:, 3])
     chroma = np.empty((2, h, n, w), np.float32)

@@ -1,4 +1,5 @@
-"""Where frames come from: one interface for cameras, files and the simulator, chosen by a word in rig.toml.
+"""Where frames come from: one interface for cameras, files and the simulator, chosen by a word in
+rig.toml.
 
     picamera2, picamera2:1     a Raspberry Pi's camera
     v4l2:0, v4l2:/dev/video0   a USB camera
@@ -6,7 +7,8 @@
     video:FILE  folder:DIR  capture:DIR     files; relative paths start at rig.toml's folder
     simulator                  the simulated rig on the bus
 
-A word that is none of these is a ConfigError with the list; a source that cannot be opened says so when it is opened, not here.
+A word that is none of these is a ConfigError with the list; a source that cannot be opened says so
+when it is opened, not here.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ FORMS = "picamera2, picamera2:N, v4l2:N, v4l2:/dev/..., gstreamer:PIPELINE, vide
 
 
 def open_source(table: CameraTable, config: RigConfig, bus: Bus, start_ns: int = 0) -> Source:
-    """The source of a camera for its service: files play at their own pace, their first frame stamped start_ns."""
+    """The source of a camera for its service: files play at their own pace, their first frame
+    stamped start_ns.
+    """
     if table.source == "simulator":
         return SimulatorSource(bus, table.name)
     return Threaded(open_reader(table, config, start_ns), paced=True)
@@ -45,9 +49,11 @@ def is_file(table: CameraTable) -> bool:
 
 
 def open_reader(table: CameraTable, config: RigConfig, start_ns: int | None = None) -> Reader:
-    """The blocking reader of a camera's source, not opened yet; start_ns None keeps a capture's own stamps (others start at 0).
+    """The blocking reader of a camera's source, not opened yet; start_ns None keeps a capture's own
+    stamps (others start at 0).
 
-    Raises ConfigError for an unknown form, and for the simulator, which is no file: write a capture with `rhot simulate`.
+    Raises ConfigError for an unknown form, and for the simulator, which is no file: write a capture
+    with `rhot simulate`.
     """
     kind, _, rest = table.source.partition(":")
     path = Path(config.folder) / Path(rest).expanduser()
@@ -61,7 +67,9 @@ def open_reader(table: CameraTable, config: RigConfig, start_ns: int | None = No
         case "picamera2", _ if not rest or rest.isdigit():
             return PiCamera(table, int(rest or 0), _exposure(config, table.name))
         case "v4l2", True:
-            return OpenCvCamera(table, int(rest) if rest.isdigit() else rest, _exposure(config, table.name))
+            return OpenCvCamera(
+                table, int(rest) if rest.isdigit() else rest, _exposure(config, table.name)
+            )
         case "gstreamer", True:
             return OpenCvCamera(table, rest, None, cv2.CAP_GSTREAMER)
     raise ConfigError(f"camera {table.name!r}: unknown source {table.source!r}; valid: {FORMS}")

@@ -1,7 +1,8 @@
 """One camera of a capture folder: <camera>.mkv and the stamps in <camera>.csv.
 
-The video holds BGR, or I420 as a grey picture of 3/2 the height (lossless at the camera's own chroma). Video and stamps must have
-the same number of frames; where they have not, CaptureError says how many of how many, after the frames that both have.
+The video holds BGR, or I420 as a grey picture of 3/2 the height (lossless at the camera's own
+chroma). Video and stamps must have the same number of frames; where they have not, CaptureError
+says how many of how many, after the frames that both have.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from services.pi_tracker.sources.video import Decoder
 
 
 class CaptureReader:
-    """Frames of one camera of a capture. start_ns, if given, moves the capture's first stamp of any camera there."""
+    """Frames of one camera of a capture.
+
+    start_ns, if given, moves the capture's first stamp of any camera there.
+    """
 
     live = False
 
@@ -35,11 +39,18 @@ class CaptureReader:
             raise CaptureError(f"{folder}: no such capture folder")
         if not self._capture.video(self._camera).is_file():
             there = sorted(path.stem for path in folder.glob("*.mkv"))
-            raise CaptureError(f"{folder}: has no video of camera {self._camera!r}; it has {', '.join(there) or 'none'}")
+            raise CaptureError(
+                f"{folder}: has no video of camera {self._camera!r}; it has {', '.join(there) or 'none'}"
+            )
         self._stamps = read_stamps(self._capture.stamps(self._camera))
         if self._start_ns is not None:
-            # All cameras' first stamps: each process finds the same one, so that the cameras stay in step.
-            first = [rows[0].stamp_ns for path in sorted(folder.glob("*.csv")) if (rows := read_stamps(path))]
+            # All cameras' first stamps: each process finds the same one, so that the cameras stay
+            # in step.
+            first = [
+                rows[0].stamp_ns
+                for path in sorted(folder.glob("*.csv"))
+                if (rows := read_stamps(path))
+            ]
             self._shift_ns = self._start_ns - min(first, default=0)
         self._decoder.open()
 
@@ -56,16 +67,30 @@ class CaptureReader:
         height, width = image.shape[:2]
         at_ns = stamp.stamp_ns + self._shift_ns
         if not self._decoder.grey:
-            return Frame(self._camera, stamp.frame, at_ns, stamp.row_time_ns, (width, height), image, "bgr")
+            return Frame(
+                self._camera, stamp.frame, at_ns, stamp.row_time_ns, (width, height), image, "bgr"
+            )
         if height % 3 or width % 2:
             video = self._capture.video(self._camera)
-            raise CaptureError(f"{video}: is grey and {width}x{height}; a grey video must hold I420 pictures of 3/2 their height")
-        return Frame(self._camera, stamp.frame, at_ns, stamp.row_time_ns, (width, height * 2 // 3), image, "i420")
+            raise CaptureError(
+                f"{video}: is grey and {width}x{height}; a grey video must hold I420 pictures of 3/2 their height"
+            )
+        return Frame(
+            self._camera,
+            stamp.frame,
+            at_ns,
+            stamp.row_time_ns,
+            (width, height * 2 // 3),
+            image,
+            "i420",
+        )
 
     def _check_end(self, *, more: bool) -> None:
         video, stamps = self._capture.video(self._camera), self._capture.stamps(self._camera)
         if more:
-            raise CaptureError(f"{stamps}: has stamps of {len(self._stamps)} frames, but {video.name} has more: the capture is damaged")
+            raise CaptureError(
+                f"{stamps}: has stamps of {len(self._stamps)} frames, but {video.name} has more: the capture is damaged"
+            )
         if self._index < len(self._stamps):
             raise CaptureError(
                 f"{video}: ends after {self._index} of the {len(self._stamps)} frames in {stamps.name}: cut short or damaged"

@@ -1,7 +1,8 @@
-"""Exposure of a running camera: a mailbox between the event loop and the thread that reads the camera.
+"""Exposure of a running camera: a mailbox between the event loop and the thread that reads the
+camera.
 
-The reader takes what is wanted before its next image and tells what images were really taken with. A driver that tells nothing leaves
-`reported` None; whoever waits for it must have a deadline.
+The reader takes what is wanted before its next image and tells what images were really taken with.
+A driver that tells nothing leaves `reported` None; whoever waits for it must have a deadline.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ class Controls:
         self._wanted: Wanted | None = None
 
     def adjust(self, exposure: Exposure | None) -> None:
-        """Ask for these values, or for the automatics, from any thread; the last one asked for counts."""
+        """Ask for these values, or for the automatics, from any thread.
+
+        The last one asked for counts.
+        """
         with self._lock:
             self._wanted = Wanted(exposure)
             self.reported = None

@@ -1,4 +1,5 @@
-"""A folder of images as a frame source, in the order of the numbers in their names, at the frame rate of the [[camera]] table.
+"""A folder of images as a frame source, in the order of the numbers in their names, at the frame
+rate of the [[camera]] table.
 
 An image that cannot be decoded, or a folder without any, is a CaptureError.
 """
@@ -33,9 +34,14 @@ class FolderReader:
     def open(self) -> None:
         if not self._folder.is_dir():
             raise CaptureError(f"{self._folder}: no such folder of images")
-        self._paths = sorted((path for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES), key=_by_number)
+        self._paths = sorted(
+            (path for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES),
+            key=_by_number,
+        )
         if not self._paths:
-            raise CaptureError(f"{self._folder}: has no images; it should hold files {', '.join('*' + s for s in _SUFFIXES)}")
+            raise CaptureError(
+                f"{self._folder}: has no images; it should hold files {', '.join('*' + s for s in _SUFFIXES)}"
+            )
 
     def read(self) -> Frame | None:
         if self._seq >= len(self._paths):
@@ -43,9 +49,13 @@ class FolderReader:
         path = self._paths[self._seq]
         image = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if image is None:
-            raise CaptureError(f"{path}: cannot be decoded (image {self._seq + 1} of {len(self._paths)}); remove or replace it")
+            raise CaptureError(
+                f"{path}: cannot be decoded (image {self._seq + 1} of {len(self._paths)}); remove or replace it"
+            )
         stamp_ns = self._start_ns + round(self._seq * 1e9 / self._fps)
-        frame = Frame(self._camera, self._seq, stamp_ns, 0.0, (image.shape[1], image.shape[0]), image, "bgr")
+        frame = Frame(
+            self._camera, self._seq, stamp_ns, 0.0, (image.shape[1], image.shape[0]), image, "bgr"
+        )
         self._seq += 1
         return frame
 
@@ -55,4 +65,7 @@ class FolderReader:
 
 def _by_number(path: Path) -> list[tuple[int, int, str]]:
     """img2 before img10."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]
+    return [
+        (0, int(part), "") if part.isdigit() else (1, 0, part)
+        for part in re.split(r"(\d+)", path.name)
+    ]

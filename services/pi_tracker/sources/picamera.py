@@ -1,11 +1,14 @@
-"""A Raspberry Pi camera through picamera2: YUV420 frames, fixed exposure, gain and colour gains, a stamp on CLOCK_REALTIME.
+"""A Raspberry Pi camera through picamera2: YUV420 frames, fixed exposure, gain and colour gains, a
+stamp on CLOCK_REALTIME.
 
-FrameWallClock is the instant at which row 0 starts to be read out, the end of its exposure; half the exposure before it is the middle.
-SensorTimestamp counts from boot and is never used. Without an exposure calibration the camera's auto modes stay on and the notes say so.
-A missing package or camera, a system too old for FrameWallClock, and a camera that stops delivering raise SourceError.
-With sync in the [[camera]] table cameras of several Pis expose together (libcamera's software synchronisation, picamera2 0.3.25 on); frames
-are delivered before that is reached, too, with their true stamps, and a camera that finds no partner says so once.
-Written from picamera2's sources and tested against a stand-in; not tried on hardware.
+FrameWallClock is the instant at which row 0 starts to be read out, the end of its exposure; half
+the exposure before it is the middle. SensorTimestamp counts from boot and is never used. Without an
+exposure calibration the camera's auto modes stay on and the notes say so. A missing package or
+camera, a system too old for FrameWallClock, and a camera that stops delivering raise SourceError.
+With sync in the [[camera]] table cameras of several Pis expose together (libcamera's software
+synchronisation, picamera2 0.3.25 on); frames are delivered before that is reached, too, with their
+true stamps, and a camera that finds no partner says so once. Written from picamera2's sources and
+tested against a stand-in; not tried on hardware.
 """
 
 from __future__ import annotations
@@ -21,11 +24,13 @@ from rhot.files.config import CameraTable
 from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.sources.controls import Controls
 
-# Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2) 18.9 us.
+# Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2)
+# 18.9 us.
 _LINE_US = {"ov5647": 33.7, "imx219": 18.9}
 # The slowest exposure of a 10 fps camera is 100 ms; one that is silent for this long is gone.
 _SILENCE_S = 2.0
-# The server tells its clients the common instant some seconds ahead; who has not heard of one by then hears no server.
+# The server tells its clients the common instant some seconds ahead; who has not heard of one by
+# then hears no server.
 _SYNC_S = 15.0
 # A client moves its frames by stretching and shortening them: a sensor at its fastest cannot.
 _FULL_SPEED = 0.97
@@ -63,7 +68,9 @@ class PiCamera:
             self._configure()
             self._camera.start()
         except RuntimeError as error:
-            raise SourceError(f"camera {self._table.name!r}: cannot be started: {error}; does another program use it?") from None
+            raise SourceError(
+                f"camera {self._table.name!r}: cannot be started: {error}; does another program use it?"
+            ) from None
 
     def _configure(self) -> None:
         mode = _best_mode(self._camera.sensor_modes, self._table)
@@ -79,19 +86,27 @@ class PiCamera:
         )
         self._camera.configure(config)
         if mode and self._table.sync != "off" and self._table.fps > _FULL_SPEED * mode["fps"]:
-            self.notes.append(f"camera {self._table.name!r}: fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one")
+            self.notes.append(
+                f"camera {self._table.name!r}: fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one"
+            )
         main = self._camera.camera_configuration()["main"]
         self._stride, self._size = int(main["stride"]), (int(main["size"][0]), int(main["size"][1]))
         if self._size != tuple(self._table.size_px):
-            self.notes.append(f"camera {self._table.name!r}: delivers {self._size[0]}x{self._size[1]} instead of {self._table.size_px}")
+            self.notes.append(
+                f"camera {self._table.name!r}: delivers {self._size[0]}x{self._size[1]} instead of {self._table.size_px}"
+            )
         line_us = _LINE_US.get(str(self._camera.camera_properties.get("Model", "")), 0.0)
         self._row_time_ns = line_us * 1000.0 * (mode["size"][1] / self._size[1] if mode else 1.0)
         if not line_us:
-            self.notes.append(f"camera {self._table.name!r}: the sensor's readout time is unknown; rows count as taken at once")
+            self.notes.append(
+                f"camera {self._table.name!r}: the sensor's readout time is unknown; rows count as taken at once"
+            )
 
     def _controls(self) -> dict[str, Any]:
         frame_us = round(1e6 / self._table.fps)
-        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)} | _sync(self._table)
+        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)} | _sync(
+            self._table
+        )
         if self._exposure is None:
             self.notes.append(
                 f"camera {self._table.name!r}: no exposure calibration, its auto modes stay on and colours may drift; "
@@ -103,11 +118,17 @@ class PiCamera:
     def read(self) -> Frame:
         wanted = self.controls.take()
         if wanted is not None:
-            self._camera.set_controls({"AeEnable": True, "AwbEnable": True} if wanted.exposure is None else _fixed(wanted.exposure))
+            self._camera.set_controls(
+                {"AeEnable": True, "AwbEnable": True}
+                if wanted.exposure is None
+                else _fixed(wanted.exposure)
+            )
         try:
             request = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
         except TimeoutError:
-            raise SourceError(f"camera {self._table.name!r}: no image for {_SILENCE_S:g} s; is its cable loose?") from None
+            raise SourceError(
+                f"camera {self._table.name!r}: no image for {_SILENCE_S:g} s; is its cable loose?"
+            ) from None
         try:
             metadata = request.get_metadata()
             image = unpadded(request.make_buffer("main"), self._size, self._stride)
@@ -115,7 +136,15 @@ class PiCamera:
             request.release()
         self.controls.reported = _reported(metadata)
         self._watch_sync(metadata)
-        frame = Frame(self._table.name, self._seq, self._stamp_ns(metadata), self._row_time_ns, self._size, image, "i420")
+        frame = Frame(
+            self._table.name,
+            self._seq,
+            self._stamp_ns(metadata),
+            self._row_time_ns,
+            self._size,
+            image,
+            "i420",
+        )
         self._seq += 1
         return frame
 
@@ -134,7 +163,9 @@ class PiCamera:
     def _stamp_ns(self, metadata: dict[str, Any]) -> int:
         wall_ns = metadata.get("FrameWallClock")
         if wall_ns is None:
-            raise SourceError(f"camera {self._table.name!r}: libcamera gives no FrameWallClock; update with `sudo apt full-upgrade`")
+            raise SourceError(
+                f"camera {self._table.name!r}: libcamera gives no FrameWallClock; update with `sudo apt full-upgrade`"
+            )
         return int(wall_ns) - round(float(metadata.get("ExposureTime", 0.0)) * 500.0)
 
     def close(self) -> None:
@@ -147,9 +178,13 @@ def _sync(table: CameraTable) -> dict[str, Any]:
     """The control that gives a camera its part in software synchronisation."""
     if table.sync == "off":
         return {}
-    roles = getattr(getattr(importlib.import_module("libcamera").controls, "rpi", None), "SyncModeEnum", None)
+    roles = getattr(
+        getattr(importlib.import_module("libcamera").controls, "rpi", None), "SyncModeEnum", None
+    )
     if roles is None:
-        raise SourceError(f'camera {table.name!r}: this libcamera cannot synchronise; `sudo apt full-upgrade`, or set sync = "off"')
+        raise SourceError(
+            f'camera {table.name!r}: this libcamera cannot synchronise; `sudo apt full-upgrade`, or set sync = "off"'
+        )
     return {"SyncMode": roles.Server if table.sync == "server" else roles.Client}
 
 
@@ -166,18 +201,29 @@ def _fixed(exposure: Exposure) -> dict[str, Any]:
 
 def _reported(metadata: dict[str, Any]) -> Exposure | None:
     """What an image was taken with; None if the metadata do not say all of it."""
-    exposure_us, gain, gains = (metadata.get(key) for key in ("ExposureTime", "AnalogueGain", "ColourGains"))
+    exposure_us, gain, gains = (
+        metadata.get(key) for key in ("ExposureTime", "AnalogueGain", "ColourGains")
+    )
     if not exposure_us or gain is None or gains is None or len(gains) != 2:
         return None
-    return Exposure(exposure_us=float(exposure_us), gain=float(gain), red_gain=float(gains[0]), blue_gain=float(gains[1]))
+    return Exposure(
+        exposure_us=float(exposure_us),
+        gain=float(gain),
+        red_gain=float(gains[0]),
+        blue_gain=float(gains[1]),
+    )
 
 
 def unpadded(buffer: Image, size_px: tuple[int, int], stride: int) -> Image:
-    """A YUV420 buffer, whose rows are padded to `stride` bytes (chroma: half of it), as packed I420 (height * 3 / 2, width)."""
+    """A YUV420 buffer, whose rows are padded to `stride` bytes (chroma: half of it), as packed I420
+    (height * 3 / 2, width).
+    """
     width, height = size_px
     needed = stride * height * 3 // 2
     if buffer.size < needed:
-        raise SourceError(f"camera buffer of {buffer.size} bytes is too small for {width}x{height} YUV420 at stride {stride} ({needed})")
+        raise SourceError(
+            f"camera buffer of {buffer.size} bytes is too small for {width}x{height} YUV420 at stride {stride} ({needed})"
+        )
     if stride == width:
         return buffer[:needed].reshape(height * 3 // 2, width)
     luma = buffer[: stride * height].reshape(height, stride)[:, :width]
@@ -196,6 +242,18 @@ def _package() -> Any:
 
 
 def _best_mode(modes: list[dict[str, Any]], table: CameraTable) -> dict[str, Any] | None:
-    """The sensor mode that sees the most at the wanted rate, and of those the smallest that covers the image."""
-    usable = [mode for mode in modes if "crop_limits" in mode and mode["fps"] >= table.fps and mode["size"][1] >= table.size_px[1]]
-    return min(usable, key=lambda mode: (-mode["crop_limits"][2] * mode["crop_limits"][3], mode["size"][0]), default=None)
+    """The sensor mode that sees the most at the wanted rate, and of those the smallest that covers
+    the image.
+    """
+    usable = [
+        mode
+        for mode in modes
+        if "crop_limits" in mode
+        and mode["fps"] >= table.fps
+        and mode["size"][1] >= table.size_px[1]
+    ]
+    return min(
+        usable,
+        key=lambda mode: (-mode["crop_limits"][2] * mode["crop_limits"][3], mode["size"][0]),
+        default=None,
+    )

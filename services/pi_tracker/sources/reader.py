@@ -1,7 +1,9 @@
-"""The frame-source interface: blocking readers, and the thread that makes an asynchronous stream of one.
+"""The frame-source interface: blocking readers, and the thread that makes an asynchronous stream of
+one.
 
-A live camera's frames count only while they are new: the latest wins and what is skipped is counted. A file's frames all count: the thread
-waits for its consumer. A reader that fails raises in the stream; one that ends, ends it; a late one is waited for.
+A live camera's frames count only while they are new: the latest wins and what is skipped is
+counted. A file's frames all count: the thread waits for its consumer. A reader that fails raises in
+the stream; one that ends, ends it; a late one is waited for.
 """
 
 from __future__ import annotations
@@ -23,7 +25,10 @@ _JOIN_S = 3.0
 
 
 class Reader(Protocol):
-    """A source of frames that blocks. read() returns None at the end of a file; a camera never ends, it fails with SourceError."""
+    """A source of frames that blocks. read() returns None at the end of a file.
+
+    A camera never ends, it fails with SourceError.
+    """
 
     live: bool
     # What the source could not do as asked, for the journal.
@@ -51,11 +56,17 @@ class Source(Protocol):
         """The clock of the stamps."""
 
     def frames(self) -> AsyncGenerator[Frame, None]:
-        """Every frame, or the latest one each time; opens the source, and closes it when the iteration ends."""
+        """Every frame, or the latest one each time.
+
+        Opens the source, and closes it when the iteration ends.
+        """
 
 
 class Threaded:
-    """A reader in a thread of its own. paced: a file's frames come no sooner than its stamps say, as a camera's would."""
+    """A reader in a thread of its own.
+
+    paced: a file's frames come no sooner than its stamps say, as a camera's would.
+    """
 
     def __init__(self, reader: Reader, *, paced: bool = False) -> None:
         self.live = reader.live

@@ -1,7 +1,9 @@
-"""The simulator's frames as a source: I420 images over the bus, with a camera computer's clock of their own.
+"""The simulator's frames as a source: I420 images over the bus, with a camera computer's clock of
+their own.
 
-Frames that come faster than they are used are dropped, oldest first. While there is no simulator nothing comes, and nothing fails;
-an attachment or payload that is not what it should be is rejected and counted.
+Frames that come faster than they are used are dropped, oldest first. While there is no simulator
+nothing comes, and nothing fails; an attachment or payload that is not what it should be is rejected
+and counted.
 """
 
 from __future__ import annotations
@@ -54,9 +56,17 @@ class SimulatorSource:
         except (msgspec.DecodeError, UnicodeDecodeError):
             return None
         width, height = told.size_px
-        sane = told.camera == self._camera and min(width, height) >= 2 and width % 2 == 0 and height % 2 == 0 and told.row_time_ns <= 1e8
+        sane = (
+            told.camera == self._camera
+            and min(width, height) >= 2
+            and width % 2 == 0
+            and height % 2 == 0
+            and told.row_time_ns <= 1e8
+        )
         if not sane or len(sample.payload) != width * height * 3 // 2:
             return None
         self._skew_ns = told.clock_skew_ns
         image = np.frombuffer(sample.payload, np.uint8).reshape(height * 3 // 2, width)
-        return Frame(self._camera, told.seq, told.stamp_ns, told.row_time_ns, told.size_px, image, "i420")
+        return Frame(
+            self._camera, told.seq, told.stamp_ns, told.row_time_ns, told.size_px, image, "i420"
+        )

@@ -1,9 +1,10 @@
 """A USB camera through V4L2, or any camera through a GStreamer pipeline, by OpenCV.
 
-Auto exposure and white balance are switched off and the calibrated values set; what the driver refuses is noted. The driver
-stamps frames with CLOCK_MONOTONIC when they arrive, which is brought to CLOCK_REALTIME less half the exposure; a driver without
-stamps gets the time of reading. Rolling shutter is unknown (row_time_ns 0). A camera that is missing, unplugged or silent is a
-SourceError. Not tried on hardware.
+Auto exposure and white balance are switched off and the calibrated values set; what the driver
+refuses is noted. The driver stamps frames with CLOCK_MONOTONIC when they arrive, which is brought
+to CLOCK_REALTIME less half the exposure; a driver without stamps gets the time of reading. Rolling
+shutter is unknown (row_time_ns 0). A camera that is missing, unplugged or silent is a SourceError.
+Not tried on hardware.
 """
 
 from __future__ import annotations
@@ -21,14 +22,18 @@ from rhot.files.config import CameraTable
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 
-# V4L2_EXPOSURE_MANUAL and _APERTURE_PRIORITY of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us.
+# V4L2_EXPOSURE_MANUAL and _APERTURE_PRIORITY of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE
+# counts in 100 us.
 _MANUAL, _AUTOMATIC, _EXPOSURE_UNIT_US = 1, 3, 100.0
 # A stamp further from now than this is not of this frame.
 _STAMP_SLACK_NS = 2_000_000_000
 
 
 class OpenCvCamera:
-    """device is a number, a path such as /dev/video0, or a GStreamer pipeline; api an OpenCV CAP_ constant."""
+    """device is a number, a path such as /dev/video0, or a GStreamer pipeline.
+
+    Api an OpenCV CAP_ constant.
+    """
 
     live = True
 
@@ -42,7 +47,11 @@ class OpenCvCamera:
     ) -> None:
         self.notes: list[str] = []
         # A GStreamer pipeline has properties of its own for that.
-        self.controls = Controls("what the driver reports while its automatics run may be old") if api == cv2.CAP_V4L2 else None
+        self.controls = (
+            Controls("what the driver reports while its automatics run may be old")
+            if api == cv2.CAP_V4L2
+            else None
+        )
         self._table = table
         self._device = device
         self._exposure = exposure
@@ -99,25 +108,46 @@ class OpenCvCamera:
                 self._fix(wanted.exposure)
         if not controls.watched:
             return
-        keys = (cv2.CAP_PROP_EXPOSURE, cv2.CAP_PROP_GAIN, cv2.CAP_PROP_WHITE_BALANCE_RED_V, cv2.CAP_PROP_WHITE_BALANCE_BLUE_U)
+        keys = (
+            cv2.CAP_PROP_EXPOSURE,
+            cv2.CAP_PROP_GAIN,
+            cv2.CAP_PROP_WHITE_BALANCE_RED_V,
+            cv2.CAP_PROP_WHITE_BALANCE_BLUE_U,
+        )
         units, gain, red, blue = (float(self._capture.get(key)) for key in keys)
         # OpenCV says -1 or 0 of what a driver does not have.
         known = units > 0.0 and min(gain, red, blue) >= 0.0
-        controls.reported = Exposure(exposure_us=units * _EXPOSURE_UNIT_US, gain=gain, red_gain=red, blue_gain=blue) if known else None
+        controls.reported = (
+            Exposure(exposure_us=units * _EXPOSURE_UNIT_US, gain=gain, red_gain=red, blue_gain=blue)
+            if known
+            else None
+        )
 
     def read(self) -> Frame:
         if self.controls is not None:
             self._obey(self.controls)
         ok, image = self._capture.read()
         if not ok or image is None:
-            raise SourceError(f"camera {self._table.name!r}: {self._device!r} delivers no more images; is it unplugged?")
-        frame = Frame(self._table.name, self._seq, self._stamp_ns(), 0.0, (image.shape[1], image.shape[0]), image, "bgr")
+            raise SourceError(
+                f"camera {self._table.name!r}: {self._device!r} delivers no more images; is it unplugged?"
+            )
+        frame = Frame(
+            self._table.name,
+            self._seq,
+            self._stamp_ns(),
+            0.0,
+            (image.shape[1], image.shape[0]),
+            image,
+            "bgr",
+        )
         self._seq += 1
         return frame
 
     def _stamp_ns(self) -> int:
         now_ns = clock.now_ns()
-        half_exposure_ns = round(self._exposure.exposure_us * 500.0) if self._exposure is not None else 0
+        half_exposure_ns = (
+            round(self._exposure.exposure_us * 500.0) if self._exposure is not None else 0
+        )
         age_ns = time.monotonic_ns() - round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
         return now_ns - half_exposure_ns - (age_ns if 0 <= age_ns < _STAMP_SLACK_NS else 0)
 

@@ -1,7 +1,8 @@
 """A video file as a frame source, with stamps from the frame's number and the file's frame rate.
 
-A file that does not exist or cannot be decoded, and one that ends before the frames its header promises, raise CaptureError saying how many
-frames there were of how many. A video of unknown frame rate takes the rate of its [[camera]] table.
+A file that does not exist or cannot be decoded, and one that ends before the frames its header
+promises, raise CaptureError saying how many frames there were of how many. A video of unknown frame
+rate takes the rate of its [[camera]] table.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import cv2
 from rhot.errors import CaptureError
 from services.pi_tracker.image.frame import Frame, Image
 
-# Headers of several containers give the duration only, from which OpenCV estimates the count; two frames or 2 % off is still whole.
+# Headers of several containers give the duration only, from which OpenCV estimates the count; two
+# frames or 2 % off is still whole.
 _SLACK_FRAMES, _SLACK = 2, 0.02
 # Below and above this no camera's video can be; such a rate is a broken header.
 _FPS_RANGE = (0.1, 1000.0)
@@ -50,7 +52,9 @@ class VideoReader:
             self._decoder.check_end(self._seq)
             return None
         stamp_ns = self._start_ns + round(self._seq * 1e9 / self._fps)
-        frame = Frame(self._camera, self._seq, stamp_ns, 0.0, (image.shape[1], image.shape[0]), image, "bgr")
+        frame = Frame(
+            self._camera, self._seq, stamp_ns, 0.0, (image.shape[1], image.shape[0]), image, "bgr"
+        )
         self._seq += 1
         return frame
 
@@ -96,7 +100,9 @@ class Decoder:
         if count == 0:
             raise CaptureError(f"{self._path}: holds no frame that can be decoded")
         if count + max(_SLACK_FRAMES, _SLACK * self.promised) < self.promised:
-            raise CaptureError(f"{self._path}: ends after {count} of {self.promised} frames: cut short or damaged")
+            raise CaptureError(
+                f"{self._path}: ends after {count} of {self.promised} frames: cut short or damaged"
+            )
 
     def close(self) -> None:
         if self._capture is not None:
@@ -106,7 +112,9 @@ class Decoder:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Without OpenCV's and FFmpeg's own words on a broken file, which would come before ours on the raw standard error."""
+    """Without OpenCV's and FFmpeg's own words on a broken file, which would come before ours on the
+    raw standard error.
+    """
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     # OpenCV 4.10 has setLogLevel beside imread, later ones in a module of its own.
     logging = getattr(cv2.utils, "logging", cv2)

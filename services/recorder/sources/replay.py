@@ -1,8 +1,8 @@
 """A recording as a source of messages: every payload on its key again, in its own time.
 
-Keys are rewritten to the rig of the bus; payloads and their stamps stay as they were, so that what listens computes the same again.
-Messages on keys that are not in the topics table, or cannot be published on, are skipped. Files that are no whole recordings
-raise CaptureError.
+Keys are rewritten to the rig of the bus; payloads and their stamps stay as they were, so that what
+listens computes the same again. Messages on keys that are not in the topics table, or cannot be
+published on, are skipped. Files that are no whole recordings raise CaptureError.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from services.recorder.reader import Record, read
 
 # Longer silence is a pause of the recording, or a damaged time: nobody wants to sit through it.
 _LONGEST_GAP_NS = 10_000_000_000
-# Flat out, messages sent before the loop and Zenoh's sender get their turn; larger bursts overflow Zenoh's queues.
+# Flat out, messages sent before the loop and Zenoh's sender get their turn; larger bursts overflow
+# Zenoh's queues.
 _BURST = 16
 
 
@@ -35,11 +36,14 @@ async def replay(
 ) -> int:
     """Publish a recording; how many messages were sent.
 
-    rate 1 is real time, 2 twice as fast, 0 flat out. loop begins again at the end, for ever. only keeps the named topics
-    (`camera/markers`; empty: all). report is called with each record as it is sent.
+    rate 1 is real time, 2 twice as fast, 0 flat out. loop begins again at the end, for ever. only
+    keeps the named topics (`camera/markers`; empty: all). report is called with each record as it
+    is sent.
     """
     if not (math.isfinite(rate) and rate >= 0.0):
-        raise CaptureError(f"cannot replay at rate {rate}; 1 is real time, 2 twice as fast, 0 flat out")
+        raise CaptureError(
+            f"cannot replay at rate {rate}; 1 is real time, 2 twice as fast, 0 flat out"
+        )
     check_names(only)
     sent = 0
     while True:
@@ -59,7 +63,13 @@ def check_names(only: Collection[str]) -> None:
         raise CaptureError(f"no recorded topic is called {unknown[0]!r}; valid: {', '.join(valid)}")
 
 
-async def _once(bus: Bus, path: Path, rate: float, only: Collection[str], report: Callable[[Record], None] | None) -> int:
+async def _once(
+    bus: Bus,
+    path: Path,
+    rate: float,
+    only: Collection[str],
+    report: Callable[[Record], None] | None,
+) -> int:
     clock = asyncio.get_running_loop()
     due_s, last_ns, sent = clock.time(), None, 0
     routes: dict[str, Route | None] = {}
@@ -97,5 +107,6 @@ def _route(recorded_key: str, rig: str, only: Collection[str]) -> Route | None:
     try:
         return Route(topic.key(rig, **(topic.names(recorded_key) or {})), topic.encoding)
     except BusError:
-        # A key with a wildcard or worse in it: somebody published it, and it was recorded; it cannot be published again.
+        # A key with a wildcard or worse in it: somebody published it, and it was recorded; it
+        # cannot be published again.
         return None

@@ -1,7 +1,8 @@
 """When each simulated camera takes its pictures, and what its computer's clock says about it. Pure.
 
-Cameras run free: each has its own phase, its own crystal, its own clock. Times are seconds on the master's clock since the
-scene began; a stamp is nanoseconds. Everything follows from (seed, number of the camera, number of the frame).
+Cameras run free: each has its own phase, its own crystal, its own clock. Times are seconds on the
+master's clock since the scene began; a stamp is nanoseconds. Everything follows from (seed, number
+of the camera, number of the frame).
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647 (18.9 and 33.7 us).
+# The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647
+# (18.9 and 33.7 us).
 _READOUT_S = 14.4e-3
 # A sensor needs part of each period for blanking.
 _MAX_READOUT = 0.85
@@ -66,11 +68,14 @@ class CameraClock:
         return np.random.default_rng([self.seed, frame, use])
 
 
-def camera_clock(name: str, number: int, cameras: int, fps: float, rows: int, exposure_s: float, seed: int) -> CameraClock:
-    """The clock of camera `number` of `cameras`, as free-running cameras on unsynchronised computers have it.
+def camera_clock(
+    name: str, number: int, cameras: int, fps: float, rows: int, exposure_s: float, seed: int
+) -> CameraClock:
+    """The clock of camera `number` of `cameras`, as free-running cameras on unsynchronised
+    computers have it.
 
-    Phases are spread over the period (two cameras at 30 fps: 16.7 ms apart), clocks up to 20 ms off and drifting up to
-    50 ppm, sensor crystals within 20 ppm, 1.5 % of the frames lost.
+    Phases are spread over the period (two cameras at 30 fps: 16.7 ms apart), clocks up to 20 ms off
+    and drifting up to 50 ppm, sensor crystals within 20 ppm, 1.5 % of the frames lost.
     """
     rng = np.random.default_rng([seed, zlib.crc32(name.encode()), 3])
     period_s = (1.0 + rng.uniform(-20e-6, 20e-6)) / fps
@@ -82,11 +87,14 @@ def camera_clock(name: str, number: int, cameras: int, fps: float, rows: int, ex
         exposure_s=min(exposure_s, 0.9 * period_s),
         offset_ns=float(rng.uniform(-20e6, 20e6)),
         drift_ppm=float(rng.uniform(-50.0, 50.0)),
-        # Software clocks on a LAN agree to some 0.1 ms; 0.5 ms is the bound promised to readers of captures.
+        # Software clocks on a LAN agree to some 0.1 ms; 0.5 ms is the bound promised to readers of
+        # captures.
         residual_ns=float(np.clip(rng.normal(0.0, 0.15e6), -0.4e6, 0.4e6)),
         residual_ppm=float(rng.uniform(-0.5, 0.5)),
         # FrameWallClock follows the kernel's time stamp of the frame interrupt.
         jitter_ns=20e3,
         drop_rate=0.015,
-        seed=int.from_bytes(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest(), "little"),
+        seed=int.from_bytes(
+            hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest(), "little"
+        ),
     )

@@ -1,6 +1,8 @@
-"""The pictures of one simulated camera as its tracker would get them: number, stamp on its own clock, bytes. Pure.
+"""The pictures of one simulated camera as its tracker would get them: number, stamp on its own
+clock, bytes. Pure.
 
-Lost frames are said to be lost and are not rendered; their numbers are skipped as a driver skips them.
+Lost frames are said to be lost and are not rendered; their numbers are skipped as a driver skips
+them.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ class Shot:
 class TakenFrame:
     """One frame; image is I420 (h * 3 / 2, w) uint8, None if the frame was lost.
 
-    stamp_ns is mid-exposure of row 0 on the camera computer's clock, which reads skew_ns more than the master's at that instant.
+    stamp_ns is mid-exposure of row 0 on the camera computer's clock, which reads skew_ns more than
+    the master's at that instant.
     """
 
     camera: str
@@ -46,8 +49,9 @@ class TakenFrame:
 class FrameSource:
     """One camera of a scene.
 
-    recorded=False: the camera computer's clock is as wrong as CameraClock says (live; the tracker measures it by echo).
-    recorded=True: only what synchronisation leaves over is wrong (captures; offline nobody can ask the time).
+    recorded=False: the camera computer's clock is as wrong as CameraClock says (live; the tracker
+    measures it by echo). recorded=True: only what synchronisation leaves over is wrong (captures;
+    offline nobody can ask the time).
     """
 
     def __init__(self, scene: Scene, camera: str, *, recorded: bool = False) -> None:
@@ -68,7 +72,9 @@ class FrameSource:
             camera=self.camera.name,
             seq=seq,
             time_s=shot.time_s,
-            stamp_ns=max(0, start_ns + round(shot.time_s * 1e9) + skew_ns + self.clock.stamp_error_ns(seq)),
+            stamp_ns=max(
+                0, start_ns + round(shot.time_s * 1e9) + skew_ns + self.clock.stamp_error_ns(seq)
+            ),
             skew_ns=skew_ns,
             row_time_ns=self.clock.row_time_ns,
             size_px=self.camera.size_px,

@@ -1,6 +1,8 @@
-"""Writes a scene as a capture folder: pictures, stamps, object poses and the truth, as a recording of a synchronised rig has them.
+"""Writes a scene as a capture folder: pictures, stamps, object poses and the truth, as a recording
+of a synchronised rig has them.
 
-The same scene and duration give the same bytes. A folder that is not empty is a CaptureError, and nothing is written.
+The same scene and duration give the same bytes. A folder that is not empty is a CaptureError, and
+nothing is written.
 """
 
 from __future__ import annotations
@@ -22,16 +24,21 @@ from services.simulator.files.rig_toml import rig_toml
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
-# When every simulated recording begins, so that the same scene gives the same bytes: 14 November 2023.
+# When every simulated recording begins, so that the same scene gives the same bytes: 14 November
+# 2023.
 START_NS = 1_700_000_000 * 1_000_000_000
 
 Progress = Callable[[int, int], None]
 
 
-def write_capture(scene: Scene, seconds: float, folder: Path, progress: Progress | None = None) -> int:
-    """Write `seconds` of a scene into a new or empty folder; returns the number of pictures written.
+def write_capture(
+    scene: Scene, seconds: float, folder: Path, progress: Progress | None = None
+) -> int:
+    """Write `seconds` of a scene into a new or empty folder; returns the number of pictures
+    written.
 
-    progress(done, total) is called after each frame of each camera. Raises CaptureError if the folder is in use or cannot be written.
+    progress(done, total) is called after each frame of each camera. Raises CaptureError if the
+    folder is in use or cannot be written.
     """
     if not seconds > 0.0:
         raise CaptureError(f"cannot write a capture of {seconds} s; give a duration above 0")
@@ -47,7 +54,9 @@ def write_capture(scene: Scene, seconds: float, folder: Path, progress: Progress
 
 def _new(folder: Path) -> Capture:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise CaptureError(f"{folder}: exists and is not an empty folder; name a new one or empty it")
+        raise CaptureError(
+            f"{folder}: exists and is not an empty folder; name a new one or empty it"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -56,7 +65,9 @@ def _new(folder: Path) -> Capture:
 
 
 def _copy_rig(config: RigConfig, capture: Capture) -> None:
-    """rig.toml with this folder as its source, and the calibration of its cameras, hands and objects."""
+    """rig.toml with this folder as its source, and the calibration of its cameras, hands and
+    objects.
+    """
     cameras = [msgspec.structs.replace(c, source="capture:.", host="") for c in config.camera]
     objects = msgspec.structs.replace(config.objects, source=f"replay:{capture.objects.name}")
     rig = msgspec.structs.replace(config.rig, calibration="calibration")
@@ -85,18 +96,23 @@ def _truth_lines(scene: Scene, seconds: float) -> Iterator[Truth]:
         yield scene.truth(t_s, START_NS + round(t_s * 1e9))
 
 
-def _write_pictures(scene: Scene, seconds: float, capture: Capture, progress: Progress | None) -> int:
+def _write_pictures(
+    scene: Scene, seconds: float, capture: Capture, progress: Progress | None
+) -> int:
     counts = {name: clock.first_frame(seconds) for name, clock in scene.clocks.items()}
     total, done, written = sum(counts.values()), 0, 0
     for name, count in counts.items():
         source = FrameSource(scene, name, recorded=True)
         stamps: list[FrameStamp] = []
-        video = _open(capture.video(name), scene.config.camera_named(name).fps, source.camera.size_px)
+        video = _open(
+            capture.video(name), scene.config.camera_named(name).fps, source.camera.size_px
+        )
         try:
             for seq in range(count):
                 taken = source.take(seq, START_NS)
                 if taken.image is not None:
-                    # FFV1 stores BGR exactly, and BGR from I420 gives back the same I420: the chroma of 2x2 equal pixels is its mean.
+                    # FFV1 stores BGR exactly, and BGR from I420 gives back the same I420: the
+                    # chroma of 2x2 equal pixels is its mean.
                     video.write(cv2.cvtColor(taken.image, cv2.COLOR_YUV2BGR_I420))
                     # `frame` is the picture's number in the video.
                     stamps.append(FrameStamp(len(stamps), taken.stamp_ns, taken.row_time_ns))
@@ -112,7 +128,11 @@ def _write_pictures(scene: Scene, seconds: float, capture: Capture, progress: Pr
 
 
 def _open(path: Path, fps: float, size_px: tuple[int, int]) -> cv2.VideoWriter:
-    video = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), fps, size_px)  # type: ignore[attr-defined]
+    video = cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), fps, size_px
+    )  # type: ignore[attr-defined]
     if not video.isOpened():
-        raise CaptureError(f"{path}: OpenCV cannot write FFV1 here; install opencv-python-headless, whose wheels bring FFmpeg along")
+        raise CaptureError(
+            f"{path}: OpenCV cannot write FFV1 here; install opencv-python-headless, whose wheels bring FFmpeg along"
+        )
     return video

@@ -1,7 +1,8 @@
 """Colour ranges for the simulated rig, fitted to rendered pixels whose surface is known. Pure.
 
-What a person does by clicking on painted fingers, with the renderer's labels instead of clicks: hue by the bulk of the samples,
-saturation and value as low as skin and background allow. A colour that nothing in the scenes wears is a CalibrationError.
+What a person does by clicking on painted fingers, with the renderer's labels instead of clicks: hue
+by the bulk of the samples, saturation and value as low as skin and background allow. A colour that
+nothing in the scenes wears is a CalibrationError.
 """
 
 from __future__ import annotations
@@ -21,19 +22,24 @@ Samples = npt.NDArray[np.int64]  # (n, 3) OpenCV HSV
 _TAIL = 1.0
 # Hues a little outside what was seen: another place, another pose.
 _HUE_SLACK = 3
-# How much greyer and darker than what was seen a pixel may be: shade deepens more than it greys. Hue of pixels below the floor
-# is noise of 4.5 grey levels, and skin and walls live there.
+# How much greyer and darker than what was seen a pixel may be: shade deepens more than it greys.
+# Hue of pixels below the floor is noise of 4.5 grey levels, and skin and walls live there.
 _SATURATION_SHARE, _VALUE_SHARE = 0.85, 0.65
 _MIN_SATURATION, _MIN_VALUE = 70, 35
 
 
 def samples(renderer: Renderer, frames: Iterable[int]) -> tuple[dict[int, Samples], Samples]:
-    """HSV of the pixels of each painted surface, and of everything else, noise included; outlines are left out."""
+    """HSV of the pixels of each painted surface, and of everything else, noise included.
+
+    Outlines are left out.
+    """
     painted: dict[int, list[Samples]] = {}
     other: list[Samples] = []
     kernel = np.ones((3, 3), np.uint8)
     for frame in frames:
-        hsv = cv2.cvtColor(cv2.cvtColor(renderer.picture(frame), cv2.COLOR_YUV2BGR_I420), cv2.COLOR_BGR2HSV).astype(np.int64)
+        hsv = cv2.cvtColor(
+            cv2.cvtColor(renderer.picture(frame), cv2.COLOR_YUV2BGR_I420), cv2.COLOR_BGR2HSV
+        ).astype(np.int64)
         labels = renderer.labels(renderer.clock.time_s(frame))
         paint = np.zeros(labels.shape, np.uint8)
         for surface in renderer.cast.marks.values():
@@ -41,11 +47,16 @@ def samples(renderer: Renderer, frames: Iterable[int]) -> tuple[dict[int, Sample
             paint |= mask
             painted.setdefault(surface, []).append(hsv[cv2.erode(mask, kernel) > 0])
         other.append(hsv[cv2.dilate(paint, kernel, iterations=3) == 0][::7])
-    return {surface: np.concatenate(rows) for surface, rows in painted.items()}, np.concatenate(other)
+    return {surface: np.concatenate(rows) for surface, rows in painted.items()}, np.concatenate(
+        other
+    )
 
 
 def fit(painted: dict[str, Samples], other: Samples, date: str, tool: str) -> Colors:
-    """Ranges of all colours; residuals tell how many of a colour's samples its range takes, and how many of all others."""
+    """Ranges of all colours.
+
+    Residuals tell how many of a colour's samples its range takes, and how many of all others.
+    """
     ranges, residuals = {}, {}
     for name, seen in sorted(painted.items()):
         if len(seen) < 50:
@@ -59,14 +70,22 @@ def fit(painted: dict[str, Samples], other: Samples, date: str, tool: str) -> Co
             "others_inside": round(float(inside(ranges[name], rest).mean()), 6),
         }
     counts = {name: len(rows) for name, rows in sorted(painted.items())}
-    return Colors(date=date, tool=tool, inputs={"samples": counts, "others": len(other)}, residuals=residuals, colors=ranges)
+    return Colors(
+        date=date,
+        tool=tool,
+        inputs={"samples": counts, "others": len(other)},
+        residuals=residuals,
+        colors=ranges,
+    )
 
 
 def _range(seen: Samples) -> ColorRange:
     """One colour's range. Hues are unrolled about their circular mean, so that red may wrap."""
     angle = seen[:, 0] * (np.pi / 90.0)
     weight = seen[:, 1]
-    centre = np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle))) * (90.0 / np.pi)
+    centre = np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle))) * (
+        90.0 / np.pi
+    )
     hue = (seen[:, 0] - centre + 90.0) % 180.0 - 90.0
     low, high = np.percentile(hue, [_TAIL, 100.0 - _TAIL])
     h_low, h_high = round(centre + low - _HUE_SLACK) % 180, round(centre + high + _HUE_SLACK) % 180

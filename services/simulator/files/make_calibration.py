@@ -1,8 +1,10 @@
-"""Makes the calibration of a simulated rig: `python -m services.simulator.files.make_calibration config/sim.toml`.
+"""Makes the calibration of a simulated rig: `python -m services.simulator.files.make_calibration
+config/sim.toml`.
 
-Lens, place, exposure and objects are what a calibration of good cheap cameras would give; colours are fitted to rendered samples
-(services/simulator/files/fit_colors.py). Existing files are replaced: a simulated rig has nothing to lose. The values follow from the
-cameras' names and order alone.
+Lens, place, exposure and objects are what a calibration of good cheap cameras would give; colours
+are fitted to rendered samples (services/simulator/files/fit_colors.py). Existing files are
+replaced: a simulated rig has nothing to lose. The values follow from the cameras' names and order
+alone.
 """
 
 from __future__ import annotations
@@ -15,7 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from rhot.errors import RhotError
-from rhot.files.calibration import CameraPlace, Colors, Exposure, Lens, ObjectPlace, Objects, RigGeometry, save
+from rhot.files.calibration import (
+    CameraPlace,
+    Colors,
+    Exposure,
+    Lens,
+    ObjectPlace,
+    Objects,
+    RigGeometry,
+    save,
+)
 from rhot.files.config import CameraTable, RigConfig, load_rig
 from rhot.geometry.camera import pinhole
 from rhot.geometry.transforms import Array, rotation_from_vector, rotation_x, rotation_y, transform
@@ -37,7 +48,9 @@ _SAMPLED, _FRAMES = ("fist", "piano", "random", "wave"), tuple(range(5, 200, 13)
 
 
 def lens(camera: CameraTable, date: str) -> Lens:
-    """A lens like the others of its kind, yet its own: focal length, middle and distortion differ a little."""
+    """A lens like the others of its kind, yet its own: focal length, middle and distortion differ a
+    little.
+    """
     rng = _rng(camera.name, 1)
     matrix = pinhole(camera.size_px, float(_HFOV_RAD))
     matrix[:2, :2] *= 1.0 + 0.002 * rng.standard_normal()
@@ -46,18 +59,29 @@ def lens(camera: CameraTable, date: str) -> Lens:
     p1, p2 = rng.uniform(-5e-4, 5e-4, 2)
     rows = np.round(matrix, 4).tolist()
     distortion = tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0))
-    return Lens(date=date, tool=TOOL, size_px=camera.size_px, matrix=tuple(tuple(r) for r in rows), distortion=distortion)  # type: ignore[arg-type]
+    return Lens(
+        date=date,
+        tool=TOOL,
+        size_px=camera.size_px,
+        matrix=tuple(tuple(r) for r in rows),
+        distortion=distortion,
+    )  # type: ignore[arg-type]
 
 
 def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:
-    """Cameras in a row, 75 mm apart, each but the first turned by up to half a degree about each axis, and displaced by millimetres."""
+    """Cameras in a row, 75 mm apart, each but the first turned by up to half a degree about each
+    axis, and displaced by millimetres.
+    """
     places = {}
     for number, camera in enumerate(cameras):
         rng = _rng(camera.name, 2)
         T = np.eye(4)
         if number:
             wrong = rng.uniform(-1.0, 1.0, 6)
-            T = transform(rotation_from_vector(np.deg2rad(0.5) * wrong[:3]), np.array([number * _BASELINE_M, 0.0, 0.0]) + 1e-3 * wrong[3:])
+            T = transform(
+                rotation_from_vector(np.deg2rad(0.5) * wrong[:3]),
+                np.array([number * _BASELINE_M, 0.0, 0.0]) + 1e-3 * wrong[3:],
+            )
         places[camera.name] = CameraPlace(T_rig_from_camera=_rows(T))
     return RigGeometry(date=date, tool=TOOL, cameras=places)
 
@@ -66,7 +90,12 @@ def objects(config: RigConfig, date: str) -> Objects:
     """Where the lighthouse stands, and how the trackers sit on their objects."""
     T = transform(rotation_x(np.pi) @ rotation_y(0.6) @ rotation_x(0.15), _LIGHTHOUSE_M)
     # A tracker sits at the lower end of its object, 75 mm from the middle.
-    places = {o.name: ObjectPlace(offset_m=(0.075, 0.0, 0.0), orientation_wxyz=(0.70710678, 0.0, 0.0, -0.70710678)) for o in config.object}
+    places = {
+        o.name: ObjectPlace(
+            offset_m=(0.075, 0.0, 0.0), orientation_wxyz=(0.70710678, 0.0, 0.0, -0.70710678)
+        )
+        for o in config.object
+    }
     return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=_rows(T), objects=places)
 
 
@@ -81,7 +110,12 @@ def write_all(config: RigConfig, date: str = "") -> list[Path]:
 
     for camera in config.camera:
         put(f"{camera.name}.lens.json", lens(camera, date))
-        put(f"{camera.name}.exposure.json", Exposure(date=date, tool=TOOL, exposure_us=8000.0, gain=2.0, red_gain=1.6, blue_gain=1.7))
+        put(
+            f"{camera.name}.exposure.json",
+            Exposure(
+                date=date, tool=TOOL, exposure_us=8000.0, gain=2.0, red_gain=1.6, blue_gain=1.7
+            ),
+        )
     put("rig.json", geometry(config.camera, date))
     put("objects.json", objects(config, date))
     for camera in config.camera:
@@ -90,7 +124,9 @@ def write_all(config: RigConfig, date: str = "") -> list[Path]:
 
 
 def colors(config: RigConfig, camera: str, date: str) -> Colors:
-    """Ranges of all configured colours, fitted to the pictures that one camera takes of several scenes."""
+    """Ranges of all configured colours, fitted to the pictures that one camera takes of several
+    scenes.
+    """
     painted: dict[str, list[Samples]] = {}
     others = []
     for name in _SAMPLED:
@@ -99,7 +135,12 @@ def colors(config: RigConfig, camera: str, date: str) -> Colors:
         others.append(rest)
         for (hand, landmark), surface in renderer.cast.marks.items():
             painted.setdefault(config.hand[hand].markers[landmark], []).append(surfaces[surface])  # type: ignore[index]
-    return fit({name: np.concatenate(rows) for name, rows in painted.items()}, np.concatenate(others), date, TOOL)
+    return fit(
+        {name: np.concatenate(rows) for name, rows in painted.items()},
+        np.concatenate(others),
+        date,
+        TOOL,
+    )
 
 
 def _rows(T: Array) -> tuple:

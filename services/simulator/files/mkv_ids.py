@@ -1,8 +1,9 @@
 """Gives a Matroska file fixed identifiers, so that the same pictures make the same bytes.
 
-FFmpeg writes a random SegmentUID and TrackUID into every file and OpenCV cannot stop it. They sit in the Info, Tracks and Tags
-elements at the head of the file, each guarded by a CRC-32. A file built in another way is left as it is: it plays all the same.
-RFC 9559 (Matroska) and RFC 8794 (EBML).
+FFmpeg writes a random SegmentUID and TrackUID into every file and OpenCV cannot stop it. They sit
+in the Info, Tracks and Tags elements at the head of the file, each guarded by a CRC-32. A file
+built in another way is left as it is: it plays all the same. RFC 9559 (Matroska) and RFC 8794
+(EBML).
 """
 
 from __future__ import annotations
@@ -11,7 +12,15 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-_SEGMENT, _INFO, _TRACKS, _TAGS, _TAG, _TARGETS, _ENTRY = 0x18538067, 0x1549A966, 0x1654AE6B, 0x1254C367, 0x7373, 0x63C0, 0xAE
+_SEGMENT, _INFO, _TRACKS, _TAGS, _TAG, _TARGETS, _ENTRY = (
+    0x18538067,
+    0x1549A966,
+    0x1654AE6B,
+    0x1254C367,
+    0x7373,
+    0x63C0,
+    0xAE,
+)
 _CRC32, _CLUSTER = 0xBF, 0x1F43B675
 # SegmentUID, TrackUID, TagTrackUID.
 _IDENTIFIERS = (0x73A4, 0x73C5, 0x63C5)
@@ -21,7 +30,9 @@ _HEAD = 65536
 
 
 def fix_identifiers(path: Path, number: int) -> None:
-    """Replace the random identifiers of a finished file by `number` and mend the checksums, in place."""
+    """Replace the random identifiers of a finished file by `number` and mend the checksums, in
+    place.
+    """
     with path.open("r+b") as file:
         head = bytearray(file.read(_HEAD))
         try:

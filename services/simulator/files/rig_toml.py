@@ -1,6 +1,7 @@
 """Writes a RigConfig as rig.toml, for captures that must stand alone. Pure.
 
-Values that rig.toml does not know (None) are left out; what load_rig reads back equals what was written, but for `folder`.
+Values that rig.toml does not know (None) are left out; what load_rig reads back equals what was
+written, but for `folder`.
 """
 
 from __future__ import annotations
@@ -43,7 +44,11 @@ def _dotted(path: list[str]) -> str:
 
 
 def _key(name: str) -> str:
-    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
+    return (
+        name
+        if name.replace("_", "").replace("-", "").isalnum() and name.isascii()
+        else json.dumps(name)
+    )
 
 
 def _value(value: Any) -> str:

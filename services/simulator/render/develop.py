@@ -1,7 +1,9 @@
-"""From light to the bytes of a camera: lens blur, gamma, YUV420 with averaged chroma, sensor noise. Compiled kernels. Pure.
+"""From light to the bytes of a camera: lens blur, gamma, YUV420 with averaged chroma, sensor noise.
+Compiled kernels. Pure.
 
-YUV is BT.601 with limited range, what cv2.COLOR_YUV2BGR_I420 undoes. A camera averages the chroma of each 2x2 pixels; OpenCV's
-own BGR2YUV_I420 takes one of the four, which moves edges by half a pixel.
+YUV is BT.601 with limited range, what cv2.COLOR_YUV2BGR_I420 undoes. A camera averages the chroma
+of each 2x2 pixels; OpenCV's own BGR2YUV_I420 takes one of the four, which moves edges by half a
+pixel.
 """
 
 from __future__ import annotations
@@ -13,14 +15,17 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 
-# The sRGB curve as a table over the square root of light: nearly a line, so 1024 steps are exact to 0.05 grey levels.
+# The sRGB curve as a table over the square root of light: nearly a line, so 1024 steps are exact to
+# 0.05 grey levels.
 _STEPS = 1024
 # Units of the noise bank per standard deviation; +-127 reaches 5.3 of them.
 NOISE_UNIT = 24.0
-# The bank is larger than the picture by this much each way: 64 x 64 even offsets, and each may be mirrored and negated.
+# The bank is larger than the picture by this much each way: 64 x 64 even offsets, and each may be
+# mirrored and negated.
 _SPARE = 128
-# Noise after gamma hardly depends on brightness: shot noise grows with the square root of light, the curve's slope falls about
-# as fast; what remains is read noise in the shadows. Factor at black, and at white.
+# Noise after gamma hardly depends on brightness: shot noise grows with the square root of light,
+# the curve's slope falls about as fast; what remains is read noise in the shadows. Factor at black,
+# and at white.
 _DARK, _BRIGHT = 1.15, 0.85
 
 
@@ -39,10 +44,12 @@ def blur_weights(sigma_px: float) -> Array:
 
 
 def noise_bank(height: int, width: int, seed: int) -> tuple[Array, Array]:
-    """Noise of Y (h + spare, w + spare) and of U and V (2, half of each) as int8, NOISE_UNIT to a grey level of RGB noise.
+    """Noise of Y (h + spare, w + spare) and of U and V (2, half of each) as int8, NOISE_UNIT to a
+    grey level of RGB noise.
 
-    White noise on a Bayer mosaic, interpolated bilinearly as cameras do (so neighbours are correlated, and averaging chroma
-    helps less than it would), scaled so that each colour channel has a standard deviation of one.
+    White noise on a Bayer mosaic, interpolated bilinearly as cameras do (so neighbours are
+    correlated, and averaging chroma helps less than it would), scaled so that each colour channel
+    has a standard deviation of one.
     """
     rng = np.random.default_rng([seed, 17])
     h, w = height + _SPARE, width + _SPARE
@@ -59,7 +66,9 @@ def noise_bank(height: int, width: int, seed: int) -> tuple[Array, Array]:
     luma = 0.257 * r + 0.504 * g + 0.098 * b
     chroma = np.stack([-0.148 * r - 0.291 * g + 0.439 * b, 0.439 * r - 0.368 * g - 0.071 * b])
     chroma = chroma.reshape(2, h // 2, 2, w // 2, 2).mean(axis=(2, 4))
-    return tuple(np.clip(np.round(NOISE_UNIT * plane), -127, 127).astype(np.int8) for plane in (luma, chroma))
+    return tuple(
+        np.clip(np.round(NOISE_UNIT * plane), -127, 127).astype(np.int8) for plane in (luma, chroma)
+    )
 
 
 def _smooth(plane: Array, kernel: tuple[float, float, float]) -> Array:
@@ -92,7 +101,9 @@ def _blur_row(reach, weights, picture, scratch):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)
 def blur(reach, weights, picture, scratch, out):  # type: ignore[no-untyped-def]
-    """Separable blur of the picture (h, w, 3) into out, between the columns reach (h, 2) of each row, as `develop`."""
+    """Separable blur of the picture (h, w, 3) into out, between the columns reach (h, 2) of each
+    row, as `develop`.
+    """
     height = picture.shape[0]
     wide = np.empty(2, np.int64)
     for y in range(height):
@@ -124,9 +135,11 @@ def _tone(curve, light):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)
 def develop(reach, curve, picture, luma, chroma):  # type: ignore[no-untyped-def]
-    """Light (h, w, 3) to Y (h, w), U and V (2, h / 2, w / 2), float32 unrounded, between the columns reach (h, 2) of each row.
+    """Light (h, w, 3) to Y (h, w), U and V (2, h / 2, w / 2), float32 unrounded, between the
+    columns reach (h, 2) of each row.
 
-    The two rows of a pair reach equally far, from an even to an odd column; an empty row ends before it begins.
+    The two rows of a pair reach equally far, from an even to an odd column; an empty row ends
+    before it begins.
     """
     for v in range(luma.shape[0] // 2):
         for w in range(reach[2 * v, 0] // 2, (reach[2 * v, 1] + 1) // 2):
@@ -134,8 +147,17 @@ def develop(reach, curve, picture, luma, chroma):  # type: ignore[no-untyped-def
             for dy in range(2):
                 for dx in range(2):
                     y, x = 2 * v + dy, 2 * w + dx
-                    r, g, b = _tone(curve, picture[y, x, 0]), _tone(curve, picture[y, x, 1]), _tone(curve, picture[y, x, 2])
-                    luma[y, x] = np.float32(16.0) + np.float32(0.257) * r + np.float32(0.504) * g + np.float32(0.098) * b
+                    r, g, b = (
+                        _tone(curve, picture[y, x, 0]),
+                        _tone(curve, picture[y, x, 1]),
+                        _tone(curve, picture[y, x, 2]),
+                    )
+                    luma[y, x] = (
+                        np.float32(16.0)
+                        + np.float32(0.257) * r
+                        + np.float32(0.504) * g
+                        + np.float32(0.098) * b
+                    )
                     red, green, blue = red + r, green + g, blue + b
             chroma[0, v, w] = np.float32(128.0) + np.float32(0.25) * (
                 np.float32(-0.148) * red - np.float32(0.291) * green + np.float32(0.439) * blue
@@ -153,7 +175,10 @@ def noise_offsets(seed: int, frame: int) -> tuple[int, int]:
 
 @njit(cache=True, nogil=True, fastmath=True)
 def expose(luma, chroma, luma_noise, chroma_noise, row, column, sign, strength, out):  # type: ignore[no-untyped-def]
-    """Noise and rounding: I420 bytes (h * 3 / 2, w) of unrounded planes. strength: grey levels per unit of the bank; sign +1 or -1."""
+    """Noise and rounding: I420 bytes (h * 3 / 2, w) of unrounded planes.
+
+    strength: grey levels per unit of the bank; sign +1 or -1.
+    """
     height, width = luma.shape
     slope = np.float32((_BRIGHT - _DARK) / 255.0 * strength * sign)
     base = np.float32(_DARK * strength * sign)
@@ -162,7 +187,9 @@ def expose(luma, chroma, luma_noise, chroma_noise, row, column, sign, strength, 
     for y in range(height):
         for x in range(width):
             value = luma[y, x]
-            noisy = value + np.float32(luma_noise[y + row, x + column]) * (base + slope * value) + half
+            noisy = (
+                value + np.float32(luma_noise[y + row, x + column]) * (base + slope * value) + half
+            )
             out[y, x] = np.uint8(min(top, max(np.float32(0.0), noisy)))
     flat = out.reshape(-1)
     for plane in range(2):

@@ -1,7 +1,8 @@
-"""How capsules and dabs move, in the camera and in its picture, while one frame is exposed. Compiled kernels. Pure.
+"""How capsules and dabs move, in the camera and in its picture, while one frame is exposed.
+Compiled kernels. Pure.
 
-A path is a parabola in u: u = -1 is the first instant that any row is exposed, u = 1 the last. Over the 24 ms of a frame a waving
-hand leaves it by less than 0.1 mm.
+A path is a parabola in u: u = -1 is the first instant that any row is exposed, u = 1 the last. Over
+the 24 ms of a frame a waving hand leaves it by less than 0.1 mm.
 """
 
 from __future__ import annotations
@@ -38,10 +39,12 @@ def _point(positions, rotations, frame, offset, R, p, out):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def motions(positions, rotations, R, p, lens, frame, offset, radius, ends, palms, tracks):  # type: ignore[no-untyped-def]
-    """Parabolas of all capsules from the frames at three instants, positions (3, f, 3), rotations (3, f, 3, 3).
+    """Parabolas of all capsules from the frames at three instants, positions (3, f, 3), rotations
+    (3, f, 3, 3).
 
-    ends (c, 2, 3, 3): each end's path in the camera frame; palms (c, 3, 3): path of the direction that is palmar for the
-    capsule's first frame; tracks (c, 2, 3, 3): each end's path in the image: x, y, radius in px.
+    ends (c, 2, 3, 3): each end's path in the camera frame; palms (c, 3, 3): path of the direction
+    that is palmar for the capsule's first frame; tracks (c, 2, 3, 3): each end's path in the image:
+    x, y, radius in px.
     """
     at, image, direction = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for c in range(frame.shape[0]):
@@ -60,7 +63,11 @@ def motions(positions, rotations, R, p, lens, frame, offset, radius, ends, palms
         for k in range(3):
             for i in range(3):
                 f = frame[c, 0]
-                direction[k, i] = -(R[i, 0] * rotations[k, f, 0, 1] + R[i, 1] * rotations[k, f, 1, 1] + R[i, 2] * rotations[k, f, 2, 1])
+                direction[k, i] = -(
+                    R[i, 0] * rotations[k, f, 0, 1]
+                    + R[i, 1] * rotations[k, f, 1, 1]
+                    + R[i, 2] * rotations[k, f, 2, 1]
+                )
         parabola(direction[0], direction[1], direction[2], palms[c])
 
 
@@ -76,14 +83,21 @@ def points(positions, rotations, R, p, frame, offset, paths):  # type: ignore[no
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def rows_of(tracks, height, spans):  # type: ignore[no-untyped-def]
-    """First and last row (c, 2) that each capsule can touch at any instant; an empty span for what is too near."""
+    """First and last row (c, 2) that each capsule can touch at any instant.
+
+    An empty span for what is too near.
+    """
     for c in range(tracks.shape[0]):
         low, high = FAR, -FAR
         for end in range(2):
             for k in range(3):
                 u = k - 1.0
                 y = tracks[c, end, 0, 1] + u * (tracks[c, end, 1, 1] + u * tracks[c, end, 2, 1])
-                r = tracks[c, end, 0, 2] + u * (tracks[c, end, 1, 2] + u * tracks[c, end, 2, 2]) + _MARGIN_PX
+                r = (
+                    tracks[c, end, 0, 2]
+                    + u * (tracks[c, end, 1, 2] + u * tracks[c, end, 2, 2])
+                    + _MARGIN_PX
+                )
                 low, high = min(low, y - r), max(high, y + r)
         if high - low > 10.0 * height:
             low, high = FAR, -FAR

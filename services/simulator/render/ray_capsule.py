@@ -1,7 +1,7 @@
 """Rays and tapered capsules as compiled kernels, in one camera's frame. Pure.
 
-A capsule is the hull of two balls. While a frame is exposed it moves along a parabola in u = -1..1 (render_paths). Capsules must lie
-before the camera; one that does not is drawn nowhere.
+A capsule is the hull of two balls. While a frame is exposed it moves along a parabola in u = -1..1
+(render_paths). Capsules must lie before the camera; one that does not is drawn nowhere.
 """
 
 from __future__ import annotations
@@ -17,21 +17,28 @@ from rhot.geometry.transforms import Array
 
 Array32 = npt.NDArray[np.float32]
 
-# Fields of a placed capsule: 0 a, 3 b - a, 6 b (xyz each), 9 radii and products of these that `hit` needs; from LOOK on what `shade`
-# needs, written once by `dress`: palmar direction (xyz), surface, end surface, end length, dabbed, instant.
+# Fields of a placed capsule: 0 a, 3 b - a, 6 b (xyz each), 9 radii and products of these that `hit`
+# needs; from LOOK on what `shade` needs, written once by `dress`: palmar direction (xyz), surface,
+# end surface, end length, dabbed, instant.
 LOOK = 20
 PLACED = LOOK + 8
 FAR = 1e9
 
 
 def rays_of(camera: Camera) -> Array32:
-    """Unit direction of every pixel's ray in the camera frame; (h, 3, w) float32, so that rows are contiguous."""
+    """Unit direction of every pixel's ray in the camera frame.
+
+    (h, 3, w) float32, so that rows are contiguous.
+    """
     w, h = camera.size_px
     x, y = np.meshgrid(np.arange(w, dtype=np.float64), np.arange(h, dtype=np.float64))
     pixels = np.stack([x.ravel(), y.ravel()], axis=1)
     xy = camera.rays_from_pixels(pixels)
-    # A lens model that folds over has no ray for its outermost pixels; real ones show a dim rim there, which a plain pinhole stands for.
-    plain = Camera(camera.name, camera.size_px, camera.matrix, np.zeros(5), camera.T_rig_from_camera)
+    # A lens model that folds over has no ray for its outermost pixels; real ones show a dim rim
+    # there, which a plain pinhole stands for.
+    plain = Camera(
+        camera.name, camera.size_px, camera.matrix, np.zeros(5), camera.T_rig_from_camera
+    )
     xy = np.where(np.isnan(xy), plain.rays_from_pixels(pixels), xy)
     rays = np.concatenate([xy, np.ones((h * w, 1))], axis=1)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -57,7 +64,10 @@ def project(lens, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place(ends, ra, rb, u, g):  # type: ignore[no-untyped-def]
-    """One capsule at instant u: everything about it that does not depend on the ray; g (PLACED,)."""
+    """One capsule at instant u: everything about it that does not depend on the ray.
+
+    G (PLACED,).
+    """
     ba2, m1, m5, m7 = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         a = ends[0, 0, i] + u * (ends[0, 1, i] + u * ends[0, 2, i])
@@ -81,10 +91,12 @@ def place(ends, ra, rb, u, g):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
 def hit(g, x, y, z):  # type: ignore[no-untyped-def]
-    """(distance, along) of the first point where a ray (unit, from the origin) meets a capsule; distance FAR if nowhere.
+    """(distance, along) of the first point where a ray (unit, from the origin) meets a capsule;
+    distance FAR if nowhere.
 
-    along is 0 on ball a, the squared slant length g[16] on ball b, and between on the cone. Closed form after
-    I. Quilez, "Ray-surface intersection functions", rounded cone; the balls lie inside the hull, so the nearest candidate is right.
+    along is 0 on ball a, the squared slant length g[16] on ball b, and between on the cone. Closed
+    form after I. Quilez, "Ray-surface intersection functions", rounded cone; the balls lie inside
+    the hull, so the nearest candidate is right.
     """
     d2 = g[16]
     m2 = g[3] * x + g[4] * y + g[5] * z
@@ -118,7 +130,10 @@ def hit(g, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def hit_row(g, rays, first, last, capsule, depth, owner, reach):  # type: ignore[no-untyped-def]
-    """`hit` for the pixels first..last of one row (3, w), keeping the nearest; free of branches, so that it compiles to SIMD."""
+    """`hit` for the pixels first..last of one row (3, w), keeping the nearest.
+
+    Free of branches, so that it compiles to SIMD.
+    """
     ax, ay, az, bx, by, bz = g[0], g[1], g[2], g[6], g[7], g[8]
     ux, uy, uz = g[3], g[4], g[5]
     d2, k0, ca, cb = g[16], g[17], g[14], g[15]
@@ -158,5 +173,9 @@ def dress(palms, kind, end_m, g):  # type: ignore[no-untyped-def]
         for c in range(g.shape[1]):
             for i in range(3):
                 g[k, c, LOOK + i] = palms[c, 0, i]
-            g[k, c, LOOK + 3], g[k, c, LOOK + 4], g[k, c, LOOK + 5] = kind[c, 0], kind[c, 1], end_m[c]
+            g[k, c, LOOK + 3], g[k, c, LOOK + 4], g[k, c, LOOK + 5] = (
+                kind[c, 0],
+                kind[c, 1],
+                end_m[c],
+            )
             g[k, c, LOOK + 6], g[k, c, LOOK + 7] = kind[c, 2], k

@@ -1,7 +1,9 @@
-"""Pictures of a scene as one camera takes them. Pure: the same (scene, camera, frame) gives the same bytes.
+"""Pictures of a scene as one camera takes them. Pure: the same (scene, camera, frame) gives the
+same bytes.
 
-A renderer belongs to one thread: it owns its buffers. Its kernels release the GIL. What lies outside the picture or nearer than
-2 cm is not drawn. The first picture compiles the kernels (cached on disk).
+A renderer belongs to one thread: it owns its buffers. Its kernels release the GIL. What lies
+outside the picture or nearer than 2 cm is not drawn. The first picture compiles the kernels (cached
+on disk).
 """
 
 from __future__ import annotations
@@ -31,7 +33,10 @@ _GAIN_SIGMA = 0.015
 
 @dataclass(frozen=True, eq=False)
 class Cast:
-    """Every body of a scene and how it looks. marks: (hand, landmark) -> surface number of its paint."""
+    """Every body of a scene and how it looks.
+
+    marks: (hand, landmark) -> surface number of its paint.
+    """
 
     shapes: ShapeArrays
     surfaces: list[Surface]
@@ -39,7 +44,10 @@ class Cast:
 
 
 def cast_of(scene: Scene) -> Cast:
-    """Bodies and surfaces of a scene; surface 0 is skin. Raises ConfigError for a colour no paint has."""
+    """Bodies and surfaces of a scene; surface 0 is skin.
+
+    Raises ConfigError for a colour no paint has.
+    """
     shapes, surfaces = Shapes(), [SKIN, CUP, TRACKER]
     marks: dict[tuple[str, str], int] = {}
     for number, hand in enumerate(scene.hands.values()):
@@ -81,7 +89,10 @@ class Renderer:
         T = camera.T_camera_from_rig
         self._R, self._p = np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
         shade = vignette(rays)
-        sharp = backdrop(camera, first, wall(scene.seed, scene.spec.clutter), rays, gains) * shade[..., None]
+        sharp = (
+            backdrop(camera, first, wall(scene.seed, scene.spec.clutter), rays, gains)
+            * shade[..., None]
+        )
         self._film = Film(
             rays=rays,
             vignette=shade,
@@ -94,7 +105,9 @@ class Renderer:
             picture=sharp.copy(),
             pattern=patterns(),
         )
-        self._world = self._make_world(lights_of(scene.spec.light, T[:3, :3] @ first.T_rig_from_camera[:3, :3]), gains)
+        self._world = self._make_world(
+            lights_of(scene.spec.light, T[:3, :3] @ first.T_rig_from_camera[:3, :3]), gains
+        )
         self._curve, self._weights = develop.tone_curve(), develop.blur_weights(scene.spec.blur_px)
         self._bank = develop.noise_bank(height, width, self._seed)
 
@@ -123,7 +136,10 @@ class Renderer:
         self._scratch, self._soft = np.empty_like(film.backdrop), np.empty_like(film.backdrop)
         everything = np.tile([0, width - 1], (height, 1))
         self._reach = everything.copy()
-        self._luma, self._chroma = np.empty((height, width), np.float32), np.empty((2, height // 2, width // 2), np.float32)
+        self._luma, self._chroma = (
+            np.empty((height, width), np.float32),
+            np.empty((2, height // 2, width // 2), np.float32),
+        )
         develop.blur(everything, self._weights, film.backdrop, self._scratch, self._soft)
         develop.develop(everything, self._curve, self._soft, self._luma, self._chroma)
         self._bare = self._luma.copy(), self._chroma.copy()
@@ -141,11 +157,17 @@ class Renderer:
 
     @property
     def light(self) -> npt.NDArray[np.float32]:
-        """Linear light of the last picture before the lens blurs it; (h, w, 3). Overwritten by the next picture."""
+        """Linear light of the last picture before the lens blurs it; (h, w, 3).
+
+        Overwritten by the next picture.
+        """
         return self._film.picture
 
-    def labels(self, time_s: float, only: npt.NDArray[np.bool_] | None = None) -> npt.NDArray[np.int16]:
-        """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1 + Cast.marks[...] paint; (h, w).
+    def labels(
+        self, time_s: float, only: npt.NDArray[np.bool_] | None = None
+    ) -> npt.NDArray[np.int16]:
+        """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1
+        + Cast.marks[...] paint; (h, w).
 
         only (c,) says which capsules are there; default all.
         """
@@ -158,7 +180,16 @@ class Renderer:
         out = np.empty((height * 3 // 2, width), np.uint8)
         row, column = develop.noise_offsets(self._seed, frame)
         sign = 1.0 if (frame ^ (row >> 1)) & 1 else -1.0
-        develop.expose(self._luma, self._chroma, *self._bank, row, column, sign, noise / develop.NOISE_UNIT, out)
+        develop.expose(
+            self._luma,
+            self._chroma,
+            *self._bank,
+            row,
+            column,
+            sign,
+            noise / develop.NOISE_UNIT,
+            out,
+        )
         return out
 
     def _draw(self, time_s: float) -> None:
@@ -166,7 +197,8 @@ class Renderer:
         self._wipe()
         timing, shutter = self._trace(time_s)
         longest = outlines(self._world, self._film, shutter)
-        # What moves reaches beyond where it was in the middle of the exposure, and the lens spreads it further.
+        # What moves reaches beyond where it was in the middle of the exposure, and the lens spreads
+        # it further.
         widen(self._film.ranges, int(0.5 * longest) + 5, self._reach)
         np.minimum(self._reach[:, 1], self.camera.size_px[0] - 1, out=self._reach[:, 1])
         self._drawn = self._bounds(self._reach)
@@ -185,19 +217,38 @@ class Renderer:
         film.label[y0:y1, x0:x1] = 0
         film.flags[y0:y1, x0:x1] = 0
         self._luma[y0:y1, x0:x1] = self._bare[0][y0:y1, x0:x1]
-        self._chroma[:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2] = self._bare[1][:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2]
+        self._chroma[:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2] = self._bare[1][
+            :, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2
+        ]
         self._drawn = None
 
-    def _trace(self, time_s: float, only: npt.NDArray[np.bool_] | None = None) -> tuple[Array, float]:
+    def _trace(
+        self, time_s: float, only: npt.NDArray[np.bool_] | None = None
+    ) -> tuple[Array, float]:
         """One ray a pixel; returns (u of row 0 and step a row), and the exposure in units of u."""
         height = self.camera.size_px[1]
         row_s, exposure_s = self.clock.row_time_ns * 1e-9, self.clock.exposure_s
         half_s = 0.5 * ((height - 1) * row_s + exposure_s)
         middle_s = time_s + 0.5 * (height - 1) * row_s
         bodies = [self.scene.bodies(middle_s + k * half_s) for k in (-1, 0, 1)]
-        positions, rotations = np.stack([b.positions for b in bodies]), np.stack([b.rotations for b in bodies])
+        positions, rotations = (
+            np.stack([b.positions for b in bodies]),
+            np.stack([b.rotations for b in bodies]),
+        )
         s, w = self.cast.shapes, self._world
-        motions(positions, rotations, self._R, self._p, self._lens, s.frame, s.offset, s.radius, w.ends, w.palms, w.tracks)
+        motions(
+            positions,
+            rotations,
+            self._R,
+            self._p,
+            self._lens,
+            s.frame,
+            s.offset,
+            s.radius,
+            w.ends,
+            w.palms,
+            w.tracks,
+        )
         points(positions, rotations, self._R, self._p, s.dab_frame, s.dab_offset, w.dabs)
         rows_of(w.tracks, height, w.spans)
         if only is not None:
@@ -208,9 +259,14 @@ class Renderer:
         return timing, exposure_s / half_s
 
     def _bounds(self, ranges: npt.NDArray[np.int64]) -> Array | None:
-        """First and last row and column of all ranges (h, 2), on even boundaries; None if they are empty."""
+        """First and last row and column of all ranges (h, 2), on even boundaries.
+
+        None if they are empty.
+        """
         rows = np.flatnonzero(ranges[:, 1] >= ranges[:, 0])
         if not len(rows):
             return None
         first, last = int(ranges[rows, 0].min()), int(ranges[rows, 1].max())
-        return np.array([rows[0] // 2 * 2, rows[-1] // 2 * 2 + 1, first // 2 * 2, last // 2 * 2 + 1])
+        return np.array(
+            [rows[0] // 2 * 2, rows[-1] // 2 * 2 + 1, first // 2 * 2, last // 2 * 2 + 1]
+        )

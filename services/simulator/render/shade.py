@@ -1,7 +1,8 @@
 """What a ray sees where it meets a capsule: which surface, in which light. Compiled kernels. Pure.
 
-Light is linear RGB; a lamp at infinity with a soft edge (wrapped Lambert), a fill lamp, light from all around, a coloured rim
-lamp, and the highlight of the first (Blinn-Phong, with Schlick's rational approximation of the power, 1994).
+Light is linear RGB; a lamp at infinity with a soft edge (wrapped Lambert), a fill lamp, light from
+all around, a coloured rim lamp, and the highlight of the first (Blinn-Phong, with Schlick's
+rational approximation of the power, 1994).
 """
 
 from __future__ import annotations
@@ -26,11 +27,21 @@ _CREASE_M, _CREASE = 1.1e-3, 0.22
 
 
 def lights_of(light: Light, rotation: Array) -> Array:
-    """(8, 3) rows: key direction and colour, fill direction and colour, rim direction and colour, ambient, up.
+    """(8, 3) rows: key direction and colour, fill direction and colour, rim direction and colour,
+    ambient, up.
 
     rotation (3, 3) turns the first camera's frame into the frame of the camera that renders.
     """
-    rows = [light.key_from, light.key, light.fill_from, light.fill, light.rim_from, light.rim, light.ambient, (0.0, -1.0, 0.0)]
+    rows = [
+        light.key_from,
+        light.key,
+        light.fill_from,
+        light.fill,
+        light.rim_from,
+        light.rim,
+        light.ambient,
+        (0.0, -1.0, 0.0),
+    ]
     lights = np.array(rows)
     for row in (0, 2, 4, 7):
         lights[row] = rotation @ (lights[row] / np.linalg.norm(lights[row]))
@@ -38,8 +49,13 @@ def lights_of(light: Light, rotation: Array) -> Array:
 
 
 def surfaces_of(surfaces: list[Surface], gains: Array) -> Array:
-    """(m, 7): albedo as the camera's colour gains (3,) see it, gloss, shininess, texture, 1 for skin (the first surface)."""
-    rows = [(*(np.array(s.albedo) * gains), s.gloss, s.shininess, s.texture, 1.0 if i == 0 else 0.0) for i, s in enumerate(surfaces)]
+    """(m, 7): albedo as the camera's colour gains (3,) see it, gloss, shininess, texture, 1 for
+    skin (the first surface).
+    """
+    rows = [
+        (*(np.array(s.albedo) * gains), s.gloss, s.shininess, s.texture, 1.0 if i == 0 else 0.0)
+        for i, s in enumerate(surfaces)
+    ]
     return np.array(rows)
 
 
@@ -54,13 +70,17 @@ def texture(seed: int) -> Array32:
     return (np.clip(0.45 * noise / noise.std(), -1.0, 1.0)).astype(np.float32)
 
 
-# Rows of a batch of hits: distance, along, ray (xyz) in; linear red, green, blue and the surface's number out.
+# Rows of a batch of hits: distance, along, ray (xyz) in; linear red, green, blue and the surface's
+# number out.
 HIT_T, HIT_ALONG, HIT_RAY, HIT_RGB, HIT_SURFACE, HITS = 0, 1, 2, 5, 8, 9
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def identify(n, hits, where, g, dabs, dab_r2, dab_surface):  # type: ignore[no-untyped-def]
-    """Which surface each of n hits is on. where (n,) are rows of the placed capsules g (k, PLACED), dabs (instants, d, 3)."""
+    """Which surface each of n hits is on.
+
+    where (n,) are rows of the placed capsules g (k, PLACED), dabs (instants, d, 3).
+    """
     for i in range(n):
         c = where[i]
         t = hits[HIT_T, i]
@@ -68,7 +88,9 @@ def identify(n, hits, where, g, dabs, dab_r2, dab_surface):  # type: ignore[no-u
         surface = g[c, LOOK + 3]
         if g[c, LOOK + 4] >= 0.0:
             # Distance from the far end of the skin, along the bone.
-            axial = (g[c, 3] * (x - g[c, 0]) + g[c, 4] * (y - g[c, 1]) + g[c, 5] * (z - g[c, 2])) * g[c, 19]
+            axial = (
+                g[c, 3] * (x - g[c, 0]) + g[c, 4] * (y - g[c, 1]) + g[c, 5] * (z - g[c, 2])
+            ) * g[c, 19]
             if g[c, 18] + g[c, 10] - axial < g[c, LOOK + 5]:
                 surface = g[c, LOOK + 4]
         if g[c, LOOK + 6] > 0.0:
@@ -91,7 +113,11 @@ def shade(n, hits, where, g, looks, lights, blotches):  # type: ignore[no-untype
         nx, ny, nz = ax, ay, az
         if along > 0.0:
             if along < g[c, 16]:
-                nx, ny, nz = g[c, 16] * ax - g[c, 3] * along, g[c, 16] * ay - g[c, 4] * along, g[c, 16] * az - g[c, 5] * along
+                nx, ny, nz = (
+                    g[c, 16] * ax - g[c, 3] * along,
+                    g[c, 16] * ay - g[c, 4] * along,
+                    g[c, 16] * az - g[c, 5] * along,
+                )
             else:
                 nx, ny, nz = ax - g[c, 3], ay - g[c, 4], az - g[c, 5]
         inverse = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz + 1e-30)
@@ -113,7 +139,10 @@ def shade(n, hits, where, g, looks, lights, blotches):  # type: ignore[no-untype
 
         palmar = nx * g[c, LOOK] + ny * g[c, LOOK + 1] + nz * g[c, LOOK + 2]
         axial = (g[c, 3] * ax + g[c, 4] * ay + g[c, 5] * az) * g[c, 19]
-        u, v = int(axial * _PER_METRE + 4096.0) & (TEXELS - 1), int((palmar + 1.0) * 10.0 + 1e4 * g[c, 9]) & (TEXELS - 1)
+        u, v = (
+            int(axial * _PER_METRE + 4096.0) & (TEXELS - 1),
+            int((palmar + 1.0) * 10.0 + 1e4 * g[c, 9]) & (TEXELS - 1),
+        )
         tone = 1.0 + looks[s, 5] * blotches[u, v]
         rest = tone
         if looks[s, 6] > 0.0:
@@ -124,4 +153,8 @@ def shade(n, hits, where, g, looks, lights, blotches):  # type: ignore[no-untype
                 tone, rest = tone * fold, rest * fold
         for j in range(3):
             light = lights[1, j] * diffuse + lights[3, j] * fill + lights[6, j] * sky
-            hits[HIT_RGB + j, i] = looks[s, j] * (tone if j == 0 else rest) * light + highlight * lights[1, j] + rim * lights[5, j]
+            hits[HIT_RGB + j, i] = (
+                looks[s, j] * (tone if j == 0 else rest) * light
+                + highlight * lights[1, j]
+                + rim * lights[5, j]
+            )

@@ -1,4 +1,7 @@
-"""Tracing a picture row by row, each row at its own instant (rolling shutter): one ray a pixel. Compiled kernels. Pure."""
+"""Tracing a picture row by row, each row at its own instant (rolling shutter): one ray a pixel.
+
+Compiled kernels. Pure.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,16 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.simulator.render.motion_paths import columns_of
 from services.simulator.render.ray_capsule import FAR, PLACED, Array32, dress, hit_row, place
-from services.simulator.render.shade import HIT_ALONG, HIT_RAY, HIT_RGB, HIT_SURFACE, HIT_T, HITS, identify, shade
+from services.simulator.render.shade import (
+    HIT_ALONG,
+    HIT_RAY,
+    HIT_RGB,
+    HIT_SURFACE,
+    HIT_T,
+    HITS,
+    identify,
+    shade,
+)
 from services.simulator.scene.bodies import Ints
 
 
@@ -34,7 +46,11 @@ class World(NamedTuple):
 
 
 class Film(NamedTuple):
-    """What is exposed. depth FAR, owner (capsule), label (1 + surface) and flags 0 mean background; ranges: touched columns of a row."""
+    """What is exposed.
+
+    depth FAR, owner (capsule), label (1 + surface) and flags 0 mean background; ranges: touched
+    columns of a row.
+    """
 
     rays: Array32  # (h, 3, w)
     vignette: Array32  # (h, w)
@@ -58,14 +74,21 @@ def dabs_at(paths, u, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def trace(world, film, timing):  # type: ignore[no-untyped-def]
-    """Fill depth, owner, label, ranges and picture with one ray through each pixel; timing: u of row 0 and of each further row."""
+    """Fill depth, owner, label, ranges and picture with one ray through each pixel.
+
+    Timing: u of row 0 and of each further row.
+    """
     height, width = film.depth.shape
     count = world.ends.shape[0]
     g = np.empty((1, count, PLACED))
     dress(world.palms, world.kind, world.end_m, g)
     dabs = np.empty((1, world.dabs.shape[0], 3))
     depth, reach, owner = np.empty(width), np.empty(width), np.empty(width, np.int64)
-    hits, where, columns = np.empty((HITS, width)), np.empty(width, np.int64), np.empty(width, np.int64)
+    hits, where, columns = (
+        np.empty((HITS, width)),
+        np.empty(width, np.int64),
+        np.empty(width, np.int64),
+    )
     for row in range(height):
         u = timing[0] + row * timing[1]
         first, last = width, -1
@@ -85,7 +108,17 @@ def trace(world, film, timing):  # type: ignore[no-untyped-def]
             dabs_at(world.dabs, u, dabs[0])
             identify(n, hits, where, g[0], dabs, world.dab_r2, world.dab_surface)
             shade(n, hits, where, g[0], world.looks, world.lights, world.blotches)
-            _develop(n, hits, where, columns, film.vignette[row], film.depth[row], film.owner[row], film.label[row], film.picture[row])
+            _develop(
+                n,
+                hits,
+                where,
+                columns,
+                film.vignette[row],
+                film.depth[row],
+                film.owner[row],
+                film.label[row],
+                film.picture[row],
+            )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -95,7 +128,11 @@ def _collect(rays, first, last, depth, reach, owner, hits, where, columns):  # t
     for x in range(first, last + 1):
         if depth[x] < FAR:
             hits[HIT_T, n], hits[HIT_ALONG, n] = depth[x], reach[x]
-            hits[HIT_RAY, n], hits[HIT_RAY + 1, n], hits[HIT_RAY + 2, n] = rays[0, x], rays[1, x], rays[2, x]
+            hits[HIT_RAY, n], hits[HIT_RAY + 1, n], hits[HIT_RAY + 2, n] = (
+                rays[0, x],
+                rays[1, x],
+                rays[2, x],
+            )
             where[n], columns[n] = owner[x], x
             n += 1
     return n

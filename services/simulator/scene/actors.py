@@ -27,7 +27,8 @@ _MIDDLE_M = np.array([0.0, 0.0, -0.09])
 _EXTENSION = 0.6
 # Two hands stand this far apart, middle to middle.
 _HANDS_APART_M = 0.23
-# A held handle lies across the palm, under the proximal phalanges; axis of the object = x of the hand.
+# A held handle lies across the palm, under the proximal phalanges; axis of the object = x of the
+# hand.
 GRIP_M = np.array([0.0, -0.036, -0.104])
 
 
@@ -48,7 +49,10 @@ class HandState:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Where a hand rests and how it travels, in the rig frame; the axes of `travel_m` are the first camera's."""
+    """Where a hand rests and how it travels, in the rig frame.
+
+    The axes of `travel_m` are the first camera's.
+    """
 
     rotation: Array  # (3, 3)
     wrist_m: Array  # (3,)
@@ -78,7 +82,9 @@ class Hand:
         stage = self.stage
         phase = TAU * stage.travel_hz * self.speed * t_s * np.array([1.0, 0.77, 0.61])
         travel = stage.travel_axes @ (stage.travel_m * np.sin(phase))
-        rotation = stage.rotation @ rotation_from_vector(gesture.turn_rad) @ rotation_from_vector(turn)
+        rotation = (
+            stage.rotation @ rotation_from_vector(gesture.turn_rad) @ rotation_from_vector(turn)
+        )
         wrist = stage.wrist_m + travel + stage.rotation @ (gesture.shift_m + shift)
         angles = self.unrest.fingers(t_s, gesture.angles_rad, self.model)
         return HandState(rotation, wrist, stage.arm_rotation, angles, gesture.grip)
@@ -101,17 +107,26 @@ class Thing:
 
     @property
     def T_object_from_tracker(self) -> Array:  # noqa: N802
-        return inverse(transform(rotation_from_quaternion(self.place.orientation_wxyz), self.place.offset_m))
+        return inverse(
+            transform(rotation_from_quaternion(self.place.orientation_wxyz), self.place.offset_m)
+        )
 
     def at(self, hands: dict[HandName, HandState]) -> Array:
-        """T_rig_from_object (4, 4) given the hands of the same instant; moves from rest to held without a jump."""
+        """T_rig_from_object (4, 4) given the hands of the same instant.
+
+        Moves from rest to held without a jump.
+        """
         state = hands.get(self.holder) if self.holder else None
         if state is None or state.grip <= 0.0:
             return self.T_rig_from_rest
         T_held = state.T_rig_from_wrist @ self.T_wrist_from_held
         delta = self.T_rig_from_rest[:3, :3].T @ T_held[:3, :3]
-        rotation = self.T_rig_from_rest[:3, :3] @ rotation_from_vector(state.grip * vector_from_rotation(delta))
-        return transform(rotation, (1.0 - state.grip) * self.T_rig_from_rest[:3, 3] + state.grip * T_held[:3, 3])
+        rotation = self.T_rig_from_rest[:3, :3] @ rotation_from_vector(
+            state.grip * vector_from_rotation(delta)
+        )
+        return transform(
+            rotation, (1.0 - state.grip) * self.T_rig_from_rest[:3, 3] + state.grip * T_held[:3, 3]
+        )
 
 
 def stage_of(
@@ -125,13 +140,17 @@ def stage_of(
 ) -> Stage:
     """A hand with its palm towards the first camera and its fingers up.
 
-    T_rig_from_view places the first camera, middle_m (3,) is the middle of the hand in its frame. Tilted by 0 deg the palm
-    faces the camera; more tilt lets the camera look from the wrist's side.
+    T_rig_from_view places the first camera, middle_m (3,) is the middle of the hand in its frame.
+    Tilted by 0 deg the palm faces the camera; more tilt lets the camera look from the wrist's side.
     """
     tilt, yaw, roll = np.deg2rad([tilt_deg, yaw_deg, roll_deg])
     # Columns: the wrist's x, y (back of the hand), z (away from the fingers) in the camera's frame.
-    upright = np.array([[-1.0, 0.0, 0.0], [0.0, np.sin(tilt), np.cos(tilt)], [0.0, np.cos(tilt), -np.sin(tilt)]])
-    spin = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
+    upright = np.array(
+        [[-1.0, 0.0, 0.0], [0.0, np.sin(tilt), np.cos(tilt)], [0.0, np.cos(tilt), -np.sin(tilt)]]
+    )
+    spin = np.array(
+        [[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]]
+    )
     R_view = spin @ rotation_y(yaw) @ upright
     axes = T_rig_from_view[:3, :3]
     rotation = axes @ R_view

@@ -1,7 +1,8 @@
-"""The bodies of the simulated world: tapered capsules that hang on moving frames, and dabs of paint on them. Pure data.
+"""The bodies of the simulated world: tapered capsules that hang on moving frames, and dabs of paint
+on them. Pure data.
 
-A frame is an OpenXR joint of a hand, its forearm, or an object. All lengths in metres, offsets in the axes of the frame they
-belong to. A left hand is the mirror image of a right one.
+A frame is an OpenXR joint of a hand, its forearm, or an object. All lengths in metres, offsets in
+the axes of the frame they belong to. A left hand is the mirror image of a right one.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Shapes:
     frame: list[tuple[int, int]] = field(default_factory=list)
     offset: list[tuple[Vec3, Vec3]] = field(default_factory=list)
     radius: list[tuple[float, float]] = field(default_factory=list)
-    # Surface of the capsule, surface of its painted end (-1: none), painted length, whether dabs stick to it.
+    # Surface of the capsule, surface of its painted end (-1: none), painted length, whether dabs
+    # stick to it.
     surface: list[int] = field(default_factory=list)
     end_surface: list[int] = field(default_factory=list)
     end_m: list[float] = field(default_factory=list)
@@ -50,7 +52,10 @@ class Shapes:
         *,
         dabbed: bool = False,
     ) -> None:
-        """A tapered capsule between two balls (frame, offset, radius); the last `end` = (surface, metres) before b's end is painted."""
+        """A tapered capsule between two balls (frame, offset, radius).
+
+        The last `end` = (surface, metres) before b's end is painted.
+        """
         self.frame.append((a[0], b[0]))
         self.offset.append((a[1], b[1]))
         self.radius.append((a[2], b[2]))
@@ -67,11 +72,14 @@ class Shapes:
         self.dab_surface.append(surface)
 
 
-def add_hand(shapes: Shapes, model: HandModel, first: int, skin: int, paints: dict[str, int]) -> None:
+def add_hand(
+    shapes: Shapes, model: HandModel, first: int, skin: int, paints: dict[str, int]
+) -> None:
     """A hand whose frames start at `first`; paints maps painted landmarks to surface numbers.
 
-    Each finger's skin ends exactly at its OpenXR tip joint. The palm is a bundle of fat capsules along the metacarpals, with
-    thenar, hypothenar and webs; the wrist's palm side is where Paint says, wrist_radius_m from the joint.
+    Each finger's skin ends exactly at its OpenXR tip joint. The palm is a bundle of fat capsules
+    along the metacarpals, with thenar, hypothenar and webs; the wrist's palm side is where Paint
+    says, wrist_radius_m from the joint.
     """
     for digit in model.digits:
         _add_digit(shapes, model, digit.name, first, skin, paints)
@@ -83,14 +91,17 @@ def add_hand(shapes: Shapes, model: HandModel, first: int, skin: int, paints: di
             shapes.dab(first + JOINT_INDEX[name], paint.offset_m, paint.extent_m, surface)
 
 
-def _add_digit(shapes: Shapes, model: HandModel, name: str, first: int, skin: int, paints: dict[str, int]) -> None:
+def _add_digit(
+    shapes: Shapes, model: HandModel, name: str, first: int, skin: int, paints: dict[str, int]
+) -> None:
     digit = next(d for d in model.digits if d.name == name)
     tip = JOINT_INDEX[f"{name}_tip"]
     r0, r1, r2, r3 = digit.radii_m
     joints = [first + j for j in range(tip - 3, tip + 1)]
     for a, b, ra, rb in ((joints[0], joints[1], r0, r1), (joints[1], joints[2], r1, r2)):
         shapes.capsule((a, _O, ra), (b, _O, rb), skin, dabbed=True)
-    # The last ball lies its radius before the tip; a distal bone shorter than that still gets a ball.
+    # The last ball lies its radius before the tip; a distal bone shorter than that still gets a
+    # ball.
     back = min(r3, digit.lengths_m[2])
     end = (paints.get(f"{name}_tip", -1), model.paint[f"{name}_tip"].extent_m)
     shapes.capsule((joints[2], _O, r2), (joints[3], (0.0, 0.0, back), r3), skin, end, dabbed=True)
@@ -102,13 +113,18 @@ def _add_palm(shapes: Shapes, model: HandModel, first: int, skin: int) -> None:
 
     def ball(joint: str, x: float, y: float, z: float, r: float) -> tuple[int, Vec3, float]:
         # Millimetres of an average right hand.
-        return first + JOINT_INDEX[joint], (side * x * 1e-3 * scale, y * 1e-3 * scale, z * 1e-3 * scale), r * 1e-3 * scale
+        return (
+            first + JOINT_INDEX[joint],
+            (side * x * 1e-3 * scale, y * 1e-3 * scale, z * 1e-3 * scale),
+            r * 1e-3 * scale,
+        )
 
     for finger in ("index", "middle", "ring", "little"):
         knuckle = (first + JOINT_INDEX[f"{finger}_proximal"], _O, radius[finger])
         shapes.capsule(ball(f"{finger}_metacarpal", 0, 0, 0, 14), knuckle, skin, dabbed=True)
     for a, b in (
-        # thenar eminence, web between thumb and index finger, hypothenar, the pads below the fingers, the hollow of the hand, its heel
+        # thenar eminence, web between thumb and index finger, hypothenar, the pads below the
+        # fingers, the hollow of the hand, its heel
         (ball("wrist", -13, -9, -14, 15), ball("thumb_proximal", 0, 0, 3, 12)),
         (ball("index_metacarpal", 0, -4, -38, 10), ball("thumb_proximal", 0, 0, 6, 10)),
         (ball("wrist", 18, -8, -18, 14.5), ball("little_proximal", 3, -3, 14, 10)),
@@ -125,7 +141,8 @@ def _add_forearm(shapes: Shapes, model: HandModel, first: int, skin: int) -> Non
     r = model.wrist_radius_m
     wrist = first + JOINT_INDEX["wrist"]
     for x, end_x in ((0.0, 0.0), (-0.45, -0.7), (0.45, 0.7)):
-        # The middle one carries the wrist dab: its surface is exactly wrist_radius_m from the joint.
+        # The middle one carries the wrist dab: its surface is exactly wrist_radius_m from the
+        # joint.
         near = r if x == 0.0 else 0.92 * r
         a, b = (model.side * x * r, 0.0, 0.0), (model.side * end_x * r, 0.0, 12.0 * r)
         shapes.capsule((wrist, a, near), (first + ARM, b, 1.45 * r), skin, dabbed=True)
@@ -152,7 +169,9 @@ def arrays(shapes: Shapes) -> ShapeArrays:
         np.array(shapes.frame, dtype=np.int64).reshape(-1, 2),
         np.array(shapes.offset).reshape(-1, 2, 3),
         np.array(shapes.radius).reshape(-1, 2),
-        np.stack([shapes.surface, shapes.end_surface, np.array(shapes.dabbed, dtype=np.int64)], axis=1).astype(np.int64),
+        np.stack(
+            [shapes.surface, shapes.end_surface, np.array(shapes.dabbed, dtype=np.int64)], axis=1
+        ).astype(np.int64),
         np.array(shapes.end_m, dtype=np.float64),
         np.array(shapes.dab_frame, dtype=np.int64),
         np.array(shapes.dab_offset).reshape(-1, 3),

@@ -1,6 +1,8 @@
-"""The guided recording as a simulated person does it: to the guide's pace, but never quite as asked. Pure.
+"""The guided recording as a simulated person does it: to the guide's pace, but never quite as
+asked. Pure.
 
-"Straight" is off by a few degrees, differently in every exercise; held fingers drift, neighbours follow the one that bends.
+"Straight" is off by a few degrees, differently in every exercise; held fingers drift, neighbours
+follow the one that bends.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from services.simulator.scene.gestures import Fitted, Gesture, Motion, bump
 
 # Standard deviation of "straight" per exercise (abduction, two flexions), and of the thumb's rest.
 _OFF_DEG, _THUMB_OFF_DEG = (3.0, 3.5, 3.5), (4.0, 5.0, 5.0)
-# How far neighbours follow, deg: finger independence is limited (Haeger-Ross & Schieber 2000), least for ring and little finger.
+# How far neighbours follow, deg: finger independence is limited (Haeger-Ross & Schieber 2000),
+# least for ring and little finger.
 _FOLLOW_DEG = (2.0, 8.0)
 _NO = np.zeros(3)
 
@@ -23,9 +26,15 @@ def guided(model: HandModel, seed: int) -> Motion:
     fit, rng = Fitted(model), np.random.default_rng([seed, 13])
     rest, bend = np.zeros((len(EXERCISES), 5, 4)), np.zeros((len(EXERCISES), 5, 4))
     for number, exercise in enumerate(EXERCISES):
-        rest[number, 0, :3] = np.array([5.0, 0.0, 10.0]) + np.clip(rng.normal(0.0, _THUMB_OFF_DEG), -8.0, 8.0)
+        rest[number, 0, :3] = np.array([5.0, 0.0, 10.0]) + np.clip(
+            rng.normal(0.0, _THUMB_OFF_DEG), -8.0, 8.0
+        )
         # Never beyond the limits, together with the bends below.
-        rest[number, 1:, :3] = np.clip(np.array([0.0, 4.0, 4.0]) + rng.normal(0.0, _OFF_DEG, (4, 3)), (-3.0, 0.0, 0.0), (3.0, 7.0, 12.0))
+        rest[number, 1:, :3] = np.clip(
+            np.array([0.0, 4.0, 4.0]) + rng.normal(0.0, _OFF_DEG, (4, 3)),
+            (-3.0, 0.0, 0.0),
+            (3.0, 7.0, 12.0),
+        )
         row, top = exercise.digit, rng.uniform(0.85, 0.97)
         if exercise.kind == "knuckle":
             bend[number, row, 1] = 84.0 * top

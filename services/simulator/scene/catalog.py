@@ -17,7 +17,10 @@ Rgb = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Light:
-    """Directions point from the hand to the light, in the frame of the first camera; colours are linear RGB."""
+    """Directions point from the hand to the light, in the frame of the first camera.
+
+    Colours are linear RGB.
+    """
 
     key_from: Vec3 = (-0.45, -0.75, -0.55)
     key: Rgb = (0.86, 0.83, 0.78)
@@ -31,14 +34,18 @@ class Light:
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """What makes a scene; lengths in metres, angles in degrees, in the frame of the first camera."""
+    """What makes a scene.
+
+    Lengths in metres, angles in degrees, in the frame of the first camera.
+    """
 
     motion: str
     about: str
     # The middle of the hand, in front of the middle of the rig.
     distance_m: float = 0.5
     shift_m: tuple[float, float] = (0.0, 0.0)
-    # The cameras see the palm from this far on the wrist's side, so that the painted tips stay in view as the fingers curl.
+    # The cameras see the palm from this far on the wrist's side, so that the painted tips stay in
+    # view as the fingers curl.
     tilt_deg: float = 38.0
     yaw_deg: float = 8.0
     roll_deg: float = -6.0
@@ -60,14 +67,20 @@ class SceneSpec:
 
 
 SCENES: dict[str, SceneSpec] = {
-    "fist": SceneSpec("fist", "the finger study's palmar grasp: 2 s closing, 2 s opening", tilt_deg=50.0),
+    "fist": SceneSpec(
+        "fist", "the finger study's palmar grasp: 2 s closing, 2 s opening", tilt_deg=50.0
+    ),
     "pinch": SceneSpec("pinch", "thumb and index finger meet and part"),
     "wave": SceneSpec("wave", "the open hand waves", tilt_deg=20.0),
     "piano": SceneSpec("piano", "the fingers strike one after the other", tilt_deg=32.0),
-    "grab": SceneSpec("grab", "the hand takes an object, carries it about and puts it back", tilt_deg=30.0),
+    "grab": SceneSpec(
+        "grab", "the hand takes an object, carries it about and puts it back", tilt_deg=30.0
+    ),
     "random": SceneSpec("random", "all joints wander through their ranges", tilt_deg=42.0),
     "still": SceneSpec("still", "an open hand held still", tilt_deg=20.0),
-    "guided": SceneSpec("guided", "the exercises of `rhot calibrate hand`, at its pace (48 s)", tilt_deg=42.0),
+    "guided": SceneSpec(
+        "guided", "the exercises of `rhot calibrate hand`, at its pace (48 s)", tilt_deg=42.0
+    ),
     "hard": SceneSpec(
         "random",
         "fast motion, blur, coloured clutter, coloured light on the skin, more noise",
@@ -81,7 +94,12 @@ SCENES: dict[str, SceneSpec] = {
         light=Light(rim=(0.50, 0.05, 0.42), key=(0.74, 0.71, 0.68)),
         clutter=True,
     ),
-    "two_hands": SceneSpec("piano", "both hands; one that is not configured is unpainted", tilt_deg=30.0, extra_hands=("left", "right")),
+    "two_hands": SceneSpec(
+        "piano",
+        "both hands; one that is not configured is unpainted",
+        tilt_deg=30.0,
+        extra_hands=("left", "right"),
+    ),
 }
 
 
@@ -93,5 +111,7 @@ def scene_spec(name: str) -> SceneSpec:
     if name not in SCENES:
         near = difflib.get_close_matches(name, SCENES, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ConfigError(f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}. Set it in [simulator] of rig.toml or on the command line")
+        raise ConfigError(
+            f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}. Set it in [simulator] of rig.toml or on the command line"
+        )
     return SCENES[name]

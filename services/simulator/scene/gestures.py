@@ -1,8 +1,10 @@
-"""Hand motions as pure functions of time, twice continuously differentiable, inside the limits of any hand.
+"""Hand motions as pure functions of time, twice continuously differentiable, inside the limits of
+any hand.
 
-A motion gives the joint angles and how the wrist moves relative to where the scene puts it. Poses are written in degrees for
-the limits of the tables and are mapped affinely to the limits of the hand at hand, so that no limit can be passed, and
-without the kinks of clipping. DIP = ratio * PIP is the hand model's own coupling, RHOT eq. (4). Time may be any real number.
+A motion gives the joint angles and how the wrist moves relative to where the scene puts it. Poses
+are written in degrees for the limits of the tables and are mapped affinely to the limits of the
+hand at hand, so that no limit can be passed, and without the kinks of clipping. DIP = ratio * PIP
+is the hand model's own coupling, RHOT eq. (4). Time may be any real number.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ TAU = 2.0 * np.pi
 
 
 class Gesture(NamedTuple):
-    """One instant: angles_rad (5, 4), and the hand's turn (rotation vector, rad) and shift (m) in the frame of the resting wrist.
+    """One instant: angles_rad (5, 4), and the hand's turn (rotation vector, rad) and shift (m) in
+    the frame of the resting wrist.
 
     grip is 0 while the hand is empty and 1 while it holds an object.
     """
@@ -33,19 +36,34 @@ class Gesture(NamedTuple):
 Motion = Callable[[float], Gesture]
 _NO = np.zeros(3)
 
-# Poses in degrees, rows thumb (abduction, cmc, mcp, dip) and fingers (abduction, mcp, pip, dip); the last column is set by the coupling.
-OPEN = np.array([[6, -6, 6, 0], [5, 8, 12, 0], [0, 6, 12, 0], [-3, 8, 14, 0], [-7, 10, 16, 0]], dtype=float)
+# Poses in degrees, rows thumb (abduction, cmc, mcp, dip) and fingers (abduction, mcp, pip, dip);
+# the last column is set by the coupling.
+OPEN = np.array(
+    [[6, -6, 6, 0], [5, 8, 12, 0], [0, 6, 12, 0], [-3, 8, 14, 0], [-7, 10, 16, 0]], dtype=float
+)
 # The finger study's fist (figure 5) ends near the limits: MCP 80-90, PIP 95-110.
-FIST = np.array([[10, 6, 24, 0], [1, 82, 102, 0], [0, 84, 104, 0], [-1, 84, 102, 0], [-2, 82, 98, 0]], dtype=float)
-CURVED = np.array([[12, 0, 14, 0], [4, 22, 34, 0], [0, 22, 36, 0], [-3, 22, 34, 0], [-6, 22, 32, 0]], dtype=float)
-# Thumb and index finger of the default hand touch, 15.6 mm between the middles of their last balls; found by least squares.
-PINCH = np.array([[17, 16, 37, 0], [3, 54, 48, 0], [0, 30, 30, 0], [-2, 24, 26, 0], [-5, 20, 24, 0]], dtype=float)
+FIST = np.array(
+    [[10, 6, 24, 0], [1, 82, 102, 0], [0, 84, 104, 0], [-1, 84, 102, 0], [-2, 82, 98, 0]],
+    dtype=float,
+)
+CURVED = np.array(
+    [[12, 0, 14, 0], [4, 22, 34, 0], [0, 22, 36, 0], [-3, 22, 34, 0], [-6, 22, 32, 0]], dtype=float
+)
+# Thumb and index finger of the default hand touch, 15.6 mm between the middles of their last balls;
+# found by least squares.
+PINCH = np.array(
+    [[17, 16, 37, 0], [3, 54, 48, 0], [0, 30, 30, 0], [-2, 24, 26, 0], [-5, 20, 24, 0]], dtype=float
+)
 # Around a handle of 40 mm.
-GRIP = np.array([[22, 0, 18, 0], [2, 52, 66, 0], [0, 54, 66, 0], [-2, 55, 66, 0], [-4, 55, 64, 0]], dtype=float)
+GRIP = np.array(
+    [[22, 0, 18, 0], [2, 52, 66, 0], [0, 54, 66, 0], [-2, 55, 66, 0], [-4, 55, 64, 0]], dtype=float
+)
 
 
 def smooth(u: float) -> float:
-    """0 below 0, 1 above 1, between them the quintic whose first and second derivatives vanish at both ends."""
+    """0 below 0, 1 above 1, between them the quintic whose first and second derivatives vanish at
+    both ends.
+    """
     u = min(1.0, max(0.0, u))
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
@@ -62,13 +80,22 @@ class Fitted:
         table = default_hand(model.hand).limits_rad  # (5, 4, 2)
         own = model.limits_rad
         span = table[..., 1] - table[..., 0]
-        # A joint that cannot move (abduction of the middle finger) stays in the middle of its range.
-        self._scale = np.where(span > 0.0, (own[..., 1] - own[..., 0]) / np.where(span > 0.0, span, 1.0), 0.0)
-        self._offset = own[..., 0] - self._scale * table[..., 0] + np.where(span > 0.0, 0.0, 0.5 * (own[..., 1] - own[..., 0]))
+        # A joint that cannot move (abduction of the middle finger) stays in the middle of its
+        # range.
+        self._scale = np.where(
+            span > 0.0, (own[..., 1] - own[..., 0]) / np.where(span > 0.0, span, 1.0), 0.0
+        )
+        self._offset = (
+            own[..., 0]
+            - self._scale * table[..., 0]
+            + np.where(span > 0.0, 0.0, 0.5 * (own[..., 1] - own[..., 0]))
+        )
         self._low, self._high = own[:, 3, 0], own[:, 3, 1]
         # The coupled joint follows as far as its own limit allows.
         reach = np.maximum(own[:, 2, 1], 1e-9)
-        self._ratio = np.minimum([digit.coupling for digit in model.digits], np.maximum(self._high, 0.0) / reach)
+        self._ratio = np.minimum(
+            [digit.coupling for digit in model.digits], np.maximum(self._high, 0.0) / reach
+        )
 
     def __call__(self, degrees: Array) -> Array:
         """(5, 4) rad of (5, 4) deg; the last column is replaced by the coupling."""
@@ -84,7 +111,10 @@ def still(model: HandModel, _seed: int) -> Motion:
 
 
 def fist(model: HandModel, _seed: int) -> Motion:
-    """The palmar grasp of the finger study: 2 s closing, 2 s opening; PIP leads, MCP follows after a third of the closing."""
+    """The palmar grasp of the finger study: 2 s closing, 2 s opening.
+
+    PIP leads, MCP follows after a third of the closing.
+    """
     fit = Fitted(model)
     # The fingers do not close as one: the little finger leads by a few frames.
     lead_s = np.array([-0.10, 0.0, 0.02, 0.05, 0.09])
@@ -95,7 +125,8 @@ def fist(model: HandModel, _seed: int) -> Motion:
             phase = (t_s - 0.25 + lead_s[row]) % 4.0
             closed = phase / 2.0 if phase < 2.0 else (4.0 - phase) / 2.0
             lead, late = smooth(closed / 0.95), smooth((closed - 1.0 / 3.0) / 0.6)
-            # The thumb follows the fingers over them; of a finger only the MCP joint lags (study, section 5).
+            # The thumb follows the fingers over them; of a finger only the MCP joint lags (study,
+            # section 5).
             share[row] = (late, late, late, late) if row == 0 else (late, late, lead, lead)
         return Gesture(fit(OPEN + share * (FIST - OPEN)), _NO, _NO)
 
@@ -116,7 +147,11 @@ def wave(model: HandModel, _seed: int) -> Motion:
         swing = np.sin(TAU * t_s)
         flex = np.zeros((5, 4))
         flex[1:, 1] = 5.0 * np.sin(TAU * t_s - 0.7)
-        return Gesture(fit(OPEN + flex), np.array([0.0, np.deg2rad(22.0) * swing, 0.0]), np.array([0.02 * swing, 0.0, 0.0]))
+        return Gesture(
+            fit(OPEN + flex),
+            np.array([0.0, np.deg2rad(22.0) * swing, 0.0]),
+            np.array([0.02 * swing, 0.0, 0.0]),
+        )
 
     return at
 
@@ -129,7 +164,10 @@ _BAR_S = 2.4
 def piano(model: HandModel, _seed: int) -> Motion:
     """Digits strike one after the other, up and down, a note each 0.3 s."""
     fit = Fitted(model)
-    stroke = np.array([[-4, 8, 12, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0]], dtype=float)
+    stroke = np.array(
+        [[-4, 8, 12, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0]],
+        dtype=float,
+    )
 
     def at(t_s: float) -> Gesture:
         press = np.zeros(5)
@@ -148,12 +186,17 @@ def grab(model: HandModel, _seed: int) -> Motion:
 
     def at(t_s: float) -> Gesture:
         phase = t_s % 8.0
-        # Open until 0.6 s, closed from 1.8 to 6.2 s; carried between 1.9 and 6.1 s, when the grip no longer changes.
+        # Open until 0.6 s, closed from 1.8 to 6.2 s; carried between 1.9 and 6.1 s, when the grip
+        # no longer changes.
         grip = smooth((phase - 0.6) / 1.2) * smooth((7.4 - phase) / 1.2)
         carry = smooth((phase - 1.9) / 0.9) * smooth((6.1 - phase) / 0.9)
         angle = TAU * (phase - 1.9) / 4.2
-        shift = carry * np.array([0.035 * np.sin(angle), 0.03 * np.sin(2.0 * angle), -0.04 * (1.0 - np.cos(angle)) / 2.0])
-        turn = carry * np.array([0.15 * np.sin(angle), 0.25 * np.sin(angle), 0.2 * np.sin(2.0 * angle)])
+        shift = carry * np.array(
+            [0.035 * np.sin(angle), 0.03 * np.sin(2.0 * angle), -0.04 * (1.0 - np.cos(angle)) / 2.0]
+        )
+        turn = carry * np.array(
+            [0.15 * np.sin(angle), 0.25 * np.sin(angle), 0.2 * np.sin(2.0 * angle)]
+        )
         held = smooth((phase - 1.7) / 0.2) * smooth((6.3 - phase) / 0.2)
         return Gesture(fit(OPEN + grip * (GRIP - OPEN)), turn, shift, held)
 
@@ -161,18 +204,24 @@ def grab(model: HandModel, _seed: int) -> Motion:
 
 
 def random(model: HandModel, seed: int) -> Motion:
-    """Every joint wanders independently through 80 % of its range, band-limited to 0.8 Hz; so does the hand."""
+    """Every joint wanders independently through 80 % of its range, band-limited to 0.8 Hz.
+
+    So does the hand.
+    """
     fit = Fitted(model)
     rng = np.random.default_rng([seed, 7])
     limits = np.rad2deg(default_hand(model.hand).limits_rad)
     middle, half = limits.mean(axis=2), 0.4 * (limits[..., 1] - limits[..., 0])
-    # Independent fingers far apart in flexion would pass through each other; abduction keeps to a third of its range.
+    # Independent fingers far apart in flexion would pass through each other; abduction keeps to a
+    # third of its range.
     half[1:, 0] /= 3.0
     waves = _Waves(rng, (5, 4), 0.8)
     turns, shifts = _Waves(rng, (3,), 0.4), _Waves(rng, (3,), 0.4)
 
     def at(t_s: float) -> Gesture:
-        return Gesture(fit(middle + half * waves(t_s)), np.deg2rad(14.0) * turns(t_s), 0.03 * shifts(t_s))
+        return Gesture(
+            fit(middle + half * waves(t_s)), np.deg2rad(14.0) * turns(t_s), 0.03 * shifts(t_s)
+        )
 
     return at
 
@@ -191,9 +240,11 @@ class _Waves:
 
 
 class Unrest:
-    """What no hand can help: a slow sway of millimetres, fingers that wander by tenths of one, and the physiological tremor.
+    """What no hand can help: a slow sway of millimetres, fingers that wander by tenths of one, and
+    the physiological tremor.
 
-    Tremor: 8-12 Hz, about 0.1 mm at the outstretched hand (Elble & Randall, Electroenceph. clin. Neurophysiol. 44, 1978).
+    Tremor: 8-12 Hz, about 0.1 mm at the outstretched hand (Elble & Randall, Electroenceph. clin.
+    Neurophysiol. 44, 1978).
     """
 
     def __init__(self, seed: int) -> None:
@@ -203,7 +254,9 @@ class Unrest:
         self._omega = TAU * np.concatenate([slow, fast], axis=2)  # (turn / shift, axis, wave)
         self._phase = rng.uniform(0.0, TAU, (2, 3, 4))
         # Sway of 0.4 deg and 1.2 mm a wave, tremor of 0.05 deg and 0.1 mm.
-        self._weight = np.array([[0.007, 0.007, 0.007, 0.0009], [1.2e-3, 1.2e-3, 1.2e-3, 1e-4]])[:, None, :]
+        self._weight = np.array([[0.007, 0.007, 0.007, 0.0009], [1.2e-3, 1.2e-3, 1.2e-3, 1e-4]])[
+            :, None, :
+        ]
         slow, fast = rng.uniform(0.1, 0.7, (5, 4, 3)), rng.uniform(8.0, 12.0, (5, 4, 1))
         self._finger_omega = TAU * np.concatenate([slow, fast], axis=2)  # (digit, joint, wave)
         self._finger_phase = rng.uniform(0.0, TAU, (5, 4, 4))
@@ -214,18 +267,25 @@ class Unrest:
         return turn, shift
 
     def fingers(self, t_s: float, angles_rad: Array, model: HandModel) -> Array:
-        """Joint angles (5, 4) that are meant, as they come out at t_s: inside the limits, DIP coupled to PIP as it was."""
-        waves = np.sum(_FINGER_WEIGHT * np.sin(self._finger_omega * t_s + self._finger_phase), axis=2)
+        """Joint angles (5, 4) that are meant, as they come out at t_s: inside the limits, DIP
+        coupled to PIP as it was.
+        """
+        waves = np.sum(
+            _FINGER_WEIGHT * np.sin(self._finger_omega * t_s + self._finger_phase), axis=2
+        )
         low, high = model.limits_rad[..., 0], model.limits_rad[..., 1]
         room = np.maximum(np.minimum(angles_rad - low, high - angles_rad), 0.0)
         # Smoothly less towards a limit, and never beyond: waves stay below the constant.
         angles = angles_rad + waves * room / (room + 0.02)
         coupling = np.array([digit.coupling for digit in model.digits])
-        angles[:, 3] = np.clip(angles_rad[:, 3] + coupling * (angles[:, 2] - angles_rad[:, 2]), low[:, 3], high[:, 3])
+        angles[:, 3] = np.clip(
+            angles_rad[:, 3] + coupling * (angles[:, 2] - angles_rad[:, 2]), low[:, 3], high[:, 3]
+        )
         return np.asarray(angles)
 
 
-# Each joint wanders by .11 deg a wave and trembles by .02 deg: .3 and .03 mm at the tip of a stretched finger, a fifth of what sway does.
+# Each joint wanders by .11 deg a wave and trembles by .02 deg: .3 and .03 mm at the tip of a
+# stretched finger, a fifth of what sway does.
 _FINGER_WEIGHT = np.array([0.002, 0.002, 0.002, 0.0004])
 
 

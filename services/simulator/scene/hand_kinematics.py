@@ -1,4 +1,5 @@
-"""Joints of a hand as a compiled kernel: rhot.hand.forward, about 50 times as fast (2 us), for every frame of every camera. Pure.
+"""Joints of a hand as a compiled kernel: rhot.hand.forward, about 50 times as fast (2 us), for
+every frame of every camera. Pure.
 
 Tests compare it with rhot.hand.forward. Angles and poses must be finite.
 """
@@ -21,10 +22,14 @@ class Skeleton:
         self._side = model.side
         self._base_m = np.array([digit.base_m for digit in model.digits])  # (5, 3)
         self._metacarpal_m = np.array([digit.metacarpal_m for digit in model.digits])  # (5, 3)
-        self._base = np.array([rotation_from_quaternion(digit.base_wxyz) for digit in model.digits])  # (5, 3, 3)
+        self._base = np.array(
+            [rotation_from_quaternion(digit.base_wxyz) for digit in model.digits]
+        )  # (5, 3, 3)
         self._lengths_m = model.lengths_m  # (5, 3)
 
-    def joints(self, wrist_rotation: Array, wrist_m: Array, angles_rad: Array) -> tuple[Array, Array]:
+    def joints(
+        self, wrist_rotation: Array, wrist_m: Array, angles_rad: Array
+    ) -> tuple[Array, Array]:
         """Positions (26, 3) and rotations (26, 3, 3), as rhot.hand.forward."""
         positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
         _forward(
@@ -61,7 +66,18 @@ def _turn(rotation, about_y, flexion, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _forward(side, base_m, metacarpal_m, base, lengths_m, wrist_rotation, wrist_m, angles_rad, positions, rotations):  # type: ignore[no-untyped-def]
+def _forward(
+    side,
+    base_m,
+    metacarpal_m,
+    base,
+    lengths_m,
+    wrist_rotation,
+    wrist_m,
+    angles_rad,
+    positions,
+    rotations,
+):  # type: ignore[no-untyped-def]
     local = np.empty(3)
     current = np.empty((3, 3))
     positions[:2] = wrist_m

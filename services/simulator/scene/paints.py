@@ -1,7 +1,8 @@
-"""Colours of the simulated world: acrylic paints, skin, and what stands in the background. Pure data.
+"""Colours of the simulated world: acrylic paints, skin, and what stands in the background. Pure
+data.
 
-A colour is what a surface reflects of white light: linear RGB, 0..1. A colour name that no paint has is a ConfigError with
-the valid names.
+A colour is what a surface reflects of white light: linear RGB, 0..1. A colour name that no paint
+has is a ConfigError with the valid names.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ Rgb = tuple[float, float, float]
 
 
 class Surface(NamedTuple):
-    """How a surface looks: diffuse albedo (linear RGB), gloss 0..1, shininess (Blinn-Phong exponent), strength of its texture."""
+    """How a surface looks: diffuse albedo (linear RGB), gloss 0..1, shininess (Blinn-Phong
+    exponent), strength of its texture.
+    """
 
     albedo: Rgb
     gloss: float
@@ -23,12 +26,14 @@ class Surface(NamedTuple):
     texture: float
 
 
-# Lightly tanned skin: sRGB (201, 152, 126) under white light, within the range of the Pantone SkinTone guide.
+# Lightly tanned skin: sRGB (201, 152, 126) under white light, within the range of the Pantone
+# SkinTone guide.
 SKIN = Surface((0.56, 0.31, 0.21), 0.05, 12.0, 0.11)
 
-# RHOT section 9.1: colours outside the hues of skin (green, blue) are unproblematic, "red tones in the purple and magenta section"
-# work; the first six are the rig's default, spread over the hue circle (OpenCV hue 42, 68, 92, 112, 134, 162) and all bright
-# enough that noise of 5 grey levels does not blur their hue. The others are for larger sets, and for seeing why skin hues fail.
+# RHOT section 9.1: colours outside the hues of skin (green, blue) are unproblematic, "red tones in
+# the purple and magenta section" work; the first six are the rig's default, spread over the hue
+# circle (OpenCV hue 42, 68, 92, 112, 134, 162) and all bright enough that noise of 5 grey levels
+# does not blur their hue. The others are for larger sets, and for seeing why skin hues fail.
 PAINTS: dict[str, Rgb] = {
     "lime": (0.44, 0.72, 0.04),
     "green": (0.03, 0.44, 0.13),

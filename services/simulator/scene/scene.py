@@ -1,9 +1,10 @@
 """A scene: everything that moves, everything that watches, as pure functions of time.
 
-`load_scene` builds one from rig.toml; frozen and seeded: the same configuration, name, seed and speed give the same scene for
-ever. Times are seconds on the master's clock since the scene began. The hands have the bones of calibration/hand.<hand>.json,
-or of the tables; cameras without calibration are a CalibrationError that names the command, an unknown scene or paint a
-ConfigError that lists the valid ones.
+`load_scene` builds one from rig.toml; frozen and seeded: the same configuration, name, seed and
+speed give the same scene for ever. Times are seconds on the master's clock since the scene began.
+The hands have the bones of calibration/hand.<hand>.json, or of the tables; cameras without
+calibration are a CalibrationError that names the command, an unknown scene or paint a ConfigError
+that lists the valid ones.
 """
 
 from __future__ import annotations
@@ -29,12 +30,15 @@ from services.simulator.scene.gestures import MOTIONS, Unrest
 from services.simulator.scene.hand_kinematics import Skeleton
 from services.simulator.scene.truth import truth_of
 
-# Without objects.json the lighthouse frame is taken to lie half a metre below and behind the cameras, y up.
+# Without objects.json the lighthouse frame is taken to lie half a metre below and behind the
+# cameras, y up.
 _LIGHTHOUSE = transform(np.diag([1.0, -1.0, -1.0]), (0.0, 0.5, -0.5))
 
 
 class Bodies(NamedTuple):
-    """All frames of the scene at one instant, in the rig frame: per hand 26 joints and the forearm, then the objects."""
+    """All frames of the scene at one instant, in the rig frame: per hand 26 joints and the forearm,
+    then the objects.
+    """
 
     positions: Array  # (f, 3)
     rotations: Array  # (f, 3, 3)
@@ -78,33 +82,56 @@ class Scene:
         return Bodies(np.concatenate(positions), np.concatenate(rotations))
 
     def truth(self, t_s: float, stamp_ns: int | None = None) -> Truth:
-        """The truth at one instant; stamp_ns is that instant on the master's clock (default: the scene began at 0)."""
+        """The truth at one instant.
+
+        stamp_ns is that instant on the master's clock (default: the scene began at 0).
+        """
         states = self.hand_states(t_s)
         things = {thing.name: thing.at(states) for thing in self.things}
-        return truth_of(self.hands, states, things, round(t_s * 1e9) if stamp_ns is None else stamp_ns)
+        return truth_of(
+            self.hands, states, things, round(t_s * 1e9) if stamp_ns is None else stamp_ns
+        )
 
 
-def load_scene(config: RigConfig, name: str | None = None, seed: int | None = None, speed: float | None = None) -> Scene:
+def load_scene(
+    config: RigConfig, name: str | None = None, seed: int | None = None, speed: float | None = None
+) -> Scene:
     """A named scene for the rig of `config`; what is None comes from its [simulator] table.
 
-    Raises ConfigError (unknown scene or paint, nothing to show) and CalibrationError (cameras without lens or place).
+    Raises ConfigError (unknown scene or paint, nothing to show) and CalibrationError (cameras
+    without lens or place).
     """
     settings = config.simulator
     name = settings.scene if name is None else name
-    return build_scene(config, scene_spec(name), name, settings.seed if seed is None else seed, settings.speed if speed is None else speed)
+    return build_scene(
+        config,
+        scene_spec(name),
+        name,
+        settings.seed if seed is None else seed,
+        settings.speed if speed is None else speed,
+    )
 
 
-def build_scene(config: RigConfig, spec: SceneSpec, name: str, seed: int, speed: float = 1.0) -> Scene:
-    """A scene of one's own making, e.g. dataclasses.replace(SCENES["wave"], distance_m=1.0). Errors as load_scene."""
+def build_scene(
+    config: RigConfig, spec: SceneSpec, name: str, seed: int, speed: float = 1.0
+) -> Scene:
+    """A scene of one's own making, e.g. dataclasses.replace(SCENES["wave"], distance_m=1.0).
+
+    Errors as load_scene.
+    """
     if not config.camera:
         raise ConfigError("the simulator needs at least one [[camera]] in rig.toml")
     cameras = rig_cameras(config)
     hands = _hands(config, spec, seed, speed, list(cameras.values()))
     objects = _objects(config)
-    T_rig_from_lighthouse = _LIGHTHOUSE if objects is None else np.array(objects.T_rig_from_lighthouse)
+    T_rig_from_lighthouse = (
+        _LIGHTHOUSE if objects is None else np.array(objects.T_rig_from_lighthouse)
+    )
     count = len(config.camera)
     clocks = {
-        c.name: camera_clock(c.name, number, count, c.fps, cameras[c.name].size_px[1], spec.exposure_s, seed)
+        c.name: camera_clock(
+            c.name, number, count, c.fps, cameras[c.name].size_px[1], spec.exposure_s, seed
+        )
         for number, c in enumerate(config.camera)
     }
     things = _things(config, spec, hands, objects, next(iter(cameras.values())))
@@ -112,7 +139,10 @@ def build_scene(config: RigConfig, spec: SceneSpec, name: str, seed: int, speed:
 
 
 def rig_cameras(config: RigConfig) -> dict[str, Camera]:
-    """Every camera of rig.toml in the rig frame, with [rig.world] applied; the picture size must be the calibrated one."""
+    """Every camera of rig.toml in the rig frame, with [rig.world] applied.
+
+    The picture size must be the calibrated one.
+    """
     cameras = load_rig_cameras(config)
     for table in config.camera:
         size = cameras[table.name].size_px
@@ -122,14 +152,20 @@ def rig_cameras(config: RigConfig) -> dict[str, Camera]:
                 f"set the same size, or run `python -m services.simulator.files.make_calibration` for a simulated rig"
             )
         if table.size_px[0] % 2 or table.size_px[1] % 2:
-            raise ConfigError(f"camera {table.name!r}: size_px = {list(table.size_px)}; YUV420 pictures need even sizes")
+            raise ConfigError(
+                f"camera {table.name!r}: size_px = {list(table.size_px)}; YUV420 pictures need even sizes"
+            )
     return cameras
 
 
-def _hands(config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras: list[Camera]) -> dict[HandName, Hand]:
+def _hands(
+    config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras: list[Camera]
+) -> dict[HandName, Hand]:
     names = [name for name in HANDS if name in config.hand or name in spec.extra_hands]
     if not names:
-        raise ConfigError('the simulator needs a hand; add a [hand.right.markers] table to rig.toml, e.g. index_tip = "blue"')
+        raise ConfigError(
+            'the simulator needs a hand; add a [hand.right.markers] table to rig.toml, e.g. index_tip = "blue"'
+        )
     hands: dict[HandName, Hand] = {}
     for name in names:
         table = config.hand.get(name)
@@ -138,7 +174,9 @@ def _hands(config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras:
         motion = (guided if spec.motion == "guided" else MOTIONS[spec.motion])(model, own)
         stage = _stage(spec, name, len(names), own, cameras)
         landmarks = dict(table.markers) if table else {}
-        hands[name] = Hand(name, model, Skeleton(model), landmarks, motion, Unrest(own), stage, spec.speed * speed)
+        hands[name] = Hand(
+            name, model, Skeleton(model), landmarks, motion, Unrest(own), stage, spec.speed * speed
+        )
     return hands
 
 
@@ -149,18 +187,36 @@ def _stage(spec: SceneSpec, name: HandName, hands: int, seed: int, cameras: list
     middle_view = T_view[:3, :3].T @ (middle_rig - T_view[:3, 3])
     rng = np.random.default_rng([seed, 5])
     off_m, off_deg = rng.uniform(-0.008, 0.008, 3), rng.uniform(-3.0, 3.0, 3)
-    middle = middle_view + np.array([spec.shift_m[0] + beside(name, hands), spec.shift_m[1], spec.distance_m]) + off_m
+    middle = (
+        middle_view
+        + np.array([spec.shift_m[0] + beside(name, hands), spec.shift_m[1], spec.distance_m])
+        + off_m
+    )
     mirror = 1.0 if name == "right" else -1.0
     yaw, roll = mirror * (spec.yaw_deg + off_deg[1]), mirror * (spec.roll_deg + off_deg[2])
-    return stage_of(T_view, middle, spec.tilt_deg + off_deg[0], yaw, roll, spec.travel_m, spec.travel_hz)
+    return stage_of(
+        T_view, middle, spec.tilt_deg + off_deg[0], yaw, roll, spec.travel_m, spec.travel_hz
+    )
 
 
 def _objects(config: RigConfig) -> Objects | None:
-    return load_objects(config.calibration_dir) if Path(config.calibration_dir, "objects.json").exists() else None
+    return (
+        load_objects(config.calibration_dir)
+        if Path(config.calibration_dir, "objects.json").exists()
+        else None
+    )
 
 
-def _things(config: RigConfig, spec: SceneSpec, hands: dict[HandName, Hand], objects: Objects | None, first: Camera) -> list[Thing]:
-    """The configured objects: the first is for grabbing if the scene grabs, the others stand in a row."""
+def _things(
+    config: RigConfig,
+    spec: SceneSpec,
+    hands: dict[HandName, Hand],
+    objects: Objects | None,
+    first: Camera,
+) -> list[Thing]:
+    """The configured objects: the first is for grabbing if the scene grabs, the others stand in a
+    row.
+    """
     holder = next(iter(hands)) if spec.motion == "grab" else None
     # Along the x axis of the hand: the axis of an object is its y.
     T_wrist_from_held = transform(rotation_z(-0.5 * np.pi), GRIP_M)
@@ -172,7 +228,22 @@ def _things(config: RigConfig, spec: SceneSpec, hands: dict[HandName, Hand], obj
             T_rest = transform(stage.rotation, stage.wrist_m) @ T_wrist_from_held
         else:
             # Beside one hand or between two, a little behind, upright and turned a little.
-            place_m = ((0.17 if len(hands) < 2 else 0.05) - 0.11 * number, 0.10, spec.distance_m + 0.12)
-            T_rest = first.T_rig_from_camera @ transform(rotation_x(np.pi) @ rotation_z(0.1), place_m)
-        things.append(Thing(table.name, table.serial, T_rest, place, holder if number == 0 else None, T_wrist_from_held))
+            place_m = (
+                (0.17 if len(hands) < 2 else 0.05) - 0.11 * number,
+                0.10,
+                spec.distance_m + 0.12,
+            )
+            T_rest = first.T_rig_from_camera @ transform(
+                rotation_x(np.pi) @ rotation_z(0.1), place_m
+            )
+        things.append(
+            Thing(
+                table.name,
+                table.serial,
+                T_rest,
+                place,
+                holder if number == 0 else None,
+                T_wrist_from_held,
+            )
+        )
     return things

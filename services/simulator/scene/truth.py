@@ -8,8 +8,16 @@ from rhot.messages import FingerAngles, HandTruth, ObjectTruth, Truth, WristPose
 from services.simulator.scene.actors import Hand, HandState
 
 
-def truth_of(hands: dict[HandName, Hand], states: dict[HandName, HandState], things: dict[str, Array], stamp_ns: int) -> Truth:
-    """The truth about hands in these states and objects at these poses T_rig_from_object; points_m has all 26 joints."""
+def truth_of(
+    hands: dict[HandName, Hand],
+    states: dict[HandName, HandState],
+    things: dict[str, Array],
+    stamp_ns: int,
+) -> Truth:
+    """The truth about hands in these states and objects at these poses T_rig_from_object.
+
+    points_m has all 26 joints.
+    """
     return Truth(
         stamp_ns=stamp_ns,
         hands={str(name): _hand(hands[name], state) for name, state in states.items()},
@@ -20,18 +28,25 @@ def truth_of(hands: dict[HandName, Hand], states: dict[HandName, HandState], thi
 def _hand(hand: Hand, state: HandState) -> HandTruth:
     positions, _ = hand.joints(state)
     angles = {
-        digit: FingerAngles(**{"pip": 0.0, **{n: round(float(a), 6) for n, a in zip(names, row, strict=True)}})
+        digit: FingerAngles(
+            **{"pip": 0.0, **{n: round(float(a), 6) for n, a in zip(names, row, strict=True)}}
+        )
         for digit, names, row in zip(DIGITS, DIGIT_ANGLES, state.angles_rad, strict=True)
     }
     return HandTruth(
         points_m={name: vector(positions[i]) for i, name in enumerate(JOINTS)},
-        wrist=WristPose(position_m=vector(state.wrist_m), orientation_wxyz=_quaternion(state.wrist_rotation)),
+        wrist=WristPose(
+            position_m=vector(state.wrist_m), orientation_wxyz=_quaternion(state.wrist_rotation)
+        ),
         angles_rad=angles,
     )
 
 
 def _object(T_rig_from_object: Array) -> ObjectTruth:
-    return ObjectTruth(position_m=vector(T_rig_from_object[:3, 3]), orientation_wxyz=_quaternion(T_rig_from_object[:3, :3]))
+    return ObjectTruth(
+        position_m=vector(T_rig_from_object[:3, 3]),
+        orientation_wxyz=_quaternion(T_rig_from_object[:3, :3]),
+    )
 
 
 def vector(values: Array) -> tuple[float, float, float]:

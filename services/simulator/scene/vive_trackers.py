@@ -1,6 +1,7 @@
 """The simulated Vive trackers, in OpenVR's shape. Pure.
 
-Poses are in the lighthouse frame with the jitter of a real tracker; the same (scene, object, seq) gives the same pose.
+Poses are in the lighthouse frame with the jitter of a real tracker; the same (scene, object, seq)
+gives the same pose.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from services.simulator.scene.actors import Thing
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.truth import vector
 
-# Jitter of a Vive tracker in daily use; the laser-tracker study in the real recordings leaves 5.65 mm RMS over a room.
+# Jitter of a Vive tracker in daily use; the laser-tracker study in the real recordings leaves 5.65
+# mm RMS over a room.
 _POSITION_SIGMA_M, _TURN_SIGMA_RAD = 1e-3, np.deg2rad(0.3)
 # Half the base of the central difference for velocities.
 _STEP_S = 1e-3
@@ -23,10 +25,14 @@ _STEP_S = 1e-3
 _RUNNING_OK = 200
 
 
-def tracker_pose(scene: Scene, thing: Thing, index: int, t_s: float, seq: int, stamp_ns: int) -> OpenVrPose:
-    """What SteamVR would say of the object's tracker at t_s: lighthouse frame, sensor noise, Valve's fields.
+def tracker_pose(
+    scene: Scene, thing: Thing, index: int, t_s: float, seq: int, stamp_ns: int
+) -> OpenVrPose:
+    """What SteamVR would say of the object's tracker at t_s: lighthouse frame, sensor noise,
+    Valve's fields.
 
-    stamp_ns is the instant on the master's clock; the message carries it late by the object's time_offset_ns.
+    stamp_ns is the instant on the master's clock; the message carries it late by the object's
+    time_offset_ns.
     """
     rng = np.random.default_rng([scene.seed, zlib.crc32(thing.serial.encode()), seq])
     T_before, T, T_after = (_tracker(scene, thing, t_s + step) for step in (-_STEP_S, 0.0, _STEP_S))

@@ -1,9 +1,12 @@
-"""Closed form for one digit whose last flexion depends on the second (DIP = 2/3 PIP): the finger study's analytical method.
+"""Closed form for one digit whose last flexion depends on the second (DIP = 2/3 PIP): the finger
+study's analytical method.
 
-Abduction turns the chain's plane onto the target. In the plane, the distance from root to tip depends on the second flexion alone:
-one equation, solved by Newton's method inside a bracket; the first flexion then turns the tip onto the target. Exact wherever the
-coupling and the limits allow it; elsewhere the nearest tip on the coupled family is found by a search over that one unknown, and
-the result says UNREACHABLE. A person whose fingers do not follow the ratio is misrepresented, as the study found in full fists.
+Abduction turns the chain's plane onto the target. In the plane, the distance from root to tip
+depends on the second flexion alone: one equation, solved by Newton's method inside a bracket; the
+first flexion then turns the tip onto the target. Exact wherever the coupling and the limits allow
+it; elsewhere the nearest tip on the coupled family is found by a search over that one unknown, and
+the result says UNREACHABLE. A person whose fingers do not follow the ratio is misrepresented, as
+the study found in full fists.
 """
 
 from __future__ import annotations
@@ -22,7 +25,10 @@ from services.solver.whole_hand.posture_prior import clamp
 
 @njit(cache=True)
 def _followed(plane: Plane, second: float) -> tuple[float, float]:
-    """The last flexion that follows a second one, and its slope; where its own limit stops it the slope is 0."""
+    """The last flexion that follows a second one, and its slope.
+
+    Where its own limit stops it the slope is 0.
+    """
     follow = plane.coupling[0] * second
     if follow < plane.limits[3, 0]:
         return plane.limits[3, 0], 0.0
@@ -33,7 +39,9 @@ def _followed(plane: Plane, second: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def _tip(plane: Plane, second: float) -> tuple[float, float, float, float]:
-    """Tip in the plane at zero first flexion: forward, palm, and their derivatives by the second flexion."""
+    """Tip in the plane at zero first flexion: forward, palm, and their derivatives by the second
+    flexion.
+    """
     follow, slope = _followed(plane, second)
     last = second + follow + plane.gamma
     b, c = plane.bones[1], plane.bones[2]
@@ -46,7 +54,10 @@ def _tip(plane: Plane, second: float) -> tuple[float, float, float, float]:
 
 @njit(cache=True)
 def _bend(plane: Plane, square: float) -> tuple[float, int]:
-    """Second flexion at which the tip is sqrt(square) from the root: Newton in a bracket; the nearer end where there is none."""
+    """Second flexion at which the tip is sqrt(square) from the root: Newton in a bracket.
+
+    The nearer end where there is none.
+    """
     low, high = plane.limits[2, 0], plane.limits[2, 1]
     f, p, _, _ = _tip(plane, low)
     at_low = f * f + p * p - square
@@ -80,7 +91,9 @@ def _apart(plane: Plane, first: float, second: float, forward: float, palm: floa
 
 @njit(cache=True)
 def _nearest(plane: Plane, first: float, forward: float, palm: float) -> float:
-    """With the first flexion held, the second one whose tip is nearest: coarse scan, then golden section."""
+    """With the first flexion held, the second one whose tip is nearest: coarse scan, then golden
+    section.
+    """
     low, high = plane.limits[2, 0], plane.limits[2, 1]
     width = (high - low) / 16.0
     best, least = low, _apart(plane, first, low, forward, palm)
@@ -101,9 +114,11 @@ def _nearest(plane: Plane, first: float, forward: float, palm: float) -> float:
 
 @njit(cache=True)
 def solve(chain: Chain, point: Array, q: Array, tolerance: float) -> tuple[int, float, int]:
-    """Angles q (4,) that bring the painted point to point (3,), canonical frame, the chain's unit of length.
+    """Angles q (4,) that bring the painted point to point (3,), canonical frame, the chain's unit
+    of length.
 
-    Returns (iterations, distance left, SOLVED | UNREACHABLE | NOT_CONVERGED). q is only kept where the point says nothing.
+    Returns (iterations, distance left, SOLVED | UNREACHABLE | NOT_CONVERGED). q is only kept where
+    the point says nothing.
     """
     clamp(q, chain.limits)
     total, far = reach_of(chain), length_of(point)
@@ -127,7 +142,8 @@ def solve(chain: Chain, point: Array, q: Array, tolerance: float) -> tuple[int, 
         trial[3], _ = _followed(plane, trial[2])
         used += steps
         left = distance_to(unit, trial, aim)
-        # Both branches can be exact; the first stands unless the second is better by more than rounding.
+        # Both branches can be exact; the first stands unless the second is better by more than
+        # rounding.
         if left < least - 1e-9:
             best[:], least = trial, left
     q[:] = best

@@ -1,7 +1,9 @@
-"""A digit seen in its own plane: abduction turns the plane onto a target, then three bones bend in it.
+"""A digit seen in its own plane: abduction turns the plane onto a target, then three bones bend in
+it.
 
-Coordinates in the plane: forward (-z of the canonical frame) and palm (-y), both with the digit's length as the unit. The third
-bone ends in the painted point; `gamma` is the angle by which that point is off the bone's axis. Pure maths.
+Coordinates in the plane: forward (-z of the canonical frame) and palm (-y), both with the digit's
+length as the unit. The third bone ends in the painted point; `gamma` is the angle by which that
+point is off the bone's axis. Pure maths.
 """
 
 from __future__ import annotations
@@ -48,11 +50,13 @@ def limited(angle: float, low: float, high: float) -> float:
 
 
 @njit(cache=True)
-def facing(target: Array, tool_x: float, branch: int, before: float, low: float, high: float) -> float:
+def facing(
+    target: Array, tool_x: float, branch: int, before: float, low: float, high: float
+) -> float:
     """Abduction that brings target (3,) into the chain's plane, within low..high.
 
-    branch +1: the tip is in front of the knuckle, -1: behind it (a tight fist). A target on the axis of abduction says nothing of
-    it: then it stays as it was `before`.
+    branch +1: the tip is in front of the knuckle, -1: behind it (a tight fist). A target on the
+    axis of abduction says nothing of it: then it stays as it was `before`.
     """
     depth = math.sqrt(max(target[0] ** 2 + target[2] ** 2 - tool_x**2, 0.0))
     if depth < 1e-6:
@@ -63,5 +67,8 @@ def facing(target: Array, tool_x: float, branch: int, before: float, low: float,
 
 @njit(cache=True)
 def forward_of(target: Array, abduction: float) -> float:
-    """How far forward target (3,) is in the plane at that abduction; its other coordinate there is -target[1]."""
+    """How far forward target (3,) is in the plane at that abduction.
+
+    Its other coordinate there is -target[1].
+    """
     return -(math.sin(abduction) * target[0] + math.cos(abduction) * target[2])

@@ -1,23 +1,28 @@
-"""Damped least squares as the index-finger study implements it (Chatterjee et al., "Trajectory based Recovery of Index Finger
-Articulated Pose during Palmar Grasp", sections 3 and appendix A1, A3). For comparison; the product's own is dls.py.
+"""Damped least squares as the index-finger study implements it (Chatterjee et al., "Trajectory
+based Recovery of Index Finger Articulated Pose during Palmar Grasp", sections 3 and appendix A1,
+A3). For comparison; the product's own is dls.py.
 
-Each step is dq = J^T [J J^T + diag(l1..l4, .7, .7)^2]^-1 e, with e = (position, orientation) of the tip and the damping of eq. (1),
-l_i = eta [(2 q_i - max_i - min_i) / (max_i - min_i)]^p, eta = 1, p = 6, which grows as a joint nears its limit. Each frame starts
-from the last one's angles, the first from q = [0, pi/2, 0, 0]; a frame ends when |dq| < 1e-6.
+Each step is dq = J^T [J J^T + diag(l1..l4, .7, .7)^2]^-1 e, with e = (position, orientation) of the
+tip and the damping of eq. (1), l_i = eta [(2 q_i - max_i - min_i) / (max_i - min_i)]^p, eta = 1, p
+= 6, which grows as a joint nears its limit. Each frame starts from the last one's angles, the first
+from q = [0, pi/2, 0, 0]; a frame ends when |dq| < 1e-6.
 
 Where the print is inconsistent, and what is done here:
-- A3 prints J^T [J^T J + l^2 I]^-1, a (4x6)(4x4) product that does not conform. "A 6x6 diagonal matrix" in the text can only damp
-  J J^T, so that is the reading.
-- A3 prints the filter s / (s + l^2); the text and the pseudo-code have s / (s^2 + l^2). The printed one diverges. The SVD form uses
-  the latter with l_i for the i-th singular value, "a fixed .7" for those beyond the fourth.
-- Damping four of six task coordinates with four joints' factors pairs x with abduction, y with MCP flexion ...; taken as printed.
+- A3 prints J^T [J^T J + l^2 I]^-1, a (4x6)(4x4) product that does not conform. "A 6x6 diagonal
+  matrix" in the text can only damp J J^T, so that is the reading.
+- A3 prints the filter s / (s + l^2); the text and the pseudo-code have s / (s^2 + l^2). The printed
+  one diverges. The SVD form uses the latter with l_i for the i-th singular value, "a fixed .7" for
+  those beyond the fourth.
+- Damping four of six task coordinates with four joints' factors pairs x with abduction, y with MCP
+  flexion ...; taken as printed.
 - Lengths are pixels there; here millimetres. In metres the damping dwarfs J J^T and it stalls.
-- Nothing keeps q in its range but the damping. Taken so, from that start, the finger ends on the mirror elbow (PIP < 0) or winds up
-  in every grasp, so `clip=True` brings q into the limits after each step. Then 60 random grasps that start from a slightly bent
-  finger take 15-33 iterations in the first frame (SVD form: 18-35; the study: 33) and 3-7 in nine of ten later ones (the study:
+- Nothing keeps q in its range but the damping. Taken so, from that start, the finger ends on the
+  mirror elbow (PIP < 0) or winds up in every grasp, so `clip=True` brings q into the limits after
+  each step. Then 60 random grasps that start from a slightly bent finger take 15-33 iterations in
+  the first frame (SVD form: 18-35; the study: 33) and 3-7 in nine of ten later ones (the study:
   3-10); frames at a dead straight finger, where three joints stand at their limits, take up to 100.
-- DLS-1 aims at the forward kinematics of measured angles, DLS-2 at the measured tip. With one painted point there is no measured
-  orientation: the live solver aims at the whole-hand solution's.
+- DLS-1 aims at the forward kinematics of measured angles, DLS-2 at the measured tip. With one
+  painted point there is no measured orientation: the live solver aims at the whole-hand solution's.
 Input that is not finite leaves the angles alone, as NOT_CONVERGED.
 """
 
@@ -54,7 +59,9 @@ class Reading:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's end: angles (4,) rad, iterations used, distance left in metres, SOLVED | UNREACHABLE | NOT_CONVERGED."""
+    """One frame's end: angles (4,) rad, iterations used, distance left in metres, SOLVED |
+    UNREACHABLE | NOT_CONVERGED.
+    """
 
     angles_rad: Array
     iterations: int
@@ -66,18 +73,26 @@ def damping(q: Array, limits: Array) -> Array:
     """Eq. (1) of the study for the four joints and the fixed .7 twice; (4,), (4, 2) -> (6,)."""
     span = limits[:, 1] - limits[:, 0]
     # A joint without range (the middle finger's abduction) has no limit to avoid.
-    share = np.divide(2.0 * q - limits[:, 1] - limits[:, 0], span, out=np.zeros(4), where=span > 0.0)
+    share = np.divide(
+        2.0 * q - limits[:, 1] - limits[:, 0], span, out=np.zeros(4), where=span > 0.0
+    )
     return np.append(ETA * share**POWER, (FIXED, FIXED))
 
 
 def differential(p: Array, R: Array, goal: Array, goal_R: Array) -> Array:
-    """de of A3: position in mm and half the sum of the axes' cross products (rad near the goal); (6,)."""
+    """de of A3: position in mm and half the sum of the axes' cross products (rad near the goal).
+
+    (6,).
+    """
     turn = 0.5 * sum(np.cross(R[:, k], goal_R[:, k]) for k in range(3))
     return np.concatenate([_MM * (goal - p), turn])
 
 
 def step(J: Array, e: Array, factors: Array, form: Form) -> Array:
-    """One dq (4,) from J (6, 4) with lengths in mm, e (6,) and damping factors (6,); not a number where those have overflowed."""
+    """One dq (4,) from J (6, 4) with lengths in mm, e (6,) and damping factors (6,).
+
+    Not a number where those have overflowed.
+    """
     if not np.all(np.isfinite(factors)):
         return np.full(4, np.nan)
     if form == "normal":
@@ -88,12 +103,15 @@ def step(J: Array, e: Array, factors: Array, form: Form) -> Array:
 
 
 def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Reading) -> Frame:
-    """One frame: tip to point (3,), metres, and last bone to rotation (3, 3), canonical frame, from q0 (4,) (feed-forward)."""
+    """One frame: tip to point (3,), metres, and last bone to rotation (3, 3), canonical frame, from
+    q0 (4,) (feed-forward).
+    """
     limits = chain.limits
     q = np.array(q0, dtype=np.float64)
     if options.clip or not np.all(np.isfinite(q)):
         clamp(q, limits)
-    # A target that far cannot be squared in double precision, and no hand is a kilometre wide; a rotation's elements are within 1.
+    # A target that far cannot be squared in double precision, and no hand is a kilometre wide; a
+    # rotation's elements are within 1.
     if not (np.all(np.abs(point) < 1e3) and np.all(np.abs(rotation) < 2.0)):
         return Frame(q, 0, 0.0, NOT_CONVERGED)
     p, J, used, moved = np.empty(3), np.empty((6, 4)), 0, np.inf
@@ -110,5 +128,9 @@ def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Readi
             new = np.clip(new, limits[:, 0], limits[:, 1])
         moved, q = float(np.linalg.norm(new - q)), new
     residual = float(np.linalg.norm(tip(chain, q) - point))
-    state = SOLVED if residual <= options.tolerance_m else (NOT_CONVERGED if used == options.most else UNREACHABLE)
+    state = (
+        SOLVED
+        if residual <= options.tolerance_m
+        else (NOT_CONVERGED if used == options.most else UNREACHABLE)
+    )
     return Frame(q, used, residual, state)

@@ -1,12 +1,15 @@
-"""FABRIK for one digit: forward and backward reaching (Aristidou & Lasenby 2011) with the joints' limits, and ways out of its traps.
+"""FABRIK for one digit: forward and backward reaching (Aristidou & Lasenby 2011) with the joints'
+limits, and ways out of its traps.
 
-The chain is a rotor (abduction and first flexion, rotor.py) and two hinges that share its plane, so the plane is turned onto the
-target first and the joints are placed in it: backward from the target, forward from the root with every hinge limited on both
-sides, then the last two flexions drawn to their coupling. Everything happens in the digit's canonical frame: turning the world
-changes nothing (the seed's framework depends on it).
-FABRIK with limits alone sticks at nearly half of random reachable targets, and a target on the line of a straight chain never bends
-it: a chain that no longer comes nearer starts again from other postures, then without the coupling, then hands over to damped least
-squares. A target beyond reach gives UNREACHABLE and a digit that points at it; one that is not finite leaves the angles alone.
+The chain is a rotor (abduction and first flexion, rotor.py) and two hinges that share its plane, so
+the plane is turned onto the target first and the joints are placed in it: backward from the target,
+forward from the root with every hinge limited on both sides, then the last two flexions drawn to
+their coupling. Everything happens in the digit's canonical frame: turning the world changes nothing
+(the seed's framework depends on it). FABRIK with limits alone sticks at nearly half of random
+reachable targets, and a target on the line of a straight chain never bends it: a chain that no
+longer comes nearer starts again from other postures, then without the coupling, then hands over to
+damped least squares. A target beyond reach gives UNREACHABLE and a digit that points at it; one
+that is not finite leaves the angles alone.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ _AGAIN = (0.5, 0.2, 0.8)
 
 @njit(cache=True)
 def _pass(plane: Plane, flexions: Array, forward: float, palm: float, joined: bool) -> float:
-    """One backward and one forward pass in the plane; flexions (3,) in and out; returns the distance left.
+    """One backward and one forward pass in the plane; flexions (3,) in and out; returns the
+    distance left.
 
     RHOT eq. (6)-(8): from the target back along the old joints, then from the root with limits.
     """
@@ -53,14 +57,18 @@ def _pass(plane: Plane, flexions: Array, forward: float, palm: float, joined: bo
     x1, y1 = a * math.cos(first), a * math.sin(first)
     bend = limited(math.atan2(y2 - y1, x2 - x1) - first, limits[2, 0], limits[2, 1])
     x2, y2 = x1 + b * math.cos(first + bend), y1 + b * math.sin(first + bend)
-    last = limited(math.atan2(palm - y2, forward - x2) - first - bend - plane.gamma, limits[3, 0], limits[3, 1])
+    last = limited(
+        math.atan2(palm - y2, forward - x2) - first - bend - plane.gamma, limits[3, 0], limits[3, 1]
+    )
     if joined:
         ratio = plane.coupling[0]
         bend = min(max((bend + ratio * last) / (1.0 + ratio**2), limits[2, 0]), limits[2, 1])
         last = min(max(ratio * bend, limits[3, 0]), limits[3, 1])
         x, y = _tip(plane, first, bend, last)
         # The root turns the whole chain onto the target again.
-        first = limited(first + math.atan2(palm, forward) - math.atan2(y, x), limits[1, 0], limits[1, 1])
+        first = limited(
+            first + math.atan2(palm, forward) - math.atan2(y, x), limits[1, 0], limits[1, 1]
+        )
     flexions[0], flexions[1], flexions[2] = first, bend, last
     x, y = _tip(plane, first, bend, last)
     return math.hypot(x - forward, y - palm)
@@ -76,8 +84,19 @@ def _tip(plane: Plane, first: float, bend: float, last: float) -> tuple[float, f
 
 
 @njit(cache=True)
-def _one_start(plane: Plane, flexions: Array, forward: float, palm: float, joined: bool, most: int, tolerance: float) -> tuple[float, int]:
-    """Passes until the tip is there or hangs; the best flexions (3,) are kept; returns (distance left, passes)."""
+def _one_start(
+    plane: Plane,
+    flexions: Array,
+    forward: float,
+    palm: float,
+    joined: bool,
+    most: int,
+    tolerance: float,
+) -> tuple[float, int]:
+    """Passes until the tip is there or hangs; the best flexions (3,) are kept.
+
+    Returns (distance left, passes).
+    """
     best, least, watched, used = flexions.copy(), np.inf, np.inf, 0
     while used < min(most, _PASSES):
         left = _pass(plane, flexions, forward, palm, joined)
@@ -95,8 +114,12 @@ def _one_start(plane: Plane, flexions: Array, forward: float, palm: float, joine
 
 
 @njit(cache=True)
-def _from_postures(plane: Plane, flexions: Array, forward: float, palm: float, most: int, tolerance: float) -> int:
-    """FABRIK from where the digit is, then from other postures, then from the best of them without the coupling; returns passes."""
+def _from_postures(
+    plane: Plane, flexions: Array, forward: float, palm: float, most: int, tolerance: float
+) -> int:
+    """FABRIK from where the digit is, then from other postures, then from the best of them without
+    the coupling; returns passes.
+    """
     best, least, used = flexions.copy(), np.inf, 0
     trial = np.empty(3)
     joined = plane.coupling[1] > 0.0
@@ -105,8 +128,12 @@ def _from_postures(plane: Plane, flexions: Array, forward: float, palm: float, m
             trial[:] = best
         else:
             for j in range(3):
-                trial[j] = plane.limits[j + 1, 0] + _AGAIN[attempt - 1] * (plane.limits[j + 1, 1] - plane.limits[j + 1, 0])
-        left, passes = _one_start(plane, trial, forward, palm, joined and attempt < 4, most - used, tolerance)
+                trial[j] = plane.limits[j + 1, 0] + _AGAIN[attempt - 1] * (
+                    plane.limits[j + 1, 1] - plane.limits[j + 1, 0]
+                )
+        left, passes = _one_start(
+            plane, trial, forward, palm, joined and attempt < 4, most - used, tolerance
+        )
         used += passes
         if left < least:
             best[:], least = trial, left
@@ -117,8 +144,13 @@ def _from_postures(plane: Plane, flexions: Array, forward: float, palm: float, m
 
 
 @njit(cache=True)
-def reach(chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance: float) -> tuple[int, float]:
-    """FABRIK alone, without the hand-over: angles q (4,) in and out; returns (passes, distance left). point must be finite."""
+def reach(
+    chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance: float
+) -> tuple[int, float]:
+    """FABRIK alone, without the hand-over: angles q (4,) in and out.
+
+    Returns (passes, distance left). point must be finite.
+    """
     total, far = reach_of(chain), length_of(point)
     # Beyond a thousand lengths only the direction matters, and squares might overflow.
     aim = point / total if far < 1e3 * total else point / far * 1e3
@@ -131,7 +163,9 @@ def reach(chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance
     for branch in (1, -1):
         trial[:] = q
         trial[0] = facing(aim, unit.tool[0], branch, q[0], chain.limits[0, 0], chain.limits[0, 1])
-        used += _from_postures(plane, trial[1:], forward_of(aim, trial[0]), -aim[1], max(most - used, 1), fine)
+        used += _from_postures(
+            plane, trial[1:], forward_of(aim, trial[0]), -aim[1], max(most - used, 1), fine
+        )
         trial[0], trial[1] = swing(shape, chain.limits, trial[0], trial[1])
         left = distance_to(unit, trial, aim)
         if left < least:
@@ -143,11 +177,14 @@ def reach(chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance
 
 
 @njit(cache=True)
-def solve(chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance: float) -> tuple[int, float, int]:
-    """Angles q (4,) that bring the painted point to point (3,), canonical frame, the chain's unit of length.
+def solve(
+    chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance: float
+) -> tuple[int, float, int]:
+    """Angles q (4,) that bring the painted point to point (3,), canonical frame, the chain's unit
+    of length.
 
-    shape: the base's rotor (rotor.py). Returns (passes and iterations, distance left, SOLVED | UNREACHABLE | NOT_CONVERGED). Angles
-    are within limits whatever comes in.
+    shape: the base's rotor (rotor.py). Returns (passes and iterations, distance left, SOLVED |
+    UNREACHABLE | NOT_CONVERGED). Angles are within limits whatever comes in.
     """
     clamp(q, chain.limits)
     total, far = reach_of(chain), length_of(point)
@@ -155,7 +192,8 @@ def solve(chain: Chain, point: Array, q: Array, shape: int, most: int, tolerance
         return 0, far if math.isfinite(far) else 0.0, NOT_CONVERGED
     used, left = reach(chain, point, q, shape, most, tolerance)
     if left > tolerance and shape == BOX:
-        # Limit deadlock, or out of reach: damped least squares from here finds the nearest posture within the limits.
+        # Limit deadlock, or out of reach: damped least squares from here finds the nearest posture
+        # within the limits.
         other = q.copy()
         wanted = dls.Goal(dls.COUPLED, point, np.eye(3), np.zeros((2, 4)))
         steps, near, _ = dls.solve(chain, wanted, other, most, tolerance)

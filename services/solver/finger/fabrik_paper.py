@@ -1,8 +1,10 @@
-"""Plain FABRIK for one digit, as the RHOT paper prints it (eq. 5-8): no limits, no coupling; here for comparison.
+"""Plain FABRIK for one digit, as the RHOT paper prints it (eq. 5-8): no limits, no coupling; here
+for comparison.
 
-Joints are points in space that are pulled along lines; a target beyond the summed lengths is not solved but pointed at. It has no
-joint angles: they are read off the points afterwards and brought within the limits, so that the published hand stays a hand; the
-distance reported is that of the published angles. A target that is not finite leaves the angles alone.
+Joints are points in space that are pulled along lines; a target beyond the summed lengths is not
+solved but pointed at. It has no joint angles: they are read off the points afterwards and brought
+within the limits, so that the published hand stays a hand; the distance reported is that of the
+published angles. A target that is not finite leaves the angles alone.
 """
 
 from __future__ import annotations
@@ -64,7 +66,9 @@ def reach(points: Array, target: Array, bones: Array, most: int, tolerance: floa
 
 @njit(cache=True)
 def angles_of(points: Array, gamma: float, limits: Array, q: Array) -> None:
-    """Angles q (4,), within limits, of joints (4, 3) in the canonical frame, in the plane through the last joint."""
+    """Angles q (4,), within limits, of joints (4, 3) in the canonical frame, in the plane through
+    the last joint.
+    """
     q[0] = facing(points[3], 0.0, 1, q[0], limits[0, 0], limits[0, 1])
     before = 0.0
     for k in range(3):
@@ -75,15 +79,26 @@ def angles_of(points: Array, gamma: float, limits: Array, q: Array) -> None:
 
 
 @njit(cache=True)
-def solve(chain: Chain, point: Array, q: Array, most: int, tolerance: float) -> tuple[int, float, int]:
-    """Angles q (4,) from plain FABRIK on point (3,), canonical frame, the chain's unit; returns (iterations, distance, state)."""
+def solve(
+    chain: Chain, point: Array, q: Array, most: int, tolerance: float
+) -> tuple[int, float, int]:
+    """Angles q (4,) from plain FABRIK on point (3,), canonical frame, the chain's unit.
+
+    Returns (iterations, distance, state).
+    """
     clamp(q, chain.limits)
     total, far = reach_of(chain), length_of(point)
     if not (math.isfinite(far) and total > 1e-9):
         return 0, far if math.isfinite(far) else 0.0, NOT_CONVERGED
     plane = plane_of(chain)
     joints = joints_of(q, plane.bones, plane.gamma)
-    used = reach(joints, point if far < 1e3 * total else point / far * (1e3 * total), plane.bones, most, 0.5 * tolerance)
+    used = reach(
+        joints,
+        point if far < 1e3 * total else point / far * (1e3 * total),
+        plane.bones,
+        most,
+        0.5 * tolerance,
+    )
     angles_of(joints, plane.gamma, chain.limits, q)
     left = distance_to(chain, q, point)
     if left <= tolerance:

@@ -1,7 +1,8 @@
 """The angles of each digit, given the wrist's pose, by the method that rig.toml names.
 
-The whole-hand solution says where the wrist is and how every digit is about bent. The method then brings each painted tip to where it
-was seen, starting from there. A digit whose tip was not seen keeps the whole-hand solution and is `predicted`.
+The whole-hand solution says where the wrist is and how every digit is about bent. The method then
+brings each painted tip to where it was seen, starting from there. A digit whose tip was not seen
+keeps the whole-hand solution and is `predicted`.
 """
 
 from __future__ import annotations
@@ -21,11 +22,16 @@ from services.solver.maths.kinematics import Chains, chain_of, tip_rotation, to_
 from services.solver.whole_hand.posture_prior import clamp
 
 Status = Literal["solved", "unreachable", "not_converged", "predicted"]
-STATES: dict[int, Status] = {dls.SOLVED: "solved", dls.UNREACHABLE: "unreachable", dls.NOT_CONVERGED: "not_converged"}
+STATES: dict[int, Status] = {
+    dls.SOLVED: "solved",
+    dls.UNREACHABLE: "unreachable",
+    dls.NOT_CONVERGED: "not_converged",
+}
 
-# rad; how far dls trusts the whole-hand solution's angles, against how far it trusts the painted tip. A tip fixes three of four
-# angles, and in a fist, when it lies on the axis of abduction, two: without this they jump with a millimetre of noise.
-# Simulated hands, 1 mm, middle knuckle painted: flexion error 2.31 deg at 0.25, 2.24 at 0.1, 2.20 at 0.03, where tips lag behind.
+# rad; how far dls trusts the whole-hand solution's angles, against how far it trusts the painted
+# tip. A tip fixes three of four angles, and in a fist, when it lies on the axis of abduction, two:
+# without this they jump with a millimetre of noise. Simulated hands, 1 mm, middle knuckle painted:
+# flexion error 2.31 deg at 0.25, 2.24 at 0.1, 2.20 at 0.03, where tips lag behind.
 _TRUST_RAD = 0.1
 # A tip is reached when it is as near as its own uncertainty allows: 3 standard deviations.
 _SIGMAS = 3.0
@@ -35,7 +41,9 @@ _ROOM_M = 1e3
 
 @dataclass(frozen=True)
 class Tip:
-    """A painted tip: where (3,) in the wrist frame, one standard deviation (m), and whether a camera saw it."""
+    """A painted tip: where (3,) in the wrist frame, one standard deviation (m), and whether a
+    camera saw it.
+    """
 
     point_m: Array
     sigma_m: float
@@ -44,7 +52,10 @@ class Tip:
 
 @dataclass(frozen=True)
 class Fingers:
-    """All digits: angles (5, 4) rad within limits, distance left (m), iterations, status; lists in the order of DIGITS."""
+    """All digits: angles (5, 4) rad within limits, distance left (m), iterations, status.
+
+    Lists in the order of DIGITS.
+    """
 
     angles_rad: Array
     residual_m: list[float]
@@ -52,10 +63,14 @@ class Fingers:
     status: list[Status]
 
 
-def solve_fingers(settings: Solver, chains: Chains, start_rad: Array, tips: Mapping[str, Tip]) -> Fingers:
-    """Bring the painted tips (by digit) to where they were seen, starting from the whole hand's angles start_rad (5, 4).
+def solve_fingers(
+    settings: Solver, chains: Chains, start_rad: Array, tips: Mapping[str, Tip]
+) -> Fingers:
+    """Bring the painted tips (by digit) to where they were seen, starting from the whole hand's
+    angles start_rad (5, 4).
 
-    Tips that no camera saw in this frame are solved for too, but called predicted. Points that are no place in a room are not tips.
+    Tips that no camera saw in this frame are solved for too, but called predicted. Points that are
+    no place in a room are not tips.
     """
     tips = {name: tip for name, tip in tips.items() if np.all(np.abs(tip.point_m) < _ROOM_M)}
     angles = start_rad.copy()
@@ -68,12 +83,16 @@ def solve_fingers(settings: Solver, chains: Chains, start_rad: Array, tips: Mapp
     if settings.method == "dls":
         sigma = np.array([tips[name].sigma_m if name in tips else 0.0 for name in DIGITS])
         keep = sigma / (_TRUST_RAD * np.maximum(chains.lengths_m.sum(axis=1), 1e-3))
-        dls.solve_digits(chains, points, angles, keep, settings.max_iterations, settings.tolerance_m, seen, ends)
+        dls.solve_digits(
+            chains, points, angles, keep, settings.max_iterations, settings.tolerance_m, seen, ends
+        )
     else:
         for row in range(5):
             if seen[row]:
                 ends[row] = _one(settings, chains, row, points[row], angles[row])
-    status = [_status(tips.get(name), ends[row], settings.tolerance_m) for row, name in enumerate(DIGITS)]
+    status = [
+        _status(tips.get(name), ends[row], settings.tolerance_m) for row, name in enumerate(DIGITS)
+    ]
     return Fingers(angles, ends[:, 1].tolist(), [int(count) for count in ends[:, 0]], status)
 
 
@@ -84,8 +103,13 @@ def _status(tip: Tip | None, end: Array, tolerance_m: float) -> Status:
     return "solved" if end[1] <= max(tolerance_m, _SIGMAS * tip.sigma_m) else STATES[int(end[2])]
 
 
-def _one(settings: Solver, chains: Chains, row: int, point: Array, q: Array) -> tuple[int, float, int]:
-    """One digit by a method other than dls; q (4,) in and out; returns (iterations, distance left, state)."""
+def _one(
+    settings: Solver, chains: Chains, row: int, point: Array, q: Array
+) -> tuple[int, float, int]:
+    """One digit by a method other than dls; q (4,) in and out.
+
+    Returns (iterations, distance left, state).
+    """
     chain = chain_of(chains, row)
     target = to_canonical(chains.base_m[row], chains.base_rotation[row], chains.side, point)
     most, tolerance = settings.max_iterations, settings.tolerance_m
@@ -97,6 +121,12 @@ def _one(settings: Solver, chains: Chains, row: int, point: Array, q: Array) -> 
         case "fabrik-seed":
             return fabrik_paper.solve(chain, target, q, most, tolerance)
         case _:
-            frame = dls_paper.solve(chain, target, tip_rotation(q), q, dls_paper.Reading(most=most, tolerance_m=tolerance))
+            frame = dls_paper.solve(
+                chain,
+                target,
+                tip_rotation(q),
+                q,
+                dls_paper.Reading(most=most, tolerance_m=tolerance),
+            )
             q[:] = frame.angles_rad
             return frame.iterations, frame.residual_m, frame.state

@@ -1,7 +1,8 @@
 """A tiny convex quadratic programme with bounds: min 1/2 x'Hx + g'x, low <= x <= high.
 
-Primal active set (Nocedal & Wright, Numerical Optimization, algorithm 16.3, for bounds only): finite for positive definite H,
-exact, and one Cholesky where no bound matters. 4 unknowns for a digit, 26 for the hand. Pure maths: no input is late here.
+Primal active set (Nocedal & Wright, Numerical Optimization, algorithm 16.3, for bounds only):
+finite for positive definite H, exact, and one Cholesky where no bound matters. 4 unknowns for a
+digit, 26 for the hand. Pure maths: no input is late here.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ Integers = npt.NDArray[np.int64]
 
 
 @njit(cache=True)
-def _solve_free(H: Array, g: Array, x: Array, free: Integers, count: int, L: Array, out: Array) -> bool:
-    """The step over the free unknowns with the others held; out[:count] gets it. False if H is not definite.
+def _solve_free(
+    H: Array, g: Array, x: Array, free: Integers, count: int, L: Array, out: Array
+) -> bool:
+    """The step over the free unknowns with the others held; out[:count] gets it. False if H is not
+    definite.
 
     L's diagonal holds reciprocals: one division a row.
     """
@@ -54,7 +58,9 @@ def _solve_free(H: Array, g: Array, x: Array, free: Integers, count: int, L: Arr
 
 @njit(cache=True)
 def _start(g: Array, low: Array, high: Array, x: Array, held: Integers) -> None:
-    """Begin at the feasible point nearest to zero and hold what stands at a bound and is pushed outwards."""
+    """Begin at the feasible point nearest to zero and hold what stands at a bound and is pushed
+    outwards.
+    """
     for i in range(g.size):
         x[i] = min(max(0.0, low[i]), high[i])
         held[i] = 0
@@ -82,7 +88,9 @@ def _release(H: Array, g: Array, x: Array, held: Integers) -> int:
 
 @njit(cache=True)
 def newton4(H: Array, g: Array, x: Array) -> bool:
-    """Minimise 1/2 x'Hx + g'x over four unknowns without bounds: LDL', written out (a third of the time of loops)."""
+    """Minimise 1/2 x'Hx + g'x over four unknowns without bounds: LDL', written out (a third of the
+    time of loops).
+    """
     d0 = H[0, 0]
     if not d0 > 0.0:
         return False
@@ -115,16 +123,21 @@ def newton4(H: Array, g: Array, x: Array) -> bool:
 
 
 @njit(cache=True)
-def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, room: Array, lists: Integers) -> bool:
-    """Solve into x (n,); H (n, n) symmetric positive definite, bounds may be infinite. False if H is not definite.
+def box_qp(
+    H: Array, g: Array, low: Array, high: Array, x: Array, room: Array, lists: Integers
+) -> bool:
+    """Solve into x (n,); H (n, n) symmetric positive definite, bounds may be infinite. False if H
+    is not definite.
 
-    x is feasible in any case, and never worse than the feasible point nearest to zero. room (n + 1, n) and lists (2, n) are to work
-    in: allocating them anew at each of many small problems costs as much as solving them.
+    x is feasible in any case, and never worse than the feasible point nearest to zero. room (n + 1,
+    n) and lists (2, n) are to work in: allocating them anew at each of many small problems costs as
+    much as solving them.
     """
     n = g.size
     L, step, held, free = room[:n], room[n], lists[0], lists[1]
     _start(g, low, high, x, held)
-    # Each round holds or releases one unknown; 4n rounds were never used up by 68,000 random problems of 4 or 26 unknowns.
+    # Each round holds or releases one unknown; 4n rounds were never used up by 68,000 random
+    # problems of 4 or 26 unknowns.
     for _ in range(4 * n + 4):
         count = 0
         for i in range(n):

@@ -1,10 +1,12 @@
-"""Kinematics of one digit and of the whole hand: forward with every joint frame, and the geometric Jacobian.
+"""Kinematics of one digit and of the whole hand: forward with every joint frame, and the geometric
+Jacobian.
 
-A digit is a chain of four hinges: abduction about y, then three flexions about -x, with bones along -z. It is solved in its
-own *canonical frame*: origin in the chain's root, axes of the first bone at zero angles, x mirrored for a left hand. So the
-maths knows neither the world (results cannot depend on how the hand is turned) nor left from right.
-Numba kernels, each with a plain numpy twin (`*_reference`) that tests compare it with. Input that is not finite gives output
-that is not finite: callers check (services/solver/step.py).
+A digit is a chain of four hinges: abduction about y, then three flexions about -x, with bones along
+-z. It is solved in its own *canonical frame*: origin in the chain's root, axes of the first bone at
+zero angles, x mirrored for a left hand. So the maths knows neither the world (results cannot depend
+on how the hand is turned) nor left from right. Numba kernels, each with a plain numpy twin
+(`*_reference`) that tests compare it with. Input that is not finite gives output that is not
+finite: callers check (services/solver/step.py).
 """
 
 from __future__ import annotations
@@ -23,7 +25,10 @@ CHAINS = CHAIN_JOINTS.astype(np.int64)
 
 
 class Chain(NamedTuple):
-    """One digit in its canonical frame, as arrays for the kernels; any unit of length (the solvers scale it to 1)."""
+    """One digit in its canonical frame, as arrays for the kernels.
+
+    Any unit of length (the solvers scale it to 1).
+    """
 
     lengths: Array  # (3,) bones
     tool: Array  # (3,) the painted point in the axes of the last joint: about (0, 0, -length of the last bone)
@@ -32,7 +37,10 @@ class Chain(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """The five chains of a hand as arrays for the kernels; metres, radians, rows in the order of DIGITS."""
+    """The five chains of a hand as arrays for the kernels.
+
+    Metres, radians, rows in the order of DIGITS.
+    """
 
     base_m: Array  # (5, 3) root of each chain in the wrist frame
     base_rotation: Array  # (5, 3, 3) axes of its first bone at zero angles, in the wrist frame
@@ -45,7 +53,10 @@ class Chains(NamedTuple):
 
 
 def hand_chains(model: HandModel) -> Chains:
-    """The kernels' view of a person's hand; the tool is the tip's painted point (Paint.offset_m short of the tip)."""
+    """The kernels' view of a person's hand.
+
+    The tool is the tip's painted point (Paint.offset_m short of the tip).
+    """
     tool = np.empty((5, 3))
     for row, digit in enumerate(model.digits):
         x, y, z = model.paint[f"{digit.name}_tip"].offset_m
@@ -57,7 +68,9 @@ def hand_chains(model: HandModel) -> Chains:
         lengths_m=np.array([d.lengths_m for d in model.digits], dtype=np.float64),
         tool_m=tool,
         limits_rad=np.array([d.limits_rad for d in model.digits], dtype=np.float64),
-        coupling=np.array([(d.coupling, d.coupling_weight) for d in model.digits], dtype=np.float64),
+        coupling=np.array(
+            [(d.coupling, d.coupling_weight) for d in model.digits], dtype=np.float64
+        ),
         side=model.side,
     )
 
@@ -65,14 +78,20 @@ def hand_chains(model: HandModel) -> Chains:
 @njit(cache=True)
 def chain_of(chains: Chains, row: int) -> Chain:
     """One digit of a hand, lengths in metres."""
-    return Chain(chains.lengths_m[row], chains.tool_m[row], chains.limits_rad[row], chains.coupling[row])
+    return Chain(
+        chains.lengths_m[row], chains.tool_m[row], chains.limits_rad[row], chains.coupling[row]
+    )
 
 
 @njit(cache=True)
 def reach_of(chain: Chain) -> float:
-    """How far the painted point is from the root when every joint is straight, were the point on the bone's axis."""
+    """How far the painted point is from the root when every joint is straight, were the point on
+    the bone's axis.
+    """
     tool = chain.tool
-    return chain.lengths[0] + chain.lengths[1] + math.sqrt(tool[0] ** 2 + tool[1] ** 2 + tool[2] ** 2)
+    return (
+        chain.lengths[0] + chain.lengths[1] + math.sqrt(tool[0] ** 2 + tool[1] ** 2 + tool[2] ** 2)
+    )
 
 
 @njit(cache=True)
@@ -120,10 +139,12 @@ def tip(chain: Chain, q: Array) -> Array:
 
 @njit(cache=True)
 def jacobian(chain: Chain, q: Array, p: Array, J: Array) -> None:
-    """Fill p (3,) with the painted point and J (6, 4) with its geometric Jacobian, both in the canonical frame.
+    """Fill p (3,) with the painted point and J (6, 4) with its geometric Jacobian, both in the
+    canonical frame.
 
-    Rows 0..2 are d p / d q, rows 3..5 the joint axes. Equal to the finger study's matrix A1 (Chatterjee et al., appendix) with
-    its D-H axes renamed, x_DH = -z, y_DH = x, z_DH = -y and theta_1 = -abduction; tests/services/solver/maths/test_kinematics.py.
+    Rows 0..2 are d p / d q, rows 3..5 the joint axes. Equal to the finger study's matrix A1
+    (Chatterjee et al., appendix) with its D-H axes renamed, x_DH = -z, y_DH = x, z_DH = -y and
+    theta_1 = -abduction; tests/services/solver/maths/test_kinematics.py.
     """
     lengths, tool = chain.lengths, chain.tool
     a1, a2, a3 = q[1], q[1] + q[2], q[1] + q[2] + q[3]
@@ -147,7 +168,10 @@ def jacobian(chain: Chain, q: Array, p: Array, J: Array) -> None:
 
 @njit(cache=True)
 def tip_rotation(q: Array) -> Array:
-    """Axes of the last bone in the canonical frame: R_y(abduction) R_x(-sum of flexions); (4,) -> (3, 3)."""
+    """Axes of the last bone in the canonical frame: R_y(abduction) R_x(-sum of flexions).
+
+    (4,) -> (3, 3).
+    """
     s0, c0 = math.sin(q[0]), math.cos(q[0])
     s, c = math.sin(q[1] + q[2] + q[3]), math.cos(q[1] + q[2] + q[3])
     R = np.empty((3, 3))
@@ -158,8 +182,18 @@ def tip_rotation(q: Array) -> Array:
 
 
 @njit(cache=True)
-def hand_frames(chains: Chains, wrist_rotation: Array, wrist_m: Array, angles: Array, positions: Array, rotations: Array) -> None:
-    """Fill positions (26, 3) and rotations (26, 3, 3) of all joints as rhot.hand.forward does; angles (5, 4) rad."""
+def hand_frames(
+    chains: Chains,
+    wrist_rotation: Array,
+    wrist_m: Array,
+    angles: Array,
+    positions: Array,
+    rotations: Array,
+) -> None:
+    """Fill positions (26, 3) and rotations (26, 3, 3) of all joints as rhot.hand.forward does.
+
+    Angles (5, 4) rad.
+    """
     for j in range(26):
         positions[j] = wrist_m
         rotations[j] = wrist_rotation

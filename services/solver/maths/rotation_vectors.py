@@ -1,4 +1,6 @@
-"""Small turns as rotation vectors, for the kernels (rhot/geometry/transforms.py has the same maths for everybody else)."""
+"""Small turns as rotation vectors, for the kernels (rhot/geometry/transforms.py has the same maths
+for everybody else).
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,10 @@ def turned(R: Array, v: Array) -> Array:
 
 @njit(cache=True)
 def rotation_vector(R: Array) -> Array:
-    """The rotation vector of R (3, 3), from its skew part; near 180 deg only its length is reliable, which is all LM needs."""
+    """The rotation vector of R (3, 3), from its skew part.
+
+    Near 180 deg only its length is reliable, which is all LM needs.
+    """
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)
     angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))

@@ -1,9 +1,11 @@
-"""The whole hand from its markers: wrist pose (6 unknowns) and all angles (20) in one box-constrained least-squares problem.
+"""The whole hand from its markers: wrist pose (6 unknowns) and all angles (20) in one
+box-constrained least-squares problem.
 
-Wrist and five tips measure 18 numbers; under RHOT's constraints the hand has 21 degrees of freedom, so the soft constraints of
-constraints.py and the previous pose say the rest, each weighed by its standard deviation against the markers'. Levenberg-
-Marquardt with Marquardt's scaling; steps stay within the joint limits (box_qp); Huber weights keep one wrong marker from
-bending the hand. A missing marker is simply no equation: its finger then follows the priors and the previous pose.
+Wrist and five tips measure 18 numbers; under RHOT's constraints the hand has 21 degrees of freedom,
+so the soft constraints of constraints.py and the previous pose say the rest, each weighed by its
+standard deviation against the markers'. Levenberg- Marquardt with Marquardt's scaling; steps stay
+within the joint limits (box_qp); Huber weights keep one wrong marker from bending the hand. A
+missing marker is simply no equation: its finger then follows the priors and the previous pose.
 Input that is not finite must not come here (services/solver/step.py drops it).
 """
 
@@ -22,16 +24,18 @@ from services.solver.maths.kinematics import CHAINS, Chains
 from services.solver.maths.rotation_vectors import rotation_vector, turned
 from services.solver.whole_hand.motion_prior import UNKNOWNS, Belief
 
-# Whitened distance beyond which a marker counts linearly: a millimetre-accurate marker that is 5 mm off is no longer noise but
-# may still be a bone measured short.
+# Whitened distance beyond which a marker counts linearly: a millimetre-accurate marker that is 5 mm
+# off is no longer noise but may still be a bone measured short.
 _HUBER = 5.0
-# Marquardt's factor: start, and how it moves; the usual values (Madsen, Nielsen & Tingleff 2004, section 3.2) made bolder, as
-# the previous pose is nearly always a good start.
+# Marquardt's factor: start, and how it moves; the usual values (Madsen, Nielsen & Tingleff 2004,
+# section 3.2) made bolder, as the previous pose is nearly always a good start.
 _DAMPING_START, _DAMPING_DOWN, _DAMPING_UP = 1e-5, 0.1, 8.0
 
 
 class Marks(NamedTuple):
-    """Markers as arrays: which joint frame each is fixed to, where in it, where it was seen (rig frame) and how well."""
+    """Markers as arrays: which joint frame each is fixed to, where in it, where it was seen (rig
+    frame) and how well.
+    """
 
     joint: Integers  # (m,) index into JOINTS
     digit: Integers  # (m,) row of its chain, -1: fixed to the wrist frame
@@ -58,8 +62,12 @@ def place_of(model: HandModel, name: str) -> tuple[int, int, int, Array]:
 
 
 @njit(cache=True)
-def _digit_frames(chains: Chains, row: int, q: Array, roots: Array, axes: Array, frames: Array) -> None:
-    """Of one digit, in the wrist frame: joint positions roots (4, 3), axes (4, 3) of the four angles, frames (4, 3, 3)."""
+def _digit_frames(
+    chains: Chains, row: int, q: Array, roots: Array, axes: Array, frames: Array
+) -> None:
+    """Of one digit, in the wrist frame: joint positions roots (4, 3), axes (4, 3) of the four
+    angles, frames (4, 3, 3).
+    """
     s, c = math.sin(chains.side * q[0]), math.cos(chains.side * q[0])
     B = chains.base_rotation[row]
     F = np.empty((3, 3))
@@ -79,8 +87,22 @@ def _digit_frames(chains: Chains, row: int, q: Array, roots: Array, axes: Array,
 
 
 @njit(cache=True)
-def _add_mark(R: Array, t: Array, p: Array, J: Array, columns: Integers, count: int, mark: int, marks: Marks, H: Array, g: Array) -> float:
-    """Add one marker's normal equations: p (3,) and J (3, count) in the wrist frame; returns its Huber cost."""
+def _add_mark(
+    R: Array,
+    t: Array,
+    p: Array,
+    J: Array,
+    columns: Integers,
+    count: int,
+    mark: int,
+    marks: Marks,
+    H: Array,
+    g: Array,
+) -> float:
+    """Add one marker's normal equations: p (3,) and J (3, count) in the wrist frame.
+
+    Returns its Huber cost.
+    """
     arm = R @ p
     full = np.zeros((3, 10))
     full[0, 1], full[0, 2] = arm[2], -arm[1]
@@ -110,7 +132,10 @@ def _add_mark(R: Array, t: Array, p: Array, J: Array, columns: Integers, count: 
 
 @njit(cache=True)
 def _normal_equations(chains: Chains, marks: Marks, belief: Belief, R: Array, t: Array, q: Array, H: Array, g: Array) -> float:  # fmt: skip
-    """Fill H (26, 26) and g (26,) of the whole problem at a pose; returns the cost (sum of squares in standard deviations)."""
+    """Fill H (26, 26) and g (26,) of the whole problem at a pose.
+
+    Returns the cost (sum of squares in standard deviations).
+    """
     H[:] = 0.0
     g[:] = 0.0
     cost = 0.0
@@ -151,8 +176,18 @@ def _normal_equations(chains: Chains, marks: Marks, belief: Belief, R: Array, t:
 
 
 @njit(cache=True)
-def fit(chains: Chains, marks: Marks, belief: Belief, R: Array, t: Array, q: Array, most: int, information: Array) -> tuple[float, int]:
-    """Improve the pose R (3, 3), t (3,), q (5, 4) in place; returns (cost, iterations). Angles stay within their limits.
+def fit(
+    chains: Chains,
+    marks: Marks,
+    belief: Belief,
+    R: Array,
+    t: Array,
+    q: Array,
+    most: int,
+    information: Array,
+) -> tuple[float, int]:
+    """Improve the pose R (3, 3), t (3,), q (5, 4) in place; returns (cost, iterations). Angles stay
+    within their limits.
 
     information (26, 26) is filled with that of the pose found: its inverse is the covariance.
     """

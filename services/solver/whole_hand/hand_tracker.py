@@ -1,10 +1,11 @@
 """One hand followed over time: the belief before a look, the fit, and when to doubt it.
 
-The first pose needs the wrist and three tips in one message (start.py). From then on every look starts from the belief. A look that
-fits badly, or sees a landmark that the last challenge did not, or comes three seconds after it, is challenged: the pose that a start
-from nothing would give is compared with the one that is being followed, and wins when it explains the markers clearly better twice
-running; so a mirrored orientation cannot last.
-A gap in the stamps of more than a second, stamps that run backwards, or a second with fewer than three markers forget the hand.
+The first pose needs the wrist and three tips in one message (start.py). From then on every look
+starts from the belief. A look that fits badly, or sees a landmark that the last challenge did not,
+or comes three seconds after it, is challenged: the pose that a start from nothing would give is
+compared with the one that is being followed, and wins when it explains the markers clearly better
+twice running; so a mirrored orientation cannot last. A gap in the stamps of more than a second,
+stamps that run backwards, or a second with fewer than three markers forget the hand.
 """
 
 from __future__ import annotations
@@ -31,16 +32,20 @@ _FORGET_S = 1.0
 _LOOK_ITERATIONS = 30
 # A look whose squared distances exceed this per marker coordinate fits badly (expected: below 1).
 _BAD = 16.0
-# Looks between challenges, and while looks are bad: a start takes 5 ms, i.e. 0.05 and 1.2 ms a look.
+# Looks between challenges, and while looks are bad: a start takes 5 ms, i.e. 0.05 and 1.2 ms a
+# look.
 _CHALLENGE_EVERY, _CHALLENGE_BAD = 90, 4
-# How much cheaper (in squared standard deviations) a challenger must be, and how often running. Equal posture: differences
-# below 1; a truth that a single look explains worse than another posture: up to 7 (720 simulated looks).
+# How much cheaper (in squared standard deviations) a challenger must be, and how often running.
+# Equal posture: differences below 1; a truth that a single look explains worse than another
+# posture: up to 7 (720 simulated looks).
 _CLEARLY, _TWICE = 12.0, 2
 
 
 @dataclass(frozen=True)
 class Look:
-    """The hand after one message: wrist in the rig frame, angles (5, 4) rad within limits, covariance (26, 26), cost, iterations."""
+    """The hand after one message: wrist in the rig frame, angles (5, 4) rad within limits,
+    covariance (26, 26), cost, iterations.
+    """
 
     rotation: Array
     position_m: Array
@@ -66,9 +71,14 @@ class HandTracker:
         self._challenged_with: frozenset[str] = frozenset()
 
     def look(self, stamp_ns: int, seen: Mapping[str, Seen]) -> Look | None:
-        """The hand at stamp_ns given its usable landmarks (screen.usable); None while it has not been found."""
+        """The hand at stamp_ns given its usable landmarks (screen.usable).
+
+        None while it has not been found.
+        """
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
-        if self._look is not None and not (0.0 <= seconds <= _FORGET_S and (stamp_ns - self._enough_ns) * 1e-9 <= _FORGET_S):
+        if self._look is not None and not (
+            0.0 <= seconds <= _FORGET_S and (stamp_ns - self._enough_ns) * 1e-9 <= _FORGET_S
+        ):
             self._look = None
         if len(seen) >= ENOUGH:
             self._enough_ns = stamp_ns
@@ -92,11 +102,17 @@ class HandTracker:
             depth=np.array([p.depth for p in where], dtype=np.int64),
             offset_m=np.array([p.offset_m for p in where], dtype=np.float64).reshape(-1, 3),
             point_m=np.array([s.point_m for s in seen.values()], dtype=np.float64).reshape(-1, 3),
-            inverse_sigma=np.array([s.inverse_sigma for s in seen.values()], dtype=np.float64).reshape(-1, 3),
+            inverse_sigma=np.array(
+                [s.inverse_sigma for s in seen.values()], dtype=np.float64
+            ).reshape(-1, 3),
         )
 
     def _from_nothing(self, marks: Marks) -> Look:
-        self._until_challenge, self._lost_challenges, self._challenged_with = _CHALLENGE_BAD, 0, frozenset()
+        self._until_challenge, self._lost_challenges, self._challenged_with = (
+            _CHALLENGE_BAD,
+            0,
+            frozenset(),
+        )
         cost, R, t, q, information = begin(self.chains, self._nothing, marks)
         return Look(R, t, q, spd_inverse(information), cost, 0)
 
@@ -122,7 +138,16 @@ class HandTracker:
         """The look, or the challenger when it has won often enough."""
         # Without the belief, both are judged by the same measure: markers and habit.
         R, t, q = look.rotation.copy(), look.position_m.copy(), look.angles_rad.copy()
-        own, _ = fit(self.chains, marks, self._nothing, R, t, q, _LOOK_ITERATIONS, np.empty((UNKNOWNS, UNKNOWNS)))
+        own, _ = fit(
+            self.chains,
+            marks,
+            self._nothing,
+            R,
+            t,
+            q,
+            _LOOK_ITERATIONS,
+            np.empty((UNKNOWNS, UNKNOWNS)),
+        )
         cost, R, t, q, information = begin(self.chains, self._nothing, marks)
         self._lost_challenges = self._lost_challenges + 1 if cost < own - _CLEARLY else 0
         if self._lost_challenges:

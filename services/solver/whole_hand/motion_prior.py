@@ -1,11 +1,13 @@
-"""What is known of a hand's pose before the next look: a Gaussian that every look sharpens and time blurs.
+"""What is known of a hand's pose before the next look: a Gaussian that every look sharpens and time
+blurs.
 
-Between looks the wrist drifts as a random walk and the angles return to the habitual posture (an Ornstein-Uhlenbeck process whose
-resting state is `Habit`), so that the soft constraints are counted once, not once a frame, and a finger that is hidden relaxes
-with honest uncertainty. What the fingers share is forgotten sooner than what each does alone: along it the markers say least (the
-palm's pitch against all knuckles), and there noise shifts the estimate always the same way, towards bent fingers, whose tips need
-less turning to follow it; the shift adds up over the time that is remembered.
-A long gap simply blurs everything; the caller starts anew then.
+Between looks the wrist drifts as a random walk and the angles return to the habitual posture (an
+Ornstein-Uhlenbeck process whose resting state is `Habit`), so that the soft constraints are counted
+once, not once a frame, and a finger that is hidden relaxes with honest uncertainty. What the
+fingers share is forgotten sooner than what each does alone: along it the markers say least (the
+palm's pitch against all knuckles), and there noise shifts the estimate always the same way, towards
+bent fingers, whose tips need less turning to follow it; the shift adds up over the time that is
+remembered. A long gap simply blurs everything; the caller starts anew then.
 """
 
 from __future__ import annotations
@@ -20,17 +22,21 @@ from rhot.geometry.transforms import Array
 from services.solver.whole_hand.posture_prior import Habit
 
 UNKNOWNS = 26
-# Random walk of the wrist: 1 rad and 1 m in a second (root mean square), 10 deg and 0.18 m in a 30 Hz frame. Simulated hands that
-# twist by 45 deg at 2.5 Hz: orientation error 5.6 deg at 1.5 rad, 6.9 at 0.7; quiet hands gain 0.1 deg from 1.5 to 0.5 rad.
+# Random walk of the wrist: 1 rad and 1 m in a second (root mean square), 10 deg and 0.18 m in a 30
+# Hz frame. Simulated hands that twist by 45 deg at 2.5 Hz: orientation error 5.6 deg at 1.5 rad,
+# 6.9 at 0.7; quiet hands gain 0.1 deg from 1.5 to 0.5 rad.
 _TURN_RAD_SQRT_S, _SHIFT_M_SQRT_S = 1.0, 1.0
-# Time in which a finger forgets its own part of the posture, and the hand what the fingers share. Flexion error of hands with 1 mm
-# of noise (six motions of the simulator; fists and random motions with a turning wrist):
-# shared part 0.6 s 5.8 and 3.8 deg, 0.2 s 4.9 and 3.9, 0.1 s 4.4 and 4.1. No memory at all costs those with a painted knuckle 15 %.
+# Time in which a finger forgets its own part of the posture, and the hand what the fingers share.
+# Flexion error of hands with 1 mm of noise (six motions of the simulator; fists and random motions
+# with a turning wrist): shared part 0.6 s 5.8 and 3.8 deg, 0.2 s 4.9 and 3.9, 0.1 s 4.4 and 4.1. No
+# memory at all costs those with a painted knuckle 15 %.
 _FORGET_S, _FORGET_SHARED_S = 0.6, 0.2
 
 
 class Belief(NamedTuple):
-    """The pose expected before looking, and how surely: an information matrix over rotation, position, angles (rad, m)."""
+    """The pose expected before looking, and how surely: an information matrix over rotation,
+    position, angles (rad, m).
+    """
 
     rotation: Array  # (3, 3) wrist in the rig frame
     position_m: Array  # (3,)
@@ -47,7 +53,10 @@ def unknown(habit: Habit) -> Belief:
 
 @njit(cache=True)
 def spd_inverse(A: Array) -> Array:
-    """Inverse of a symmetric positive definite matrix (n, n) by Cholesky; what is not definite is treated as barely so."""
+    """Inverse of a symmetric positive definite matrix (n, n) by Cholesky.
+
+    What is not definite is treated as barely so.
+    """
     n = A.shape[0]
     L = np.zeros((n, n))
     for a in range(n):
@@ -79,7 +88,10 @@ def spd_inverse(A: Array) -> Array:
 
 @njit(cache=True)
 def _faded(habit: Habit, values: Array, keep: float, keep_shared: float) -> Array:
-    """K @ values for K = keep * identity + (keep_shared - keep) * together @ shares; (20, n) -> (20, n)."""
+    """K @ values for K = keep * identity + (keep_shared - keep) * together @ shares.
+
+    (20, n) -> (20, n).
+    """
     out = keep * values
     for m in range(2):
         share = np.zeros(values.shape[1])
@@ -93,9 +105,11 @@ def _faded(habit: Habit, values: Array, keep: float, keep_shared: float) -> Arra
 
 @njit(cache=True)
 def predict(habit: Habit, angles: Array, covariance: Array, seconds: float) -> tuple[Array, Array]:
-    """Angles (5, 4) and covariance (26, 26) after some seconds without looking; returns the angles and the *information*.
+    """Angles (5, 4) and covariance (26, 26) after some seconds without looking; returns the angles
+    and the *information*.
 
-    The covariance becomes K P K' + H - K H K' with the habit's H; the projection that K is made of commutes with H.
+    The covariance becomes K P K' + H - K H K' with the habit's H; the projection that K is made of
+    commutes with H.
     """
     keep, keep_shared = math.exp(-seconds / _FORGET_S), math.exp(-seconds / _FORGET_SHARED_S)
     off = (angles.ravel() - habit.mean).reshape(20, 1)

@@ -1,7 +1,9 @@
-"""Which points of a HandPoints message are fit to be solved with: values may be absurd (1e300, all equal, from another hand).
+"""Which points of a HandPoints message are fit to be solved with: values may be absurd (1e300, all
+equal, from another hand).
 
-A point is dropped when it is unknown, a repetition, not finite, beyond any room, or too vaguely placed to say anything; and of points
-that lie further apart than one hand can be, those that disagree with most others. Missing points are no error: fewer equations.
+A point is dropped when it is unknown, a repetition, not finite, beyond any room, or too vaguely
+placed to say anything; and of points that lie further apart than one hand can be, those that
+disagree with most others. Missing points are no error: fewer equations.
 """
 
 from __future__ import annotations
@@ -20,17 +22,22 @@ from services.solver.whole_hand.fit import place_of
 
 # No camera of this kind sees a finger tip 10 m away.
 _FAR_M = 10.0
-# A point known to no better than a hand's length says nothing of a posture; one better than 0.3 mm is not skin.
+# A point known to no better than a hand's length says nothing of a posture; one better than 0.3 mm
+# is not skin.
 _SIGMA_M = (3e-4, 0.15)
-# A point carried on by fusion is trusted a third as much as one seen: its sigma says how it was filtered, not that it turned.
+# A point carried on by fusion is trusted a third as much as one seen: its sigma says how it was
+# filtered, not that it turned.
 _PREDICTED = 3.0
-# Two points of one hand may be further apart than the model says when its bones were never measured.
+# Two points of one hand may be further apart than the model says when its bones were never
+# measured.
 _SLACK = 1.25
 
 
 @dataclass(frozen=True)
 class Seen:
-    """One usable landmark: where (3,) in the rig frame, 1 / sigma (3,) per metre along its axes, and whether a camera saw it."""
+    """One usable landmark: where (3,) in the rig frame, 1 / sigma (3,) per metre along its axes,
+    and whether a camera saw it.
+    """
 
     point_m: Array
     inverse_sigma: Array
@@ -39,7 +46,9 @@ class Seen:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a landmark sits on the hand (see whole_hand.Marks) and how far it can be from the wrist marker, metres."""
+    """Where a landmark sits on the hand (see whole_hand.Marks) and how far it can be from the wrist
+    marker, metres.
+    """
 
     joint: int
     digit: int
@@ -68,8 +77,12 @@ def usable(points: HandPoints, known: Mapping[str, Place]) -> dict[str, Seen]:
     seen: dict[str, Seen] = {}
     for point in points.points:
         if point.name in known and point.name not in seen and _sane(point):
-            sigma = np.clip(point.sigma_m, *_SIGMA_M) * (1.0 if point.source == "measured" else _PREDICTED)
-            seen[point.name] = Seen(np.array(point.position_m), 1.0 / sigma, point.source == "measured")
+            sigma = np.clip(point.sigma_m, *_SIGMA_M) * (
+                1.0 if point.source == "measured" else _PREDICTED
+            )
+            seen[point.name] = Seen(
+                np.array(point.position_m), 1.0 / sigma, point.source == "measured"
+            )
     return _of_one_hand(seen, known)
 
 

@@ -1,7 +1,9 @@
-"""The controls of the calibration page, and its picture as a plane in the scene that can be clicked, zoomed and panned.
+"""The controls of the calibration page, and its picture as a plane in the scene that can be
+clicked, zoomed and panned.
 
-The plane stands far away from the rig, and browsers' cameras are sent there and back: so nothing of the rig is in the way of a click.
-viser calls back from threads of its own; whatever a person does becomes an Action, handed to `tell`.
+The plane stands far away from the rig, and browsers' cameras are sent there and back: so nothing of
+the rig is in the way of a click. viser calls back from threads of its own; whatever a person does
+becomes an Action, handed to `tell`.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from services.viewer.calibration.picture import Image
 # Where the plane stands, and its height; the rig is around the origin.
 _AT = np.array([0.0, 0.0, 300.0])
 _HEIGHT = 1.0
-# The panel floats over the right side of the window, this wide (control_width "large"); the picture is centred in the rest.
+# The panel floats over the right side of the window, this wide (control_width "large"); the picture
+# is centred in the rest.
 _PANEL_PX, _FILL = 400.0, 0.94
 _JPEG_QUALITY = 90
 _STEPS = {"take back": "undo", "start over": "reset", "propose all": "auto"}
@@ -29,7 +32,9 @@ _STEPS = {"take back": "undo", "start over": "reset", "propose all": "auto"}
 
 @dataclass(frozen=True)
 class Action:
-    """What a person did: open, close, camera, color, click, undo, reset, auto, edit, masks or save; x, y of a click from 0 to 1."""
+    """What a person did: open, close, camera, color, click, undo, reset, auto, edit, masks or save;
+    x, y of a click from 0 to 1.
+    """
 
     kind: str
     x: float = 0.0
@@ -39,7 +44,9 @@ class Action:
 class CalibrateGui:
     """Folder "calibrate colours" of one viewer, shared by all who look."""
 
-    def __init__(self, server: viser.ViserServer, config: RigConfig, tell: Callable[[Action], object]) -> None:
+    def __init__(
+        self, server: viser.ViserServer, config: RigConfig, tell: Callable[[Action], object]
+    ) -> None:
         self._server, self._tell = server, tell
         self._up = (0.0, -1.0, 0.0) if config.rig.world is None else (0.0, 0.0, 1.0)
         cameras = [camera.name for camera in config.camera]
@@ -47,18 +54,29 @@ class CalibrateGui:
         self._ratio = 4.0 / 3.0
         gui = server.gui
         with gui.add_folder("calibrate colours", expand_by_default=False):
-            self._open = gui.add_checkbox("show picture", False, disabled=not cameras, hint="pictures are sent only while this is on")
+            self._open = gui.add_checkbox(
+                "show picture",
+                False,
+                disabled=not cameras,
+                hint="pictures are sent only while this is on",
+            )
             self._camera = gui.add_dropdown("camera", tuple(cameras) or ("none",))
             self._color = gui.add_dropdown("colour", ("green",))
             self._to_do = gui.add_html("")
-            self._step = gui.add_button_group("clicks", tuple(_STEPS), hint="the last click, every click, no clicks")
+            self._step = gui.add_button_group(
+                "clicks", tuple(_STEPS), hint="the last click, every click, no clicks"
+            )
             self._report = gui.add_html("")
             self._save = gui.add_button("put in force", disabled=True)
             self._verdict = gui.add_html("")
-            self._hold = gui.add_checkbox("hold picture", False, hint="for hands that cannot be held still")
+            self._hold = gui.add_checkbox(
+                "hold picture", False, hint="for hands that cannot be held still"
+            )
             self._masks = gui.add_checkbox("show masks", True, hint="what each range takes")
             self._from = gui.add_slider("hue from", 0, 179, 1, 0)
-            self._to = gui.add_slider("hue to", 0, 179, 1, 179, hint="below 'from' it wraps through red")
+            self._to = gui.add_slider(
+                "hue to", 0, 179, 1, 179, hint="below 'from' it wraps through red"
+            )
             self._saturation = gui.add_multi_slider("saturation", 0, 255, 1, (80, 255))
             self._value = gui.add_multi_slider("value", 0, 255, 1, (40, 255))
         self._listen()
@@ -183,12 +201,21 @@ class CalibrateGui:
         if abs(direction[2]) < 1e-9:
             return
         hit = origin + direction * ((_AT[2] - origin[2]) / direction[2]) - _AT
-        self._tell(Action("click", float(hit[0] / (self._ratio * _HEIGHT)) + 0.5, float(hit[1] / _HEIGHT) + 0.5))
+        self._tell(
+            Action(
+                "click",
+                float(hit[0] / (self._ratio * _HEIGHT)) + 0.5,
+                float(hit[1] / _HEIGHT) + 0.5,
+            )
+        )
 
     def _send_there(self, client: viser.ClientHandle) -> None:
         """A browser's camera before the picture, as large as the window allows beside the panel."""
         camera = client.camera
-        width, height = max(float(camera.image_width), 480.0), max(float(camera.image_height), 320.0)
+        width, height = (
+            max(float(camera.image_width), 480.0),
+            max(float(camera.image_height), 320.0),
+        )
         free = max(width - _PANEL_PX, 0.4 * width)
         px_per_m = _FILL * min(height / _HEIGHT, free / (self._ratio * _HEIGHT))
         away = height / px_per_m / (2.0 * math.tan(camera.fov / 2.0))

@@ -1,7 +1,9 @@
-"""Calibrating one camera's colours in the page: what was pointed at, what came of it, what a person changed by hand. Pure.
+"""Calibrating one camera's colours in the page: what was pointed at, what came of it, what a person
+changed by hand. Pure.
 
-The ranges shown and saved are those in force, under those fitted to what was pointed at, under those set with the sliders. A place that
-shows no paint is forgotten again, with the reason; nothing is in force before it is saved.
+The ranges shown and saved are those in force, under those fitted to what was pointed at, under
+those set with the sliders. A place that shows no paint is forgotten again, with the reason; nothing
+is in force before it is saved.
 """
 
 from __future__ import annotations
@@ -18,7 +20,11 @@ _ANY = ColorRange(hsv_low=(0, 80, 40), hsv_high=(179, 255, 255))
 
 @dataclass
 class Session:
-    """One camera's calibration. wanted are the colours of rig.toml, next_camera is one that was not calibrated yet, "" if all were."""
+    """One camera's calibration.
+
+    wanted are the colours of rig.toml, next_camera is one that was not calibrated yet, "" if all
+    were.
+    """
 
     camera: str
     wanted: list[str]
@@ -56,7 +62,9 @@ class Session:
 
     def point(self, color: str, picture: str, x_px: float, y_px: float) -> None:
         """A click on a marker."""
-        self.pointed.append(PointedAt(color=color, picture=picture, x_px=round(x_px, 1), y_px=round(y_px, 1)))
+        self.pointed.append(
+            PointedAt(color=color, picture=picture, x_px=round(x_px, 1), y_px=round(y_px, 1))
+        )
         self.error = self.saved = ""
 
     def request(self) -> FitRequest:
@@ -64,7 +72,10 @@ class Session:
         return FitRequest(pointed=self.pointed)
 
     def take(self, result: FitResult | None) -> bool:
-        """The tracker's answer to the last click, None if there was none; whether it showed paint."""
+        """The tracker's answer to the last click, None if there was none.
+
+        Whether it showed paint.
+        """
         if result is None or result.error:
             self.error = result.error if result else "the tracker does not answer; is it running?"
             if self.pointed:
@@ -81,10 +92,21 @@ class Session:
         if result is None or result.error:
             self.error = result.error if result else "the tracker does not answer; is it running?"
             return False
-        known = {name: span for name, span in result.colors.items() if not self.wanted or name in self.wanted}
+        known = {
+            name: span
+            for name, span in result.colors.items()
+            if not self.wanted or name in self.wanted
+        }
         self.result = msgspec.structs.replace(result, colors=known)
         self.pointed = [
-            PointedAt(color=p.color, picture=p.picture, x_px=p.box_px[0], y_px=p.box_px[1], width_px=p.box_px[2], height_px=p.box_px[3])
+            PointedAt(
+                color=p.color,
+                picture=p.picture,
+                x_px=p.box_px[0],
+                y_px=p.box_px[1],
+                width_px=p.box_px[2],
+                height_px=p.box_px[3],
+            )
             for p in result.patches
             if p.color in known
         ]
@@ -122,7 +144,13 @@ class Session:
         """What is saved."""
         places = [f"{p.color}={p.x_px:g},{p.y_px:g}" for p in self.pointed]
         inputs = {"places": places, "by_hand": sorted(self.edited)}
-        return Colors(date=date, tool="rhot viewer", inputs=inputs, residuals=self.result.residuals, colors=self.ranges)
+        return Colors(
+            date=date,
+            tool="rhot viewer",
+            inputs=inputs,
+            residuals=self.result.residuals,
+            colors=self.ranges,
+        )
 
     def was_saved(self, made: Colors) -> None:
         """It is in force now."""

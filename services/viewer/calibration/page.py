@@ -1,7 +1,8 @@
-"""Calibrating colours in the page: pictures from the camera's tracker, clicks to it, ranges back, and into force.
+"""Calibrating colours in the page: pictures from the camera's tracker, clicks to it, ranges back,
+and into force.
 
-Pictures are asked for only while the page shows one, so cameras work no more than before. A tracker that does not answer is said to be
-missing, and asked again; what it refuses is shown in its words.
+Pictures are asked for only while the page shows one, so cameras work no more than before. A tracker
+that does not answer is said to be missing, and asked again; what it refuses is shown in its words.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from services.viewer.live.palette import paint_rgb
 _PICTURE_S = 0.25
 # A Pi 3 fits ranges to six pictures within five seconds.
 _FIT_S = 15.0
-# A click belongs to the picture before if the newest was sent less than this ago: a browser needs so long to show one.
+# A click belongs to the picture before if the newest was sent less than this ago: a browser needs
+# so long to show one.
 _SHOWN_AFTER_S = 0.1
 
 
@@ -39,7 +41,11 @@ class Calibrate:
         self._client = RigClient(service.bus)
         self._actions: asyncio.Queue[Action] = asyncio.Queue()
         loop = asyncio.get_running_loop()
-        self._gui = CalibrateGui(server, service.config, lambda action: loop.call_soon_threadsafe(self._actions.put_nowait, action))
+        self._gui = CalibrateGui(
+            server,
+            service.config,
+            lambda action: loop.call_soon_threadsafe(self._actions.put_nowait, action),
+        )
         self._session = Session("", [])
         # Newest last: (name, picture, when it was sent to the browsers).
         self._pictures: list[tuple[str, Image, float]] = []
@@ -51,7 +57,9 @@ class Calibrate:
         """For ever."""
         due_s = 0.0
         while True:
-            action = await self._next(max(0.0, due_s - time.monotonic()) if self._gui.is_open else None)
+            action = await self._next(
+                max(0.0, due_s - time.monotonic()) if self._gui.is_open else None
+            )
             if action is not None:
                 await self._do(action)
             elif not self._server.get_clients():
@@ -117,7 +125,9 @@ class Calibrate:
 
     async def _look(self) -> None:
         """One picture of the camera, to the browsers."""
-        answers = await self._service.bus.get(topics.FRAME, timeout_s=2.0, camera=self._session.camera)
+        answers = await self._service.bus.get(
+            topics.FRAME, timeout_s=2.0, camera=self._session.camera
+        )
         image = await asyncio.to_thread(decoded, answers[0]) if answers else None
         if image is None or not self._gui.is_open:
             return
@@ -139,7 +149,9 @@ class Calibrate:
         recent = time.monotonic() - self._pictures[-1][2] < _SHOWN_AFTER_S
         name, image, _ = self._pictures[0 if recent else -1]
         height, width = image.shape[:2]
-        self._session.point(self._chosen, name, min(x * width, width - 1.0), min(y * height, height - 1.0))
+        self._session.point(
+            self._chosen, name, min(x * width, width - 1.0), min(y * height, height - 1.0)
+        )
         if await self._fit(self._session.request()):
             self._chosen = self._session.next_after(self._chosen)
             self._show_chosen()
@@ -149,7 +161,9 @@ class Calibrate:
         if request is None:
             self._show_chosen()
             return False
-        answers = await self._service.bus.get(topics.FIT, timeout_s=_FIT_S, request=request, camera=self._session.camera)
+        answers = await self._service.bus.get(
+            topics.FIT, timeout_s=_FIT_S, request=request, camera=self._session.camera
+        )
         good = self._session.take(answers[0] if answers else None)
         self._show_chosen()
         return good
@@ -157,12 +171,16 @@ class Calibrate:
     async def _propose(self) -> None:
         names = [name for name, _, _ in self._pictures]
         request = FitRequest(auto=True, pictures=names)
-        answers = await self._service.bus.get(topics.FIT, timeout_s=_FIT_S, request=request, camera=self._session.camera)
+        answers = await self._service.bus.get(
+            topics.FIT, timeout_s=_FIT_S, request=request, camera=self._session.camera
+        )
         self._session.take_proposal(answers[0] if answers else None)
         self._show_chosen()
 
     async def _save(self) -> None:
-        made = self._session.file(datetime.datetime.now().astimezone().isoformat(timespec="milliseconds"))
+        made = self._session.file(
+            datetime.datetime.now().astimezone().isoformat(timespec="milliseconds")
+        )
         try:
             await self._client.set_colors(self._session.camera, made)
         except RhotError as error:
@@ -170,7 +188,11 @@ class Calibrate:
         else:
             self._session.was_saved(made)
             self._done.add(self._session.camera)
-            others = [camera.name for camera in self._service.config.camera if camera.name not in self._done]
+            others = [
+                camera.name
+                for camera in self._service.config.camera
+                if camera.name not in self._done
+            ]
             self._session.next_camera = others[0] if others else ""
 
     def _show_chosen(self) -> None:

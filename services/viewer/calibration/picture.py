@@ -1,4 +1,5 @@
-"""The calibration page's picture: what each range takes, painted over, and boxes around the patches found. Pure.
+"""The calibration page's picture: what each range takes, painted over, and boxes around the patches
+found. Pure.
 
 A picture that cannot be decoded is None, and the page keeps the last one.
 """
@@ -16,7 +17,8 @@ from rhot.camera_messages import ColorRange, Patch
 from services.viewer.live.palette import Rgb
 
 Image = npt.NDArray[Any]
-# Masks are nearly opaque, so that holes show, and outlined: white around what the chosen colour takes, black around the others.
+# Masks are nearly opaque, so that holes show, and outlined: white around what the chosen colour
+# takes, black around the others.
 _STRENGTH = 0.8
 _CHOSEN, _OTHER = (255, 255, 255), (0, 0, 0)
 # As erosion in the tracker: single pixels are noise and are not taken.
@@ -39,13 +41,21 @@ def mask_of(hsv: Image, span: ColorRange) -> Image:
         mask = cv2.inRange(hsv, low, high)
     else:
         above = cv2.inRange(hsv, low, np.array([179, *span.hsv_high[1:]], np.uint8))
-        mask = cv2.bitwise_or(above, cv2.inRange(hsv, np.array([0, *span.hsv_low[1:]], np.uint8), high))
+        mask = cv2.bitwise_or(
+            above, cv2.inRange(hsv, np.array([0, *span.hsv_low[1:]], np.uint8), high)
+        )
     # An even kernel reaches to one side; opposite anchors bring the mask back to its place.
     return cv2.dilate(cv2.erode(mask, _KERNEL, anchor=(0, 0)), _KERNEL, anchor=(1, 1))
 
 
 def shown(
-    bgr: Image, ranges: Mapping[str, ColorRange], paints: Mapping[str, Rgb], chosen: str, patches: Sequence[Patch], *, masks: bool
+    bgr: Image,
+    ranges: Mapping[str, ColorRange],
+    paints: Mapping[str, Rgb],
+    chosen: str,
+    patches: Sequence[Patch],
+    *,
+    masks: bool,
 ) -> Image:
     """The picture as RGB (h, w, 3) with masks and boxes."""
     rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
@@ -54,9 +64,14 @@ def shown(
         small = cv2.resize(bgr, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         hsv = cv2.cvtColor(small, cv2.COLOR_BGR2HSV)
         for color, span in ranges.items():
-            mask = cv2.resize(mask_of(hsv, span), (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST)
+            mask = cv2.resize(
+                mask_of(hsv, span), (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST
+            )
             taken = mask > 0
-            rgb[taken] = (_STRENGTH * np.array(paints.get(color, (255, 255, 255))) + (1.0 - _STRENGTH) * rgb[taken]).astype(np.uint8)
+            rgb[taken] = (
+                _STRENGTH * np.array(paints.get(color, (255, 255, 255)))
+                + (1.0 - _STRENGTH) * rgb[taken]
+            ).astype(np.uint8)
             contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
             cv2.drawContours(rgb, contours, -1, _CHOSEN if color == chosen else _OTHER, 1)
     for patch in patches:

@@ -1,4 +1,5 @@
-"""What the calibration page says, as HTML: what to do next, how well the colours can be told apart, whether they are in force. Pure.
+"""What the calibration page says, as HTML: what to do next, how well the colours can be told apart,
+whether they are in force. Pure.
 
 Texts from the network are escaped and shortened; numbers that are missing are left out.
 """
@@ -23,7 +24,9 @@ _MOST = 8
 def to_do(session: Session, chosen: str, *, pictures: bool) -> str:
     """What the person should do now."""
     if not pictures:
-        return _box(f"waiting for a picture of camera {text(session.camera)} ... (is its tracker running?)")
+        return _box(
+            f"waiting for a picture of camera {text(session.camera)} ... (is its tracker running?)"
+        )
     done = {one.color for one in session.pointed}
     lines = []
     if session.error:
@@ -31,15 +34,27 @@ def to_do(session: Session, chosen: str, *, pictures: bool) -> str:
     clicks = sum(one.color == chosen for one in session.pointed)
     complete = done.issuperset(session.names)
     if complete and session.changed:
-        lines.append("All colours are pointed at: <b>put them in force</b>, or turn the hand and click again where a mask has holes.")
+        lines.append(
+            "All colours are pointed at: <b>put them in force</b>, or turn the hand and click again where a mask has holes."
+        )
     elif complete:
-        onward = f"Now <b>camera {text(session.next_camera)}</b>." if session.next_camera else "Untick <i>show picture</i> to see the hand."
+        onward = (
+            f"Now <b>camera {text(session.next_camera)}</b>."
+            if session.next_camera
+            else "Untick <i>show picture</i> to see the hand."
+        )
         lines.append(f"This camera is done. {onward}")
     elif clicks:
-        lines.append(f"<b>{text(chosen)}</b>: {clicks} click{'s' if clicks > 1 else ''}. Click again where its mask has holes, or move on.")
+        lines.append(
+            f"<b>{text(chosen)}</b>: {clicks} click{'s' if clicks > 1 else ''}. Click again where its mask has holes, or move on."
+        )
     else:
-        lines.append(f"Hold the hand still and <b>click the middle of the {text(chosen)} marker</b> in the picture.")
-    lines.append(f"{len(done & set(session.names))} of {len(session.names)} colours pointed at. Drag turns, the wheel zooms.")
+        lines.append(
+            f"Hold the hand still and <b>click the middle of the {text(chosen)} marker</b> in the picture."
+        )
+    lines.append(
+        f"{len(done & set(session.names))} of {len(session.names)} colours pointed at. Drag turns, the wheel zooms."
+    )
     return _box("<br>".join(lines))
 
 
@@ -52,9 +67,17 @@ def report(session: Session) -> str:
     if session.edited:
         lines.append("set by hand: " + ", ".join(text(color) for color in sorted(session.edited)))
     if not rows and not lines:
-        return _box("nothing fitted yet; the masks show what is in force" if session.in_force.colors else "no colours are in force yet")
+        return _box(
+            "nothing fitted yet; the masks show what is in force"
+            if session.in_force.colors
+            else "no colours are in force yet"
+        )
     head = "<tr><td></td><td>taken</td><td>from skin</td><td>nearest</td></tr>" if rows else ""
-    table = f'<table style="width:100%;font-size:0.95em">{head}{"".join(rows)}</table>{_LEGEND}' if rows else ""
+    table = (
+        f'<table style="width:100%;font-size:0.95em">{head}{"".join(rows)}</table>{_LEGEND}'
+        if rows
+        else ""
+    )
     return _box(table + "<br>".join(lines))
 
 
@@ -82,14 +105,23 @@ def _table(of: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def _number(value: Any, form: str) -> str:
-    return form.format(min(float(value), 999.0)) if isinstance(value, int | float) and value >= 0.0 else ""
+    return (
+        form.format(min(float(value), 999.0))
+        if isinstance(value, int | float) and value >= 0.0
+        else ""
+    )
 
 
 def verdict(session: Session) -> str:
     """What is in force, and what is missing."""
     lines = []
     if session.saved:
-        lines.append(_colored(f"in force on camera {session.camera}, and written on its machine, {_clock(session.saved)}", _GREEN))
+        lines.append(
+            _colored(
+                f"in force on camera {session.camera}, and written on its machine, {_clock(session.saved)}",
+                _GREEN,
+            )
+        )
     elif session.changed:
         lines.append("not in force yet: press the button")
     if session.missing:

@@ -1,4 +1,7 @@
-"""The panel beside the picture: switches, texts and camera pictures. What it shows is made in panels.py."""
+"""The panel beside the picture: switches, texts and camera pictures.
+
+What it shows is made in panels.py.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +30,14 @@ class Gui:
         gui.add_html(panels.legend())
         self._trails = gui.add_checkbox("finger trails", False)
         self._pictures = gui.add_checkbox(
-            "camera pictures", False, disabled=not config.camera, hint="cameras send pictures only while this is on"
+            "camera pictures",
+            False,
+            disabled=not config.camera,
+            hint="cameras send pictures only while this is on",
         )
         self._previews: dict[str, viser.GuiHtmlHandle] = {
-            camera.name: gui.add_html(panels.preview(camera.name, None), visible=False) for camera in config.camera
+            camera.name: gui.add_html(panels.preview(camera.name, None), visible=False)
+            for camera in config.camera
         }
         self._angles: dict[HandName, viser.GuiHtmlHandle] = {}
         for hand in config.hand:
@@ -54,7 +61,9 @@ class Gui:
         self._status.content = panels.status(self._config, view, self._notes)
         self._rates.content = panels.rates(view.health)
         for hand, handle in self._angles.items():
-            handle.content = panels.angles(view.hands[hand].pose) if hand in view.hands else panels.no_angles()
+            handle.content = (
+                panels.angles(view.hands[hand].pose) if hand in view.hands else panels.no_angles()
+            )
 
     def show_pictures(self, wanted: bool) -> None:
         """Make room for pictures, or take it back."""

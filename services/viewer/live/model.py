@@ -1,8 +1,9 @@
-"""What the live view shows, reduced from messages. Pure: time is an argument (seconds of one monotonic clock).
+"""What the live view shows, reduced from messages. Pure: time is an argument (seconds of one
+monotonic clock).
 
-Whatever has not come for a second is hidden, and said to be missing. Absurd positions (not finite, beyond 100 m) are not drawn.
-Objects in the lighthouse frame are not drawn either: where they are in the rig would be a guess. Nothing from the network makes
-the state grow without bound.
+Whatever has not come for a second is hidden, and said to be missing. Absurd positions (not finite,
+beyond 100 m) are not drawn. Objects in the lighthouse frame are not drawn either: where they are in
+the rig would be a guess. Nothing from the network makes the state grow without bound.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ _MAX_M = 100.0
 _MAX_OBJECTS, _MAX_SERVICES = 32, 64
 # Two seconds of finger tips at 30 Hz.
 TRAIL = 60
-# A stamp further from now than this is a replay's or another clock's, and says nothing about latency.
+# A stamp further from now than this is a replay's or another clock's, and says nothing about
+# latency.
 _MAX_LATENCY_S = 10.0
 
 
@@ -104,7 +106,9 @@ class ViewModel:
         if not np.all(np.abs(positions) <= _MAX_M) or not np.all(radii <= _MAX_M):
             self.absurd += 1
             return
-        view = HandView(pose.hand, positions, radii, tuple(joint.source for joint in pose.joints), pose)
+        view = HandView(
+            pose.hand, positions, radii, tuple(joint.source for joint in pose.joints), pose
+        )
         latency_s = (wall_ns - pose.stamp_ns) * 1e-9
         latency_ms = latency_s * 1e3 if abs(latency_s) <= _MAX_LATENCY_S else None
         known = self._hands.get(pose.hand)
@@ -118,7 +122,11 @@ class ViewModel:
         drawn = []
         for point in points.points:
             if point.name in LANDMARKS and all(abs(v) <= _MAX_M for v in point.position_m):
-                drawn.append(PointView(points.hand, point.name, point.position_m, point.source == "predicted"))
+                drawn.append(
+                    PointView(
+                        points.hand, point.name, point.position_m, point.source == "predicted"
+                    )
+                )
             else:
                 self.absurd += 1
         self._points[points.hand] = (now_s, drawn)
@@ -130,7 +138,9 @@ class ViewModel:
             self.absurd += 1
             return
         if pose.object in self._objects or len(self._objects) < _MAX_OBJECTS:
-            view = ObjectView(pose.object, pose.position_m, pose.orientation_wxyz, pose.tracking, pose.registered)
+            view = ObjectView(
+                pose.object, pose.position_m, pose.orientation_wxyz, pose.tracking, pose.registered
+            )
             self._objects[pose.object] = (now_s, view)
 
     def health(self, health: Health, now_s: float) -> None:
@@ -141,15 +151,25 @@ class ViewModel:
 
     def view(self, now_s: float) -> View:
         """What is to be seen now; forgets what is stale."""
-        self._hands = {name: hand for name, hand in self._hands.items() if now_s - hand.seen_s <= STALE_S}
-        self._points = {name: entry for name, entry in self._points.items() if now_s - entry[0] <= STALE_S}
-        self._objects = {name: entry for name, entry in self._objects.items() if now_s - entry[0] <= STALE_S}
-        self._health = {key: entry for key, entry in self._health.items() if now_s - entry[0] <= HEALTH_STALE_S}
+        self._hands = {
+            name: hand for name, hand in self._hands.items() if now_s - hand.seen_s <= STALE_S
+        }
+        self._points = {
+            name: entry for name, entry in self._points.items() if now_s - entry[0] <= STALE_S
+        }
+        self._objects = {
+            name: entry for name, entry in self._objects.items() if now_s - entry[0] <= STALE_S
+        }
+        self._health = {
+            key: entry for key, entry in self._health.items() if now_s - entry[0] <= HEALTH_STALE_S
+        }
         return View(
             hands={name: hand.view for name, hand in self._hands.items()},
             points={(p.hand, p.name): p for _, points in self._points.values() for p in points},
             objects={name: view for name, (_, view) in self._objects.items()},
             trails={name: np.array(hand.trail) for name, hand in self._hands.items()},
-            health=[health for _, (_, health) in sorted(self._health.items(), key=lambda item: item[0])],
+            health=[
+                health for _, (_, health) in sorted(self._health.items(), key=lambda item: item[0])
+            ],
             latency_ms={name: hand.latency_ms for name, hand in self._hands.items()},
         )

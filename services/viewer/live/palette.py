@@ -1,4 +1,7 @@
-"""Colours of the live view: sources of joints, paints of markers. Pure; a colour nobody knows is grey."""
+"""Colours of the live view: sources of joints, paints of markers. Pure.
+
+A colour nobody knows is grey.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,11 @@ from rhot.messages import JointSource
 Rgb = tuple[int, int, int]
 
 # Tell seen from guessed at a glance, also with red-green blindness (after Okabe and Ito's palette).
-SOURCE_RGB: dict[JointSource, Rgb] = {"measured": (0, 158, 115), "solved": (60, 120, 225), "predicted": (230, 159, 0)}
+SOURCE_RGB: dict[JointSource, Rgb] = {
+    "measured": (0, 158, 115),
+    "solved": (60, 120, 225),
+    "predicted": (230, 159, 0),
+}
 UNKNOWN: Rgb = (150, 150, 150)
 # Paints people name in rig.toml before they have calibrated them.
 _NAMED: dict[str, Rgb] = {
@@ -32,7 +39,9 @@ _NAMED: dict[str, Rgb] = {
 
 
 def paint_rgb(color: str, calibrations: Iterable[Colors]) -> Rgb:
-    """A paint as it should look: by its name, else by the middle hue of its calibrated range, else grey."""
+    """A paint as it should look: by its name, else by the middle hue of its calibrated range, else
+    grey.
+    """
     if color in _NAMED:
         return _NAMED[color]
     for calibration in calibrations:

@@ -1,7 +1,7 @@
 """The texts beside the picture, as HTML. Pure.
 
-Everything that came over the network is escaped and shortened: a browser executes what it is given. What is missing is said in
-words, with what to look at.
+Everything that came over the network is escaped and shortened: a browser executes what it is given.
+What is missing is said in words, with what to look at.
 """
 
 from __future__ import annotations
@@ -36,9 +36,14 @@ def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
     for hand in config.hand:
         if hand in view.hands:
             latency = view.latency_ms.get(hand)
-            lines.append(f"{hand} hand: tracked" + ("" if latency is None else f", {latency:.0f} ms after the light"))
+            lines.append(
+                f"{hand} hand: tracked"
+                + ("" if latency is None else f", {latency:.0f} ms after the light")
+            )
         elif any(h == hand for h, _ in view.points):
-            lines.append(f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)")
+            lines.append(
+                f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)"
+            )
         else:
             lines.append(f"waiting for hand poses of the {hand} hand ... ({_missing(view)})")
     if not config.hand:
@@ -48,7 +53,9 @@ def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
         if known is None:
             lines.append(f"waiting for the object {text(table.name)} ...")
         elif not known.registered:
-            lines.append(f"object {text(table.name)}: not registered to the rig; run `rhot calibrate objects`")
+            lines.append(
+                f"object {text(table.name)}: not registered to the rig; run `rhot calibrate objects`"
+            )
         else:
             lines.append(f"object {text(table.name)}: {text(known.tracking.replace('_', ' '))}")
     lines += [text(note, 200) for note in notes]
@@ -69,7 +76,12 @@ def _missing(view: View) -> str:
 
 def legend() -> str:
     """What the colours of joints and bones say."""
-    return _box(" &nbsp; ".join(f'<span style="color:rgb{rgb}">&#9679;</span> {name}' for name, rgb in SOURCE_RGB.items()))
+    return _box(
+        " &nbsp; ".join(
+            f'<span style="color:rgb{rgb}">&#9679;</span> {name}'
+            for name, rgb in SOURCE_RGB.items()
+        )
+    )
 
 
 def angles(pose: HandPose) -> str:
@@ -95,11 +107,17 @@ def rates(health: Sequence[Health]) -> str:
     rows = [_row(("stream", "Hz", "of", "ms", "lost"), head=True)]
     for beat in health:
         name = f"{beat.service}/{beat.instance}"
-        rows.append(f'<tr><td colspan="5"><b>{text(name)}</b> {min(beat.cpu_percent, 9999.0):.0f} % of a core</td></tr>')
+        rows.append(
+            f'<tr><td colspan="5"><b>{text(name)}</b> {min(beat.cpu_percent, 9999.0):.0f} % of a core</td></tr>'
+        )
         rows += [_stream(stream) for stream in beat.streams]
         if beat.last_error:
-            rows.append(f'<tr><td colspan="5" style="color:#c0392b">{text(beat.last_error, 120)}</td></tr>')
-    more = f"<tr><td>... and {len(rows) - _MAX_ROWS} more</td></tr>" if len(rows) > _MAX_ROWS else ""
+            rows.append(
+                f'<tr><td colspan="5" style="color:#c0392b">{text(beat.last_error, 120)}</td></tr>'
+            )
+    more = (
+        f"<tr><td>... and {len(rows) - _MAX_ROWS} more</td></tr>" if len(rows) > _MAX_ROWS else ""
+    )
     return _table([*rows[:_MAX_ROWS], more])
 
 
@@ -112,14 +130,24 @@ def _stream(stream: StreamHealth) -> str:
     expected = f"{min(stream.expected_hz, 99999.0):.0f}" if stream.expected_hz else ""
     latency = f"{min(stream.latency_p50_ms, 99999.0):.1f}" if stream.latency_p50_ms >= 0.0 else ""
     lost = stream.dropped + stream.rejected
-    return _row((f"{arrow} {text(short, 40)}", shown, expected, latency, str(min(lost, 10**9)) if lost else ""))
+    return _row(
+        (
+            f"{arrow} {text(short, 40)}",
+            shown,
+            expected,
+            latency,
+            str(min(lost, 10**9)) if lost else "",
+        )
+    )
 
 
 def preview(camera: str, jpeg_base64: str | None) -> str:
     """One camera's picture, or that it is waited for."""
     if jpeg_base64 is None:
         return _box(f"waiting for the picture of {text(camera)} ...")
-    return _box(f'{text(camera)}<br><img style="width:100%" src="data:image/jpeg;base64,{jpeg_base64}" alt="{text(camera)}">')
+    return _box(
+        f'{text(camera)}<br><img style="width:100%" src="data:image/jpeg;base64,{jpeg_base64}" alt="{text(camera)}">'
+    )
 
 
 def _degrees(angle_rad: float) -> float:
@@ -129,7 +157,13 @@ def _degrees(angle_rad: float) -> float:
 
 def _row(cells: Sequence[str], *, head: bool = False) -> str:
     tag = "th" if head else "td"
-    return "<tr>" + "".join(f'<{tag} style="{_CELL if i else _LEFT}">{cell}</{tag}>' for i, cell in enumerate(cells)) + "</tr>"
+    return (
+        "<tr>"
+        + "".join(
+            f'<{tag} style="{_CELL if i else _LEFT}">{cell}</{tag}>' for i, cell in enumerate(cells)
+        )
+        + "</tr>"
+    )
 
 
 def _table(rows: Sequence[str]) -> str:

@@ -1,6 +1,7 @@
 """The 3D picture: a View applied to viser's scene.
 
-Meshes are made once and then moved; a hand, point or object that is gone is hidden. Without calibration there are no frusta.
+Meshes are made once and then moved; a hand, point or object that is gone is hidden. Without
+calibration there are no frusta.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from services.viewer.live.model import HandView, ObjectView, PointView, View
 from services.viewer.live.palette import SOURCE_RGB, UNKNOWN, Rgb
 from services.viewer.live.shapes import BONES, cylinders, unit_cylinder, unit_sphere
 
-# Where hands work: RHOT section 6 has them half a metre in front of the cameras; first camera's frame.
+# Where hands work: RHOT section 6 has them half a metre in front of the cameras; first camera's
+# frame.
 _LOOK_CAMERA = np.array([0.09, 0.02, 0.48])
-# From behind and above the cameras, to the right: the hand in the middle, its fingers apart, the frusta still in view.
+# From behind and above the cameras, to the right: the hand in the middle, its fingers apart, the
+# frusta still in view.
 _EYE_CAMERA = np.array([0.36, -0.36, -0.26])
 _FOV_RAD = float(np.deg2rad(34.0))
 # A desk is some 20 cm under the cameras.
@@ -42,7 +45,11 @@ class Scene:
     """Everything in the picture. paints is what each hand's landmarks are painted with."""
 
     def __init__(
-        self, server: viser.ViserServer, config: RigConfig, cameras: Mapping[str, Camera], paints: Mapping[tuple[HandName, str], Rgb]
+        self,
+        server: viser.ViserServer,
+        config: RigConfig,
+        cameras: Mapping[str, Camera],
+        paints: Mapping[tuple[HandName, str], Rgb],
     ) -> None:
         self._scene = server.scene
         self._atomic = server.atomic
@@ -60,18 +67,29 @@ class Scene:
             for hand in {*self._hands, *view.hands}:
                 if hand not in self._hands:
                     self._hands[hand] = _Hand(self._scene, hand)
-                self._hands[hand].show(view.hands.get(hand), view.trails.get(hand) if trails else None)
+                self._hands[hand].show(
+                    view.hands.get(hand), view.trails.get(hand) if trails else None
+                )
             for hand in {*self._points, *(name for name, _ in view.points)}:
                 if hand not in self._points:
-                    self._points[hand] = _Points(self._scene, hand, {n: rgb for (h, n), rgb in self._paints.items() if h == hand})
-                self._points[hand].show({name: point for (h, name), point in view.points.items() if h == hand})
+                    self._points[hand] = _Points(
+                        self._scene,
+                        hand,
+                        {n: rgb for (h, n), rgb in self._paints.items() if h == hand},
+                    )
+                self._points[hand].show(
+                    {name: point for (h, name), point in view.points.items() if h == hand}
+                )
             for name in {*self._objects, *view.objects}:
                 if name not in self._objects:
                     self._objects[name] = _Object(self._scene, name)
                 self._objects[name].show(view.objects.get(name))
 
     def _stage(self, server: viser.ViserServer, config: RigConfig) -> None:
-        """Up, grid and first look: y is down in a camera's frame; a world of its own has z up and its desk at z = 0."""
+        """Up, grid and first look: y is down in a camera's frame.
+
+        A world of its own has z up and its desk at z = 0.
+        """
         world = config.rig.world
         T_rig_from_camera = np.eye(4) if world is None else np.array(world.T_rig_from_camera)
         self._scene.set_up_direction("-y" if world is None else "+z")
@@ -132,7 +150,9 @@ class _Hand:
             batched_colors=_PALETTE[np.ones(len(BONES), dtype=int)],
             lod="off",
         )
-        self._trails = scene.add_line_segments(f"/hands/{hand}/trails", np.zeros((1, 2, 3)), _TRAIL_RGB, thickness=0.001, visible=False)
+        self._trails = scene.add_line_segments(
+            f"/hands/{hand}/trails", np.zeros((1, 2, 3)), _TRAIL_RGB, thickness=0.001, visible=False
+        )
 
     def show(self, view: HandView | None, trail: Array | None) -> None:
         self._joints.visible = self._bones.visible = view is not None
@@ -141,7 +161,9 @@ class _Hand:
             return
         doubt = np.array([_SOURCES.index(source) for source in view.sources])
         self._joints.batched_positions = _f32(view.positions_m)
-        self._joints.batched_scales = _f32(np.repeat(_JOINT_SHARE * view.radii_m[:, None], 3, axis=1))
+        self._joints.batched_scales = _f32(
+            np.repeat(_JOINT_SHARE * view.radii_m[:, None], 3, axis=1)
+        )
         self._joints.batched_colors = _PALETTE[doubt]
         start, end = BONES.T
         middle, wxyz, length = cylinders(view.positions_m[start], view.positions_m[end])
@@ -155,7 +177,10 @@ class _Hand:
 
 
 class _Points:
-    """Marked landmarks in the colour of their paint; those carried on without being seen are smaller."""
+    """Marked landmarks in the colour of their paint.
+
+    Those carried on without being seen are smaller.
+    """
 
     def __init__(self, scene: viser.SceneApi, hand: HandName, paints: Mapping[str, Rgb]) -> None:
         self._names = list(paints)
@@ -172,7 +197,10 @@ class _Points:
 
     def show(self, points: Mapping[str, PointView]) -> None:
         self._handle.visible = bool(points)
-        positions, radii = np.zeros((max(len(self._names), 1), 3)), np.full(max(len(self._names), 1), 1e-6)
+        positions, radii = (
+            np.zeros((max(len(self._names), 1), 3)),
+            np.full(max(len(self._names), 1), 1e-6),
+        )
         for slot, name in enumerate(self._names):
             if name in points:
                 positions[slot] = points[name].position_m
@@ -186,7 +214,12 @@ class _Object:
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._frame = scene.add_frame(f"/objects/{name}", axes_length=0.06, axes_radius=0.0018)
-        self._box = scene.add_box(f"/objects/{name}/box", color=SOURCE_RGB["measured"], dimensions=_OBJECT_BOX_M, opacity=0.45)
+        self._box = scene.add_box(
+            f"/objects/{name}/box",
+            color=SOURCE_RGB["measured"],
+            dimensions=_OBJECT_BOX_M,
+            opacity=0.45,
+        )
         scene.add_label(f"/objects/{name}/name", name)
 
     def show(self, view: ObjectView | None) -> None:

@@ -1,6 +1,7 @@
 """Meshes and skeleton geometry of the live view. Pure.
 
-Unit meshes are drawn many times over with a position, an orientation and a scale each; degenerate bones get no length, never NaN.
+Unit meshes are drawn many times over with a position, an orientation and a scale each; degenerate
+bones get no length, never NaN.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ Faces = npt.NDArray[np.uint32]
 
 
 def _bones() -> npt.NDArray[np.intp]:
-    """Joint index pairs: wrist to every metacarpal, along each digit, and across the knuckles for the palm."""
+    """Joint index pairs: wrist to every metacarpal, along each digit, and across the knuckles for
+    the palm.
+    """
     wrist = JOINT_INDEX["wrist"]
     pairs = []
     for row, chain in enumerate(CHAIN_JOINTS.tolist()):
@@ -32,14 +35,19 @@ BONES = _bones()
 
 
 def cylinders(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
-    """Middles (n, 3), orientations wxyz (n, 4) and lengths (n,) that lay a unit cylinder along z from start to end (n, 3)."""
+    """Middles (n, 3), orientations wxyz (n, 4) and lengths (n,) that lay a unit cylinder along z
+    from start to end (n, 3).
+    """
     along = end_m - start_m
     length = np.sqrt(np.sum(along**2, axis=1))
     z = np.where(length[:, None] > 1e-9, along / np.maximum(length, 1e-9)[:, None], [0.0, 0.0, 1.0])
-    # The shortest turn from +z to the bone: (1 + z . u, z x u), which vanishes for a bone along -z: half a turn about x.
+    # The shortest turn from +z to the bone: (1 + z . u, z x u), which vanishes for a bone along -z:
+    # half a turn about x.
     wxyz = np.stack([1.0 + z[:, 2], -z[:, 1], z[:, 0], np.zeros(len(z))], axis=1)
     norm = np.sqrt(np.sum(wxyz**2, axis=1))
-    wxyz = np.where(norm[:, None] > 1e-6, wxyz / np.maximum(norm, 1e-6)[:, None], [0.0, 1.0, 0.0, 0.0])
+    wxyz = np.where(
+        norm[:, None] > 1e-6, wxyz / np.maximum(norm, 1e-6)[:, None], [0.0, 1.0, 0.0, 0.0]
+    )
     return 0.5 * (start_m + end_m), wxyz, length
 
 
@@ -48,18 +56,28 @@ def unit_sphere(rings: int = 10, segments: int = 16) -> tuple[Array, Faces]:
     polar = np.linspace(0.0, np.pi, rings + 1)[1:-1]
     around = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
     p, a = np.meshgrid(polar, around, indexing="ij")
-    body = np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], axis=-1).reshape(-1, 3)
+    body = np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], axis=-1).reshape(
+        -1, 3
+    )
     top, bottom = len(body), len(body) + 1
     faces = _strips(rings - 1, segments)
     j = np.arange(segments)
     after = (j + 1) % segments
     last = (rings - 2) * segments
-    caps = [np.stack([np.full(segments, top), j, after], axis=1), np.stack([np.full(segments, bottom), last + after, last + j], axis=1)]
-    return np.vstack([body, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]]), np.vstack([faces, *caps]).astype(np.uint32)
+    caps = [
+        np.stack([np.full(segments, top), j, after], axis=1),
+        np.stack([np.full(segments, bottom), last + after, last + j], axis=1),
+    ]
+    return np.vstack([body, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]]), np.vstack([faces, *caps]).astype(
+        np.uint32
+    )
 
 
 def unit_cylinder(segments: int = 12) -> tuple[Array, Faces]:
-    """An open tube of radius 1 and length 1 along z about the origin; joints' spheres cover its ends."""
+    """An open tube of radius 1 and length 1 along z about the origin.
+
+    Joints' spheres cover its ends.
+    """
     around = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
     ring = np.stack([np.cos(around), np.sin(around), np.zeros(segments)], axis=1)
     half = np.array([0.0, 0.0, 0.5])
@@ -72,5 +90,8 @@ def _strips(rings: int, segments: int) -> npt.NDArray[np.intp]:
     upper, right = i * segments + j, i * segments + (j + 1) % segments
     lower, lower_right = upper + segments, right + segments
     return np.concatenate(
-        [np.stack([upper, lower, lower_right], -1).reshape(-1, 3), np.stack([upper, lower_right, right], -1).reshape(-1, 3)]
+        [
+            np.stack([upper, lower, lower_right], -1).reshape(-1, 3),
+            np.stack([upper, lower_right, right], -1).reshape(-1, 3),
+        ]
     )

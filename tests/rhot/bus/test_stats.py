@@ -7,7 +7,13 @@ def test_a_beat_reports_and_starts_anew():
     stats.count, stats.dropped, stats.rejected = 27, 2, 1
     stats.latencies_ns.extend([1_000_000, 2_000_000, 3_000_000])
     health = stats.beat(1.0, 30.0)
-    assert (health.count, health.rate_hz, health.dropped, health.rejected, health.ok) == (27, 27.0, 2, 1, True)
+    assert (health.count, health.rate_hz, health.dropped, health.rejected, health.ok) == (
+        27,
+        27.0,
+        2,
+        1,
+        True,
+    )
     assert (health.latency_p50_ms, health.latency_p99_ms) == (2.0, 3.0)
     empty = stats.beat(1.0, 30.0)
     assert (empty.count, empty.ok, empty.latency_p50_ms) == (0, False, -1.0)

@@ -5,7 +5,11 @@ import pytest
 from rhot.errors import CalibrationError
 from rhot.files import calibration as cal
 
-LENS = cal.Lens(size_px=(640, 480), matrix=((500.0, 0.0, 320.0), (0.0, 500.0, 240.0), (0.0, 0.0, 1.0)), distortion=(0.1, 0, 0, 0, 0))
+LENS = cal.Lens(
+    size_px=(640, 480),
+    matrix=((500.0, 0.0, 320.0), (0.0, 500.0, 240.0), (0.0, 0.0, 1.0)),
+    distortion=(0.1, 0, 0, 0, 0),
+)
 EYE = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 
@@ -30,7 +34,9 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_only_the_main_fields_are_needed_and_more_are_allowed(tmp_path):
-    (tmp_path / "cam.colors.json").write_text('{"colors": {"green": {"hsv_low": [35, 60, 40], "hsv_high": [85, 255, 255]}}, "new": 1}')
+    (tmp_path / "cam.colors.json").write_text(
+        '{"colors": {"green": {"hsv_low": [35, 60, 40], "hsv_high": [85, 255, 255]}}, "new": 1}'
+    )
     assert cal.load_colors(tmp_path, "cam").colors["green"].hsv_low == (35, 60, 40)
 
 
@@ -55,12 +61,18 @@ def test_a_missing_file_names_the_command_that_makes_it(tmp_path):
 
 def test_cameras_need_lens_place_and_a_rigid_transform(tmp_path):
     cal.save(tmp_path / "left.lens.json", LENS)
-    cal.save(tmp_path / "rig.json", cal.RigGeometry(cameras={"left": cal.CameraPlace(T_rig_from_camera=EYE)}))
+    cal.save(
+        tmp_path / "rig.json",
+        cal.RigGeometry(cameras={"left": cal.CameraPlace(T_rig_from_camera=EYE)}),
+    )
     assert np.allclose(cal.load_cameras(tmp_path, ["left"])["left"].matrix[0, 0], 500.0)
     with pytest.raises(CalibrationError, match="camera 'right' is missing"):
         cal.load_cameras(tmp_path, ["left", "right"])
     mirrored = ((-1.0, 0.0, 0.0, 0.0), *EYE[1:])
-    cal.save(tmp_path / "rig.json", cal.RigGeometry(cameras={"left": cal.CameraPlace(T_rig_from_camera=mirrored)}))
+    cal.save(
+        tmp_path / "rig.json",
+        cal.RigGeometry(cameras={"left": cal.CameraPlace(T_rig_from_camera=mirrored)}),
+    )
     with pytest.raises(CalibrationError, match="not a rigid transform"):
         cal.load_cameras(tmp_path, ["left"])
 

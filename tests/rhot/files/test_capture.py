@@ -1,12 +1,22 @@
 import pytest
 
 from rhot.errors import CaptureError
-from rhot.files.capture import Capture, FrameStamp, read_lines, read_stamps, write_lines, write_stamps
+from rhot.files.capture import (
+    Capture,
+    FrameStamp,
+    read_lines,
+    read_stamps,
+    write_lines,
+    write_stamps,
+)
 from rhot.messages import Session
 
 
 def test_stamps_round_trip(tmp_path):
-    stamps = [FrameStamp(0, 1_700_000_000_000_000_001, 33_700.0), FrameStamp(2, 1_700_000_000_066_666_667, 33_700.5)]
+    stamps = [
+        FrameStamp(0, 1_700_000_000_000_000_001, 33_700.0),
+        FrameStamp(2, 1_700_000_000_066_666_667, 33_700.5),
+    ]
     path = Capture(tmp_path).stamps("left")
     write_stamps(path, stamps)
     assert path.read_text().startswith("frame,stamp_ns,row_time_ns\n0,1700000000000000001,33700\n")

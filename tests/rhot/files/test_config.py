@@ -18,7 +18,10 @@ def rig(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('[[camera]]\nname = "l"\nsorce = "x"', r"\[camera\[0\]\]: unknown key `sorce`, did you mean `source`\?.*Valid keys: name, source"),
+        (
+            '[[camera]]\nname = "l"\nsorce = "x"',
+            r"\[camera\[0\]\]: unknown key `sorce`, did you mean `source`\?.*Valid keys: name, source",
+        ),
         ("[rig]\nname = 3", "`rig.name`: expected `str`, got `int`"),
         ("[fusion.one_euro]\nbta = 1", "did you mean `beta`"),
         ('[hand.right.markers]\nindx_tip = "blue"', "did you mean 'index_tip'"),
@@ -29,7 +32,10 @@ def rig(tmp_path):
         ('[[camera]]\nname = "a"\nfps = -1', "expected `float` > 0.0"),
         ('[[camera]]\nname = "a"\n[[camera]]\nname = "a"', "'a' is used twice"),
         ('[hand.right.markers]\nwrist = "blue"\nindex_tip = "blue"', "'blue' is used twice"),
-        ('[hand.right.markers]\nwrist = "blue"\n[hand.left.markers]\nwrist = "blue"', "'blue' is used twice"),
+        (
+            '[hand.right.markers]\nwrist = "blue"\n[hand.left.markers]\nwrist = "blue"',
+            "'blue' is used twice",
+        ),
         ("[hand.right]\nmarkers = {}", "is empty"),
         ("[rig", "not valid TOML"),
         ('folder = "x"', "unknown key `folder`"),
@@ -61,7 +67,9 @@ def test_the_shipped_files_load(repository):
 
 
 def test_expected_rates(rig):
-    config = load_rig(rig('[[camera]]\nname="a"\nfps=30\n[[camera]]\nname="b"\nfps=60\n[objects]\nrate_hz=90'))
+    config = load_rig(
+        rig('[[camera]]\nname="a"\nfps=30\n[[camera]]\nname="b"\nfps=60\n[objects]\nrate_hz=90')
+    )
     assert config.rate_hz(Rate.CAMERA, "a") == 30.0
     assert config.rate_hz(Rate.HAND) == 60.0
     assert config.rate_hz(Rate.OBJECT) == 90.0

@@ -12,7 +12,9 @@ vectors = st.tuples(angles, angles, angles).map(np.array)
 
 @given(vectors)
 def test_rotation_vector_agrees_with_scipy(vector):
-    assert np.allclose(tf.rotation_from_vector(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
+    assert np.allclose(
+        tf.rotation_from_vector(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12
+    )
 
 
 @given(vectors)
@@ -24,10 +26,14 @@ def test_quaternion_round_trip(vector):
     assert np.allclose(tf.rotation_from_quaternion(q), rotation, atol=1e-12)
 
 
-@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0.8, 0), (0.6, 0, -0.8), (-0.48, 0.6, 0.64)])
+@pytest.mark.parametrize(
+    "axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0.8, 0), (0.6, 0, -0.8), (-0.48, 0.6, 0.64)]
+)
 def test_quaternion_is_right_at_180_degrees(axis):
     rotation = 2.0 * np.outer(axis, axis) - np.eye(3)
-    assert np.allclose(tf.rotation_from_quaternion(tf.quaternion_from_rotation(rotation)), rotation, atol=1e-12)
+    assert np.allclose(
+        tf.rotation_from_quaternion(tf.quaternion_from_rotation(rotation)), rotation, atol=1e-12
+    )
     assert np.isclose(np.linalg.norm(tf.vector_from_rotation(rotation)), np.pi)
 
 
@@ -49,7 +55,9 @@ def test_inverse_and_apply(rotation_vector, position):
 @given(angles)
 def test_angle_between_is_the_angle_turned(angle):
     for axis_rotation in (tf.rotation_x, tf.rotation_y, tf.rotation_z):
-        assert np.isclose(tf.angle_between(axis_rotation(0.3), axis_rotation(0.3 + angle)), abs(angle), atol=1e-7)
+        assert np.isclose(
+            tf.angle_between(axis_rotation(0.3), axis_rotation(0.3 + angle)), abs(angle), atol=1e-7
+        )
 
 
 @given(vectors, vectors)

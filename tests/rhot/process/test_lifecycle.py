@@ -29,7 +29,9 @@ ENDINGS = {
 @pytest.fixture
 def start(tmp_path, endpoint):
     """Start a service process that ends in the way named; returns (process, notify socket)."""
-    (tmp_path / "rig.toml").write_text(f'[rig]\nname = "test"\n[bus]\nconnect = ["{endpoint}"]\n[[camera]]\nname = "left"\n')
+    (tmp_path / "rig.toml").write_text(
+        f'[rig]\nname = "test"\n[bus]\nconnect = ["{endpoint}"]\n[[camera]]\nname = "left"\n'
+    )
     server = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     server.bind(str(tmp_path / "notify"))
     server.setblocking(False)
@@ -64,7 +66,13 @@ async def ended(process):
 
 
 @pytest.mark.parametrize(
-    ("ending", "code", "says"), [("user", 2, "plug it in"), ("task", 2, "a task failed"), ("bug", 1, "failed"), ("done", 0, "")]
+    ("ending", "code", "says"),
+    [
+        ("user", 2, "plug it in"),
+        ("task", 2, "a task failed"),
+        ("bug", 1, "failed"),
+        ("done", 0, ""),
+    ],
 )
 async def test_the_exit_code_tells_what_ended_it(start, router, ending, code, says):
     launch, _ = start
@@ -115,7 +123,12 @@ async def test_health_and_liveliness_are_published(start, router):
         async with asyncio.timeout(DEADLINE_S):
             change, health = await anext(alive), await anext(beats)
         assert (change.service, change.alive) == ("probe", True)
-        assert (health.service, health.state, health.errors, health.last_error) == ("probe", "running", 1, "a small thing")
+        assert (health.service, health.state, health.errors, health.last_error) == (
+            "probe",
+            "running",
+            1,
+            "a small thing",
+        )
         assert health.values == {"answer": 42.0}
         assert health.pid == process.pid
         assert 5.0 < health.rss_mb < 500.0

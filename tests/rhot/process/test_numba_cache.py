@@ -1,4 +1,6 @@
-"""The folder of compiled kernels: one for each state of the sources, and never one of an older state."""
+"""The folder of compiled kernels: one for each state of the sources, and never one of an older
+state.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def package(tmp_path, monkeypatch):
         "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\nuse_cache(Path(__file__).parent)\n"
     )
     (folder / "inner.py").write_text(KERNEL.format(name="inner", body="x + 1"))
-    outer = KERNEL.format(name="outer", body="inner(x)").replace("import njit\n", "import njit\n\nfrom kernels.inner import inner\n")
+    outer = KERNEL.format(name="outer", body="inner(x)").replace(
+        "import njit\n", "import njit\n\nfrom kernels.inner import inner\n"
+    )
     (folder / "outer.py").write_text(outer)
     (folder / "plain.py").write_text("ANSWER = 42\n")
     return folder
@@ -34,7 +38,15 @@ def package(tmp_path, monkeypatch):
 def outcome(package, **variables) -> int:
     code = "from kernels.outer import outer; print(outer(1))"
     environment = {**os.environ, "PYTHONPATH": str(package.parent), **variables}
-    return int(subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True).stdout)
+    return int(
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+    )
 
 
 def test_a_changed_callee_is_compiled_anew(package):

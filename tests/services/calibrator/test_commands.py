@@ -27,7 +27,9 @@ def run():
     """Runs `rhot calibrate ...`; an error of ours is raised."""
 
     def invoke(*arguments: object):
-        return CliRunner().invoke(calibrate, [str(argument) for argument in arguments], catch_exceptions=False)
+        return CliRunner().invoke(
+            calibrate, [str(argument) for argument in arguments], catch_exceptions=False
+        )
 
     return invoke
 
@@ -35,7 +37,9 @@ def run():
 @pytest.fixture(scope="module")
 def folder(make_bench, tmp_path_factory):
     """Rendered pairs left01.png, right01.png, ... and one picture without a board."""
-    bench = make_bench(positions=6, size_px=(400, 300), focal_px=330.0, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0))
+    bench = make_bench(
+        positions=6, size_px=(400, 300), focal_px=330.0, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0)
+    )
     made = tmp_path_factory.mktemp("pictures")
     for camera in bench.cameras:
         for key in bench.poses:
@@ -71,10 +75,23 @@ def test_stereo_says_when_the_squares_were_assumed_and_prints_json(run, folder, 
     result = run("stereo", pictures, "--board", "9x6", "--out", tmp_path, "--json")
     assert json.loads(result.stdout)["inputs"]["square_m"] == 0.025
     assert "25 mm were assumed" in result.stderr
-    again = run("stereo", pictures, "--board", "9x6", "--square", 0.05, "--out", tmp_path, "--keep-lenses", "--json")
+    again = run(
+        "stereo",
+        pictures,
+        "--board",
+        "9x6",
+        "--square",
+        0.05,
+        "--out",
+        tmp_path,
+        "--keep-lenses",
+        "--json",
+    )
     residuals = json.loads(again.stdout)["residuals"]
     assert residuals["square_mm"] == pytest.approx(50.0, rel=5e-3)
-    assert np.linalg.norm(load_cameras(tmp_path, ["right"])["right"].centre_rig) == pytest.approx(0.15, rel=0.02)
+    assert np.linalg.norm(load_cameras(tmp_path, ["right"])["right"].centre_rig) == pytest.approx(
+        0.15, rel=0.02
+    )
 
 
 def test_lens_writes_one_file(run, folder, tmp_path):
@@ -101,7 +118,10 @@ def test_refused_data_write_nothing(run, folder, blank, tmp_path):
 
 
 def test_world_prints_the_table_for_rig_toml(run, folder, tmp_path, make_bench):
-    """Test: calibrate, then a board on the desk. Expected: [rig.world] with the camera above the desk."""
+    """Test: calibrate, then a board on the desk.
+
+    Expected: [rig.world] with the camera above the desk.
+    """
     bench, pictures = folder
     config = tmp_path / "rig.toml"
     config.write_text(RIG_TOML)
@@ -126,7 +146,10 @@ def test_depth_fits_a_table_or_the_simulated_bench(run, tmp_path):
     law = json.loads(run("depth", "--simulate", "--json").stdout)
     table = tmp_path / "bench.csv"
     rows = zip(law["distances_cm"], law["disparities_px"], strict=True)
-    table.write_text("distance_cm,disparity_px\n" + "".join(f"{distance},{disparity}\n" for distance, disparity in rows))
+    table.write_text(
+        "distance_cm,disparity_px\n"
+        + "".join(f"{distance},{disparity}\n" for distance, disparity in rows)
+    )
     assert json.loads(run("depth", table, "--json").stdout)["k"] == pytest.approx(law["k"])
     with pytest.raises(CalibrationError, match="--simulate"):
         run("depth")
@@ -136,13 +159,30 @@ def test_board_writes_a_pdf_and_says_how_to_use_it(tmp_path):
     app = typer.Typer()
     app.command()(board)
     path = tmp_path / "new" / "board.pdf"
-    result = CliRunner().invoke(app, ["--kind", "charuco", "--cols", "7", "--rows", "5", "--square-mm", "30", "--out", str(path)])
+    result = CliRunner().invoke(
+        app,
+        [
+            "--kind",
+            "charuco",
+            "--cols",
+            "7",
+            "--rows",
+            "5",
+            "--square-mm",
+            "30",
+            "--out",
+            str(path),
+        ],
+    )
     assert path.read_bytes().startswith(b"%PDF")
     assert "--board 7x5 --square 0.03 --kind charuco" in result.stdout
 
 
 def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
-    """The right camera stands half a degree and 2 mm off its rig.json; the report says so, and services read the new file."""
+    """The right camera stands half a degree and 2 mm off its rig.json.
+
+    The report says so, and services read the new file.
+    """
     setup = Setup(sigma_px=0.15)
     true = setup.rig()
     (tmp_path / "rig.toml").write_text(RIG_TOML)
@@ -157,14 +197,22 @@ def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
         T = camera.T_rig_from_camera @ turn if name == "right" else camera.T_rig_from_camera
         places[name] = CameraPlace(T_rig_from_camera=tuple(tuple(row) for row in T.tolist()))
     save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
-    write_lines(tmp_path / "markers.jsonl", frames(setup, Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6)), 8.0))
+    write_lines(
+        tmp_path / "markers.jsonl",
+        frames(setup, Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6)), 8.0),
+    )
     result = run("refine", tmp_path, "--config", tmp_path / "rig.toml")
     assert result.exit_code == 0
     assert "held-out epipolar" in result.stdout
     assert "camera right: turned about its x, y, z by -0.50" in result.stdout
     found = load_cameras(tmp_path / "calibration", ["left", "right"])["right"].T_rig_from_camera
     np.testing.assert_allclose(found[:3, :3], true["right"].T_rig_from_camera[:3, :3], atol=1e-3)
-    assert json.loads((tmp_path / "calibration" / "rig.json").read_text())["residuals"]["epipolar_before_px"] > 3.0
+    assert (
+        json.loads((tmp_path / "calibration" / "rig.json").read_text())["residuals"][
+            "epipolar_before_px"
+        ]
+        > 3.0
+    )
 
 
 def test_refine_explains_a_wand_it_does_not_understand(run, tmp_path):

@@ -1,4 +1,6 @@
-"""`rhot calibrate stereo --live` against cameras on a real router that answer `frame` queries with rendered pictures."""
+"""`rhot calibrate stereo --live` against cameras on a real router that answer `frame` queries with
+rendered pictures.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ from services.cli.calibrate.live_pictures import collect, one_each
 def rig(tmp_path, router) -> RigConfig:
     """A rig of two cameras at the router."""
     path = tmp_path / "rig.toml"
-    path.write_text(f'[bus]\nconnect = ["{router}"]\n[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n')
+    path.write_text(
+        f'[bus]\nconnect = ["{router}"]\n[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
+    )
     return load_rig(path)
 
 
@@ -30,12 +34,19 @@ def rig(tmp_path, router) -> RigConfig:
 def shown(make_bench) -> dict[str, list[bytes]]:
     """PNGs of each camera, position by position."""
     bench = make_bench(positions=3, size_px=(320, 240), focal_px=263.0, distortion=(0.0,) * 5)
-    pictures = {camera.name: [bench.picture(camera, key) for key in bench.poses] for camera in bench.cameras}
-    return {name: [cv2.imencode(".png", picture)[1].tobytes() for picture in each] for name, each in pictures.items()}
+    pictures = {
+        camera.name: [bench.picture(camera, key) for key in bench.poses] for camera in bench.cameras
+    }
+    return {
+        name: [cv2.imencode(".png", picture)[1].tobytes() for picture in each]
+        for name, each in pictures.items()
+    }
 
 
 @asynccontextmanager
-async def cameras(router: str, shown: dict[str, list[bytes]], each: int = 4) -> AsyncIterator[dict[str, int]]:
+async def cameras(
+    router: str, shown: dict[str, list[bytes]], each: int = 4
+) -> AsyncIterator[dict[str, int]]:
     """Cameras that show every position for so many takes, and count what they were asked for."""
     asked = dict.fromkeys(shown, 0)
     async with open_bus("desk", [router]) as bus:
@@ -54,7 +65,9 @@ async def test_still_positions_are_kept_as_pictures(rig, router, shown, tmp_path
     async with cameras(router, shown) as asked:
         board = await asyncio.to_thread(collect, rig, [], folder, None, 0.025, 3, None)
     assert (board.cols, board.rows, board.square_m) == (9, 6, 0.025)
-    assert sorted(path.name for path in folder.iterdir()) == [f"{name}_{n:02d}.png" for name in ("left", "right") for n in (1, 2, 3)]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        f"{name}_{n:02d}.png" for name in ("left", "right") for n in (1, 2, 3)
+    ]
     assert (folder / "left_01.png").read_bytes() == shown["left"][0]
     assert asked["left"] == asked["right"]
 

@@ -33,5 +33,6 @@ def test_the_real_pairs_are_calibrated_to_the_limit(pictures):
     assert abs(result.square_worst - 1.0) < 0.005
     assert result.epipolar_px < 0.13
     assert not result.left_out
-    # The baseline in squares, as every calibration of these pairs in the literature's tools finds it.
+    # The baseline in squares, as every calibration of these pairs in the literature's tools finds
+    # it.
     assert np.linalg.norm(result.state.T_camera_from_rig[1][:3, 3]) == pytest.approx(3.33, abs=0.02)

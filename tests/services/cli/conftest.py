@@ -1,4 +1,6 @@
-"""A hand whose truth is known in closed form, and one short capture rendered once for all tests of this room."""
+"""A hand whose truth is known in closed form, and one short capture rendered once for all tests of
+this room.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,16 @@ import pytest
 from rhot.files.config import load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, forward, joint_radii_m
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, ObjectTruth, Truth, WristPose
+from rhot.messages import (
+    FingerAngles,
+    FingerPose,
+    HandJoint,
+    HandPose,
+    HandTruth,
+    ObjectTruth,
+    Truth,
+    WristPose,
+)
 from services.cli.defaults import sim_toml
 from services.cli.offline.inputs import job_of
 from services.cli.offline.run import run
@@ -30,27 +41,57 @@ class MadeUpHand:
 
     def state(self, t_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """wrist rotation (3, 3), wrist position (3,), angles (5, 4)."""
-        rotation = rotation_from_vector((0.3 * np.sin(2.1 * t_s), 0.2 * np.cos(1.7 * t_s), 0.1 * t_s)) @ rotation_x(-0.5 * np.pi)
-        position = np.array([0.02 + 0.05 * np.sin(3.0 * t_s), 0.03 * np.cos(2.0 * t_s), 0.5 + 0.04 * np.sin(2.5 * t_s)])
+        rotation = rotation_from_vector(
+            (0.3 * np.sin(2.1 * t_s), 0.2 * np.cos(1.7 * t_s), 0.1 * t_s)
+        ) @ rotation_x(-0.5 * np.pi)
+        position = np.array(
+            [
+                0.02 + 0.05 * np.sin(3.0 * t_s),
+                0.03 * np.cos(2.0 * t_s),
+                0.5 + 0.04 * np.sin(2.5 * t_s),
+            ]
+        )
         low, high = self.model.limits_rad[:, :, 0], self.model.limits_rad[:, :, 1]
-        return rotation, position, low + (high - low) * (0.5 + 0.3 * np.sin(4.0 * t_s + np.arange(20).reshape(5, 4)))
+        return (
+            rotation,
+            position,
+            low + (high - low) * (0.5 + 0.3 * np.sin(4.0 * t_s + np.arange(20).reshape(5, 4))),
+        )
 
     def truth(self, t_s: float) -> Truth:
         rotation, position, angles = self.state(t_s)
         joints, _ = forward(self.model, rotation, position, angles)
         hand = HandTruth(
             points_m={name: tuple(row) for name, row in zip(JOINTS, joints.tolist(), strict=True)},
-            wrist=WristPose(position_m=tuple(position.tolist()), orientation_wxyz=tuple(quaternion_from_rotation(rotation).tolist())),
+            wrist=WristPose(
+                position_m=tuple(position.tolist()),
+                orientation_wxyz=tuple(quaternion_from_rotation(rotation).tolist()),
+            ),
             angles_rad={digit: finger_angles(row, angles[row]) for row, digit in enumerate(DIGITS)},
         )
-        cup = ObjectTruth(position_m=tuple((position + 0.1).tolist()), orientation_wxyz=hand.wrist.orientation_wxyz)
-        return Truth(stamp_ns=START_NS + round(t_s * 1e9), hands={"right": hand}, objects={"cup": cup})
+        cup = ObjectTruth(
+            position_m=tuple((position + 0.1).tolist()),
+            orientation_wxyz=hand.wrist.orientation_wxyz,
+        )
+        return Truth(
+            stamp_ns=START_NS + round(t_s * 1e9), hands={"right": hand}, objects={"cup": cup}
+        )
 
     def truths(self, seconds: float = 3.0, hz: float = 30.0) -> list[Truth]:
         return [self.truth(i / hz) for i in range(round(seconds * hz))]
 
-    def pose(self, t_s: float, *, shift_m=(0.0, 0.0, 0.0), late_s: float = 0.0, off_rad=None, turn_rad: float = 0.0) -> HandPose:
-        """The pose at t_s with known errors: shifted, late in content, angles off, hand turned about its own x."""
+    def pose(
+        self,
+        t_s: float,
+        *,
+        shift_m=(0.0, 0.0, 0.0),
+        late_s: float = 0.0,
+        off_rad=None,
+        turn_rad: float = 0.0,
+    ) -> HandPose:
+        """The pose at t_s with known errors: shifted, late in content, angles off, hand turned
+        about its own x.
+        """
         rotation, position, angles = self.state(t_s - late_s)
         angles = angles if off_rad is None else angles + off_rad
         wxyz = tuple(quaternion_from_rotation(rotation @ rotation_x(turn_rad)).tolist())
@@ -60,7 +101,9 @@ class MadeUpHand:
             seq=round(t_s * 1000),
             stamp_ns=START_NS + round(t_s * 1e9),
             method="made up",
-            wrist=WristPose(position_m=tuple((position + np.array(shift_m)).tolist()), orientation_wxyz=wxyz),
+            wrist=WristPose(
+                position_m=tuple((position + np.array(shift_m)).tolist()), orientation_wxyz=wxyz
+            ),
             joints=[
                 HandJoint(
                     name=name,
@@ -72,7 +115,13 @@ class MadeUpHand:
                 for i, name in enumerate(JOINTS)
             ],
             fingers=[
-                FingerPose(name=digit, angles_rad=finger_angles(row, angles[row]), residual_m=0.001, iterations=3, status="solved")
+                FingerPose(
+                    name=digit,
+                    angles_rad=finger_angles(row, angles[row]),
+                    residual_m=0.001,
+                    iterations=3,
+                    status="solved",
+                )
                 for row, digit in enumerate(DIGITS)
             ],
         )
@@ -82,7 +131,9 @@ class MadeUpHand:
 
 
 def finger_angles(row: int, angles: np.ndarray) -> FingerAngles:
-    return FingerAngles(**{"pip": 0.0, **dict(zip(DIGIT_ANGLES[row], angles.tolist(), strict=True))})
+    return FingerAngles(
+        **{"pip": 0.0, **dict(zip(DIGIT_ANGLES[row], angles.tolist(), strict=True))}
+    )
 
 
 @pytest.fixture(scope="session")

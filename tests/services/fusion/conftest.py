@@ -1,4 +1,6 @@
-"""What the tests of fusion share: a pair of cameras, and how well a run did against the synthetic truth."""
+"""What the tests of fusion share: a pair of cameras, and how well a run did against the synthetic
+truth.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def score(told: Iterable[HandPoints], path: Path, warm_s: float = 1.0) -> Score:
     return Score(len(told), table[:, :3], table[:, 3:6], table[:, 6], table[:, 7])
 
 
-def track(setup: Setup, given: Iterable[MarkerFrame], fusion: Fusion | None = None) -> tuple[FusionStep, list[HandPoints]]:
+def track(
+    setup: Setup, given: Iterable[MarkerFrame], fusion: Fusion | None = None
+) -> tuple[FusionStep, list[HandPoints]]:
     step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
     told = [points for frame in given for points in step.step(frame)]
     return step, told + step.flush()
@@ -69,7 +73,9 @@ Run = Callable[..., tuple[FusionStep, Score]]
 def run() -> Run:
     """Synthetic hand -> FusionStep -> score."""
 
-    def simulate(setup: Setup, path: Path, fusion: Fusion | None = None, seconds: float = 6.0) -> tuple[FusionStep, Score]:
+    def simulate(
+        setup: Setup, path: Path, fusion: Fusion | None = None, seconds: float = 6.0
+    ) -> tuple[FusionStep, Score]:
         step, told = track(setup, frames(setup, path, seconds), fusion)
         return step, score(told, path)
 
@@ -94,18 +100,31 @@ def pair() -> tuple[Camera, Camera]:
     left, right = Setup(toe_in_rad=0.05).rig().values()
     tilted = right.T_rig_from_camera.copy()
     tilted[:3, 3] += [0.0, 0.004, -0.01]
-    return left, Camera("right", right.size_px, right.matrix * np.array([[1.1], [1.1], [1.0]]), right.distortion, tilted)
+    return left, Camera(
+        "right",
+        right.size_px,
+        right.matrix * np.array([[1.1], [1.1], [1.0]]),
+        right.distortion,
+        tilted,
+    )
 
 
 class Bench:
     """A KalmanMethod fed with frames, without the rest of fusion."""
 
-    def __init__(self, setup: Setup, fusion: Fusion | None = None, hands: Iterable[Iterable[int]] = (range(6),)) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        fusion: Fusion | None = None,
+        hands: Iterable[Iterable[int]] = (range(6),),
+    ) -> None:
         self.cameras = setup.rig()
         self.observer = Observer(setup.config(), self.cameras)
         periods_s = np.full(len(self.cameras), 1.0 / setup.fps)
         groups = [np.array(list(hand), dtype=np.int64) for hand in hands]
-        self.method = KalmanMethod(groups, tuple(self.cameras.values()), periods_s, fusion or Fusion())
+        self.method = KalmanMethod(
+            groups, tuple(self.cameras.values()), periods_s, fusion or Fusion()
+        )
 
     def see(self, frame: MarkerFrame) -> float:
         """Take in a frame; its instant in s."""

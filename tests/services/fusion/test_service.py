@@ -27,9 +27,16 @@ def config(tmp_path) -> RigConfig:
     """The synthetic rig with its calibration on disk."""
     setup = Setup()
     for camera in setup.rig().values():
-        lens = Lens(size_px=camera.size_px, matrix=rows(camera.matrix), distortion=tuple(camera.distortion.tolist()))
+        lens = Lens(
+            size_px=camera.size_px,
+            matrix=rows(camera.matrix),
+            distortion=tuple(camera.distortion.tolist()),
+        )
         save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
-    places = {camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera)) for camera in setup.rig().values()}
+    places = {
+        camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera))
+        for camera in setup.rig().values()
+    }
     save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
     return msgspec.structs.replace(setup.config(), folder=str(tmp_path))
 
@@ -64,7 +71,11 @@ async def test_without_calibration_it_says_what_makes_it(router, tmp_path):
 
 
 async def test_leads_the_rig_and_turns_markers_into_points(router, config):
-    async with asyncio.timeout(DEADLINE_S), open_bus(RIG, [router]) as bus, open_bus(RIG, [router]) as client:
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        open_bus(RIG, [router]) as bus,
+        open_bus(RIG, [router]) as client,
+    ):
         heard, points = client.every(topics.SESSION, 8), client.every(topics.POINTS, 64)
         async with running(config, bus) as service:
             assert (await anext(aiter(heard))).running
@@ -87,7 +98,9 @@ async def feed(client, points):
         await asyncio.sleep(0.01)
     for frame in frames(setup, path, 1.0):
         publishers[frame.camera].put(frame)
-        await asyncio.sleep(0.005)  # not all at once: what the network cannot take is dropped by design
+        await asyncio.sleep(
+            0.005
+        )  # not all at once: what the network cannot take is dropped by design
     async for message in points:
         if len(message.points) == 6 and message.stamp_ns > START_NS + 8 * 10**8:
             assert message.hand == "right"

@@ -7,7 +7,13 @@ from services.fusion.output import paint_centroid
 from services.fusion.warm import warm_up
 from testing.synthetic_points import Path, Setup, frames, point_hands
 
-LIVE = (frame_update.take_in, frame_update.drop, rest_detection.blend, track_history.query_all, track_history.start)
+LIVE = (
+    frame_update.take_in,
+    frame_update.drop,
+    rest_detection.blend,
+    track_history.query_all,
+    track_history.start,
+)
 
 
 def test_warming_up_exercises_the_whole_of_fusion():

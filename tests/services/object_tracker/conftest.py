@@ -32,7 +32,14 @@ def make_pose() -> Callable[..., OpenVrPose]:
             "seq": 7,
             "stamp_ns": 1_700_000_000_000_000_000,
             "universe": "test",
-            "device": OpenVrDevice(index=3, serial=serial, device_class="GenericTracker", model="Tracker 3.0", battery=0.5, charging=False),
+            "device": OpenVrDevice(
+                index=3,
+                serial=serial,
+                device_class="GenericTracker",
+                model="Tracker 3.0",
+                battery=0.5,
+                charging=False,
+            ),
             "mDeviceToAbsoluteTracking": tuple(tuple(row) for row in T[:3].tolist()),
             "vVelocity": (0.0, 0.0, 0.0),
             "vAngularVelocity": (0.0, 0.0, 0.0),
@@ -82,7 +89,9 @@ class FakeSystem:
     def getBoolTrackedDeviceProperty(self, index: int, prop: int) -> bool:  # noqa: N802
         return False
 
-    def getDeviceToAbsoluteTrackingPose(self, origin: int, seconds: float, array: list[Any]) -> None:  # noqa: N802
+    def getDeviceToAbsoluteTrackingPose(
+        self, origin: int, seconds: float, array: list[Any]
+    ) -> None:  # noqa: N802
         array[2].mDeviceToAbsoluteTracking.m = self.matrix
 
 

@@ -23,16 +23,29 @@ MakePose = Callable[..., OpenVrPose]
 
 def rig(folder: Path, source: str) -> RigConfig:
     return RigConfig(
-        rig=RigTable(name="desk"), object=[ObjectTable(name="cup", serial="LHR-1")], objects=Objects(source=source), folder=str(folder)
+        rig=RigTable(name="desk"),
+        object=[ObjectTable(name="cup", serial="LHR-1")],
+        objects=Objects(source=source),
+        folder=str(folder),
     )
 
 
-async def test_poses_in_objects_out_with_garbage_between(running: Callable, tmp_path: Path, make_pose: MakePose, sending: Callable) -> None:
+async def test_poses_in_objects_out_with_garbage_between(
+    running: Callable, tmp_path: Path, make_pose: MakePose, sending: Callable
+) -> None:
     async with running("object_tracker", serve, rig(tmp_path, "network")) as (service, bus):
-        known, unknown = (bus.publisher(topics.OPENVR, serial=serial) for serial in ("LHR-1", "LHR-2"))
+        known, unknown = (
+            bus.publisher(topics.OPENVR, serial=serial) for serial in ("LHR-1", "LHR-2")
+        )
 
         def send() -> None:
-            for payload in (b"\xff\x00", b"[]", b"{}", b'{"v": null}', msgspec.json.encode(make_pose(serial="LHR-9"))):
+            for payload in (
+                b"\xff\x00",
+                b"[]",
+                b"{}",
+                b'{"v": null}',
+                msgspec.json.encode(make_pose(serial="LHR-9")),
+            ):
                 bus.put_raw("rhot/desk/openvr/LHR-1/pose", payload)
             unknown.put(make_pose(serial="LHR-2"))
             known.put(make_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
@@ -40,16 +53,29 @@ async def test_poses_in_objects_out_with_garbage_between(running: Callable, tmp_
         objects = bus.every(topics.OBJECT, 8)
         with sending(send):
             # Poses overtake the garbage, which travels at a lower priority.
-            while sum(stats.rejected for stats in service.bus.streams) < 5 or service.values["unknown"] < 1:
+            while (
+                sum(stats.rejected for stats in service.bus.streams) < 5
+                or service.values["unknown"] < 1
+            ):
                 result = await anext(objects)
-        assert (result.object, result.position_m, result.tracking, result.registered) == ("cup", (0.1, 0.2, 0.3), "ok", False)
+        assert (result.object, result.position_m, result.tracking, result.registered) == (
+            "cup",
+            (0.1, 0.2, 0.3),
+            "ok",
+            False,
+        )
         assert service.state == "running"
         # Not calibrated, and a device that rig.toml does not name: both are told, once.
         assert service.errors == 2
 
 
-async def test_a_source_feeds_the_bus(running: Callable, tmp_path: Path, make_pose: MakePose) -> None:
-    write_lines(tmp_path / "o.jsonl", [make_pose(stamp_ns=10**18 + i * 5_000_000, seq=i) for i in range(400)])
+async def test_a_source_feeds_the_bus(
+    running: Callable, tmp_path: Path, make_pose: MakePose
+) -> None:
+    write_lines(
+        tmp_path / "o.jsonl",
+        [make_pose(stamp_ns=10**18 + i * 5_000_000, seq=i) for i in range(400)],
+    )
     async with running("object_tracker", serve, rig(tmp_path, "replay:o.jsonl")) as (_, bus):
         raw = bus.every(topics.OPENVR, 8)
         result = await anext(bus.every(topics.OBJECT, 8))
@@ -57,7 +83,9 @@ async def test_a_source_feeds_the_bus(running: Callable, tmp_path: Path, make_po
         assert (await anext(raw)).device.serial == "LHR-1"
 
 
-async def test_a_source_that_fails_ends_the_service(running: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_source_that_fails_ends_the_service(
+    running: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.RaisesGroup(SourceError):
         async with running("object_tracker", serve, rig(tmp_path, "libsurvive")):

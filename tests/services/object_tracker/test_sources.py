@@ -61,7 +61,10 @@ def test_unknown_names_list_the_valid_ones(name: str) -> None:
 
 async def test_replay_keeps_order_stamps_and_pace(tmp_path: Path, make_pose: MakePose) -> None:
     path = tmp_path / "objects.jsonl"
-    poses = [make_pose(stamp_ns=stamp) for stamp in (1_000_000_000, 1_040_000_000, 900_000_000, 940_000_000)]
+    poses = [
+        make_pose(stamp_ns=stamp)
+        for stamp in (1_000_000_000, 1_040_000_000, 900_000_000, 940_000_000)
+    ]
     write_lines(path, poses)
     start_s = asyncio.get_running_loop().time()
     assert await take(Replay(path), 9) == poses
@@ -69,7 +72,9 @@ async def test_replay_keeps_order_stamps_and_pace(tmp_path: Path, make_pose: Mak
     assert asyncio.get_running_loop().time() - start_s >= 0.079
 
 
-@pytest.mark.parametrize(("text", "said"), [(None, "cannot be read"), ("{}\n", "line 1"), ('{"v": 1', "line 1")])
+@pytest.mark.parametrize(
+    ("text", "said"), [(None, "cannot be read"), ("{}\n", "line 1"), ('{"v": 1', "line 1")]
+)
 async def test_replay_of_broken_files(tmp_path: Path, text: str | None, said: str) -> None:
     path = tmp_path / "objects.jsonl"
     if text is not None:
@@ -108,7 +113,11 @@ async def test_steamvr_poses(fake_vr: SimpleNamespace) -> None:
     poses = await take(SteamVr(500.0, print), 3)
     assert [pose.seq for pose in poses] == [0, 1, 2]
     pose = poses[0]
-    assert (pose.device.serial, pose.device.index, pose.device.device_class) == ("LHR-1", 2, "GenericTracker")
+    assert (pose.device.serial, pose.device.index, pose.device.device_class) == (
+        "LHR-1",
+        2,
+        "GenericTracker",
+    )
     assert pose.device.battery == -1.0  # a wired device has none to report
     assert [row[3] for row in pose.mDeviceToAbsoluteTracking] == [0.1, 0.2, 0.3]
     assert (pose.bPoseIsValid, pose.eTrackingResult, pose.vVelocity) == (True, 200, (0.1, 0.0, 0.0))
@@ -122,8 +131,13 @@ async def test_steamvr_numbers_that_are_not_finite(fake_vr: SimpleNamespace) -> 
     assert pose.mDeviceToAbsoluteTracking == ((0.0,) * 4,) * 3
 
 
-@pytest.mark.parametrize(("serial", "name"), [("LHR/1 x", "LHR_1_x"), ("", "device2"), ("-odd", "device2"), ("x" * 99, "x" * 64)])
-async def test_steamvr_serials_fit_into_keys(fake_vr: SimpleNamespace, serial: str, name: str) -> None:
+@pytest.mark.parametrize(
+    ("serial", "name"),
+    [("LHR/1 x", "LHR_1_x"), ("", "device2"), ("-odd", "device2"), ("x" * 99, "x" * 64)],
+)
+async def test_steamvr_serials_fit_into_keys(
+    fake_vr: SimpleNamespace, serial: str, name: str
+) -> None:
     fake_vr.system.serial = serial
     (pose,) = await take(SteamVr(500.0, print), 1)
     assert pose.device.serial == name
@@ -147,7 +161,9 @@ async def test_steamvr_missing(fake_vr: SimpleNamespace, monkeypatch: pytest.Mon
         raise fake_vr.OpenVRError
 
     fake_vr.init = refuse
-    with pytest.raises(SourceError, match=r"SteamVR cannot be reached \(FakeVrError\); install and start SteamVR"):
+    with pytest.raises(
+        SourceError, match=r"SteamVR cannot be reached \(FakeVrError\); install and start SteamVR"
+    ):
         await take(SteamVr(90.0, print), 1)
     monkeypatch.setitem(sys.modules, "openvr", None)
     with pytest.raises(SourceError, match=r"rhot\[bridges\]"):

@@ -15,7 +15,14 @@ from hypothesis import strategies as st
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ObjectPlace, Objects, save
 from rhot.files.config import ObjectTable, RigConfig, RigTable
-from rhot.geometry.transforms import Array, angle_between, apply, rotation_from_quaternion, rotation_from_vector, transform
+from rhot.geometry.transforms import (
+    Array,
+    angle_between,
+    apply,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    transform,
+)
 from rhot.messages import ObjectPose, OpenVrDevice, OpenVrPose
 from services.object_tracker.registration import load_registration
 from services.object_tracker.step import ObjectStep
@@ -32,7 +39,9 @@ def objects(**places: ObjectPlace) -> Objects:
 
 
 def calibrated(time_offset_ns: int = 0) -> Objects:
-    return objects(cup=ObjectPlace(offset_m=OFFSET, orientation_wxyz=TURN, time_offset_ns=time_offset_ns))
+    return objects(
+        cup=ObjectPlace(offset_m=OFFSET, orientation_wxyz=TURN, time_offset_ns=time_offset_ns)
+    )
 
 
 def step_one(config: RigConfig, file: Objects | None, pose: OpenVrPose) -> ObjectPose:
@@ -44,13 +53,23 @@ def step_one(config: RigConfig, file: Objects | None, pose: OpenVrPose) -> Objec
 def test_chain_of_frames(config: RigConfig, make_pose: MakePose) -> None:
     T = transform(rotation_from_vector([-0.7, 0.2, 0.9]), [1.0, 1.5, -0.8])
     result = step_one(config, calibrated(), make_pose(T))
-    assert (result.object, result.serial, result.seq, result.tracking, result.registered) == ("cup", "LHR-1", 7, "ok", True)
-    np.testing.assert_allclose(result.position_m, apply(T_RIG_FROM_LIGHTHOUSE, apply(T, OFFSET)), atol=1e-6)
+    assert (result.object, result.serial, result.seq, result.tracking, result.registered) == (
+        "cup",
+        "LHR-1",
+        7,
+        "ok",
+        True,
+    )
+    np.testing.assert_allclose(
+        result.position_m, apply(T_RIG_FROM_LIGHTHOUSE, apply(T, OFFSET)), atol=1e-6
+    )
     R = T_RIG_FROM_LIGHTHOUSE[:3, :3] @ T[:3, :3] @ rotation_from_quaternion(TURN)
     assert angle_between(R, rotation_from_quaternion(result.orientation_wxyz)) < 3e-6
 
 
-@pytest.mark.parametrize("axis", np.vstack([np.eye(3), [[1, 1, 0], [0, -1, 1], [1, -2, 3]]]).tolist())
+@pytest.mark.parametrize(
+    "axis", np.vstack([np.eye(3), [[1, 1, 0], [0, -1, 1], [1, -2, 3]]]).tolist()
+)
 def test_orientation_at_180_deg(config: RigConfig, make_pose: MakePose, axis: list[float]) -> None:
     u = np.array(axis) / np.linalg.norm(axis)
     R = 2.0 * np.outer(u, u) - np.eye(3)
@@ -60,7 +79,9 @@ def test_orientation_at_180_deg(config: RigConfig, make_pose: MakePose, axis: li
 
 
 def test_velocities_agree_with_finite_differences(config: RigConfig, make_pose: MakePose) -> None:
-    """A tracker that spins and flies: the published velocities are the derivatives of the published poses."""
+    """A tracker that spins and flies: the published velocities are the derivatives of the published
+    poses.
+    """
     w, v, dt = np.array([1.2, -0.7, 2.1]), np.array([0.3, 0.5, -0.2]), 1e-3
     start = rotation_from_vector([0.4, 0.1, -0.6])
 
@@ -72,14 +93,22 @@ def test_velocities_agree_with_finite_differences(config: RigConfig, make_pose: 
     velocity = (np.array(after.position_m) - before.position_m) / (2 * dt)
     # Positions are rounded to 1e-6 m: 1e-6 / 1e-3 s.
     np.testing.assert_allclose(now.velocity_m_s, velocity, atol=1e-3)
-    R_before, R_now, R_after = (rotation_from_quaternion(p.orientation_wxyz) for p in (before, now, after))
+    R_before, R_now, R_after = (
+        rotation_from_quaternion(p.orientation_wxyz) for p in (before, now, after)
+    )
     spin = (R_after - R_before) @ R_now.T / (2 * dt)
-    angular = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+    angular = (
+        np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+    )
     np.testing.assert_allclose(now.angular_velocity_rad_s, angular, atol=4e-3)
-    assert np.linalg.norm(np.array(now.velocity_m_s) - T_RIG_FROM_LIGHTHOUSE[:3, :3] @ v) > 0.1  # the lever arm matters
+    assert (
+        np.linalg.norm(np.array(now.velocity_m_s) - T_RIG_FROM_LIGHTHOUSE[:3, :3] @ v) > 0.1
+    )  # the lever arm matters
 
 
-def test_without_registration_poses_stay_in_the_lighthouse_frame(config: RigConfig, make_pose: MakePose) -> None:
+def test_without_registration_poses_stay_in_the_lighthouse_frame(
+    config: RigConfig, make_pose: MakePose
+) -> None:
     T = transform(rotation_from_vector([0.1, 0.2, 0.3]), [0.1, 0.2, 0.3])
     result = step_one(config, None, make_pose(T, vVelocity=(1.0, 2.0, 3.0)))
     assert not result.registered
@@ -90,14 +119,25 @@ def test_without_registration_poses_stay_in_the_lighthouse_frame(config: RigConf
 def test_object_without_a_place_is_its_tracker(config: RigConfig, make_pose: MakePose) -> None:
     result = step_one(config, objects(), make_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
     assert result.registered
-    np.testing.assert_allclose(result.position_m, apply(T_RIG_FROM_LIGHTHOUSE, [0.1, 0.2, 0.3]), atol=1e-6)
+    np.testing.assert_allclose(
+        result.position_m, apply(T_RIG_FROM_LIGHTHOUSE, [0.1, 0.2, 0.3]), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(
-    ("code", "tracking"), [(100, "calibrating"), (101, "calibrating"), (200, "ok"), (201, "out_of_range"), (300, "rotation_only")]
+    ("code", "tracking"),
+    [
+        (100, "calibrating"),
+        (101, "calibrating"),
+        (200, "ok"),
+        (201, "out_of_range"),
+        (300, "rotation_only"),
+    ],
 )
 def test_tracking_results(config: RigConfig, make_pose: MakePose, code: int, tracking: str) -> None:
-    result = step_one(config, None, make_pose(transform(np.eye(3), [1.0, 0.0, 0.0]), eTrackingResult=code))
+    result = step_one(
+        config, None, make_pose(transform(np.eye(3), [1.0, 0.0, 0.0]), eTrackingResult=code)
+    )
     assert (result.tracking, result.position_m) == (tracking, (1.0, 0.0, 0.0))
 
 
@@ -132,7 +172,9 @@ UNTRUSTED = {
 
 
 @pytest.mark.parametrize("fault", UNTRUSTED)
-def test_untrusted_poses_are_lost_and_nothing_is_guessed(config: RigConfig, make_pose: MakePose, fault: str) -> None:
+def test_untrusted_poses_are_lost_and_nothing_is_guessed(
+    config: RigConfig, make_pose: MakePose, fault: str
+) -> None:
     step = ObjectStep(config, calibrated())
     step.step(make_pose(transform(np.eye(3), [1.0, 2.0, 3.0])))
     result = step.step(make_pose(**UNTRUSTED[fault]))
@@ -142,7 +184,9 @@ def test_untrusted_poses_are_lost_and_nothing_is_guessed(config: RigConfig, make
     assert result.velocity_m_s == result.angular_velocity_rad_s == (0.0, 0.0, 0.0)
 
 
-def test_unknown_serials_are_ignored_counted_and_bounded(config: RigConfig, make_pose: MakePose) -> None:
+def test_unknown_serials_are_ignored_counted_and_bounded(
+    config: RigConfig, make_pose: MakePose
+) -> None:
     step = ObjectStep(config, None)
     for number in range(200):
         assert step.step(make_pose(serial=f"X{number}")) is None
@@ -151,16 +195,24 @@ def test_unknown_serials_are_ignored_counted_and_bounded(config: RigConfig, make
 
 
 @pytest.mark.parametrize(
-    ("offset_ns", "stamp_ns", "expected_ns"), [(5, 100, 95), (-5, 100, 105), (200, 100, 0), (-(10**30), 100, 2**63 - 1)]
+    ("offset_ns", "stamp_ns", "expected_ns"),
+    [(5, 100, 95), (-5, 100, 105), (200, 100, 0), (-(10**30), 100, 2**63 - 1)],
 )
-def test_time_offset(config: RigConfig, make_pose: MakePose, offset_ns: int, stamp_ns: int, expected_ns: int) -> None:
-    assert step_one(config, calibrated(offset_ns), make_pose(stamp_ns=stamp_ns)).stamp_ns == expected_ns
+def test_time_offset(
+    config: RigConfig, make_pose: MakePose, offset_ns: int, stamp_ns: int, expected_ns: int
+) -> None:
+    assert (
+        step_one(config, calibrated(offset_ns), make_pose(stamp_ns=stamp_ns)).stamp_ns
+        == expected_ns
+    )
 
 
 BAD_FILES = {
     "scaled": {"T_rig_from_lighthouse": (2.0 * np.eye(4)).tolist()},
     "mirrored": {"T_rig_from_lighthouse": np.diag([1.0, 1.0, -1.0, 1.0]).tolist()},
-    "bottom row": {"T_rig_from_lighthouse": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 1]]},
+    "bottom row": {
+        "T_rig_from_lighthouse": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 1]]
+    },
     "huge": {"T_rig_from_lighthouse": (1e300 * np.eye(4)).tolist()},
     "quaternion": {"objects": {"cup": {"orientation_wxyz": [0, 0, 0, 0]}}},
     "long quaternion": {"objects": {"cup": {"orientation_wxyz": [1e300, 0, 0, 1e300]}}},
@@ -169,7 +221,9 @@ BAD_FILES = {
 
 @pytest.mark.parametrize("fault", BAD_FILES)
 def test_impossible_registrations_are_refused(config: RigConfig, fault: str) -> None:
-    file = msgspec.convert({"T_rig_from_lighthouse": np.eye(4).tolist()} | BAD_FILES[fault], Objects)
+    file = msgspec.convert(
+        {"T_rig_from_lighthouse": np.eye(4).tolist()} | BAD_FILES[fault], Objects
+    )
     with pytest.raises(CalibrationError, match="run `rhot calibrate objects` again"):
         ObjectStep(config, file)
 
@@ -200,7 +254,9 @@ def test_any_numbers_give_a_message_that_survives_the_wire(
         seq=0,
         stamp_ns=0,
         universe="",
-        device=OpenVrDevice(index=0, serial="LHR-1", device_class="", model="", battery=0.0, charging=False),
+        device=OpenVrDevice(
+            index=0, serial="LHR-1", device_class="", model="", battery=0.0, charging=False
+        ),
         mDeviceToAbsoluteTracking=tuple(matrix),  # type: ignore[arg-type]
         vVelocity=speeds[0],  # type: ignore[arg-type]
         vAngularVelocity=speeds[1],  # type: ignore[arg-type]
@@ -213,7 +269,9 @@ def test_any_numbers_give_a_message_that_survives_the_wire(
     assert msgspec.json.decode(msgspec.json.encode(result), type=ObjectPose) == result
 
 
-def test_real_steamvr_drift_recording_is_all_rotations(config: RigConfig, make_pose: MakePose, vive: Path) -> None:
+def test_real_steamvr_drift_recording_is_all_rotations(
+    config: RigConfig, make_pose: MakePose, vive: Path
+) -> None:
     """20 minutes of a still tracker in SteamVR's 3x4 rows (MarvinGravert/Vive-Accuracy-Experiment)."""
     recorded = np.loadtxt(vive / "marvin" / "drift20minExperiment.txt.gz").reshape(-1, 3, 4)
     step = ObjectStep(config, None)

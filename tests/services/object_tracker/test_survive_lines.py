@@ -1,4 +1,6 @@
-"""The survive-cli parser on a real recording, against poses that others took from it, and on garbage."""
+"""The survive-cli parser on a real recording, against poses that others took from it, and on
+garbage.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,13 @@ def read(lines: list[str]) -> list[SurvivePose]:
 
 
 def test_real_recording(vive: Path) -> None:
-    """Every POSE line of a real recording, equal to the CSV taken from it, under the tracker's own serial number."""
+    """Every POSE line of a real recording, equal to the CSV taken from it, under the tracker's own
+    serial number.
+    """
     parser = SurviveLines()
-    with gzip.open(vive / "libsurvive" / "tracker-cal-attempt.rec.gz", "rt", encoding="utf-8", errors="replace") as file:
+    with gzip.open(
+        vive / "libsurvive" / "tracker-cal-attempt.rec.gz", "rt", encoding="utf-8", errors="replace"
+    ) as file:
         poses = [pose for line in file if (pose := parser.feed(line)) is not None]
     with gzip.open(vive / "libsurvive" / "poses_tracker-cal-attempt.csv.gz", "rt") as file:
         expected = [row for row in csv.DictReader(file) if row["kind"] == "POSE"]
@@ -35,7 +41,9 @@ def test_real_recording(vive: Path) -> None:
     assert {pose.device for pose in poses} == {"WM0"}
     ours = np.array([[p.time_s, *p.position_m, *p.orientation_wxyz] for p in poses])
     columns = ("t_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
-    np.testing.assert_allclose(ours, [[float(row[c]) for c in columns] for row in expected], atol=1e-6)
+    np.testing.assert_allclose(
+        ours, [[float(row[c]) for c in columns] for row in expected], atol=1e-6
+    )
     # 4354 of them came with a velocity; a tracker at rest has one of some um/s.
     assert sum(any(pose.velocity_m_s) for pose in poses) > 4000
     assert max(np.abs(pose.velocity_m_s).max() for pose in poses) < 0.01
@@ -83,14 +91,27 @@ def test_malformed_poses_are_counted_and_skipped(line: str) -> None:
     assert parser.malformed == 1
 
 
-@given(st.lists(st.text() | st.from_regex(r"\d W POSE( -?\d){7}|\d W VELOCITY.*|1 \w CONFIG .*"), max_size=20))
+@given(
+    st.lists(
+        st.text() | st.from_regex(r"\d W POSE( -?\d){7}|\d W VELOCITY.*|1 \w CONFIG .*"),
+        max_size=20,
+    )
+)
 def test_no_line_breaks_it(lines: list[str]) -> None:
     for pose in read(lines):
         openvr_pose(pose, 0, 0)
 
 
 def test_z_up_becomes_y_up() -> None:
-    pose = SurvivePose(0.0, "WM0", "LHR-1", (1.0, 2.0, 3.0), (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)), (0.1, 0.2, 0.3), (0.0, 0.0, 1.0))
+    pose = SurvivePose(
+        0.0,
+        "WM0",
+        "LHR-1",
+        (1.0, 2.0, 3.0),
+        (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)),
+        (0.1, 0.2, 0.3),
+        (0.0, 0.0, 1.0),
+    )
     message = openvr_pose(pose, 4, 5)
     rows = np.array(message.mDeviceToAbsoluteTracking)
     np.testing.assert_allclose(rows[:, 3], [1.0, 3.0, -2.0])
@@ -100,7 +121,12 @@ def test_z_up_becomes_y_up() -> None:
     R = rotation_from_quaternion(pose.orientation_wxyz)
     np.testing.assert_allclose(rows[:, :3] @ R.T @ [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], atol=1e-12)
     assert np.linalg.det(rows[:, :3]) == pytest.approx(1.0)
-    assert (message.device.serial, message.seq, message.stamp_ns, message.universe) == ("LHR-1", 4, 5, "libsurvive")
+    assert (message.device.serial, message.seq, message.stamp_ns, message.universe) == (
+        "LHR-1",
+        4,
+        5,
+        "libsurvive",
+    )
 
 
 def test_run_clock_removes_delay_and_follows_drift() -> None:

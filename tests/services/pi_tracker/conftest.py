@@ -24,7 +24,9 @@ class Studio:
     def frame(tips, seq=0, layout="i420", sigma=5.0, size_px=(64, 64), **look):
         """A noisy frame and the truth."""
         image, truth = synthetic_images.clean(tips, size_px, **look)
-        return synthetic_images.frame_of(synthetic_images.noisy(image, sigma, seq), seq, layout), truth
+        return synthetic_images.frame_of(
+            synthetic_images.noisy(image, sigma, seq), seq, layout
+        ), truth
 
 
 @pytest.fixture(scope="session")

@@ -10,8 +10,8 @@ from rhot.files.config import Tracker
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
 
-# Frames in which the ball is out of the picture or hidden in the fist at its edge, and the ones beside them that show a sliver of it at
-# most (looked at one by one).
+# Frames in which the ball is out of the picture or hidden in the fist at its edge, and the ones
+# beside them that show a sliver of it at most (looked at one by one).
 ABSENT = [*range(28), *range(464, 488), *range(788, 825), *range(963, 1004)]
 SLIVER = {462, 463, 488, 489, 787, 825, 961, 962, 28, 29}
 
@@ -22,7 +22,11 @@ def tracked(rhot_data):
     reader = VideoReader("cam", rhot_data / "color_video" / "ball2.mp4", 30.0)
     reader.open()
     step = TrackerStep(
-        "cam", Colors(colors={"green": ColorRange(hsv_low=(35, 60, 40), hsv_high=(85, 255, 255))}), Tracker(), (640, 480), ["green"]
+        "cam",
+        Colors(colors={"green": ColorRange(hsv_low=(35, 60, 40), hsv_high=(85, 255, 255))}),
+        Tracker(),
+        (640, 480),
+        ["green"],
     )
     frames = []
     while (frame := reader.read()) is not None:
@@ -43,7 +47,9 @@ def test_nothing_is_found_where_no_ball_is(tracked):
 
 
 def test_the_track_is_one_ball(tracked):
-    """A ball of 45-70 px that a hand moves: no jump beyond 110 px a frame (24 Hz), no shrinking but at the edge."""
+    """A ball of 45-70 px that a hand moves: no jump beyond 110 px a frame (24 Hz), no shrinking but
+    at the edge.
+    """
     path = {seq: markers[0] for seq, (_, markers) in enumerate(tracked) if markers}
     for seq, marker in path.items():
         before = path.get(seq - 1)

@@ -68,7 +68,14 @@ class Rig:
     def shoot(self):
         """Send one frame; its number."""
         self._seq += 1
-        told = SimFrame(camera="left", seq=self._seq, stamp_ns=10**18 + self._seq, row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
+        told = SimFrame(
+            camera="left",
+            seq=self._seq,
+            stamp_ns=10**18 + self._seq,
+            row_time_ns=1e4,
+            size_px=SIZE,
+            clock_skew_ns=0,
+        )
         self._camera.put_bytes(self._frame.image.tobytes(), told)
         return self._seq
 
@@ -90,7 +97,11 @@ async def rig(router, studio, tip):
 
 
 async def test_it_waits_for_the_start_and_pauses_at_the_stop(config, router, rig):
-    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as other, running(config, router) as service:
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        open_bus("test", [router]) as other,
+        running(config, router) as service,
+    ):
         markers = other.every(topics.MARKERS, 64)
         await rig.camera_wanted()
         for _ in range(5):
@@ -123,7 +134,11 @@ async def test_after_a_restart_it_asks_and_carries_on(config, router, rig):
 
 async def test_frames_without_markers_are_published_too(config, router, rig, studio):
     rig._frame = studio.frame([], size_px=SIZE)[0]
-    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master, running(config, router):
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        open_bus("test", [router]) as master,
+        running(config, router),
+    ):
         master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
         markers = master.every(topics.MARKERS, 64)
         await rig.camera_wanted()
@@ -131,7 +146,11 @@ async def test_frames_without_markers_are_published_too(config, router, rig, stu
 
 
 async def test_pictures_for_who_asks(config, router, rig):
-    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as other, running(config, router):
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        open_bus("test", [router]) as other,
+        running(config, router),
+    ):
         await rig.camera_wanted()
         assert await other.get(topics.FRAME, 0.3, camera="left") == []
         previews = other.raw(topics.PREVIEW, 4, camera="left")
@@ -148,7 +167,11 @@ async def test_pictures_for_who_asks(config, router, rig):
 
 async def test_new_colours_need_no_restart(config, router, rig, colors, tmp_path):
     path = tmp_path / "calibration" / "left.colors.json"
-    async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master, running(config, router) as service:
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        open_bus("test", [router]) as master,
+        running(config, router) as service,
+    ):
         master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
         markers = master.latest(topics.MARKERS)
         await rig.camera_wanted()
@@ -164,31 +187,53 @@ async def test_new_colours_need_no_restart(config, router, rig, colors, tmp_path
             pass
 
 
-async def test_a_recording_begins_with_the_session_and_ends_the_service(config, router, studio, tip, tmp_path):
+async def test_a_recording_begins_with_the_session_and_ends_the_service(
+    config, router, studio, tip, tmp_path
+):
     (tmp_path / "shots").mkdir()
     for seq in range(3):
         clean, _ = studio.clean([tip("green", 50.0, 60.0)], size_px=SIZE)
         cv2.imwrite(str(tmp_path / "shots" / f"{seq}.png"), studio.bgr(clean, 3.0, seq))
-    config = msgspec.structs.replace(config, camera=[CameraTable(name="left", source="folder:shots", size_px=SIZE)])
+    config = msgspec.structs.replace(
+        config, camera=[CameraTable(name="left", source="folder:shots", size_px=SIZE)]
+    )
     async with asyncio.timeout(DEADLINE_S), open_bus("test", [router]) as master:
         markers = master.every(topics.MARKERS, 64)
         master.answer(topics.SESSION, lambda: Session(running=True, start_ns=7_000_000_000))
         async with open_bus("test", [router]) as bus, asyncio.TaskGroup() as tasks:
             await serve(Service("pi_tracker", "left", config, bus, tasks))
         found = [await anext(markers) for _ in range(3)]
-    assert [one.stamp_ns for one in found] == [7_000_000_000 + round(n * 1e9 / 30.0) for n in range(3)]
+    assert [one.stamp_ns for one in found] == [
+        7_000_000_000 + round(n * 1e9 / 30.0) for n in range(3)
+    ]
     assert all([marker.color for marker in one.markers] == ["green"] for one in found)
 
 
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"camera": [CameraTable(name="left", source="folder:nowhere")]}, CaptureError, "no such folder of images"),
-        ({"camera": [CameraTable(name="left", source="kinect")]}, ConfigError, "unknown source 'kinect'"),
+        (
+            {"camera": [CameraTable(name="left", source="folder:nowhere")]},
+            CaptureError,
+            "no such folder of images",
+        ),
+        (
+            {"camera": [CameraTable(name="left", source="kinect")]},
+            ConfigError,
+            "unknown source 'kinect'",
+        ),
         ({"camera": [CameraTable(name="other")]}, ConfigError, "has no camera 'left'; it has"),
         # A live camera would start, to be calibrated over the bus; a recording cannot be.
-        ({"hand": {"right": HandTable(markers={"index_tip": "mauve"})}, "camera": [FOLDER]}, CalibrationError, "colour 'mauve'"),
-        ({"folder": "/nowhere", "camera": [FOLDER]}, CalibrationError, "rhot calibrate colors left"),
+        (
+            {"hand": {"right": HandTable(markers={"index_tip": "mauve"})}, "camera": [FOLDER]},
+            CalibrationError,
+            "colour 'mauve'",
+        ),
+        (
+            {"folder": "/nowhere", "camera": [FOLDER]},
+            CalibrationError,
+            "rhot calibrate colors left",
+        ),
     ],
 )
 async def test_what_is_wrong_ends_it_with_a_reason(config, router, change, error, message):

@@ -40,7 +40,12 @@ def test_markers_are_where_the_paint_is(moving, colors, layout, method, toleranc
     step = tracker(colors, method=method)
     for frame, truth in moving(layout):
         message = step.step(frame, 5, 7)
-        assert (message.camera, message.seq, message.stamp_ns, message.size_px) == ("left", frame.seq, frame.stamp_ns, SIZE)
+        assert (message.camera, message.seq, message.stamp_ns, message.size_px) == (
+            "left",
+            frame.seq,
+            frame.stamp_ns,
+            SIZE,
+        )
         assert (message.clock_offset_ns, message.clock_sigma_ns) == (5, 7)
         found = {marker.color: marker for marker in message.markers}
         assert set(found) == set(truth)
@@ -60,7 +65,10 @@ def test_a_frame_without_markers_is_a_message_too(studio, colors, method):
 
 
 def test_the_same_frames_give_the_same_bytes(moving, colors):
-    runs = [[msgspec.json.encode(step.step(frame)) for frame, _ in moving()] for step in (tracker(colors), tracker(colors))]
+    runs = [
+        [msgspec.json.encode(step.step(frame)) for frame, _ in moving()]
+        for step in (tracker(colors), tracker(colors))
+    ]
     assert runs[0] == runs[1]
 
 
@@ -102,7 +110,9 @@ def test_a_frame_of_another_size_is_tracked_as_it_is(studio, tip, colors):
 def test_the_size_may_change_while_running(studio, tip, colors):
     step = tracker(colors)
     for seq, size_px in enumerate([(160, 120), (64, 48), (160, 120)]):
-        frame, _ = studio.frame([tip("green", size_px[0] - 20.0, size_px[1] - 20.0)], seq, size_px=size_px)
+        frame, _ = studio.frame(
+            [tip("green", size_px[0] - 20.0, size_px[1] - 20.0)], seq, size_px=size_px
+        )
         assert len(step.step(frame).markers) == 1
 
 
@@ -131,7 +141,10 @@ def test_new_colours_are_in_force_with_the_next_frame(studio, tip, colors):
 
 @pytest.mark.parametrize("method", ["lut", "seed"])
 def test_a_colour_without_calibration_ends_the_start(colors, method):
-    with pytest.raises(CalibrationError, match=r"left\.colors\.json: colour 'pink' .* blue, cyan, green, lime, magenta, violet"):
+    with pytest.raises(
+        CalibrationError,
+        match=r"left\.colors\.json: colour 'pink' .* blue, cyan, green, lime, magenta, violet",
+    ):
         tracker(colors, ["green", "pink"], method=method)
 
 

@@ -22,7 +22,9 @@ def start_ns() -> int:
 @pytest.fixture
 def payload() -> Callable[[int], bytes]:
     """Something like a MarkerFrame, which does not compress to nothing."""
-    return lambda seq: f'{{"camera": "left", "seq": {seq}, "noise": "{pow(seq + 2, 97, 10**200 + 357)}"}}'.encode()
+    return lambda seq: (
+        f'{{"camera": "left", "seq": {seq}, "noise": "{pow(seq + 2, 97, 10**200 + 357)}"}}'.encode()
+    )
 
 
 @pytest.fixture
@@ -33,7 +35,10 @@ def write(payload: Callable[[int], bytes]) -> Callable[..., Path]:
         with RecordingWriter(path, rig, "1.2.3", {"config.json": b'{"rig": 1}'}) as writer:
             for seq in range(count):
                 writer.add(
-                    topics.MARKERS, f"rhot/{rig}/camera/{('left', 'right')[seq % 2]}/markers", payload(seq), START_NS + seq * 10_000_000
+                    topics.MARKERS,
+                    f"rhot/{rig}/camera/{('left', 'right')[seq % 2]}/markers",
+                    payload(seq),
+                    START_NS + seq * 10_000_000,
                 )
         return path
 

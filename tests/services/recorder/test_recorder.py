@@ -44,7 +44,9 @@ def test_names_are_utc_and_never_taken_twice(tmp_path: Path) -> None:
     assert recording_path(tmp_path, "desk", 2**63 - 1).name == "rhot-desk-22620411-234716.mcap"
 
 
-def test_a_session_is_a_file_with_its_start_and_its_stop(recorder: Recorder, tmp_path: Path) -> None:
+def test_a_session_is_a_file_with_its_start_and_its_stop(
+    recorder: Recorder, tmp_path: Path
+) -> None:
     point(recorder)
     say(recorder, session(True))
     point(recorder)
@@ -60,7 +62,10 @@ def test_a_session_is_a_file_with_its_start_and_its_stop(recorder: Recorder, tmp
 
 def test_the_next_session_is_the_next_file(recorder: Recorder, tmp_path: Path) -> None:
     say(recorder, session(True), session(True, START_NS + 60 * 10**9), session(False))
-    assert [p.name for p in sorted((tmp_path / "r").iterdir())] == ["rhot-desk-20231114-221320.mcap", "rhot-desk-20231114-221420.mcap"]
+    assert [p.name for p in sorted((tmp_path / "r").iterdir())] == [
+        "rhot-desk-20231114-221320.mcap",
+        "rhot-desk-20231114-221420.mcap",
+    ]
 
 
 def test_autostart_records_between_sessions_too(tmp_path: Path) -> None:
@@ -83,7 +88,10 @@ def test_by_hand_sessions_change_nothing(tmp_path: Path) -> None:
     assert len(list(read(tmp_path / "x.mcap"))) == 3
 
 
-@pytest.mark.parametrize("garbage", [b"", b"\xff", b"[]", b'{"running": 1}', b'{"running": true, "start_ns": -1}', b"[" * 60_000])
+@pytest.mark.parametrize(
+    "garbage",
+    [b"", b"\xff", b"[]", b'{"running": 1}', b'{"running": true, "start_ns": -1}', b"[" * 60_000],
+)
 def test_garbage_starts_nothing(recorder: Recorder, garbage: bytes) -> None:
     say(recorder, garbage)
     assert recorder.path is None
@@ -96,7 +104,9 @@ def test_truth_is_recorded_only_where_something_is_simulated() -> None:
     real = RigConfig(camera=[CameraTable(name="left")], objects=Objects(source="steamvr"))
     assert topics.TRUTH not in recorded_topics(real)
     assert {topics.MARKERS, topics.POSE, topics.SESSION, topics.HEALTH} < set(recorded_topics(real))
-    assert topics.TRUTH in recorded_topics(RigConfig(camera=[CameraTable(name="left", source="simulator")], objects=real.objects))
+    assert topics.TRUTH in recorded_topics(
+        RigConfig(camera=[CameraTable(name="left", source="simulator")], objects=real.objects)
+    )
     assert topics.PREVIEW not in recorded_topics(RigConfig())
 
 

@@ -55,7 +55,9 @@ os.kill(os.getpid(), signal.SIGKILL)
     assert unfinished(tmp_path) == [], "recovered once is enough"
 
 
-def test_damage_in_the_middle_costs_only_its_chunk(tmp_path: Path, write: Write, payload: Payload) -> None:
+def test_damage_in_the_middle_costs_only_its_chunk(
+    tmp_path: Path, write: Write, payload: Payload
+) -> None:
     path = write(tmp_path / "a.mcap")
     data = bytearray(path.read_bytes())
     middle = len(data) // 2
@@ -68,7 +70,14 @@ def test_damage_in_the_middle_costs_only_its_chunk(tmp_path: Path, write: Write,
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"\x89MCAP0\r\n", b"hello " * 50, b"\x89MCAP0\r\n" + bytes(500), b"\x89MCAP0\r\n" + b"\x06" + b"\xff" * 60]
+    "data",
+    [
+        b"",
+        b"\x89MCAP0\r\n",
+        b"hello " * 50,
+        b"\x89MCAP0\r\n" + bytes(500),
+        b"\x89MCAP0\r\n" + b"\x06" + b"\xff" * 60,
+    ],
 )
 def test_nothing_whole(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "a.mcap"

@@ -32,7 +32,11 @@ async def until(condition: Callable[[], object], act: Callable[[], None] = lambd
 
 async def test_everything_marked_is_recorded_garbage_too(running: Callable, tmp_path: Path) -> None:
     config = RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True))
-    keys = {"rhot/desk/camera/left/markers": b"\xff\x00", "rhot/desk/hand/right/pose": b"[1]", "rhot/desk/camera/left/preview": b"jpeg"}
+    keys = {
+        "rhot/desk/camera/left/markers": b"\xff\x00",
+        "rhot/desk/hand/right/pose": b"[1]",
+        "rhot/desk/camera/left/preview": b"jpeg",
+    }
     async with running("recorder", serve, config) as (service, bus):
 
         def publish() -> None:
@@ -43,7 +47,9 @@ async def test_everything_marked_is_recorded_garbage_too(running: Callable, tmp_
         assert service.state == "running"
     (path,) = (tmp_path / "recordings").glob("rhot-desk-*.mcap")
     records = list(read(path))
-    assert {(r.key, r.payload) for r in records} == {item for item in keys.items() if "preview" not in item[0]}
+    assert {(r.key, r.payload) for r in records} == {
+        item for item in keys.items() if "preview" not in item[0]
+    }
     assert abs(records[-1].log_time_ns - records[0].log_time_ns) < 20 * 10**9
 
 
@@ -52,15 +58,23 @@ async def test_sessions_by_broadcast_and_after_a_restart(running: Callable, tmp_
     folder = tmp_path / "recordings"
     async with running("recorder", serve, config) as (service, bus):
         publisher = bus.publisher(topics.SESSION)
-        await until(lambda: list(folder.glob("*.mcap")), lambda: publisher.put(Session(running=True, start_ns=10**18)))
+        await until(
+            lambda: list(folder.glob("*.mcap")),
+            lambda: publisher.put(Session(running=True, start_ns=10**18)),
+        )
         await until(lambda: service.values.get("recording") == 1.0)
         bus.answer(topics.SESSION, lambda: Session(running=True, start_ns=10**18))
         async with running("recorder", serve, config):
             await until(lambda: len(list(folder.glob("*.mcap"))) == 2)
-    assert [p.name for p in sorted(folder.iterdir())] == ["rhot-desk-20010909-014640-2.mcap", "rhot-desk-20010909-014640.mcap"]
+    assert [p.name for p in sorted(folder.iterdir())] == [
+        "rhot-desk-20010909-014640-2.mcap",
+        "rhot-desk-20010909-014640.mcap",
+    ]
 
 
-async def test_cut_files_are_restored_at_the_start(running: Callable, tmp_path: Path, write: Write) -> None:
+async def test_cut_files_are_restored_at_the_start(
+    running: Callable, tmp_path: Path, write: Write
+) -> None:
     path = write(tmp_path / "recordings" / "rhot-desk-1.mcap")
     path.write_bytes(path.read_bytes()[:-5])
     (tmp_path / "recordings" / "rhot-desk-2.mcap").write_bytes(b"")
@@ -70,17 +84,29 @@ async def test_cut_files_are_restored_at_the_start(running: Callable, tmp_path: 
     assert len(list(read(tmp_path / "recordings" / "rhot-desk-1.recovered.mcap"))) == 1000
 
 
-async def test_a_folder_that_cannot_be_written_ends_the_service(running: Callable, tmp_path: Path) -> None:
+async def test_a_folder_that_cannot_be_written_ends_the_service(
+    running: Callable, tmp_path: Path
+) -> None:
     (tmp_path / "recordings").write_text("")
     with pytest.RaisesGroup(CaptureError):
-        async with running("recorder", serve, RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True))):
+        async with running(
+            "recorder",
+            serve,
+            RigConfig(folder=str(tmp_path), recorder=RecorderTable(autostart=True)),
+        ):
             await asyncio.Event().wait()
 
 
 @contextlib.asynccontextmanager
-async def heard(router: str, rig: str) -> AsyncIterator[tuple[Bus, asyncio.Queue[tuple[str, bytes]]]]:
+async def heard(
+    router: str, rig: str
+) -> AsyncIterator[tuple[Bus, asyncio.Queue[tuple[str, bytes]]]]:
     """A bus to replay to, and what another session hears of it."""
-    async with open_bus(rig, [router]) as ours, open_bus(rig, [router]) as theirs, asyncio.timeout(15.0):
+    async with (
+        open_bus(rig, [router]) as ours,
+        open_bus(rig, [router]) as theirs,
+        asyncio.timeout(15.0),
+    ):
         queue: asyncio.Queue[tuple[str, bytes]] = asyncio.Queue()
 
         async def listen() -> None:
@@ -90,7 +116,10 @@ async def heard(router: str, rig: str) -> AsyncIterator[tuple[Bus, asyncio.Queue
         task = asyncio.create_task(listen())
         try:
             # The subscription needs a moment to reach the router.
-            await until(lambda: not queue.empty(), lambda: ours.put_raw(topics.MARKERS.key(rig, camera="ping"), b""))
+            await until(
+                lambda: not queue.empty(),
+                lambda: ours.put_raw(topics.MARKERS.key(rig, camera="ping"), b""),
+            )
             while not queue.empty():
                 queue.get_nowait()
             yield ours, queue
@@ -115,7 +144,10 @@ async def test_replay_flat_out_rewrites_the_rig_and_loses_nothing(
         assert await replay(bus, path, 0.0) == 2000
         found = await take(queue, 2000)
     assert [data for _, data in found] == [payload(seq) for seq in range(2000)]
-    assert {key for key, _ in found} == {"rhot/lab/camera/left/markers", "rhot/lab/camera/right/markers"}
+    assert {key for key, _ in found} == {
+        "rhot/lab/camera/left/markers",
+        "rhot/lab/camera/right/markers",
+    }
 
 
 async def test_replay_keeps_time(router: str, tmp_path: Path, write: Write) -> None:
@@ -137,7 +169,16 @@ async def test_replay_in_a_loop_and_only_some(router: str, tmp_path: Path) -> No
         writer.add(topics.MARKERS, "rhot/desk/camera/left/other", b"unknown", 3)
     async with heard(router, "desk") as (bus, queue):
         records: list[Record] = []
-        task = asyncio.create_task(replay(bus, tmp_path / "a.mcap", 0.0, loop=True, only=["camera/markers"], report=records.append))
+        task = asyncio.create_task(
+            replay(
+                bus,
+                tmp_path / "a.mcap",
+                0.0,
+                loop=True,
+                only=["camera/markers"],
+                report=records.append,
+            )
+        )
         assert await take(queue, 5) == [("rhot/desk/camera/left/markers", b"m")] * 5
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):

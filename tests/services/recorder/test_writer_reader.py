@@ -28,7 +28,10 @@ def test_round_trip(tmp_path: Path, write: Write, payload: Payload, start_ns: in
     records = list(read(write(tmp_path / "a.mcap")))
     assert [r.payload for r in records] == [payload(seq) for seq in range(1000)]
     assert [r.log_time_ns for r in records] == [start_ns + seq * 10_000_000 for seq in range(1000)]
-    assert {r.key for r in records} == {"rhot/desk/camera/left/markers", "rhot/desk/camera/right/markers"}
+    assert {r.key for r in records} == {
+        "rhot/desk/camera/left/markers",
+        "rhot/desk/camera/right/markers",
+    }
     assert {r.encoding for r in records} == {"application/json;rhot.MarkerFrame.1"}
 
 
@@ -36,7 +39,10 @@ def test_summary_and_attachments(tmp_path: Path, write: Write) -> None:
     path = write(tmp_path / "a.mcap", 101)
     summary = summarize(path)
     assert (summary.rig, summary.messages, summary.duration_s) == ("desk", 101, 1.0)
-    assert summary.keys == {"rhot/desk/camera/left/markers": 51, "rhot/desk/camera/right/markers": 50}
+    assert summary.keys == {
+        "rhot/desk/camera/left/markers": 51,
+        "rhot/desk/camera/right/markers": 50,
+    }
     assert read_attachments(path) == {"config.json": b'{"rig": 1}'}
 
 
@@ -49,12 +55,20 @@ def test_other_mcap_tools_find_compressed_chunks_and_schemas(tmp_path: Path, wri
         assert len(summary.chunk_indexes) > 2
         schema, channel, _ = next(reader.iter_messages())
         assert schema is not None
-        assert (schema.name, schema.encoding, channel.message_encoding) == ("rhot.MarkerFrame", "jsonschema", "json")
+        assert (schema.name, schema.encoding, channel.message_encoding) == (
+            "rhot.MarkerFrame",
+            "jsonschema",
+            "json",
+        )
         assert json.loads(schema.data)["type"] == "object"
 
 
-@pytest.mark.parametrize("missing", [{CompressionType.ZSTD}, {CompressionType.ZSTD, CompressionType.LZ4}])
-def test_without_zstandard(tmp_path: Path, write: Write, monkeypatch: pytest.MonkeyPatch, missing: set[CompressionType]) -> None:
+@pytest.mark.parametrize(
+    "missing", [{CompressionType.ZSTD}, {CompressionType.ZSTD, CompressionType.LZ4}]
+)
+def test_without_zstandard(
+    tmp_path: Path, write: Write, monkeypatch: pytest.MonkeyPatch, missing: set[CompressionType]
+) -> None:
     def refusing(output: object, chunk_size: int, compression: CompressionType) -> Writer:
         if compression in missing:
             raise writer_module.UnsupportedCompressionError(compression.name)
@@ -68,7 +82,12 @@ def test_payloads_that_do_not_decode_are_kept(tmp_path: Path) -> None:
     rubbish = [b"", b"\xff\x00", b"{", b"x" * 65536]
     with RecordingWriter(tmp_path / "a.mcap", "desk") as writer:
         for number, data in enumerate(rubbish):
-            writer.add(topics.POSE, "rhot/desk/hand/\udcff/pose".encode("utf-8", "replace").decode(), data, number)
+            writer.add(
+                topics.POSE,
+                "rhot/desk/hand/\udcff/pose".encode("utf-8", "replace").decode(),
+                data,
+                number,
+            )
     assert [r.payload for r in read(tmp_path / "a.mcap")] == rubbish
 
 
@@ -94,7 +113,11 @@ def test_an_empty_recording_is_whole(tmp_path: Path) -> None:
 
 
 def test_the_file_is_locked_while_it_is_written(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "a.mcap", "desk"), (tmp_path / "a.mcap").open("rb") as file, pytest.raises(BlockingIOError):
+    with (
+        RecordingWriter(tmp_path / "a.mcap", "desk"),
+        (tmp_path / "a.mcap").open("rb") as file,
+        pytest.raises(BlockingIOError),
+    ):
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
@@ -111,7 +134,10 @@ BAD = {
     "text": (lambda path: path.write_text("hello " * 100), "no MCAP file"),
     "foreign": (foreign, "no recording of rhot"),
     "only magic": (lambda path: path.write_bytes(b"\x89MCAP0\r\n" * 2), "cut off"),
-    "magic and rubbish": (lambda path: path.write_bytes(b"\x89MCAP0\r\n" + b"\xa5" * 500 + b"\x89MCAP0\r\n"), "is damaged"),
+    "magic and rubbish": (
+        lambda path: path.write_bytes(b"\x89MCAP0\r\n" + b"\xa5" * 500 + b"\x89MCAP0\r\n"),
+        "is damaged",
+    ),
     "folder": (lambda path: path.mkdir(), "cannot be read"),
 }
 
@@ -136,8 +162,13 @@ def test_cut_files_say_how_to_restore_them(tmp_path: Path, write: Write) -> None
             list(read(path))
 
 
-def test_damage_anywhere_is_an_error_or_harmless(tmp_path: Path, write: Write, payload: Payload) -> None:
-    """Every 97th byte of a file flipped in turn: the right payloads, or a CaptureError; nothing else."""
+def test_damage_anywhere_is_an_error_or_harmless(
+    tmp_path: Path, write: Write, payload: Payload
+) -> None:
+    """Every 97th byte of a file flipped in turn: the right payloads, or a CaptureError.
+
+    Nothing else.
+    """
     path = write(tmp_path / "a.mcap", 300)
     data = path.read_bytes()
     whole = [payload(seq) for seq in range(300)]
@@ -176,5 +207,8 @@ def test_folders_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(CaptureError, match="cannot be recorded"):
         RecordingWriter(tmp_path / "file" / "a.mcap", "desk")
-    with RecordingWriter(tmp_path / "a.mcap", "desk"), pytest.raises(CaptureError, match="File exists"):
+    with (
+        RecordingWriter(tmp_path / "a.mcap", "desk"),
+        pytest.raises(CaptureError, match="File exists"),
+    ):
         RecordingWriter(tmp_path / "a.mcap", "desk")

@@ -1,4 +1,6 @@
-"""The simulated rig of config/sim.toml, and one renderer of a moving scene for all tests of this room."""
+"""The simulated rig of config/sim.toml, and one renderer of a moving scene for all tests of this
+room.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,10 @@ def fast(config: RigConfig) -> Scene:
 
 @pytest.fixture(scope="session")
 def renderer(fist: Scene) -> Renderer:
-    """The left camera's. Give every call its own time: a renderer keeps nothing from picture to picture."""
+    """The left camera's.
+
+    Give every call its own time: a renderer keeps nothing from picture to picture.
+    """
     return Renderer(fist, "left")
 
 
@@ -50,7 +55,11 @@ def planes() -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]
         flat = image.reshape(-1).astype(np.int64)
         luma, quarter = height * width, height * width // 4
         u, v = flat[luma : luma + quarter], flat[luma + quarter :]
-        return flat[:luma].reshape(height, width), u.reshape(height // 2, -1), v.reshape(height // 2, -1)
+        return (
+            flat[:luma].reshape(height, width),
+            u.reshape(height // 2, -1),
+            v.reshape(height // 2, -1),
+        )
 
     return split
 

@@ -1,4 +1,6 @@
-"""The simulator as a service between a real router and a reader: pictures, poses and truth in real time."""
+"""The simulator as a service between a real router and a reader: pictures, poses and truth in real
+time.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from services.simulator.scene.scene import load_scene
 from services.simulator.service import StageClock, serve
 
 
-async def collect(router: str, config, wanted: int) -> tuple[Service, list, list[Truth], list[OpenVrPose]]:
+async def collect(
+    router: str, config, wanted: int
+) -> tuple[Service, list, list[Truth], list[OpenVrPose]]:
     """Run the service until so many pictures, truths and poses each have come."""
     frames: list[tuple[SimFrame, bytes, int]] = []
     truths: list[Truth] = []
@@ -32,14 +36,25 @@ async def collect(router: str, config, wanted: int) -> tuple[Service, list, list
                 return
 
     def frame(sample) -> int:
-        frames.append((msgspec.json.decode(sample.attachment, type=SimFrame), sample.payload, sample.received_ns))
+        frames.append(
+            (
+                msgspec.json.decode(sample.attachment, type=SimFrame),
+                sample.payload,
+                sample.received_ns,
+            )
+        )
         return len(frames)
 
     def append(to: list):
         return lambda message: to.append(message) or len(to)
 
     rig = config.rig.name
-    async with open_bus(rig, [router]) as theirs, open_bus(rig, [router]) as ours, asyncio.timeout(60.0), asyncio.TaskGroup() as tasks:
+    async with (
+        open_bus(rig, [router]) as theirs,
+        open_bus(rig, [router]) as ours,
+        asyncio.timeout(60.0),
+        asyncio.TaskGroup() as tasks,
+    ):
         service = Service("simulator", "main", config, theirs, tasks)
         readers = [
             tasks.create_task(read(ours.raw(topics.SIM_FRAME, 64), frame)),
@@ -56,7 +71,9 @@ async def collect(router: str, config, wanted: int) -> tuple[Service, list, list
 @pytest.fixture
 def live(config):
     """The rig of config/sim.toml on this machine's clock."""
-    return msgspec.structs.replace(config, simulator=msgspec.structs.replace(config.simulator, scene="still"))
+    return msgspec.structs.replace(
+        config, simulator=msgspec.structs.replace(config.simulator, scene="still")
+    )
 
 
 async def test_pictures_truth_and_poses_come_in_real_time(router, live):
@@ -70,7 +87,8 @@ async def test_pictures_truth_and_poses_come_in_real_time(router, live):
         clock = scene.clocks[about.camera]
         assert len(payload) == 640 * 480 * 3 // 2
         assert about.row_time_ns == clock.row_time_ns
-        # On the master's clock a picture is taken before it is there; the camera computer's clock is milliseconds off.
+        # On the master's clock a picture is taken before it is there; the camera computer's clock
+        # is milliseconds off.
         true_ns = about.stamp_ns - about.clock_skew_ns
         assert before_ns < true_ns < received_ns
         assert abs(about.clock_skew_ns - clock.offset_ns) < 1e6
@@ -81,7 +99,9 @@ async def test_pictures_truth_and_poses_come_in_real_time(router, live):
     assert all(before_ns < t.stamp_ns < after_ns for t in truths)
     assert {p.device.serial for p in poses} == {"LHR-SIM00001"}
     assert all(before_ns < p.stamp_ns < after_ns for p in poses)
-    bgr = cv2.cvtColor(np.frombuffer(frames[0][1], np.uint8).reshape(720, 640), cv2.COLOR_YUV2BGR_I420)
+    bgr = cv2.cvtColor(
+        np.frombuffer(frames[0][1], np.uint8).reshape(720, 640), cv2.COLOR_YUV2BGR_I420
+    )
     assert bgr.std() > 20
 
 
@@ -94,7 +114,9 @@ async def test_other_sources_are_left_alone(router, live):
 
 
 async def test_an_unknown_scene_ends_the_service(router, live):
-    wrong = msgspec.structs.replace(live, simulator=msgspec.structs.replace(live.simulator, scene="opera"))
+    wrong = msgspec.structs.replace(
+        live, simulator=msgspec.structs.replace(live.simulator, scene="opera")
+    )
     with pytest.raises(ExceptionGroup) as caught:
         await collect(router, wrong, wanted=1)
     assert caught.group_contains(ConfigError, match="no scene 'opera'")

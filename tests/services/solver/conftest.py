@@ -1,4 +1,6 @@
-"""Helpers of the solver's tests: hands in motion, what a camera would measure of them, random angles within limits."""
+"""Helpers of the solver's tests: hands in motion, what a camera would measure of them, random
+angles within limits.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ class World:
     model: HandModel
 
     def motion(self, seed: int, frames: int, kind: str = "random") -> list[Instant]:
-        """Smooth motion: every joint on its own ("random") or a fist closing and opening ("fist"); fingers follow DIP = 2/3 PIP."""
+        """Smooth motion: every joint on its own ("random") or a fist closing and opening ("fist").
+
+        Fingers follow DIP = 2/3 PIP.
+        """
         rng = np.random.default_rng(seed)
         low, high = self.model.limits_rad[..., 0], self.model.limits_rad[..., 1]
         if kind == "random":
@@ -54,7 +59,13 @@ class World:
         joints = forward(self.model, instant.rotation, instant.position_m, instant.angles_rad)
         return {name: landmark_point(self.model, name, *joints) for name in names}
 
-    def message(self, places: dict[str, Array], frame: int, sigma_m: float = 1e-3, predicted: Sequence[str] = ()) -> HandPoints:
+    def message(
+        self,
+        places: dict[str, Array],
+        frame: int,
+        sigma_m: float = 1e-3,
+        predicted: Sequence[str] = (),
+    ) -> HandPoints:
         """The HandPoints of some landmarks, frame by frame at 30 Hz."""
         return HandPoints(
             hand=self.model.hand,
@@ -101,7 +112,8 @@ def angles_of() -> Callable[[HandPose], Array]:
 def grasp() -> Callable[[np.random.Generator, bool], Array]:
     """A random 37-frame palmar grasp, as in the finger study: (37, 4); PIP leads, MCP follows.
 
-    It starts as a hand does that is held open, bent by a few degrees, or straight; coupled: DIP = 2/3 PIP.
+    It starts as a hand does that is held open, bent by a few degrees, or straight; coupled: DIP =
+    2/3 PIP.
     """
 
     def rise(t: Array, centre: float, width: float) -> Array:
@@ -112,11 +124,19 @@ def grasp() -> Callable[[np.random.Generator, bool], Array]:
         t = np.linspace(0.0, 1.0, 37)
         q = np.zeros((37, 4))
         q[:, 0] = np.deg2rad(rng.uniform(-10.0, 10.0)) * (1.0 - t)
-        q[:, 1] = np.deg2rad(rng.uniform(50.0, 88.0)) * rise(t, rng.uniform(0.4, 0.7), rng.uniform(0.1, 0.2))
-        q[:, 2] = np.deg2rad(rng.uniform(70.0, 108.0)) * rise(t, rng.uniform(0.2, 0.5), rng.uniform(0.15, 0.3))
-        q[:, 3] = np.deg2rad(rng.uniform(40.0, 85.0)) * rise(t, rng.uniform(0.2, 0.6), rng.uniform(0.15, 0.3))
+        q[:, 1] = np.deg2rad(rng.uniform(50.0, 88.0)) * rise(
+            t, rng.uniform(0.4, 0.7), rng.uniform(0.1, 0.2)
+        )
+        q[:, 2] = np.deg2rad(rng.uniform(70.0, 108.0)) * rise(
+            t, rng.uniform(0.2, 0.5), rng.uniform(0.15, 0.3)
+        )
+        q[:, 3] = np.deg2rad(rng.uniform(40.0, 85.0)) * rise(
+            t, rng.uniform(0.2, 0.6), rng.uniform(0.15, 0.3)
+        )
         if not straight:
-            q[:, 1:] += np.linspace(1.0, 0.0, 37)[:, None] * np.deg2rad(rng.uniform((4.0, 6.0, 3.0), (10.0, 14.0, 9.0)))
+            q[:, 1:] += np.linspace(1.0, 0.0, 37)[:, None] * np.deg2rad(
+                rng.uniform((4.0, 6.0, 3.0), (10.0, 14.0, 9.0))
+            )
         if coupled:
             q[:, 3] = 2.0 / 3.0 * q[:, 2]
         return q
@@ -126,7 +146,10 @@ def grasp() -> Callable[[np.random.Generator, bool], Array]:
 
 @pytest.fixture(scope="session")
 def within() -> Callable[[np.random.Generator, Array, bool], Array]:
-    """Random angles (4,) within limits (4, 2); coupled: DIP = 2/3 PIP, and PIP low enough for it."""
+    """Random angles (4,) within limits (4, 2).
+
+    Coupled: DIP = 2/3 PIP, and PIP low enough for it.
+    """
 
     def make(rng: np.random.Generator, limits: Array, coupled: bool) -> Array:
         q = rng.uniform(limits[:, 0], limits[:, 1])

@@ -1,4 +1,7 @@
-"""Whatever comes in: limits are kept, nothing that is not finite comes out, every loop ends. See also test_step.test_absurd_input."""
+"""Whatever comes in: limits are kept, nothing that is not finite comes out, every loop ends.
+
+See also test_step.test_absurd_input.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ CHAINS = k.hand_chains(MODEL)
 LOW, HIGH = MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]
 METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-seed")
 few = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-wild = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, -0.0, 1e300, -1e300, 1e-300, 0.05, -0.05]))
+wild = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, -0.0, 1e300, -1e300, 1e-300, 0.05, -0.05]),
+)
 # What screen.py lets through: within ten metres, sigma from 0.3 mm to 0.15 m.
 near = st.one_of(st.floats(-10.0, 10.0), st.floats(-0.2, 0.2), st.just(0.0))
 inverse = st.floats(1.0 / 0.45, 1.0 / 3e-4)
@@ -42,10 +48,15 @@ def _inside(angles: Array) -> bool:
 
 @few
 @given(
-    st.lists(st.tuples(wild, wild, wild), min_size=5, max_size=5), st.lists(wild, min_size=20, max_size=20), wild, st.sampled_from(METHODS)
+    st.lists(st.tuples(wild, wild, wild), min_size=5, max_size=5),
+    st.lists(wild, min_size=20, max_size=20),
+    wild,
+    st.sampled_from(METHODS),
 )
 def test_all_fingers(points: list, start: list[float], sigma: float, method: str) -> None:
-    tips = {name: Tip(np.array(p), abs(sigma), True) for name, p in zip(DIGITS, points, strict=True)}
+    tips = {
+        name: Tip(np.array(p), abs(sigma), True) for name, p in zip(DIGITS, points, strict=True)
+    }
     found = solve_fingers(Solver(method=method), CHAINS, np.array(start).reshape(5, 4), tips)
     assert _inside(found.angles_rad)
     assert np.all(np.array(found.residual_m) < np.inf)
@@ -56,9 +67,14 @@ def test_all_fingers(points: list, start: list[float], sigma: float, method: str
 
 @few
 @given(
-    st.lists(wild, min_size=3, max_size=3), st.lists(wild, min_size=9, max_size=9), st.lists(wild, min_size=4, max_size=4), st.booleans()
+    st.lists(wild, min_size=3, max_size=3),
+    st.lists(wild, min_size=9, max_size=9),
+    st.lists(wild, min_size=4, max_size=4),
+    st.booleans(),
 )
-def test_the_study_algorithm(point: list[float], rotation: list[float], start: list[float], svd: bool) -> None:
+def test_the_study_algorithm(
+    point: list[float], rotation: list[float], start: list[float], svd: bool
+) -> None:
     chain = k.chain_of(CHAINS, 1)
     reading = dls_paper.Reading(form="svd" if svd else "normal", most=50)
     q = np.clip(np.nan_to_num(start, nan=0.5), LOW[1], HIGH[1])
@@ -99,7 +115,10 @@ def test_a_start_from_nonsense(found: list) -> None:
 
 
 looks = st.lists(
-    st.tuples(st.integers(0, 2 * 10**9), st.dictionaries(st.sampled_from(BASIC_LANDMARKS), st.tuples(near, near, near, inverse))),
+    st.tuples(
+        st.integers(0, 2 * 10**9),
+        st.dictionaries(st.sampled_from(BASIC_LANDMARKS), st.tuples(near, near, near, inverse)),
+    ),
     max_size=5,
 )
 
@@ -108,10 +127,14 @@ looks = st.lists(
 @given(looks)
 def test_a_hand_followed_through_nonsense(looks: list) -> None:
     tracker, stamp = HandTracker(MODEL, places(MODEL)), 0
-    start = {name: (0.01 * i, 0.05 if i else 0.0, 0.5, 1e3) for i, name in enumerate(BASIC_LANDMARKS)}
+    start = {
+        name: (0.01 * i, 0.05 if i else 0.0, 0.5, 1e3) for i, name in enumerate(BASIC_LANDMARKS)
+    }
     for wait, seen in [(0, start), *looks]:
         stamp += wait
-        look = tracker.look(stamp, {name: Seen(np.array(v[:3]), np.full(3, v[3]), True) for name, v in seen.items()})
+        look = tracker.look(
+            stamp, {name: Seen(np.array(v[:3]), np.full(3, v[3]), True) for name, v in seen.items()}
+        )
         if look is not None:
             assert _inside(look.angles_rad)
             assert np.all(np.isfinite(look.covariance))
@@ -130,15 +153,29 @@ def people(draw: st.DrawFn) -> HandModel:
     """Hands as a file may describe them: any lengths, knuckles, limits, couplings."""
     digits = []
     for digit in MODEL.digits:
-        fields = {"lengths_m": draw(st.tuples(length, length, length)), "base_m": draw(st.tuples(number, number, number))}
-        fields |= {"limits_rad": draw(st.tuples(*(st.tuples(angle, angle),) * 4)) if draw(st.booleans()) else digit.limits_rad}
-        fields |= {"coupling": draw(st.floats(-2.0, 2.0)), "coupling_weight": draw(st.floats(-0.1, 10.0))}
+        fields = {
+            "lengths_m": draw(st.tuples(length, length, length)),
+            "base_m": draw(st.tuples(number, number, number)),
+        }
+        fields |= {
+            "limits_rad": draw(st.tuples(*(st.tuples(angle, angle),) * 4))
+            if draw(st.booleans())
+            else digit.limits_rad
+        }
+        fields |= {
+            "coupling": draw(st.floats(-2.0, 2.0)),
+            "coupling_weight": draw(st.floats(-0.1, 10.0)),
+        }
         digits.append(msgspec.structs.replace(digit, **fields))
     return msgspec.structs.replace(MODEL, digits=tuple(digits))
 
 
 @few
-@given(people(), st.lists(st.tuples(near, near, near), min_size=6, max_size=6), st.sampled_from(METHODS))
+@given(
+    people(),
+    st.lists(st.tuples(near, near, near), min_size=6, max_size=6),
+    st.sampled_from(METHODS),
+)
 def test_any_hand_that_a_file_may_describe(model: HandModel, found: list, method: str) -> None:
     """A model is refused as a CalibrationError, or followed within its own limits."""
     try:
@@ -150,7 +187,9 @@ def test_any_hand_that_a_file_may_describe(model: HandModel, found: list, method
         for name, p in zip(BASIC_LANDMARKS, found, strict=True)
     ]
     for seq in range(2):
-        pose = step.step(HandPoints(hand="right", seq=seq, stamp_ns=seq * 33_000_000, points=points))
+        pose = step.step(
+            HandPoints(hand="right", seq=seq, stamp_ns=seq * 33_000_000, points=points)
+        )
         if pose is not None:
             assert b"null" not in msgspec.json.encode(pose)
             for finger, limits in zip(pose.fingers, model.limits_rad, strict=True):
@@ -159,13 +198,23 @@ def test_any_hand_that_a_file_may_describe(model: HandModel, found: list, method
             assert len(pose.joints) == len(JOINTS)
 
 
-@pytest.mark.parametrize("bones", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.02), (1e-12, 0.0, 0.0), (0.04, 0.0, 0.0)])
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.0, 0.0, -1e-15), (0.0, 0.0, 1e300), (0.0, -0.02, 0.0)])
-def test_targets_at_the_root_of_bones_without_length(bones: tuple[float, ...], point: tuple[float, ...]) -> None:
-    chain = k.chain_of(CHAINS, 1)._replace(lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]]))
+@pytest.mark.parametrize(
+    "bones", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.02), (1e-12, 0.0, 0.0), (0.04, 0.0, 0.0)]
+)
+@pytest.mark.parametrize(
+    "point", [(0.0, 0.0, 0.0), (0.0, 0.0, -1e-15), (0.0, 0.0, 1e300), (0.0, -0.02, 0.0)]
+)
+def test_targets_at_the_root_of_bones_without_length(
+    bones: tuple[float, ...], point: tuple[float, ...]
+) -> None:
+    chain = k.chain_of(CHAINS, 1)._replace(
+        lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]])
+    )
     q = np.array([0.0, 0.3, 0.3, 0.2])
     used, left, state = dls.solve(chain, dls.goal(dls.COUPLED, np.array(point)), q, 60, 1e-4)
     assert np.all((q >= chain.limits[:, 0]) & (q <= chain.limits[:, 1]))
     assert used <= 60
     assert np.isfinite(left)
-    assert state != dls.SOLVED or (left <= 1e-4 and k.distance_to(chain, q, np.array(point)) <= 1e-4)
+    assert state != dls.SOLVED or (
+        left <= 1e-4 and k.distance_to(chain, q, np.array(point)) <= 1e-4
+    )

@@ -34,9 +34,18 @@ def test_rounding_does_not_leave_the_limits() -> None:
 
 
 def test_sources() -> None:
-    found = sources({"wrist", "index_tip", "middle_proximal"}, True, [False, True, True, False, False])
+    found = sources(
+        {"wrist", "index_tip", "middle_proximal"}, True, [False, True, True, False, False]
+    )
     at = {name: found[JOINT_INDEX[name]] for name in JOINT_INDEX}
     assert at["wrist"] == at["index_tip"] == at["middle_proximal"] == "measured"
-    assert at["palm"] == at["index_distal"] == at["middle_tip"] == at["ring_proximal"] == at["thumb_metacarpal"] == "solved"
+    assert (
+        at["palm"]
+        == at["index_distal"]
+        == at["middle_tip"]
+        == at["ring_proximal"]
+        == at["thumb_metacarpal"]
+        == "solved"
+    )
     assert at["ring_distal"] == at["thumb_tip"] == "predicted"
     assert set(sources(set(), False, [True] * 5)) == {"predicted"}

@@ -1,4 +1,5 @@
-"""Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three OpenXR poses as a test of frames.
+"""Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three
+OpenXR poses as a test of frames.
 
 `pytest -rP tests/services/solver/test_real_motion.py` prints the table of docs/accuracy.md.
 """
@@ -17,7 +18,13 @@ import numpy as np
 import pytest
 
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import Array, quaternion_from_rotation, rotation_from_quaternion, rotation_x, rotation_y
+from rhot.geometry.transforms import (
+    Array,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_x,
+    rotation_y,
+)
 from rhot.hand import CHAIN_JOINTS, DIGITS, JOINTS, Digit, HandModel, Paint, default_hand
 from rhot.messages import HandPoint, HandPoints
 from services.solver.finger import analytic, dls, fabrik
@@ -28,13 +35,18 @@ from services.solver.step import SolverStep
 FINGERS = ("index", "middle", "ring", "little")
 LEAP = {"thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "little": "pinky"}
 # What the sensor's own model allows, and its DIP = PIP.
-WIDE = tuple((float(np.deg2rad(low)), float(np.deg2rad(high))) for low, high in ((-30, 30), (-45, 95), (-5, 115), (-5, 115)))
+WIDE = tuple(
+    (float(np.deg2rad(low)), float(np.deg2rad(high)))
+    for low, high in ((-30, 30), (-45, 95), (-5, 115), (-5, 115))
+)
 SAME = 1.0
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Joints (frames, 5, 4, 3) in metres, palm (frames, 3), wrist frame axes (frames, 3, 3), stamps."""
+    """Joints (frames, 5, 4, 3) in metres, palm (frames, 3), wrist frame axes (frames, 3, 3),
+    stamps.
+    """
 
     joints_m: Array
     palm_m: Array
@@ -53,26 +65,47 @@ def fist(rhot_data: Path) -> Recording:
     def point(name: str) -> Array:
         return np.stack([column(f"{name}_{axis}") for axis in "xyz"], axis=1) * 1e-3
 
-    joints = np.stack([np.stack([point(f"{LEAP[d]}_{j}") for j in ("mcp", "pip", "dip", "tip")], axis=1) for d in DIGITS], axis=1)
-    # The sensor's basis: backward, out of the back of the hand, towards the thumb. Ours: x right, y out of the back, z backward.
-    basis = np.stack([np.stack([column(f"r{i}{j}") for j in range(3)], axis=1) for i in range(3)], axis=1)
+    joints = np.stack(
+        [
+            np.stack([point(f"{LEAP[d]}_{j}") for j in ("mcp", "pip", "dip", "tip")], axis=1)
+            for d in DIGITS
+        ],
+        axis=1,
+    )
+    # The sensor's basis: backward, out of the back of the hand, towards the thumb. Ours: x right, y
+    # out of the back, z backward.
+    basis = np.stack(
+        [np.stack([column(f"r{i}{j}") for j in range(3)], axis=1) for i in range(3)], axis=1
+    )
     axes = np.stack([-basis[:, 2], basis[:, 1], basis[:, 0]], axis=2)
     return Recording(joints, point("palm"), axes, [int(1e3 * t) for t in column("timestamp_us")])
 
 
 def _own_angles(rec: Recording, row: int, base: Array) -> Array:
-    """The recording's own angles (frames, 4) in a base frame fixed to the palm: what our chain would call them."""
+    """The recording's own angles (frames, 4) in a base frame fixed to the palm: what our chain
+    would call them.
+    """
     bones = np.diff(rec.joints_m[:, row], axis=1)
-    bones = np.einsum("nij,nkj->nki", np.swapaxes(rec.axes @ base, 1, 2), bones / np.linalg.norm(bones, axis=2, keepdims=True))
+    bones = np.einsum(
+        "nij,nkj->nki",
+        np.swapaxes(rec.axes @ base, 1, 2),
+        bones / np.linalg.norm(bones, axis=2, keepdims=True),
+    )
     abduction = np.arctan2(-bones[:, 0, 0], -bones[:, 0, 2])
-    forward = np.hypot(bones[:, :, 0], bones[:, :, 2]) * np.sign(np.sum(bones[:, :1, [0, 2]] * bones[:, :, [0, 2]], axis=2))
+    forward = np.hypot(bones[:, :, 0], bones[:, :, 2]) * np.sign(
+        np.sum(bones[:, :1, [0, 2]] * bones[:, :, [0, 2]], axis=2)
+    )
     absolute = np.unwrap(np.arctan2(-bones[:, :, 1], forward), axis=1)
     return np.column_stack([abduction, absolute[:, 0], np.diff(absolute, axis=1)])
 
 
 def _base(rec: Recording, row: int) -> Array:
-    """The finger's axes at zero angles in the palm: y, the axis of abduction, is what all its axes of flexion are square to."""
-    bones = np.einsum("nij,nkj->nki", np.swapaxes(rec.axes, 1, 2), np.diff(rec.joints_m[:, row], axis=1))
+    """The finger's axes at zero angles in the palm: y, the axis of abduction, is what all its axes
+    of flexion are square to.
+    """
+    bones = np.einsum(
+        "nij,nkj->nki", np.swapaxes(rec.axes, 1, 2), np.diff(rec.joints_m[:, row], axis=1)
+    )
     # The cross product is long where the finger is bent, and says something of the axis only there.
     normal = np.cross(bones[:, 0], bones[:, 1])
     y = np.linalg.eigh(normal.T @ normal)[1][:, 0]
@@ -85,16 +118,20 @@ def _base(rec: Recording, row: int) -> Array:
 
 def _chain(rec: Recording, row: int) -> k.Chain:
     lengths = np.linalg.norm(np.diff(rec.joints_m[:, row], axis=1), axis=2).mean(axis=0)
-    return k.Chain(lengths, np.array([0.0, 0.0, -lengths[2]]), np.array(WIDE), np.array([SAME, 1.0]))
+    return k.Chain(
+        lengths, np.array([0.0, 0.0, -lengths[2]]), np.array(WIDE), np.array([SAME, 1.0])
+    )
 
 
 def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
     """Print a line of the table; mean differences of the flexions (3,) in degrees.
 
-    found, own: (frames, n, 4) rad. No flexion may jump by more than 20 deg between frames where the recording does not: it lost two
-    frames once and jumps by 27 deg there.
+    found, own: (frames, n, 4) rad. No flexion may jump by more than 20 deg between frames where the
+    recording does not: it lost two frames once and jumps by 27 deg there.
     """
-    jumps, theirs = (np.abs(np.diff(angles, axis=0))[..., 1:] > np.deg2rad(20.0) for angles in (found, own))
+    jumps, theirs = (
+        np.abs(np.diff(angles, axis=0))[..., 1:] > np.deg2rad(20.0) for angles in (found, own)
+    )
     off = np.rad2deg(np.abs(found - own)[..., 1:].mean(axis=(0, 1)))
     share = 100.0 * np.mean(left_m <= 1e-4)
     print(
@@ -108,7 +145,9 @@ def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
 @pytest.mark.parametrize("name", FINGERS)
 @pytest.mark.parametrize("method", ["dls", "fabrik", "analytic"])
 def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, method: str) -> None:
-    """Tip within 0.1 mm, joints within 1.5 mm of the sensor's, no jump that the recording does not have."""
+    """Tip within 0.1 mm, joints within 1.5 mm of the sensor's, no jump that the recording does not
+    have.
+    """
     row = DIGITS.index(name)
     chain, base = _chain(fist, row), _base(fist, row)
     q, found, gaps, lefts = np.zeros(4), [], [], []
@@ -120,52 +159,89 @@ def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, metho
             _, left, _ = fabrik.solve(chain, point, q, BOX, 1000, 5e-5)
         else:
             _, left, _ = analytic.solve(chain, point, q, 1e-4)
-        # The sensor's DIP equals its PIP to a tenth of a degree only, and the closed form knows no other.
+        # The sensor's DIP equals its PIP to a tenth of a degree only, and the closed form knows no
+        # other.
         assert left <= (2e-4 if method == "analytic" else 1e-4)
         lefts.append(left)
         assert np.all((q >= chain.limits[:, 0]) & (q <= chain.limits[:, 1]))
         found.append(q.copy())
-        elbow = fist.axes[frame] @ base @ rotation_y(q[0]) @ rotation_x(-q[1]) @ np.array([0.0, 0.0, -chain.lengths[0]])
+        elbow = (
+            fist.axes[frame]
+            @ base
+            @ rotation_y(q[0])
+            @ rotation_x(-q[1])
+            @ np.array([0.0, 0.0, -chain.lengths[0]])
+        )
         gaps.append(np.linalg.norm(joints[0] + elbow - joints[1]))
-    off = _compare(f"{method} {name}", np.array(found)[:, None], _own_angles(fist, row, base)[:, None], np.array(lefts))
+    off = _compare(
+        f"{method} {name}",
+        np.array(found)[:, None],
+        _own_angles(fist, row, base)[:, None],
+        np.array(lefts),
+    )
     assert off.mean() < 1.0
     assert np.mean(gaps) < 1.5e-3
 
 
 def _leap_hand(rec: Recording) -> HandModel:
-    """A hand model with the recording's bones and knuckles; the palm's centre stands for the wrist marker."""
-    local = np.einsum("nij,nkj->nki", np.swapaxes(rec.axes, 1, 2), rec.joints_m[:, :, 0] - rec.palm_m[:, None])
+    """A hand model with the recording's bones and knuckles.
+
+    The palm's centre stands for the wrist marker.
+    """
+    local = np.einsum(
+        "nij,nkj->nki", np.swapaxes(rec.axes, 1, 2), rec.joints_m[:, :, 0] - rec.palm_m[:, None]
+    )
     table, digits = default_hand("right"), []
     for row, digit in enumerate(table.digits):
         place = tuple(local[:, row].mean(axis=0).tolist())
-        fields: dict[str, object] = {"base_m": place, "metacarpal_m": (0.0, 0.0, 0.0), "coupling": SAME}
+        fields: dict[str, object] = {
+            "base_m": place,
+            "metacarpal_m": (0.0, 0.0, 0.0),
+            "coupling": SAME,
+        }
         fields["lengths_m"] = tuple(_chain(rec, row).lengths.tolist())
         if row > 0:
-            fields |= {"base_wxyz": tuple(quaternion_from_rotation(_base(rec, row)).tolist()), "limits_rad": WIDE}
+            fields |= {
+                "base_wxyz": tuple(quaternion_from_rotation(_base(rec, row)).tolist()),
+                "limits_rad": WIDE,
+            }
         digits.append(msgspec.structs.replace(digit, **fields))
     centre = Paint(offset_m=(0.0, 0.0, 0.0), radius_m=0.0, extent_m=0.01)
-    paint = {name: msgspec.structs.replace(p, offset_m=(0.0, 0.0, 0.0)) for name, p in table.paint.items()}
+    paint = {
+        name: msgspec.structs.replace(p, offset_m=(0.0, 0.0, 0.0))
+        for name, p in table.paint.items()
+    }
     return msgspec.structs.replace(table, digits=tuple(digits), paint={**paint, "wrist": centre})
 
 
 def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Callable) -> None:
     """Tips within 0.1 mm wherever the joints allow it, and no jump of its own.
 
-    The recording has no wrist, so the palm's centre stands in for it: 3 to 4 cm from the knuckles instead of 9, and the knuckles move
-    by millimetres about it, which costs orientation (14 deg on average) and, for 1 tip in 50, up to 0.22 mm at a joint's limit.
+    The recording has no wrist, so the palm's centre stands in for it: 3 to 4 cm from the knuckles
+    instead of 9, and the knuckles move by millimetres about it, which costs orientation (14 deg on
+    average) and, for 1 tip in 50, up to 0.22 mm at a joint's limit.
     """
     model = _leap_hand(fist)
     step, found, gaps, turns = SolverStep(RigConfig(), {"right": model}), [], [], []
     for frame, joints in enumerate(fist.joints_m):
-        places = {"wrist": fist.palm_m[frame], **{f"{d}_tip": joints[row, 3] for row, d in enumerate(DIGITS)}}
+        places = {
+            "wrist": fist.palm_m[frame],
+            **{f"{d}_tip": joints[row, 3] for row, d in enumerate(DIGITS)},
+        }
         # The stand-in moves by millimetres in the hand; the sensor's tips are exact by definition.
         points = [
             HandPoint(
-                name=name, position_m=tuple(p.tolist()), sigma_m=(1e-3 if name == "wrist" else 3e-4,) * 3, cameras=[], source="measured"
+                name=name,
+                position_m=tuple(p.tolist()),
+                sigma_m=(1e-3 if name == "wrist" else 3e-4,) * 3,
+                cameras=[],
+                source="measured",
             )
             for name, p in places.items()
         ]
-        pose = step.step(HandPoints(hand="right", seq=frame, stamp_ns=fist.stamps_ns[frame], points=points))
+        pose = step.step(
+            HandPoints(hand="right", seq=frame, stamp_ns=fist.stamps_ns[frame], points=points)
+        )
         found.append(angles_of(pose))
         gaps.append([finger.residual_m for finger in pose.fingers[1:]])
         R = rotation_from_quaternion(pose.wrist.orientation_wxyz)
@@ -180,7 +256,11 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
 
 def _openxr_poses(folder: Path) -> dict[str, dict[str, Array]]:
     """Joint name -> 4x4 in the wrist's frame, for each recorded pose."""
-    bones = {"metacarpal": "metacarpal", "tip": "tip", **{b: f"phalanx-{b}" for b in ("proximal", "intermediate", "distal")}}
+    bones = {
+        "metacarpal": "metacarpal",
+        "tip": "tip",
+        **{b: f"phalanx-{b}" for b in ("proximal", "intermediate", "distal")},
+    }
     poses = {}
     for path in sorted((folder / "hand_motion/openxr_poses").glob("*.json")):
         read = json.loads(path.read_text())["jointTransforms"]
@@ -189,14 +269,18 @@ def _openxr_poses(folder: Path) -> dict[str, dict[str, Array]]:
             digit, bone = name.split("_")
             digit = {"thumb": "thumb", "little": "pinky-finger"}.get(digit, f"{digit}-finger")
             found[name] = read[f"{digit}-{bones[bone]}"]
-        matrices = {name: np.array(joint["offsetMatrix"]).reshape(4, 4).T for name, joint in found.items()}
+        matrices = {
+            name: np.array(joint["offsetMatrix"]).reshape(4, 4).T for name, joint in found.items()
+        }
         back = np.linalg.inv(matrices["wrist"])
         poses[path.stem] = {name: back @ T for name, T in matrices.items()}
     return poses
 
 
 def test_recorded_poses_are_of_a_left_hand_in_our_frames(rhot_data: Path) -> None:
-    """Thumb on +x, -z along every bone, +y out of the back, flexion about -x: what rhot/hand.py says of frames."""
+    """Thumb on +x, -z along every bone, +y out of the back, flexion about -x: what rhot/hand.py
+    says of frames.
+    """
     table = default_hand("left")
     for pose in _openxr_poses(rhot_data).values():
         assert pose["thumb_tip"][0, 3] > pose["little_tip"][0, 3]
@@ -205,17 +289,25 @@ def test_recorded_poses_are_of_a_left_hand_in_our_frames(rhot_data: Path) -> Non
             names = [JOINTS[joint] for joint in CHAIN_JOINTS[row]]
             for near, far in itertools.pairwise(names[:3]):
                 bone = pose[far][:3, 3] - pose[near][:3, 3]
-                np.testing.assert_allclose(-pose[near][:3, 2], bone / np.linalg.norm(bone), atol=1e-3)
+                np.testing.assert_allclose(
+                    -pose[near][:3, 2], bone / np.linalg.norm(bone), atol=1e-3
+                )
             # The table's knuckles are where a real hand has them, to the width of a finger.
             assert np.linalg.norm(pose[names[0]][:3, 3] - digit.base_m) < 0.02
 
 
-def _openxr_digit(pose: dict[str, Array], row: int, digit: Digit) -> tuple[k.Chain, Array, Array, Array]:
-    """Chain with the pose's own bone lengths, its base, the tip and the last bone's axes in the canonical frame."""
+def _openxr_digit(
+    pose: dict[str, Array], row: int, digit: Digit
+) -> tuple[k.Chain, Array, Array, Array]:
+    """Chain with the pose's own bone lengths, its base, the tip and the last bone's axes in the
+    canonical frame.
+    """
     joints = [pose[JOINTS[joint]] for joint in CHAIN_JOINTS[row]]
     base = rotation_from_quaternion(digit.base_wxyz)
     lengths = np.array([np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in itertools.pairwise(joints)])
-    limits = np.array(digit.limits_rad) + np.deg2rad([[-25.0, 25.0], [-25.0, 15.0], [-15.0, 10.0], [-35.0, 10.0]])
+    limits = np.array(digit.limits_rad) + np.deg2rad(
+        [[-25.0, 25.0], [-25.0, 15.0], [-15.0, 10.0], [-35.0, 10.0]]
+    )
     chain = k.Chain(lengths, np.array([0.0, 0.0, -lengths[2]]), limits, np.array([2 / 3, 1.0]))
     target = k.to_canonical(joints[0][:3, 3], base, -1.0, joints[3][:3, 3])
     mirror = np.diag([-1.0, 1.0, 1.0])
@@ -224,7 +316,10 @@ def _openxr_digit(pose: dict[str, Array], row: int, digit: Digit) -> tuple[k.Cha
 
 @pytest.mark.parametrize("name", FINGERS)
 def test_recorded_poses_are_reproduced(rhot_data: Path, name: str) -> None:
-    """From knuckle and tip pose: tip within 0.1 mm, joints within 5 mm; real fingers twist by some degrees, ours do not."""
+    """From knuckle and tip pose: tip within 0.1 mm, joints within 5 mm.
+
+    Real fingers twist by some degrees, ours do not.
+    """
     row = DIGITS.index(name)
     for stem, pose in _openxr_poses(rhot_data).items():
         digit = default_hand("left").digits[row]
@@ -241,4 +336,6 @@ def test_recorded_poses_are_reproduced(rhot_data: Path, name: str) -> None:
             p = p - length * R[:, 2]
             joint_off.append(np.linalg.norm(p - pose[JOINTS[joint]][:3, 3]))
         assert max(joint_off) < 5e-3
-        print(f"{stem:8s} {name:7s} tip {1e3 * tip_off:.2f} mm, joints within {1e3 * max(joint_off):.1f} mm")
+        print(
+            f"{stem:8s} {name:7s} tip {1e3 * tip_off:.2f} mm, joints within {1e3 * max(joint_off):.1f} mm"
+        )

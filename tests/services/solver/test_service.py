@@ -38,7 +38,9 @@ async def running(router: str, config: RigConfig) -> AsyncIterator[tuple[Service
 
 
 def rig(folder: Path, *hands: str) -> RigConfig:
-    return RigConfig(rig=RigTable(name="desk"), hand=dict.fromkeys(hands, MARKERS), folder=str(folder))
+    return RigConfig(
+        rig=RigTable(name="desk"), hand=dict.fromkeys(hands, MARKERS), folder=str(folder)
+    )
 
 
 async def _sending(send: Callable[[], None]) -> None:
@@ -48,7 +50,9 @@ async def _sending(send: Callable[[], None]) -> None:
         await asyncio.sleep(0.02)
 
 
-async def test_points_in_poses_out_with_garbage_between(router: str, tmp_path: Path, world: Callable) -> None:
+async def test_points_in_poses_out_with_garbage_between(
+    router: str, tmp_path: Path, world: Callable
+) -> None:
     right, left = world("right"), world("left")
     good = right.message(right.points(right.motion(1, 1)[0]), 0)
     other = left.message(left.points(left.motion(1, 1)[0]), 0)
@@ -63,11 +67,18 @@ async def test_points_in_poses_out_with_garbage_between(router: str, tmp_path: P
             # `latest` keeps the newest only, whatever it is: each kind gets a moment of its own.
             kind = count % 3
             if kind == 0:
-                bus.put_raw("rhot/desk/hand/right/points", (b"\xff\x00", b"[]", b'{"hand": "right"}')[count // 3 % 3])
+                bus.put_raw(
+                    "rhot/desk/hand/right/points",
+                    (b"\xff\x00", b"[]", b'{"hand": "right"}')[count // 3 % 3],
+                )
                 return
             # The right hand's key also carries points of the left one: rejected too.
             for hand, message in (("right", (good, other)[kind - 1]), ("left", other)):
-                points[hand].put(msgspec.structs.replace(message, seq=count, stamp_ns=10**18 + count * 20_000_000))
+                points[hand].put(
+                    msgspec.structs.replace(
+                        message, seq=count, stamp_ns=10**18 + count * 20_000_000
+                    )
+                )
 
         sender = asyncio.create_task(_sending(send))
         pose, mirrored = await anext(poses["right"]), await anext(poses["left"])
@@ -82,7 +93,10 @@ async def test_points_in_poses_out_with_garbage_between(router: str, tmp_path: P
 
 
 async def test_a_measured_hand_is_used(router: str, tmp_path: Path) -> None:
-    save(tmp_path / "calibration" / "hand.right.json", msgspec.structs.replace(default_hand("right", 1.1), origin="measured"))
+    save(
+        tmp_path / "calibration" / "hand.right.json",
+        msgspec.structs.replace(default_hand("right", 1.1), origin="measured"),
+    )
     async with running(router, rig(tmp_path, "right")) as (service, _):
         while service.state != "running":
             await asyncio.sleep(0.01)
@@ -90,9 +104,14 @@ async def test_a_measured_hand_is_used(router: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("broken", ["no hand", "no paint"])
-async def test_what_the_user_can_mend_ends_the_service(router: str, tmp_path: Path, broken: str) -> None:
+async def test_what_the_user_can_mend_ends_the_service(
+    router: str, tmp_path: Path, broken: str
+) -> None:
     hands = ("right",) if broken == "no paint" else ()
-    save(tmp_path / "calibration" / "hand.right.json", msgspec.structs.replace(default_hand(), paint={}))
+    save(
+        tmp_path / "calibration" / "hand.right.json",
+        msgspec.structs.replace(default_hand(), paint={}),
+    )
     with pytest.RaisesGroup(pytest.RaisesExc(CalibrationError if hands else ConfigError)):
         async with running(router, rig(tmp_path, *hands)) as (service, _):
             while service.state != "running":

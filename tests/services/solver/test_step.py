@@ -1,4 +1,7 @@
-"""The solver's step: messages in, messages out; accuracy, honesty, determinism, absurd input, every method."""
+"""The solver's step: messages in, messages out.
+
+Accuracy, honesty, determinism, absurd input, every method.
+"""
 
 from __future__ import annotations
 
@@ -25,26 +28,43 @@ def _solver(hand: HandName = "right", method: str = "dls") -> SolverStep:
     return SolverStep(RigConfig(solver=Solver(method=method)), {hand: default_hand(hand)})
 
 
-def _run(ours, instants, names=BASIC_LANDMARKS, method: str = "dls", noise_m: float = 1e-3, seed: int = 0) -> list[HandPose]:
+def _run(
+    ours, instants, names=BASIC_LANDMARKS, method: str = "dls", noise_m: float = 1e-3, seed: int = 0
+) -> list[HandPose]:
     rng, step = np.random.default_rng(seed), _solver(ours.model.hand, method)
     poses = []
     for frame, instant in enumerate(instants):
-        places = {name: p + rng.normal(0.0, noise_m, 3) for name, p in ours.points(instant, names).items()}
+        places = {
+            name: p + rng.normal(0.0, noise_m, 3) for name, p in ours.points(instant, names).items()
+        }
         poses.append(step.step(ours.message(places, frame)))
     return poses
 
 
 def _errors(poses, instants, angles_of) -> tuple[float, float]:
     """Mean flexion error of the four fingers and mean orientation error, degrees."""
-    flexion = [np.abs(angles_of(p) - i.angles_rad)[1:, 1:].mean() for p, i in zip(poses, instants, strict=True)]
-    turns = [angle_between(rotation_from_quaternion(p.wrist.orientation_wxyz), i.rotation) for p, i in zip(poses, instants, strict=True)]
+    flexion = [
+        np.abs(angles_of(p) - i.angles_rad)[1:, 1:].mean()
+        for p, i in zip(poses, instants, strict=True)
+    ]
+    turns = [
+        angle_between(rotation_from_quaternion(p.wrist.orientation_wxyz), i.rotation)
+        for p, i in zip(poses, instants, strict=True)
+    ]
     return float(np.rad2deg(np.mean(flexion))), float(np.rad2deg(np.mean(turns)))
 
 
 @pytest.mark.parametrize("hand", ["right", "left"])
-@pytest.mark.parametrize(("names", "flexion_deg", "turn_deg"), [(BASIC_LANDMARKS, 5.5, 4.5), (KNUCKLE, 2.3, 1.7)])
+@pytest.mark.parametrize(
+    ("names", "flexion_deg", "turn_deg"), [(BASIC_LANDMARKS, 5.5, 4.5), (KNUCKLE, 2.3, 1.7)]
+)
 def test_accuracy_at_one_millimetre(
-    world: Callable, angles_of: Callable, hand: HandName, names: tuple, flexion_deg: float, turn_deg: float
+    world: Callable,
+    angles_of: Callable,
+    hand: HandName,
+    names: tuple,
+    flexion_deg: float,
+    turn_deg: float,
 ) -> None:
     """The issue's figures, over random motions and fists."""
     ours, results = world(hand), []
@@ -57,23 +77,31 @@ def test_accuracy_at_one_millimetre(
 
 
 def test_a_fist_closes_instead_of_turning(world: Callable, angles_of: Callable) -> None:
-    """Wrist and tips alone would also fit a palm that turns: 20 deg at worst while every finger was believed to bend on its own."""
+    """Wrist and tips alone would also fit a palm that turns: 20 deg at worst while every finger was
+    believed to bend on its own.
+    """
     ours, turns, off = world("right"), [], []
     low, high = ours.model.limits_rad[..., 0], ours.model.limits_rad[..., 1]
     start, instants = ours.motion(10, 1)[0], []
-    for share in np.concatenate([np.full(5, 0.1), 0.51 - 0.41 * np.cos(np.linspace(0.0, 2.0 * np.pi, 90))]):
+    for share in np.concatenate(
+        [np.full(5, 0.1), 0.51 - 0.41 * np.cos(np.linspace(0.0, 2.0 * np.pi, 90))]
+    ):
         angles = low + share * (high - low)
         angles[:, 0], angles[1:, 3] = np.clip(0.0, low[:, 0], high[:, 0]), 2.0 / 3.0 * angles[1:, 2]
         instants.append(type(start)(start.rotation, start.position_m, angles))
     for pose, instant in zip(_run(ours, instants, noise_m=0.0), instants, strict=True):
-        turns.append(angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation))
+        turns.append(
+            angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation)
+        )
         off.append(np.abs(angles_of(pose) - instant.angles_rad)[1:, 1:3])
     assert np.rad2deg(max(turns)) < 8.0
     assert np.rad2deg(np.mean(off)) < 4.0
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_stays_in_the_limits_and_near_the_tips(world: Callable, angles_of: Callable, method: str) -> None:
+def test_every_method_stays_in_the_limits_and_near_the_tips(
+    world: Callable, angles_of: Callable, method: str
+) -> None:
     ours = world("right")
     instants = ours.motion(5, 60)
     limits, gaps = ours.model.limits_rad, []
@@ -81,7 +109,12 @@ def test_every_method_stays_in_the_limits_and_near_the_tips(world: Callable, ang
         assert pose.method == method
         assert np.all((angles_of(pose) >= limits[..., 0]) & (angles_of(pose) <= limits[..., 1]))
         truth, _ = forward(ours.model, instant.rotation, instant.position_m, instant.angles_rad)
-        gaps.extend(np.linalg.norm(np.array(pose.joints[JOINTS.index(tip)].position_m) - truth[JOINTS.index(tip)]) for tip in TIPS)
+        gaps.extend(
+            np.linalg.norm(
+                np.array(pose.joints[JOINTS.index(tip)].position_m) - truth[JOINTS.index(tip)]
+            )
+            for tip in TIPS
+        )
     assert np.sqrt(np.mean(np.square(gaps))) < (0.008 if method == "fabrik-seed" else 0.004)
 
 
@@ -90,11 +123,21 @@ def test_the_message(world: Callable, angles_of: Callable) -> None:
     instants = ours.motion(6, 5)
     pose = _run(ours, instants)[-1]
     assert [joint.name for joint in pose.joints] == list(JOINTS)
-    assert [finger.name for finger in pose.fingers] == ["thumb", "index", "middle", "ring", "little"]
+    assert [finger.name for finger in pose.fingers] == [
+        "thumb",
+        "index",
+        "middle",
+        "ring",
+        "little",
+    ]
     assert {finger.status for finger in pose.fingers} == {"solved"}
     assert all(finger.iterations >= 0 and finger.residual_m < 3e-3 for finger in pose.fingers)
-    assert {joint.name for joint in pose.joints if joint.source == "measured"} == set(BASIC_LANDMARKS)
-    assert {joint.source for joint in pose.joints if joint.name not in BASIC_LANDMARKS} == {"solved"}
+    assert {joint.name for joint in pose.joints if joint.source == "measured"} == set(
+        BASIC_LANDMARKS
+    )
+    assert {joint.source for joint in pose.joints if joint.name not in BASIC_LANDMARKS} == {
+        "solved"
+    }
     # Joints are those of the hand model at the published wrist and angles.
     R, t = rotation_from_quaternion(pose.wrist.orientation_wxyz), np.array(pose.wrist.position_m)
     positions, _ = forward(ours.model, R, t, angles_of(pose))
@@ -121,11 +164,17 @@ def test_left_and_right_mirror_each_other(world: Callable, angles_of: Callable) 
         here = a.step(right.message(places, frame))
         there = b.step(left.message({name: mirror @ p for name, p in places.items()}, frame))
         np.testing.assert_allclose(angles_of(there), angles_of(here), atol=2e-3)
-        np.testing.assert_allclose([j.position_m for j in there.joints], [j.position_m for j in here.joints] @ mirror, atol=2e-4)
+        np.testing.assert_allclose(
+            [j.position_m for j in there.joints],
+            [j.position_m for j in here.joints] @ mirror,
+            atol=2e-4,
+        )
 
 
 @pytest.mark.parametrize("method", ["dls", "fabrik"])
-def test_turning_the_world_turns_the_pose(world: Callable, angles_of: Callable, method: str) -> None:
+def test_turning_the_world_turns_the_pose(
+    world: Callable, angles_of: Callable, method: str
+) -> None:
     ours, rng = world("right"), np.random.default_rng(9)
     instants = ours.motion(9, 8)
     reference = _run(ours, instants, method=method, noise_m=0.0)[-1]
@@ -142,15 +191,22 @@ def test_none_until_found_and_for_hands_that_are_not_ours(world: Callable) -> No
     assert step.step(ours.message({}, 0)) is None
     assert step.step(ours.message({name: found[name] for name in TIPS}, 1)) is None
     assert step.step(left.message(left.points(left.motion(10, 1)[0]), 2)) is None
-    assert step.step(ours.message({name: found[name] for name in ("wrist", *TIPS[:3])}, 3)) is not None
+    assert (
+        step.step(ours.message({name: found[name] for name in ("wrist", *TIPS[:3])}, 3)) is not None
+    )
 
 
 def test_the_pose_says_how_sure_it_is(world: Callable, angles_of: Callable) -> None:
-    """Errors in published standard deviations: about 1, over random motions; a hidden finger and a lost hand are less sure."""
+    """Errors in published standard deviations: about 1, over random motions.
+
+    A hidden finger and a lost hand are less sure.
+    """
     ours, turns, bends = world("right"), [], []
     instants = ours.motion(14, 150)
     for pose, instant in zip(_run(ours, instants), instants, strict=True):
-        turn = angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation)
+        turn = angle_between(
+            rotation_from_quaternion(pose.wrist.orientation_wxyz), instant.rotation
+        )
         turns.append(turn / pose.wrist_sigma_rad)
         off = np.sqrt(np.mean(np.square(angles_of(pose) - instant.angles_rad), axis=1))
         bends.append(off[1:] / [finger.sigma_rad for finger in pose.fingers[1:]])
@@ -159,7 +215,9 @@ def test_the_pose_says_how_sure_it_is(world: Callable, angles_of: Callable) -> N
     step = _solver()
     places = ours.points(instants[0])
     seen = step.step(ours.message(places, 0))
-    hidden = step.step(ours.message({name: p for name, p in places.items() if name != "ring_tip"}, 1))
+    hidden = step.step(
+        ours.message({name: p for name, p in places.items() if name != "ring_tip"}, 1)
+    )
     lost = step.step(ours.message({}, 8))
     assert hidden.fingers[3].sigma_rad > 1.3 * seen.fingers[3].sigma_rad
     assert lost.wrist_sigma_rad > 1.5 * seen.wrist_sigma_rad
@@ -173,7 +231,13 @@ def test_hidden_markers_are_predicted(world: Callable) -> None:
         if frame > 10:
             del places["ring_tip"]
         pose = step.step(ours.message(places, frame, predicted=["thumb_tip"] if frame > 10 else []))
-    assert [finger.status for finger in pose.fingers] == ["predicted", "solved", "solved", "predicted", "solved"]
+    assert [finger.status for finger in pose.fingers] == [
+        "predicted",
+        "solved",
+        "solved",
+        "predicted",
+        "solved",
+    ]
     source = {joint.name: joint.source for joint in pose.joints}
     assert source["ring_tip"] == source["ring_distal"] == source["thumb_tip"] == "predicted"
     assert source["index_tip"] == source["wrist"] == "measured"
@@ -197,7 +261,10 @@ def test_a_tip_out_of_reach_says_so(world: Callable) -> None:
     assert reached @ outwards / np.linalg.norm(reached) / np.linalg.norm(outwards) > 0.9
 
 
-wild = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, 1e300, -1e300, 1e-300, 0.5, -3.0]))
+wild = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, 1e300, -1e300, 1e-300, 0.5, -3.0]),
+)
 point = st.builds(
     HandPoint,
     name=st.sampled_from([*BASIC_LANDMARKS, "middle_proximal", "palm", "nose"]),
@@ -210,21 +277,28 @@ point = st.builds(
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
-    st.lists(st.tuples(st.integers(0, 2**63 - 1), st.lists(point, max_size=12)), min_size=1, max_size=4),
+    st.lists(
+        st.tuples(st.integers(0, 2**63 - 1), st.lists(point, max_size=12)), min_size=1, max_size=4
+    ),
     st.sampled_from(METHODS),
 )
 def test_absurd_input(messages: list[tuple[int, list[HandPoint]]], method: str) -> None:
     """No crash, no hang, no NaN, no limit crossed, whatever valid JSON may say."""
     step, limits = _solver(method=method), default_hand().limits_rad
     good = {name: (0.01 * i, 0.05 if i else 0.0, 0.5) for i, name in enumerate(BASIC_LANDMARKS)}
-    start = [HandPoint(name=n, position_m=p, sigma_m=(1e-3,) * 3, cameras=[], source="measured") for n, p in good.items()]
+    start = [
+        HandPoint(name=n, position_m=p, sigma_m=(1e-3,) * 3, cameras=[], source="measured")
+        for n, p in good.items()
+    ]
     for seq, (stamp, points) in enumerate([(0, start), *messages]):
         pose = step.step(HandPoints(hand="right", seq=seq, stamp_ns=stamp, points=points))
         if pose is not None:
             assert b"null" not in msgspec.json.encode(pose)
             for row, finger in enumerate(pose.fingers):
                 q = finger.model_angles_rad
-                assert np.all((np.array(q) >= limits[row, :, 0]) & (np.array(q) <= limits[row, :, 1]))
+                assert np.all(
+                    (np.array(q) >= limits[row, :, 0]) & (np.array(q) <= limits[row, :, 1])
+                )
 
 
 @pytest.mark.parametrize(
@@ -242,7 +316,10 @@ def test_a_hand_that_cannot_be_solved_with_is_refused(field: str, value: object)
     model = default_hand()
     thumb = msgspec.structs.replace(model.digits[0], **{field: value})
     with pytest.raises(CalibrationError, match=r"hand\.right\.json"):
-        SolverStep(RigConfig(), {"right": msgspec.structs.replace(model, digits=(thumb, *model.digits[1:]))})
+        SolverStep(
+            RigConfig(),
+            {"right": msgspec.structs.replace(model, digits=(thumb, *model.digits[1:]))},
+        )
 
 
 def test_a_hand_without_paint_is_refused() -> None:

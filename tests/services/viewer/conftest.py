@@ -15,7 +15,18 @@ from websockets.sync.client import ClientConnection, connect
 
 from rhot.files.config import CameraTable, HandTable, ObjectTable, RigConfig, RigTable, Viewer
 from rhot.hand import DIGITS, JOINTS, default_hand, forward, joint_radii_m
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPoint, HandPoints, HandPose, Health, ObjectPose, StreamHealth, WristPose
+from rhot.messages import (
+    FingerAngles,
+    FingerPose,
+    HandJoint,
+    HandPoint,
+    HandPoints,
+    HandPose,
+    Health,
+    ObjectPose,
+    StreamHealth,
+    WristPose,
+)
 
 STAMP_NS = 1_700_000_000_000_000_000
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -44,11 +55,20 @@ def make_pose() -> Callable[..., HandPose]:
     def make(at: Any = None, source: str = "solved", **fields: Any) -> HandPose:
         where = positions if at is None else np.broadcast_to(at, (26, 3))
         joints = [
-            HandJoint(name=name, position_m=tuple(p), orientation_wxyz=IDENTITY, radius_m=float(r), source=source)  # type: ignore[arg-type]
+            HandJoint(
+                name=name,
+                position_m=tuple(p),
+                orientation_wxyz=IDENTITY,
+                radius_m=float(r),
+                source=source,
+            )  # type: ignore[arg-type]
             for name, p, r in zip(JOINTS, where.tolist(), radii, strict=True)
         ]
         angles = FingerAngles(abduction=0.0, mcp=0.5, pip=1.0, dip=0.66)
-        fingers = [FingerPose(name=d, angles_rad=angles, residual_m=0.001, iterations=3, status="solved") for d in DIGITS]  # type: ignore[arg-type]
+        fingers = [
+            FingerPose(name=d, angles_rad=angles, residual_m=0.001, iterations=3, status="solved")
+            for d in DIGITS
+        ]  # type: ignore[arg-type]
         values: dict[str, Any] = {
             "hand": "right",
             "seq": 1,
@@ -67,8 +87,15 @@ def make_pose() -> Callable[..., HandPose]:
 def make_points() -> Callable[..., HandPoints]:
     """Points of the right hand by name, all at one place."""
 
-    def make(*names: str, at: tuple[float, float, float] = (0.0, 0.0, 0.5), source: Any = "measured") -> HandPoints:
-        points = [HandPoint(name=name, position_m=at, sigma_m=(0.001,) * 3, cameras=["left"], source=source) for name in names]  # type: ignore[arg-type]
+    def make(
+        *names: str, at: tuple[float, float, float] = (0.0, 0.0, 0.5), source: Any = "measured"
+    ) -> HandPoints:
+        points = [
+            HandPoint(
+                name=name, position_m=at, sigma_m=(0.001,) * 3, cameras=["left"], source=source
+            )
+            for name in names
+        ]  # type: ignore[arg-type]
         return HandPoints(hand="right", seq=1, stamp_ns=STAMP_NS, points=points)
 
     return make
@@ -134,7 +161,19 @@ class Browser:
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection
         self._heard: list[dict[str, Any]] = []
-        self._send(_messages.ViewerCameraMessage(IDENTITY, (0.0, 0.0, 0.0), 1.0, 0.1, 10.0, 100, 100, (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
+        self._send(
+            _messages.ViewerCameraMessage(
+                IDENTITY,
+                (0.0, 0.0, 0.0),
+                1.0,
+                0.1,
+                10.0,
+                100,
+                100,
+                (0.0, 0.0, 1.0),
+                (0.0, -1.0, 0.0),
+            )
+        )
 
     def _send(self, message: _messages.Message) -> None:
         self._connection.send(msgspec.msgpack.encode(message.as_serializable_dict()))
@@ -148,11 +187,17 @@ class Browser:
         self._send(_messages.ShareUrlRequest())
 
     def wait_for(self, type_: str, timeout_s: float = 10.0, **fields: Any) -> dict[str, Any]:
-        """A message of a type with the given fields, among those since `forget` or to come; a callable value is asked."""
+        """A message of a type with the given fields, among those since `forget` or to come.
+
+        A callable value is asked.
+        """
         at = 0
         while True:
             for message in self._heard[at:]:
-                if message["type"] == type_ and all(v(message.get(k)) if callable(v) else message.get(k) == v for k, v in fields.items()):
+                if message["type"] == type_ and all(
+                    v(message.get(k)) if callable(v) else message.get(k) == v
+                    for k, v in fields.items()
+                ):
                     return message
             at = len(self._heard)
             self._heard += _decode(self._connection.recv(timeout=timeout_s))
@@ -169,7 +214,9 @@ class Browser:
 def _decode(frame: str | bytes) -> list[dict[str, Any]]:
     assert isinstance(frame, bytes)
     size = int.from_bytes(frame[8:16], "little")
-    return msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size]))["messages"]
+    return msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size]))[
+        "messages"
+    ]
 
 
 @pytest.fixture
@@ -178,7 +225,12 @@ def browse() -> Iterator[Callable[..., Browser]]:
     connections: list[ClientConnection] = []
 
     def open_(port: int, **options: Any) -> Browser:
-        connection = connect(f"ws://127.0.0.1:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None, **options)  # type: ignore[list-item]
+        connection = connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=[f"viser-v{viser.__version__}"],
+            max_size=None,
+            **options,
+        )  # type: ignore[list-item]
         connections.append(connection)
         return Browser(connection)
 

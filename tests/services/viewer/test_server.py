@@ -20,7 +20,9 @@ from services.viewer.server import Audience, open_server
 def addresses() -> list[str]:
     """This machine's addresses that are not the loopback's."""
     with contextlib.suppress(OSError):
-        return [a for a in socket.gethostbyname_ex(socket.gethostname())[2] if not a.startswith("127.")]
+        return [
+            a for a in socket.gethostbyname_ex(socket.gethostname())[2] if not a.startswith("127.")
+        ]
     return []
 
 
@@ -45,7 +47,9 @@ def test_a_taken_port_gives_the_next() -> None:
         assert second.get_port() != first.get_port()
 
 
-def test_there_is_no_tunnel_even_for_a_client_that_asks(browse: Callable[..., object], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_there_is_no_tunnel_even_for_a_client_that_asks(
+    browse: Callable[..., object], monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = threading.Event()
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *_: pytest.fail("a tunnel was opened"))
     with open_server("127.0.0.1", 0) as server:
@@ -62,7 +66,12 @@ def test_foreign_pages_are_refused(browse: Callable[..., object]) -> None:
     serve = websockets.asyncio.server.serve
     with open_server("127.0.0.1", 0) as server:
         assert websockets.asyncio.server.serve is serve, "the library is left as it was"
-        for origin in ("http://evil.example", "http://127.0.0.1.evil.example", "https://127.0.0.1:1", "null"):
+        for origin in (
+            "http://evil.example",
+            "http://127.0.0.1.evil.example",
+            "https://127.0.0.1:1",
+            "null",
+        ):
             with pytest.raises(InvalidStatus):
                 browse(server.get_port(), origin=origin)
         for origin in (f"http://127.0.0.1:{server.get_port()}", "http://localhost:9000"):

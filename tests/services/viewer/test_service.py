@@ -33,8 +33,14 @@ async def test_what_is_published_is_drawn_and_told(
 ) -> None:
     async with running("viewer", serve, config) as (service, bus):
         await until(lambda: service.state == "running")
-        pose, points = bus.publisher(topics.POSE, hand="right"), bus.publisher(topics.POINTS, hand="right")
-        thing, health = bus.publisher(topics.OBJECT, object="cup"), bus.publisher(topics.HEALTH, service="fusion", instance="main")
+        pose, points = (
+            bus.publisher(topics.POSE, hand="right"),
+            bus.publisher(topics.POINTS, hand="right"),
+        )
+        thing, health = (
+            bus.publisher(topics.OBJECT, object="cup"),
+            bus.publisher(topics.HEALTH, service="fusion", instance="main"),
+        )
 
         def send() -> None:
             message: HandPose | HandPoints | ObjectPose | Health
@@ -45,7 +51,12 @@ async def test_what_is_published_is_drawn_and_told(
                 (health, make_health()),
             ):
                 publisher.put(message)  # type: ignore[arg-type]
-            for key in ("hand/right/pose", "hand/right/points", "object/cup/pose", "service/fusion/main/health"):
+            for key in (
+                "hand/right/pose",
+                "hand/right/points",
+                "object/cup/pose",
+                "service/fusion/main/health",
+            ):
                 bus.put_raw(f"rhot/desk/{key}", b'\xff{"garbage"')
 
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
@@ -54,19 +65,36 @@ async def test_what_is_published_is_drawn_and_told(
                 ("BatchedMeshesMessage", {"name": "/hands/right/joints"}),
                 ("BatchedMeshesMessage", {"name": "/hands/right/points"}),
                 ("SetPositionMessage", {"name": "/objects/cup"}),
-                ("GuiUpdateMessage", {"updates": lambda u: "right hand: tracked" in u.get("content", "")}),
-                ("GuiUpdateMessage", {"updates": lambda u: "hand/right/points" in u.get("content", "")}),
+                (
+                    "GuiUpdateMessage",
+                    {"updates": lambda u: "right hand: tracked" in u.get("content", "")},
+                ),
+                (
+                    "GuiUpdateMessage",
+                    {"updates": lambda u: "hand/right/points" in u.get("content", "")},
+                ),
                 ("GuiUpdateMessage", {"updates": lambda u: "57&deg;" in u.get("content", "")}),
             ):
                 await asyncio.to_thread(browser.wait_for, type_, **fields)
             await until(lambda: sum(stats.rejected for stats in service.bus.streams) >= 4)
         browser.forget()
         # Nothing comes any more: the hand is hidden, and said to be missing.
-        await asyncio.to_thread(browser.wait_for, "SetSceneNodeVisibilityMessage", name="/hands/right/joints", visible=False)
-        await asyncio.to_thread(browser.wait_for, "GuiUpdateMessage", updates=lambda u: "waiting for hand poses" in u.get("content", ""))
+        await asyncio.to_thread(
+            browser.wait_for,
+            "SetSceneNodeVisibilityMessage",
+            name="/hands/right/joints",
+            visible=False,
+        )
+        await asyncio.to_thread(
+            browser.wait_for,
+            "GuiUpdateMessage",
+            updates=lambda u: "waiting for hand poses" in u.get("content", ""),
+        )
 
 
-async def test_uncalibrated_cameras_are_left_out_with_a_note(running: Callable, config: RigConfig, browse: Make) -> None:
+async def test_uncalibrated_cameras_are_left_out_with_a_note(
+    running: Callable, config: RigConfig, browse: Make
+) -> None:
     async with running("viewer", serve, config) as (service, _):
         await until(lambda: service.state == "running")
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
@@ -75,7 +103,9 @@ async def test_uncalibrated_cameras_are_left_out_with_a_note(running: Callable, 
         assert "waiting for hand poses" in status["props"]["content"]
 
 
-async def test_nothing_is_done_while_nobody_looks(running: Callable, config: RigConfig, browse: Make, make_pose: Make) -> None:
+async def test_nothing_is_done_while_nobody_looks(
+    running: Callable, config: RigConfig, browse: Make, make_pose: Make
+) -> None:
     async with running("viewer", serve, config) as (service, bus):
         await until(lambda: service.state == "running")
         publisher = bus.publisher(topics.POSE, hand="right")
@@ -97,7 +127,9 @@ async def test_pictures_are_asked_for_only_while_the_switch_is_on(
         await until(lambda: service.state == "running")
         publisher = bus.publisher(topics.PREVIEW, camera="left")
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
-        switch = await asyncio.to_thread(browser.wait_for, "GuiCheckboxMessage", props=lambda p: p["label"] == "camera pictures")
+        switch = await asyncio.to_thread(
+            browser.wait_for, "GuiCheckboxMessage", props=lambda p: p["label"] == "camera pictures"
+        )
         assert not publisher.wanted
         browser.click(switch["uuid"], True)
         await until(lambda: publisher.wanted)
@@ -109,7 +141,9 @@ async def test_pictures_are_asked_for_only_while_the_switch_is_on(
 
         with sending(send):
             shown = await asyncio.to_thread(
-                browser.wait_for, "GuiUpdateMessage", updates=lambda u: "data:image/jpeg" in u.get("content", "")
+                browser.wait_for,
+                "GuiUpdateMessage",
+                updates=lambda u: "data:image/jpeg" in u.get("content", ""),
             )
             assert "left<br>" in shown["updates"]["content"]
             await until(lambda: service.errors >= 2)

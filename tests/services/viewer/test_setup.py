@@ -31,7 +31,10 @@ def test_without_calibration_there_are_notes_and_no_cameras(config: RigConfig) -
     setup = read_setup(config)
     assert setup.cameras == {}
     assert len(setup.notes) == 2
-    assert all("rig.json: no such file; make it with `rhot calibrate stereo`" in note for note in setup.notes)
+    assert all(
+        "rig.json: no such file; make it with `rhot calibrate stereo`" in note
+        for note in setup.notes
+    )
     assert setup.paints["right", "index_tip"] == paint_rgb("blue", [])
 
 
@@ -46,7 +49,11 @@ def test_one_broken_camera_leaves_the_other(repository: Path, tmp_path: Path) ->
         (tmp_path / path.name).write_bytes(path.read_bytes())
     (tmp_path / "right.lens.json").write_text("{broken")
     save(tmp_path / "right.colors.json", calibrated(1, 2)[0])
-    broken = read_setup(msgspec.structs.replace(rig, folder=str(tmp_path), rig=msgspec.structs.replace(rig.rig, calibration=".")))
+    broken = read_setup(
+        msgspec.structs.replace(
+            rig, folder=str(tmp_path), rig=msgspec.structs.replace(rig.rig, calibration=".")
+        )
+    )
     assert set(broken.cameras) == {"left"}
     assert len(broken.notes) == 1
     assert broken.notes[0].startswith("camera right is not drawn: right.lens.json:")

@@ -21,12 +21,21 @@ def raster(board: Board, per_mm: int = 4, margin_mm: int = 20) -> np.ndarray:
     height, width = ((n + 1) * side + 2 * margin_mm for n in (board.rows, board.cols))
     page = np.full((round(height * per_mm), round(width * per_mm)), 235, dtype=np.uint8)
     for x, y, w, h in rectangles(board):
-        left, top, right, bottom = (round((value + margin_mm) * per_mm) for value in (x, y, x + w, y + h))
+        left, top, right, bottom = (
+            round((value + margin_mm) * per_mm) for value in (x, y, x + w, y + h)
+        )
         page[top:bottom, left:right] = 20
     return page
 
 
-@pytest.mark.parametrize("board", [Board(9, 6, 0.025), Board(7, 5, 0.03, "charuco"), Board(6, 9, 0.02, "charuco", "DICT_5X5_50", 0.6)])
+@pytest.mark.parametrize(
+    "board",
+    [
+        Board(9, 6, 0.025),
+        Board(7, 5, 0.03, "charuco"),
+        Board(6, 9, 0.02, "charuco", "DICT_5X5_50", 0.6),
+    ],
+)
 def test_the_printed_board_is_found_at_its_size(board):
     found = detect(raster(board), board)
     assert found is not None
@@ -45,7 +54,11 @@ def test_the_page_is_a_valid_pdf_of_exact_size():
     assert document[table:].startswith(b"xref")
     for number, place in enumerate(re.findall(rb"(\d{10}) 00000 n", document[table:]), start=1):
         assert document[int(place) :].startswith(b"%d 0 obj" % number)
-    squares = [[float(v) for v in line.split()[:4]] for line in document.decode("latin-1").splitlines() if line.endswith(" re")]
+    squares = [
+        [float(v) for v in line.split()[:4]]
+        for line in document.decode("latin-1").splitlines()
+        if line.endswith(" re")
+    ]
     assert len(squares) == 35
     np.testing.assert_allclose(np.array(squares)[:, 2:] / MM, 25.0, atol=1e-3)
 

@@ -17,7 +17,10 @@ def test_turns_are_the_rotations_of_the_grid():
 
 @pytest.mark.parametrize("size", [(9, 6), (8, 5)])
 def test_any_numbering_of_a_coloured_board_becomes_the_same(make_bench, size):
-    """Test: a picture's corners turned by 180 degrees, and mirrored. Expected: the numbering with black beyond the first corner."""
+    """Test: a picture's corners turned by 180 degrees, and mirrored.
+
+    Expected: the numbering with black beyond the first corner.
+    """
     bench = make_bench(positions=1, board=Board(*size, 0.025))
     camera = bench.cameras[0]
     image, true = bench.picture(camera, "01"), bench.corners(camera, "01")

@@ -24,9 +24,16 @@ def test_a_chessboard_is_found_and_numbered(make_bench, size_px):
 
 def test_a_large_picture_is_searched_small_and_refined_large(make_bench):
     bench = make_bench(positions=1, size_px=(1400, 1050), focal_px=1154.0)
-    found = detect(bench.picture(bench.cameras[0], "01", blur_px=2.0, fine=1), bench.board, quick=True)
+    found = detect(
+        bench.picture(bench.cameras[0], "01", blur_px=2.0, fine=1), bench.board, quick=True
+    )
     assert found is not None
-    assert np.sqrt(np.mean(np.sum((found.corners - bench.corners(bench.cameras[0], "01")) ** 2, axis=1))) < 0.1
+    assert (
+        np.sqrt(
+            np.mean(np.sum((found.corners - bench.corners(bench.cameras[0], "01")) ** 2, axis=1))
+        )
+        < 0.1
+    )
 
 
 def test_a_board_cut_off_by_the_edge_is_not_found(make_bench):
@@ -50,12 +57,17 @@ def test_colour_pictures_become_grey():
 
 @pytest.mark.parametrize("legacy", [False, True])
 def test_a_part_of_a_charuco_board_is_found_with_its_own_numbers(legacy):
-    """Test: the left half of a ChArUco board seen obliquely. Expected: its corners under the numbers they have on the whole board."""
+    """Test: the left half of a ChArUco board seen obliquely.
+
+    Expected: its corners under the numbers they have on the whole board.
+    """
     board = Board(7, 5, 0.03, "charuco", legacy=legacy)
     flat = charuco_board(board).generateImage((800, 600), marginSize=0)
     H = np.array([[0.62, -0.08, 60.0], [0.05, 0.60, 40.0], [1e-4, 5e-5, 1.0]])
     picture = cv2.warpPerspective(flat, H, (640, 480), flags=cv2.INTER_AREA, borderValue=255)
-    true = cv2.perspectiveTransform((100.0 * (board.grid + 1.0) - 0.5).reshape(-1, 1, 2), H).reshape(-1, 2)
+    true = cv2.perspectiveTransform(
+        (100.0 * (board.grid + 1.0) - 0.5).reshape(-1, 1, 2), H
+    ).reshape(-1, 2)
     picture[:, 330:] = 128
     found = detect(picture, board)
     assert found is not None

@@ -28,7 +28,10 @@ def pictures(make_bench, tmp_path_factory) -> PictureSet:
 def test_boards_are_found_and_pictures_without_are_listed(pictures):
     advanced: list[int] = []
     found, blind = find_boards(pictures, Board(7, 5, 0.03), advanced.append)
-    assert {camera: list(each) for camera, each in found.items()} == {"left": ["1", "2", "3"], "right": ["1", "2", "3"]}
+    assert {camera: list(each) for camera, each in found.items()} == {
+        "left": ["1", "2", "3"],
+        "right": ["1", "2", "3"],
+    }
     assert [(item.camera, item.key) for item in blind] == [("right", "4")]
     assert sum(advanced) == 7
 
@@ -42,7 +45,10 @@ def test_the_board_is_counted_if_it_is_not_given(pictures):
 
 
 def test_the_pattern_of_a_charuco_board_is_found_out(tmp_path):
-    """Test: pictures of a board printed by OpenCV before 4.6. Expected: the old pattern, although the new one was asked for."""
+    """Test: pictures of a board printed by OpenCV before 4.6.
+
+    Expected: the old pattern, although the new one was asked for.
+    """
     board = Board(4, 5, 0.03, "charuco", legacy=True)
     for n in range(2):
         flat = charuco_board(board).generateImage((300 + 20 * n, 360 + 24 * n), marginSize=20)

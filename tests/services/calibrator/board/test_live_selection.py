@@ -15,7 +15,9 @@ def seen(make_bench):
     bench = make_bench(positions=10)
     found = bench.detections(0.05)
     both = [key for key in bench.poses if key in found["left"] and key in found["right"]]
-    return Collector(["left", "right"], bench.board, 3), [{camera: found[camera][key] for camera in found} for key in both]
+    return Collector(["left", "right"], bench.board, 3), [
+        {camera: found[camera][key] for camera in found} for key in both
+    ]
 
 
 def test_a_position_is_kept_once_it_stands_still(seen):
@@ -29,7 +31,10 @@ def test_a_position_is_kept_once_it_stands_still(seen):
 def test_a_board_that_moves_is_not_kept(seen):
     collector, positions = seen
     collector.offer(positions[0])
-    moved = {camera: replace(shown, corners=shown.corners + 2.0) for camera, shown in positions[0].items()}
+    moved = {
+        camera: replace(shown, corners=shown.corners + 2.0)
+        for camera, shown in positions[0].items()
+    }
     take = collector.offer(moved)
     assert take.verdict is Verdict.MOVING
     assert take.cameras == ("left", "right")

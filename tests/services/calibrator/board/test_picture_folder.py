@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
-from services.calibrator.board.picture_folder import find_pictures, one_camera, picture_of, read_grey, side_by_side, split_side_by_side
+from services.calibrator.board.picture_folder import (
+    find_pictures,
+    one_camera,
+    picture_of,
+    read_grey,
+    side_by_side,
+    split_side_by_side,
+)
 
 
 @pytest.fixture
@@ -52,20 +59,39 @@ def test_cameras_and_positions_are_found_out(folder, pattern, given, found):
 
 
 def test_pairs_belong_together_whatever_the_zeros(folder):
-    pictures = find_pictures(folder("left01.png", "left02.png", "left10.png", "right1.png", "right2.png", "right10.png"))
+    pictures = find_pictures(
+        folder("left01.png", "left02.png", "left10.png", "right1.png", "right2.png", "right10.png")
+    )
     assert pictures.positions() == ["1", "2", "10"]
     assert pictures.files["right"]["10"].name == "right10.png"
 
 
 def test_pictures_named_by_time_are_paired_in_their_order(folder):
-    pictures = find_pictures(folder("left/100.png", "left/205.png", "left/310.png", "right/101.png", "right/206.png", "right/311.png"))
-    assert [pictures.files["right"][key].name for key in pictures.positions()] == ["101.png", "206.png", "311.png"]
+    pictures = find_pictures(
+        folder(
+            "left/100.png",
+            "left/205.png",
+            "left/310.png",
+            "right/101.png",
+            "right/206.png",
+            "right/311.png",
+        )
+    )
+    assert [pictures.files["right"][key].name for key in pictures.positions()] == [
+        "101.png",
+        "206.png",
+        "311.png",
+    ]
     uneven = find_pictures(folder("left/415.png"))
     assert not set(uneven.files["left"]) & set(uneven.files["right"])
 
 
 def test_other_pictures_are_listed_and_a_missing_partner_is_no_error(folder):
-    pictures = find_pictures(folder(*names_of("{camera}{n}.png", ("left", "right")), "left7.png", "result.png", "readme.txt"))
+    pictures = find_pictures(
+        folder(
+            *names_of("{camera}{n}.png", ("left", "right")), "left7.png", "result.png", "readme.txt"
+        )
+    )
     assert set(pictures.files["left"]) - set(pictures.files["right"]) == {"7"}
     assert [path.name for path in pictures.left_out] == ["result.png"]
 
@@ -79,7 +105,11 @@ def test_named_cameras_come_in_the_order_they_are_named(folder):
 
 @pytest.mark.parametrize(
     ("names", "reason"),
-    [((), "holds no pictures"), (("notes.txt",), "holds no pictures"), (("a.png", "b1.jpg"), "left01.png and right01.png")],
+    [
+        ((), "holds no pictures"),
+        (("notes.txt",), "holds no pictures"),
+        (("a.png", "b1.jpg"), "left01.png and right01.png"),
+    ],
 )
 def test_folders_that_say_nothing_are_refused(folder, names, reason):
     with pytest.raises(CalibrationError, match=reason):
@@ -100,7 +130,9 @@ def test_one_camera_takes_its_own_pictures_or_all(folder):
 
 
 def test_pictures_side_by_side_are_cut(tmp_path):
-    image = np.concatenate([np.full((4, 6), 10, dtype=np.uint8), np.full((4, 6), 200, dtype=np.uint8)], axis=1)
+    image = np.concatenate(
+        [np.full((4, 6), 10, dtype=np.uint8), np.full((4, 6), 200, dtype=np.uint8)], axis=1
+    )
     cv2.imwrite(str(tmp_path / "scene_1.png"), image)
     pictures = side_by_side(tmp_path, ["left", "right"])
     assert pictures.read("left", "scene_1").tolist() == np.full((4, 6), 10).tolist()
@@ -113,7 +145,9 @@ def test_pictures_side_by_side_are_cut(tmp_path):
 
 def test_pictures_as_wide_as_two_need_no_option(tmp_path):
     for n in range(1, 4):
-        cv2.imwrite(str(tmp_path / f"scene_1280x480_{n}.png"), np.full((48, 128), n, dtype=np.uint8))
+        cv2.imwrite(
+            str(tmp_path / f"scene_1280x480_{n}.png"), np.full((48, 128), n, dtype=np.uint8)
+        )
     pictures = find_pictures(tmp_path)
     assert pictures.side_by_side
     assert pictures.cameras == ["left", "right"]

@@ -22,8 +22,14 @@ def pair(make_bench):
     """Views of two cameras with .1 px of noise, and the true state."""
     bench = make_bench(positions=8)
     found = bench.detections(noise_px=0.1)
-    keys = [key for key in bench.poses if all(key in found[camera.name] for camera in bench.cameras)]
-    views = [view_of(bench.board, found[camera.name][key], c, k) for c, camera in enumerate(bench.cameras) for k, key in enumerate(keys)]
+    keys = [
+        key for key in bench.poses if all(key in found[camera.name] for camera in bench.cameras)
+    ]
+    views = [
+        view_of(bench.board, found[camera.name][key], c, k)
+        for c, camera in enumerate(bench.cameras)
+        for k, key in enumerate(keys)
+    ]
     state = State(
         np.stack([lens_vector(camera.matrix, camera.distortion) for camera in bench.cameras]),
         np.stack([camera.T_camera_from_rig for camera in bench.cameras]),
@@ -40,7 +46,11 @@ def test_derivatives_agree_with_finite_differences(pair):
     for column in range(21):
 
         def moved(sign: float, column: int = column) -> State:
-            lenses, places, boards = state.lenses.copy(), state.T_camera_from_rig.copy(), state.T_rig_from_board.copy()
+            lenses, places, boards = (
+                state.lenses.copy(),
+                state.T_camera_from_rig.copy(),
+                state.T_rig_from_board.copy(),
+            )
             if column < 9:
                 lenses[1, column] += sign * h
             else:
@@ -49,16 +59,23 @@ def test_derivatives_agree_with_finite_differences(pair):
                 step = np.zeros(6)
                 step[axis] = sign * h
                 T = which[number]
-                which[number] = transform(rotation_from_vector(step[:3]) @ T[:3, :3], T[:3, 3] + step[3:])
+                which[number] = transform(
+                    rotation_from_vector(step[:3]) @ T[:3, :3], T[:3, 3] + step[3:]
+                )
             return State(lenses, places, boards)
 
-        numeric = -(pixel_errors([view], moved(1.0))[0] - pixel_errors([view], moved(-1.0))[0]) / (2 * h)
+        numeric = -(pixel_errors([view], moved(1.0))[0] - pixel_errors([view], moved(-1.0))[0]) / (
+            2 * h
+        )
         np.testing.assert_allclose(J[:, :, column], numeric, rtol=1e-5, atol=1e-3)
 
 
 def test_one_lens_agrees_with_opencv(pair):
     bench, views, _ = pair
-    mine = [replace(alone(view), board=k) for k, view in enumerate(view for view in views if view.camera == 0)]
+    mine = [
+        replace(alone(view), board=k)
+        for k, view in enumerate(view for view in views if view.camera == 0)
+    ]
     ours = calibrate_lens(bench.cameras[0].size_px, mine, USUAL.free)
     error, matrix, distortion, _, _ = cv2.calibrateCamera(
         [view.points.astype(np.float32) for view in mine],
@@ -69,18 +86,32 @@ def test_one_lens_agrees_with_opencv(pair):
         flags=cv2.CALIB_FIX_K3,
     )
     assert ours.rms_px == pytest.approx(error, abs=2e-3)
-    np.testing.assert_allclose(ours.state.lenses[0, :4], lens_vector(matrix, distortion.reshape(-1))[:4], atol=0.1)
+    np.testing.assert_allclose(
+        ours.state.lenses[0, :4], lens_vector(matrix, distortion.reshape(-1))[:4], atol=0.1
+    )
 
 
 def test_a_rig_is_found_again_within_its_sigmas(pair):
-    """Test: start from a disturbed rig. Expected: lens and place numbers within four sigmas of the truth, chi squared near one."""
+    """Test: start from a disturbed rig.
+
+    Expected: lens and place numbers within four sigmas of the truth, chi squared near one.
+    """
     bench, views, true = pair
     start = State(
         true.lenses + np.array([15.0, -12.0, 8.0, 5.0, 0.05, -0.05, 0.0, 0.0, 0.0]),
         np.stack(
-            [true.T_camera_from_rig[0], transform(rotation_from_vector([0.02, -0.03, 0.01]), [0.01, 0.01, 0.0]) @ true.T_camera_from_rig[1]]
+            [
+                true.T_camera_from_rig[0],
+                transform(rotation_from_vector([0.02, -0.03, 0.01]), [0.01, 0.01, 0.0])
+                @ true.T_camera_from_rig[1],
+            ]
         ),
-        np.stack([transform(rotation_from_vector([0.05, 0.0, -0.05]), [0.01, -0.01, 0.02]) @ T for T in true.T_rig_from_board]),
+        np.stack(
+            [
+                transform(rotation_from_vector([0.05, 0.0, -0.05]), [0.01, -0.01, 0.02]) @ T
+                for T in true.T_rig_from_board
+            ]
+        ),
     )
     found = adjust(views, start, Free(np.tile(USUAL.free, (2, 1)), np.array([False, True])))
     assert found.rms_px == pytest.approx(0.1 * np.sqrt(2.0), rel=0.06)
@@ -96,8 +127,16 @@ def test_a_rig_is_found_again_within_its_sigmas(pair):
 def test_wild_corners_hardly_move_the_result(pair):
     _, views, true = pair
     free = Free(np.tile(USUAL.free, (2, 1)), np.array([False, True]))
-    spoilt = [replace(views[0], pixels=views[0].pixels + np.where(np.arange(54)[:, None] == 10, 40.0, 0.0)), *views[1:]]
-    moved = adjust(spoilt, true, free).state.T_camera_from_rig[1][:3, 3] - true.T_camera_from_rig[1][:3, 3]
+    spoilt = [
+        replace(
+            views[0], pixels=views[0].pixels + np.where(np.arange(54)[:, None] == 10, 40.0, 0.0)
+        ),
+        *views[1:],
+    ]
+    moved = (
+        adjust(spoilt, true, free).state.T_camera_from_rig[1][:3, 3]
+        - true.T_camera_from_rig[1][:3, 3]
+    )
     assert np.linalg.norm(moved) < 1e-3
 
 
@@ -110,7 +149,10 @@ def test_what_is_held_does_not_move(pair):
 
 
 def test_an_undetermined_number_has_a_large_sigma(make_bench):
-    """Test: one camera's place is free although it sees no board with another. Expected: no crash, and a sigma that says so."""
+    """Test: one camera's place is free although it sees no board with another.
+
+    Expected: no crash, and a sigma that says so.
+    """
     bench = make_bench(positions=5)
     found = bench.detections()["left"]
     views = [view_of(bench.board, detection, 0, k) for k, detection in enumerate(found.values())]

@@ -15,7 +15,9 @@ from services.calibrator.bundle.triangulate import epipolar_px, rigid_fit, trian
 def test_exact_pixels_give_exact_points_on_exact_epipolar_lines(make_bench, cameras):
     bench = make_bench(cameras, positions=1)
     true = apply(bench.poses["01"], bench.board.points)
-    seen = np.stack([rays(lens_vector(c.matrix, c.distortion), c.project(true)) for c in bench.cameras])
+    seen = np.stack(
+        [rays(lens_vector(c.matrix, c.distortion), c.project(true)) for c in bench.cameras]
+    )
     places = np.stack([camera.T_camera_from_rig for camera in bench.cameras])
     np.testing.assert_allclose(triangulate(places, seen, np.full(cameras, 527.0)), true, atol=1e-9)
     np.testing.assert_allclose(epipolar_px(places[1], seen[0], seen[1], 527.0), 0.0, atol=1e-7)
@@ -25,7 +27,9 @@ def test_epipolar_distance_is_in_pixels():
     """Two parallel cameras: the second sees every point 2 px lower."""
     T = transform(np.eye(3), [-0.075, 0.0, 0.0])
     first = np.array([[0.1, 0.0], [0.0, -0.1]])
-    np.testing.assert_allclose(np.abs(epipolar_px(T, first, first + np.array([-0.05, 2.0 / 500.0]), 500.0)), 2.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        np.abs(epipolar_px(T, first, first + np.array([-0.05, 2.0 / 500.0]), 500.0)), 2.0, rtol=1e-9
+    )
 
 
 def test_the_rigid_fit_finds_rotation_translation_and_scale():
@@ -40,7 +44,13 @@ def test_the_rigid_fit_finds_rotation_translation_and_scale():
 
 
 def test_the_scale_of_noisy_points_has_no_bias():
-    """Test: noise of a tenth of a square in depth. Expected: the scale is right to .1 %, where the mean side would be 1 % too long."""
+    """Test: noise of a tenth of a square in depth.
+
+    Expected: the scale is right to .1 %, where the mean side would be 1 % too long.
+    """
     board, generator = Board(9, 6, 0.025).points, np.random.default_rng(0)
-    scales = [rigid_fit(board, board + generator.normal(0.0, [0.0, 0.0, 0.0025], board.shape)).scale for _ in range(50)]
+    scales = [
+        rigid_fit(board, board + generator.normal(0.0, [0.0, 0.0, 0.0025], board.shape)).scale
+        for _ in range(50)
+    ]
     assert np.mean(scales) == pytest.approx(1.0, abs=1e-3)

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
-from services.calibrator.depth_law.fit import SEED_DISTANCES_CM, SEED_K, SEED_Z, bench, depth_text, fit_depth, read_bench
+from services.calibrator.depth_law.fit import (
+    SEED_DISTANCES_CM,
+    SEED_K,
+    SEED_Z,
+    bench,
+    depth_text,
+    fit_depth,
+    read_bench,
+)
 
 
 def test_the_bench_is_the_papers():
@@ -25,21 +33,31 @@ def test_ideal_cameras_give_the_geometric_law():
 
 
 def test_the_seeds_numbers_follow_from_a_tenth_of_a_degree_and_a_centimetre():
-    """Test: cameras .095 degrees apart, the tape's zero 10.2 mm in front of the optical centres. Expected: the paper's k and z.
+    """Test: cameras .095 degrees apart, the tape's zero 10.2 mm in front of the optical centres.
+    Expected: the paper's k and z.
 
-    One cause alone cannot give both: turned cameras of z = -1.035 have k = 4794, a displaced zero of that z has k = 4382.
+    One cause alone cannot give both: turned cameras of z = -1.035 have k = 4794, a displaced zero
+    of that z has k = 4382.
     """
     law = fit_depth(*bench(divergence_rad=np.radians(0.095), zero_cm=1.02))
     assert law.k == pytest.approx(SEED_K, rel=0.01)
     assert law.z == pytest.approx(SEED_Z, abs=0.002)
     turned = fit_depth(*bench(divergence_rad=np.radians(0.3)))
-    assert (turned.k, turned.z) == (pytest.approx(4794.0, rel=0.01), pytest.approx(SEED_Z, abs=0.001))
+    assert (turned.k, turned.z) == (
+        pytest.approx(4794.0, rel=0.01),
+        pytest.approx(SEED_Z, abs=0.001),
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_noisy_bench_lands_near_the_seed_and_names_the_causes(seed):
-    """Test: .2 px of noise, target placed to 1 mm. Expected: k within 3 %, z within .008, and the causes found again."""
-    law = fit_depth(*bench(divergence_rad=np.radians(0.095), zero_cm=1.02, noise_px=0.2, tape_cm=0.1, seed=seed))
+    """Test: .2 px of noise, target placed to 1 mm.
+
+    Expected: k within 3 %, z within .008, and the causes found again.
+    """
+    law = fit_depth(
+        *bench(divergence_rad=np.radians(0.095), zero_cm=1.02, noise_px=0.2, tape_cm=0.1, seed=seed)
+    )
     assert law.k == pytest.approx(SEED_K, rel=0.03)
     assert law.z == pytest.approx(SEED_Z, abs=0.008)
     assert np.degrees(law.divergence_rad) == pytest.approx(0.095, abs=0.03)
@@ -57,7 +75,11 @@ def test_the_power_law_corrects_what_the_geometric_law_cannot():
 def test_phi_makes_equation_10_meet_the_measurements():
     law = fit_depth(*bench(zero_cm=0.5))
     k = 7.5 * 640 / (2.0 * np.tan(np.arctan(320.0 / 527.3) + law.phi_rad))
-    np.testing.assert_allclose(np.array(law.distances_cm) + np.array(law.geometry_cm), k / np.array(law.disparities_px), rtol=1e-9)
+    np.testing.assert_allclose(
+        np.array(law.distances_cm) + np.array(law.geometry_cm),
+        k / np.array(law.disparities_px),
+        rtol=1e-9,
+    )
 
 
 def test_a_table_is_read(tmp_path):

@@ -24,7 +24,11 @@ def _other(hand: HandName, factors: tuple[float, ...]) -> HandModel:
         start = np.array(digit.metacarpal_m)
         base = start + factor * (np.array(digit.base_m) - start)
         digits.append(
-            msgspec.structs.replace(digit, base_m=tuple(base.tolist()), lengths_m=tuple((factor * np.array(digit.lengths_m)).tolist()))
+            msgspec.structs.replace(
+                digit,
+                base_m=tuple(base.tolist()),
+                lengths_m=tuple((factor * np.array(digit.lengths_m)).tolist()),
+            )
         )
     return msgspec.structs.replace(default_hand(hand), digits=tuple(digits))
 
@@ -35,18 +39,29 @@ def _messages(model: HandModel, begin_s: float = 0.0, still: bool = False) -> li
         t_s = frame / _FPS
         turn, shift = unrest(t_s)
         R = rotation_from_vector(np.array([1.2, 0.3, 0.1])) @ rotation_from_vector(turn)
-        joints = forward(model, R, np.array([0.0, 0.0, 0.5]) + shift, motion(1.0 if still else t_s - begin_s).angles_rad)
+        joints = forward(
+            model,
+            R,
+            np.array([0.0, 0.0, 0.5]) + shift,
+            motion(1.0 if still else t_s - begin_s).angles_rad,
+        )
         points = [
             HandPoint(
                 name=name,
-                position_m=tuple((landmark_point(model, name, *joints) + rng.normal(0.0, 1e-3, 3)).tolist()),
+                position_m=tuple(
+                    (landmark_point(model, name, *joints) + rng.normal(0.0, 1e-3, 3)).tolist()
+                ),
                 sigma_m=(1e-3,) * 3,
                 cameras=["left", "right"],
                 source="measured",
             )
             for name in BASIC_LANDMARKS
         ]
-        told.append(HandPoints(hand=model.hand, seq=frame, stamp_ns=10**18 + round(1e9 * t_s), points=points))
+        told.append(
+            HandPoints(
+                hand=model.hand, seq=frame, stamp_ns=10**18 + round(1e9 * t_s), points=points
+            )
+        )
     return told
 
 
@@ -58,5 +73,8 @@ def other_hand() -> Callable[[HandName, tuple[float, ...]], HandModel]:
 
 @pytest.fixture(scope="session")
 def guided_messages() -> Callable[..., list[HandPoints]]:
-    """One pass of the guide with 1 mm noise; begin_s: cut so that the exercises begin later; still: nothing moves."""
+    """One pass of the guide with 1 mm noise; begin_s: cut so that the exercises begin later.
+
+    Still: nothing moves.
+    """
     return _messages

@@ -31,16 +31,30 @@ def measured(request, other_hand, guided_messages):
 
 def _reach(model):
     """From each finger's root to the middle of its paint: what tips show."""
-    return np.array([sum(d.lengths_m) - model.paint[tip].offset_m[2] for d, tip in zip(model.digits, TIPS, strict=True)])[1:]
+    return np.array(
+        [
+            sum(d.lengths_m) - model.paint[tip].offset_m[2]
+            for d, tip in zip(model.digits, TIPS, strict=True)
+        ]
+    )[1:]
 
 
 def test_the_fingers_are_found(measured) -> None:
     truth, table, _, problem, found = measured
     model = problem.shape.model(found.x)
     assert np.abs(_reach(model) - _reach(truth)).max() < 5e-3
-    assert np.abs(_reach(model) - _reach(truth)).mean() < 0.5 * np.abs(_reach(table) - _reach(truth)).mean()
-    metacarpals = [np.array([np.linalg.norm(np.subtract(d.base_m, d.metacarpal_m)) for d in m.digits[1:]]) for m in (truth, table, model)]
-    assert np.abs(metacarpals[2] - metacarpals[0]).mean() < np.abs(metacarpals[1] - metacarpals[0]).mean()
+    assert (
+        np.abs(_reach(model) - _reach(truth)).mean()
+        < 0.5 * np.abs(_reach(table) - _reach(truth)).mean()
+    )
+    metacarpals = [
+        np.array([np.linalg.norm(np.subtract(d.base_m, d.metacarpal_m)) for d in m.digits[1:]])
+        for m in (truth, table, model)
+    ]
+    assert (
+        np.abs(metacarpals[2] - metacarpals[0]).mean()
+        < np.abs(metacarpals[1] - metacarpals[0]).mean()
+    )
 
 
 def test_the_report_is_honest(measured) -> None:
@@ -67,7 +81,9 @@ def test_what_is_written_is_what_services_load(measured, tmp_path) -> None:
     assert loaded.digits == made.digits
     SolverStep(RigConfig(), {truth.hand: loaded})
     again, same = fit_person(recording, table)
-    assert msgspec.json.encode(hand_file(again, same, table, date="2026-01-01", inputs="test")) == msgspec.json.encode(made)
+    assert msgspec.json.encode(
+        hand_file(again, same, table, date="2026-01-01", inputs="test")
+    ) == msgspec.json.encode(made)
 
 
 def test_lengths_measured_by_hand_are_kept(measured) -> None:
@@ -75,7 +91,9 @@ def test_lengths_measured_by_hand_are_kept(measured) -> None:
     problem, found = fit_person(recording, table, {(1, 0): 0.0438})
     made = hand_file(problem, found, table, date="", inputs="")
     assert made.digits[1].lengths_m[0] == 0.0438
-    assert {length.name for length in made.lengths if length.source == "by hand"} == {"index proximal"}
+    assert {length.name for length in made.lengths if length.source == "by hand"} == {
+        "index proximal"
+    }
 
 
 def test_derivatives_are_those_of_finite_differences(measured) -> None:
@@ -89,13 +107,19 @@ def test_derivatives_are_those_of_finite_differences(measured) -> None:
     for j in range(len(x) - 5):
         step = np.zeros(len(x))
         step[j] = 1e-5
-        ahead, behind = (marks_of(shape, shape.geometry(x + s), angles, shape.table.side).points for s in (step, -step))
+        ahead, behind = (
+            marks_of(shape, shape.geometry(x + s), angles, shape.table.side).points
+            for s in (step, -step)
+        )
         np.testing.assert_allclose((ahead - behind) / 2e-5, by_x[..., j], atol=1e-8)
     for j in range(20):
         turn = np.zeros(20)
         turn[j] = 1e-6
         turned = turn.reshape(5, 4)
-        ahead, behind = (marks_of(shape, shape.geometry(x), angles + s, shape.table.side).points for s in (turned, -turned))
+        ahead, behind = (
+            marks_of(shape, shape.geometry(x), angles + s, shape.table.side).points
+            for s in (turned, -turned)
+        )
         np.testing.assert_allclose((ahead - behind) / 2e-6, marks.J[..., 6 + j], atol=1e-8)
 
 
@@ -103,7 +127,12 @@ def test_the_solution_is_stationary(measured) -> None:
     *_, problem, found = measured
     again = adjust(problem, found.x, found.poses)
     assert np.abs(again.x - found.x).max() < 0.05
-    assert equations(problem, np.zeros_like(found.x), first_poses(problem, np.zeros_like(found.x))).cost > found.found.cost
+    assert (
+        equations(
+            problem, np.zeros_like(found.x), first_poses(problem, np.zeros_like(found.x))
+        ).cost
+        > found.found.cost
+    )
 
 
 def test_the_beginning_is_found(other_hand, guided_messages) -> None:
@@ -122,14 +151,23 @@ def test_refusals_say_why(other_hand, guided_messages) -> None:
         fit_person(recording_of(guided_messages(truth, still=True), table, start_s=0.0), table)
     with pytest.raises(CalibrationError, match="fist: nothing was recorded"):
         fit_person(recording_of(messages[:300], table, start_s=0.0), table)
-    blind = [msgspec.structs.replace(m, points=[p for p in m.points if p.name != "ring_tip"]) for m in messages]
+    blind = [
+        msgspec.structs.replace(m, points=[p for p in m.points if p.name != "ring_tip"])
+        for m in messages
+    ]
     with pytest.raises(CalibrationError, match="no measured ring_tip"):
         recording_of(blind, table)
     rare = [m if k % 12 else n for k, (n, m) in enumerate(zip(messages, blind, strict=True))]
     with pytest.raises(CalibrationError, match="ring_tip was measured in"):
         fit_person(recording_of(rare, table, start_s=0.0), table)
     huge = [
-        msgspec.structs.replace(m, points=[msgspec.structs.replace(p, position_m=tuple(9.0 * v for v in p.position_m)) for p in m.points])
+        msgspec.structs.replace(
+            m,
+            points=[
+                msgspec.structs.replace(p, position_m=tuple(9.0 * v for v in p.position_m))
+                for p in m.points
+            ],
+        )
         for m in messages
     ]
     with pytest.raises(CalibrationError, match="times the size"):
@@ -141,7 +179,9 @@ def _flexion_error(ours, model, angles_of) -> float:
     rng, step, errors = np.random.default_rng(1), SolverStep(RigConfig(), {model.hand: model}), []
     for seed in range(3):
         for frame, instant in enumerate(ours.motion(seed, 80)):
-            places = {name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant).items()}
+            places = {
+                name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant).items()
+            }
             pose = step.step(ours.message(places, 1000 * seed + frame))
             errors.append(np.abs(angles_of(pose) - instant.angles_rad)[1:, 1:].mean())
     return float(np.rad2deg(np.mean(errors)))
@@ -151,6 +191,8 @@ def test_the_solver_is_nearly_as_good_as_with_true_bones(measured, world, angles
     """The issue's figure: within 20 % (benchmarks/calibrate_hand.py has it over more hands)."""
     truth, table, _, problem, found = measured
     ours = type(world(truth.hand))(truth)
-    true, before, after = (_flexion_error(ours, m, angles_of) for m in (truth, table, problem.shape.model(found.x)))
+    true, before, after = (
+        _flexion_error(ours, m, angles_of) for m in (truth, table, problem.shape.model(found.x))
+    )
     assert after <= 1.2 * true
     assert before > 1.5 * true

@@ -1,4 +1,6 @@
-"""`rhot calibrate lens` on synthetic views: the lens is found again, bad data are refused with their reason."""
+"""`rhot calibrate lens` on synthetic views: the lens is found again, bad data are refused with
+their reason.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,10 @@ def test_a_lens_is_found_again(make_bench, distortion):
 
 
 def test_partly_seen_boards_calibrate(make_bench):
-    """Test: every view lacks a third of its corners, each another third, as with ChArUco boards. Expected: the same lens."""
+    """Test: every view lacks a third of its corners, each another third, as with ChArUco boards.
+
+    Expected: the same lens.
+    """
     bench = make_bench(1, positions=12)
     generator = np.random.default_rng(3)
     parts = {}
@@ -46,7 +51,10 @@ def test_partly_seen_boards_calibrate(make_bench):
 
 
 def test_pictures_that_contradict_are_left_out_and_named(make_bench):
-    """Test: one picture's corners are wrong, another is of other size. Expected: both named, the lens unharmed."""
+    """Test: one picture's corners are wrong, another is of other size.
+
+    Expected: both named, the lens unharmed.
+    """
     bench = make_bench(1, positions=12)
     found = bench.detections(0.05)["left"]
     bad, other = list(found)[3], list(found)[5]
@@ -61,11 +69,16 @@ def test_pictures_that_contradict_are_left_out_and_named(make_bench):
 
 
 def test_a_picture_that_hurts_is_marked(make_bench):
-    """Test: a board bent in one picture, too little to be left out. Expected: it is marked, and the report says so."""
+    """Test: a board bent in one picture, too little to be left out.
+
+    Expected: it is marked, and the report says so.
+    """
     bench = make_bench(1, positions=10)
     found = bench.detections(0.05)["left"]
     key = list(found)[2]
-    found[key] = replace(found[key], corners=found[key].corners + 0.1 * (bench.board.grid - [4.0, 2.5]) ** 2)
+    found[key] = replace(
+        found[key], corners=found[key].corners + 0.1 * (bench.board.grid - [4.0, 2.5]) ** 2
+    )
     result = calibrate_camera("left", found, bench.board)
     assert key in [picture.key for picture in result.pictures if picture.hurts]
     assert sum(picture.hurts for picture in result.pictures) <= 2
@@ -80,7 +93,9 @@ def test_a_picture_that_hurts_is_marked(make_bench):
         ({"spread": 0.0, "depth_m": (1.2, 1.3), "positions": 8}, "corners cover"),
     ],
 )
-def test_data_that_cannot_support_a_calibration_are_refused_with_the_reason(make_bench, arguments, reason):
+def test_data_that_cannot_support_a_calibration_are_refused_with_the_reason(
+    make_bench, arguments, reason
+):
     bench = make_bench(1, **arguments)
     with pytest.raises(CalibrationError, match=reason) as refused:
         calibrate_camera("left", bench.detections(0.1)["left"], bench.board)
@@ -93,9 +108,15 @@ def test_no_picture_at_all_is_refused(make_bench):
 
 
 def test_a_board_counted_wrongly_is_refused(make_bench):
-    """Test: corners of a board that is not a regular grid, as after --board with swapped numbers. Expected: no lens explains it."""
+    """Test: corners of a board that is not a regular grid, as after --board with swapped numbers.
+
+    Expected: no lens explains it.
+    """
     bench = make_bench(1, positions=10)
-    found = {key: replace(shown, corners=shown.corners) for key, shown in bench.detections(0.05)["left"].items()}
+    found = {
+        key: replace(shown, corners=shown.corners)
+        for key, shown in bench.detections(0.05)["left"].items()
+    }
     with pytest.raises(CalibrationError, match="no lens explains"):
         calibrate_camera("left", found, Board(6, 9, 0.025))
 

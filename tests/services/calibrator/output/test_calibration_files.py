@@ -29,8 +29,14 @@ def test_a_rig_is_read_back_as_cameras_that_see_the_board_where_it_was_seen(cali
     np.testing.assert_array_equal(cameras["left"].T_rig_from_camera, np.eye(4))
     points = apply(result.state.T_rig_from_board[0], bench.board.points)
     for camera in bench.cameras:
-        np.testing.assert_allclose(cameras[camera.name].project(points), bench.corners(camera, "01"), atol=0.1)
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["left.lens.json", "rig.json", "right.lens.json"]
+        np.testing.assert_allclose(
+            cameras[camera.name].project(points), bench.corners(camera, "01"), atol=0.1
+        )
+    assert [path.name for path in sorted(tmp_path.iterdir())] == [
+        "left.lens.json",
+        "rig.json",
+        "right.lens.json",
+    ]
 
 
 def test_files_say_how_they_were_made(calibrated):
@@ -39,7 +45,13 @@ def test_files_say_how_they_were_made(calibrated):
     assert (geometry.date, geometry.tool) == ("2025-01-01", "rhot calibrate stereo")
     assert geometry.inputs["board"] == "chessboard 9x6"
     assert geometry.inputs["square_m"] == 0.025
-    assert {"stereo_rms_px", "held_out_squares", "held_out_mm", "square_error_percent", "epipolar_px"} <= set(geometry.residuals)
+    assert {
+        "stereo_rms_px",
+        "held_out_squares",
+        "held_out_mm",
+        "square_error_percent",
+        "epipolar_px",
+    } <= set(geometry.residuals)
     assert all(np.isfinite(value) for value in geometry.residuals.values())
 
 
@@ -50,7 +62,9 @@ def test_one_lens_is_read_back(make_bench, tmp_path):
     lens = load_lens(tmp_path, "left")
     assert lens.size_px == (640, 480)
     assert lens.matrix[0][0] == pytest.approx(result.lens[0], abs=1e-3)
-    assert lens.residuals["held_out_mm"] == pytest.approx(25.0 * lens.residuals["held_out_squares"], rel=1e-3)
+    assert lens.residuals["held_out_mm"] == pytest.approx(
+        25.0 * lens.residuals["held_out_squares"], rel=1e-3
+    )
 
 
 def test_a_lens_of_another_picture_size_is_refused(calibrated):
@@ -58,6 +72,11 @@ def test_a_lens_of_another_picture_size_is_refused(calibrated):
     files = lenses_of(result, "", "")
     found = bench.detections()
     assert set(given_lenses(files, found)) == {"left", "right"}
-    other = {"left": {key: type(shown)(shown.ids, shown.corners, (1280, 960)) for key, shown in found["left"].items()}}
+    other = {
+        "left": {
+            key: type(shown)(shown.ids, shown.corners, (1280, 960))
+            for key, shown in found["left"].items()
+        }
+    }
     with pytest.raises(CalibrationError, match="calibrated at 640x480"):
         given_lenses(files, other)

@@ -1,4 +1,7 @@
-"""Places of a rig whose camera was bumped, recovered from moving markers; and recordings that must be refused."""
+"""Places of a rig whose camera was bumped, recovered from moving markers.
+
+And recordings that must be refused.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,8 @@ from services.calibrator.recalibrate.marker_tracks import recording
 from services.calibrator.recalibrate.refine_rig import Wand, refine_rig
 from testing.synthetic_points import START_NS, Path, Setup, frames
 
-# The right camera's clock runs 6 ms off the left one's beside what it announces; noise as of painted blobs.
+# The right camera's clock runs 6 ms off the left one's beside what it announces; noise as of
+# painted blobs.
 SETUP = Setup(sigma_px=0.15, clock_error_s=0.003)
 TURN_DEG, SHIFT_M = np.array([0.6, -0.8, 0.5]), np.array([0.003, -0.002, 0.002])
 EVERYWHERE = Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6))
@@ -41,18 +45,44 @@ def waved(seconds: float, setup: Setup = SETUP, seed: int = 1):
                 at_s = time_s + 0.008
                 for _ in range(4):
                     angles = np.array([1.1 * np.sin(0.9 * at_s), 1.3 * np.sin(0.7 * at_s + 1.0)])
-                    along = np.array([np.cos(angles[0]) * np.cos(angles[1]), np.sin(angles[0]), np.cos(angles[0]) * np.sin(angles[1])])
-                    x, y = camera.project((path(np.array([at_s]))[0, 0] + [0.0, -0.09, 0.0] + end * LENGTH_M * along)[None])[0]
+                    along = np.array(
+                        [
+                            np.cos(angles[0]) * np.cos(angles[1]),
+                            np.sin(angles[0]),
+                            np.cos(angles[0]) * np.sin(angles[1]),
+                        ]
+                    )
+                    x, y = camera.project(
+                        (path(np.array([at_s]))[0, 0] + [0.0, -0.09, 0.0] + end * LENGTH_M * along)[
+                            None
+                        ]
+                    )[0]
                     at_s = time_s + y * setup.row_time_ns * 1e-9
                 pixels.append(np.array([x, y]) + random.normal(0.0, setup.sigma_px, 2))
             markers = [
-                Marker(color=color, x_px=float(x), y_px=float(y), area_px=80.0, sigma_px=0.1, quality=1.0)
+                Marker(
+                    color=color,
+                    x_px=float(x),
+                    y_px=float(y),
+                    area_px=80.0,
+                    sigma_px=0.1,
+                    quality=1.0,
+                )
                 for color, (x, y) in zip(("blue", "lime"), pixels, strict=True)
                 if 0 <= x < 640 and 0 <= y < 480
             ]
             frame = frames(setup, path, 0.01)[0]
             stamp_ns = START_NS + round(time_s * 1e9)
-            found.append(msgspec.structs.replace(frame, camera=camera.name, seq=k, stamp_ns=stamp_ns, clock_offset_ns=0, markers=markers))
+            found.append(
+                msgspec.structs.replace(
+                    frame,
+                    camera=camera.name,
+                    seq=k,
+                    stamp_ns=stamp_ns,
+                    clock_offset_ns=0,
+                    markers=markers,
+                )
+            )
     return sorted(found, key=lambda frame: frame.stamp_ns)
 
 
@@ -65,10 +95,15 @@ def test_a_hand_tells_the_turn_and_the_direction_of_the_shift():
     np.testing.assert_allclose(moved.shifted_mm[1:], -1e3 * SHIFT_M[1:], atol=0.1)
     assert moved.late_ms == pytest.approx(6.0, abs=0.1)
     # Without a wand the distance of the cameras stays what it was.
-    kept, was = (np.linalg.norm(cameras["right"].centre_rig - cameras["left"].centre_rig) for cameras in (result.cameras, old))
+    kept, was = (
+        np.linalg.norm(cameras["right"].centre_rig - cameras["left"].centre_rig)
+        for cameras in (result.cameras, old)
+    )
     assert kept == pytest.approx(was, abs=1e-6)
     assert result.epipolar_px < 0.3 < 3.0 < result.epipolar_before_px
-    np.testing.assert_array_equal(result.cameras["left"].T_rig_from_camera, old["left"].T_rig_from_camera)
+    np.testing.assert_array_equal(
+        result.cameras["left"].T_rig_from_camera, old["left"].T_rig_from_camera
+    )
     assert "scale" in refined_text(result)
 
 
@@ -100,7 +135,10 @@ def test_wrong_markers_now_and_then_do_not_matter():
         msgspec.structs.replace(
             frame,
             markers=[
-                msgspec.structs.replace(m, x_px=m.x_px * (random.uniform() if random.uniform() < 0.01 else 1.0)) for m in frame.markers
+                msgspec.structs.replace(
+                    m, x_px=m.x_px * (random.uniform() if random.uniform() < 0.01 else 1.0)
+                )
+                for m in frame.markers
             ],
         )
         for frame in frames(SETUP, EVERYWHERE, 10.0)
@@ -134,7 +172,9 @@ def test_a_rig_that_is_right_is_left_alone_or_hardly_moved():
     assert np.linalg.norm(T[:3, 3]) < 2e-4
 
 
-@pytest.mark.parametrize("wand", [Wand("blue", "blue", 0.2), Wand("blue", "gold", 0.2), Wand("blue", "lime", 200.0)])
+@pytest.mark.parametrize(
+    "wand", [Wand("blue", "blue", 0.2), Wand("blue", "gold", 0.2), Wand("blue", "lime", 200.0)]
+)
 def test_impossible_wands_are_refused(wand):
     old = SETUP.rig()
     with pytest.raises(CalibrationError, match="cannot be used"):
@@ -143,7 +183,10 @@ def test_impossible_wands_are_refused(wand):
 
 def test_another_picture_size_is_refused():
     old = SETUP.rig()
-    given = [msgspec.structs.replace(frame, size_px=(1280, 960)) for frame in frames(SETUP, EVERYWHERE, 0.2)]
+    given = [
+        msgspec.structs.replace(frame, size_px=(1280, 960))
+        for frame in frames(SETUP, EVERYWHERE, 0.2)
+    ]
     with pytest.raises(CalibrationError, match="1280x960"):
         recording(given, old)
 

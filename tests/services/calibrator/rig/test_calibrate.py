@@ -1,4 +1,6 @@
-"""`rhot calibrate stereo` on synthetic rigs: places are found again, bad data are refused with their reason."""
+"""`rhot calibrate stereo` on synthetic rigs: places are found again, bad data are refused with
+their reason.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def place_errors(bench, result: RigResult) -> list[tuple[float, float]]:
     for k, camera in enumerate(bench.cameras):
         T = inverse(result.state.T_camera_from_rig[k])
         shift = np.linalg.norm(T[:3, 3] - camera.T_rig_from_camera[:3, 3])
-        errors.append((1e3 * shift, np.degrees(angle_between(T[:3, :3], camera.T_rig_from_camera[:3, :3]))))
+        errors.append(
+            (1e3 * shift, np.degrees(angle_between(T[:3, :3], camera.T_rig_from_camera[:3, :3])))
+        )
     return errors
 
 
@@ -33,7 +37,9 @@ def test_a_rig_is_found_again(make_bench, cameras):
     for shift_mm, turn_deg in place_errors(bench, result):
         assert shift_mm < 0.5
         assert turn_deg < 0.15
-    np.testing.assert_allclose(result.state.lenses[:, 0], [camera.matrix[0, 0] for camera in bench.cameras], rtol=2e-3)
+    np.testing.assert_allclose(
+        result.state.lenses[:, 0], [camera.matrix[0, 0] for camera in bench.cameras], rtol=2e-3
+    )
     assert result.rms_px == pytest.approx(0.141, rel=0.1)
     assert abs(result.square_ratio - 1.0) < 0.003
     assert result.held_out_px < 0.18
@@ -50,30 +56,47 @@ def test_the_same_pictures_give_the_same_rig(make_bench):
 
 @pytest.mark.parametrize("size", [(7, 7), (8, 6)])
 def test_boards_that_look_the_same_turned_are_numbered_alike(make_bench, size):
-    """Test: the second camera begins at any corner of a symmetric board. Expected: the cameras agree all the same."""
+    """Test: the second camera begins at any corner of a symmetric board.
+
+    Expected: the cameras agree all the same.
+    """
     bench = make_bench(positions=8, board=Board(*size, 0.025))
     found, options = bench.detections(0.1), turns(*size)
     for k, key in enumerate(found["right"]):
-        found["right"][key] = replace(found["right"][key], corners=found["right"][key].corners[options[k % len(options)]])
+        found["right"][key] = replace(
+            found["right"][key], corners=found["right"][key].corners[options[k % len(options)]]
+        )
     result = calibrate_rig(found, bench.board)
     assert place_errors(bench, result)[1][0] < 1.0
 
 
 def test_partly_seen_charuco_boards_calibrate(make_bench):
-    """Test: each camera sees another two thirds of a ChArUco board's corners. Expected: the same rig."""
+    """Test: each camera sees another two thirds of a ChArUco board's corners.
+
+    Expected: the same rig.
+    """
     bench = make_bench(positions=9, board=Board(9, 6, 0.025, "charuco", "DICT_4X4_50"))
     generator, parts = np.random.default_rng(1), {}
     for camera, found in bench.detections(0.1).items():
         keep = {key: np.sort(generator.choice(54, 38, replace=False)) for key in found}
-        parts[camera] = {key: replace(shown, ids=keep[key], corners=shown.corners[keep[key]]) for key, shown in found.items()}
+        parts[camera] = {
+            key: replace(shown, ids=keep[key], corners=shown.corners[keep[key]])
+            for key, shown in found.items()
+        }
     result = calibrate_rig(parts, bench.board)
     assert place_errors(bench, result)[1][0] < 0.8
-    assert all(position.held_out for position in result.positions if all(position.key in found for found in parts.values()))
+    assert all(
+        position.held_out
+        for position in result.positions
+        if all(position.key in found for found in parts.values())
+    )
 
 
 def test_given_lenses_are_kept(make_bench):
     bench = make_bench(positions=8)
-    lenses = {camera.name: lens_vector(camera.matrix, camera.distortion) for camera in bench.cameras}
+    lenses = {
+        camera.name: lens_vector(camera.matrix, camera.distortion) for camera in bench.cameras
+    }
     result = calibrate_rig(bench.detections(0.1), bench.board, lenses)
     assert result.lenses_given
     np.testing.assert_array_equal(result.state.lenses, np.stack(list(lenses.values())))
@@ -81,7 +104,10 @@ def test_given_lenses_are_kept(make_bench):
 
 
 def test_cameras_need_not_all_see_every_board(make_bench):
-    """Test: the third camera shares boards with the second only. Expected: it is joined through the second."""
+    """Test: the third camera shares boards with the second only.
+
+    Expected: it is joined through the second.
+    """
     bench = make_bench(3, positions=13)
     found = bench.detections(0.1)
     keys = list(found["right"])
@@ -95,7 +121,9 @@ def test_a_board_that_moved_between_the_exposures_is_left_out(make_bench):
     bench = make_bench(positions=12)
     found = bench.detections(0.05)
     key = next(key for key in found["left"] if key in found["right"])
-    found["right"][key] = replace(found["right"][key], corners=found["right"][key].corners + np.array([0.0, 6.0]))
+    found["right"][key] = replace(
+        found["right"][key], corners=found["right"][key].corners + np.array([0.0, 6.0])
+    )
     result = calibrate_rig(found, bench.board)
     assert [item.key for item in result.left_out] == [key]
     assert "did it move" in result.left_out[0].reason
@@ -105,7 +133,10 @@ def test_a_board_that_moved_between_the_exposures_is_left_out(make_bench):
 def shifted(found, key_of):
     """The right camera's pictures under other keys."""
     keys = list(found["right"])
-    return {**found, "right": {keys[key_of(k, len(keys))]: found["right"][key] for k, key in enumerate(keys)}}
+    return {
+        **found,
+        "right": {keys[key_of(k, len(keys))]: found["right"][key] for k, key in enumerate(keys)},
+    }
 
 
 def mirrored(found):
@@ -114,20 +145,29 @@ def mirrored(found):
     flip = np.array([-1.0, 1.0])
     return {
         **found,
-        "right": {key: replace(shown, corners=(shown.corners * flip + [639.0, 0.0])[order]) for key, shown in found["right"].items()},
+        "right": {
+            key: replace(shown, corners=(shown.corners * flip + [639.0, 0.0])[order])
+            for key, shown in found["right"].items()
+        },
     }
 
 
 def few_in_common(found):
     """The left camera's first eight pictures, the right one's from the seventh."""
-    return {"left": dict(list(found["left"].items())[:8]), "right": dict(list(found["right"].items())[6:])}
+    return {
+        "left": dict(list(found["left"].items())[:8]),
+        "right": dict(list(found["right"].items())[6:]),
+    }
 
 
 def unrelated(found):
     """The right camera's pictures in random order."""
     keys = list(found["right"])
     order = np.random.default_rng(0).permutation(len(keys))
-    return {**found, "right": {key: found["right"][keys[k]] for key, k in zip(keys, order, strict=True)}}
+    return {
+        **found,
+        "right": {key: found["right"][keys[k]] for key, k in zip(keys, order, strict=True)},
+    }
 
 
 @pytest.mark.parametrize(
@@ -135,13 +175,24 @@ def unrelated(found):
     [
         (lambda found: {"left": found["left"]}, "two cameras or more"),
         (lambda found: {**found, "right": {}}, "no picture of 'right' shows the board"),
-        (lambda found: {**found, "right": dict(list(found["right"].items())[:2])}, "'right': only 2 usable pictures"),
+        (
+            lambda found: {**found, "right": dict(list(found["right"].items())[:2])},
+            "'right': only 2 usable pictures",
+        ),
         (few_in_common, "together"),
         (lambda found: shifted(found, lambda k, n: (k + 1) % n), "paired wrongly"),
         (mirrored, "mirrored"),
         (unrelated, "no position of the second"),
     ],
-    ids=["one camera", "blind camera", "too few", "too few in common", "paired one off", "mirrored", "unrelated"],
+    ids=[
+        "one camera",
+        "blind camera",
+        "too few",
+        "too few in common",
+        "paired one off",
+        "mirrored",
+        "unrelated",
+    ],
 )
 def test_bad_data_are_refused_with_the_reason(make_bench, spoil, reason):
     bench = make_bench(positions=14, depth_m=(0.45, 0.8))

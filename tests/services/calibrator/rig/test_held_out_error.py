@@ -13,8 +13,13 @@ from services.calibrator.rig.held_out_error import board_error
 
 def views_and_state(bench, noise_px):
     found = bench.detections(noise_px)
-    key = next(key for key in bench.poses if all(key in found[camera.name] for camera in bench.cameras))
-    views = [view_of(bench.board, found[camera.name][key], k, 0) for k, camera in enumerate(bench.cameras)]
+    key = next(
+        key for key in bench.poses if all(key in found[camera.name] for camera in bench.cameras)
+    )
+    views = [
+        view_of(bench.board, found[camera.name][key], k, 0)
+        for k, camera in enumerate(bench.cameras)
+    ]
     state = State(
         np.stack([lens_vector(camera.matrix, camera.distortion) for camera in bench.cameras]),
         np.stack([camera.T_camera_from_rig for camera in bench.cameras]),

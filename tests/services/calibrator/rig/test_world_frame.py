@@ -25,7 +25,10 @@ def desk_bench(make_bench):
 
     def make(board: Board):
         bench = replace(make_bench(board=board), poses={"desk": LYING})
-        seen = {c.name: Detection(np.arange(board.size), bench.corners(c, "desk"), c.size_px) for c in bench.cameras}
+        seen = {
+            c.name: Detection(np.arange(board.size), bench.corners(c, "desk"), c.size_px)
+            for c in bench.cameras
+        }
         return {camera.name: camera for camera in bench.cameras}, seen
 
     return make
@@ -67,6 +70,9 @@ def test_what_cannot_be_the_desk_is_refused(desk_bench):
         find_desk(cameras, {}, board)
     with pytest.raises(CalibrationError, match="calibrated at"):
         find_desk(cameras, {"left": replace(seen["left"], size_px=(320, 240))}, board)
-    moved = {**seen, "right": replace(seen["right"], corners=seen["right"].corners + np.array([0.0, 12.0]))}
+    moved = {
+        **seen,
+        "right": replace(seen["right"], corners=seen["right"].corners + np.array([0.0, 12.0])),
+    }
     with pytest.raises(CalibrationError, match="was a camera moved"):
         find_desk(cameras, moved, board)

@@ -26,7 +26,10 @@ from services.pi_tracker.service import serve
 from testing.synthetic_images import Tip, clean, frame_of, noisy
 
 SIZE = (240, 160)
-TIPS = [Tip("green", 70.0, 80.0, width_px=14.0, length_px=16.0), Tip("blue", 130.0, 70.0, width_px=14.0, length_px=16.0)]
+TIPS = [
+    Tip("green", 70.0, 80.0, width_px=14.0, length_px=16.0),
+    Tip("blue", 130.0, 70.0, width_px=14.0, length_px=16.0),
+]
 RIG = '[rig]\nname = "desk"\n[[camera]]\nname = "left"\nsource = "simulator"\nsize_px = [240, 160]\n[hand.right.markers]\n'
 RIG += 'index_tip = "green"\nthumb_tip = "blue"\n'
 
@@ -49,7 +52,9 @@ def pictures(shot, tmp_path):
 
 def rhot(*words):
     """Run the command; raises what it would say."""
-    result = CliRunner().invoke(application(), ["calibrate", *map(str, words)], catch_exceptions=True)
+    result = CliRunner().invoke(
+        application(), ["calibrate", *map(str, words)], catch_exceptions=True
+    )
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
@@ -59,12 +64,26 @@ def places(shot, option):
     half = 12
     for color, (x, y) in shot[1].items():
         yield option
-        yield f"{color}={x:.0f},{y:.0f}" if option == "--click" else f"{color}={x - half:.0f},{y - half:.0f},{2 * half},{2 * half}"
+        yield (
+            f"{color}={x:.0f},{y:.0f}"
+            if option == "--click"
+            else f"{color}={x - half:.0f},{y - half:.0f},{2 * half},{2 * half}"
+        )
 
 
 @pytest.mark.parametrize("option", ["--box", "--click"])
 def test_a_recording_gives_a_file_with_date_tool_and_statistics(shot, pictures, tmp_path, option):
-    result = rhot("colors", "cam", "--video", pictures, "--frames", "0,2,4", *places(shot, option), "--out", tmp_path / "cal")
+    result = rhot(
+        "colors",
+        "cam",
+        "--video",
+        pictures,
+        "--frames",
+        "0,2,4",
+        *places(shot, option),
+        "--out",
+        tmp_path / "cal",
+    )
     made = load_colors(tmp_path / "cal", "cam")
     assert set(made.colors) == {"green", "blue"}
     assert made.date
@@ -80,7 +99,9 @@ def test_other_colours_in_the_file_stay(shot, pictures, tmp_path):
     other = ColorRange(hsv_low=(150, 100, 40), hsv_high=(165, 255, 255))
     save(tmp_path / "cam.colors.json", Colors(colors={"pink": other, "green": other}))
     (x, y) = shot[1]["green"]
-    rhot("colors", "cam", "--video", pictures, "--at", f"1:green={x:.0f},{y:.0f}", "--out", tmp_path)
+    rhot(
+        "colors", "cam", "--video", pictures, "--at", f"1:green={x:.0f},{y:.0f}", "--out", tmp_path
+    )
     made = load_colors(tmp_path, "cam").colors
     assert made["pink"] == other
     assert made["green"] != other
@@ -89,7 +110,18 @@ def test_other_colours_in_the_file_stay(shot, pictures, tmp_path):
 def test_auto_proposes_names_fits_and_draws(pictures, tmp_path):
     (tmp_path / "rig.toml").write_text(RIG)
     shown = tmp_path / "seen.png"
-    result = rhot("colors", "left", "--video", pictures, "--auto", "--config", tmp_path / "rig.toml", "--picture", shown, "--json")
+    result = rhot(
+        "colors",
+        "left",
+        "--video",
+        pictures,
+        "--auto",
+        "--config",
+        tmp_path / "rig.toml",
+        "--picture",
+        shown,
+        "--json",
+    )
     assert set(load_colors(tmp_path / "calibration", "left").colors) == {"green", "blue"}
     assert set(json.loads(result.stdout)["colors"]) == {"green", "blue"}
     assert "further paints that would stand out" in result.stderr
@@ -100,13 +132,26 @@ def test_auto_proposes_names_fits_and_draws(pictures, tmp_path):
 
 
 def test_a_dry_run_writes_nothing(shot, pictures, tmp_path):
-    rhot("colors", "cam", "--video", pictures, "--frames", "1", *places(shot, "--click"), "--dry-run", "--out", tmp_path / "cal")
+    rhot(
+        "colors",
+        "cam",
+        "--video",
+        pictures,
+        "--frames",
+        "1",
+        *places(shot, "--click"),
+        "--dry-run",
+        "--out",
+        tmp_path / "cal",
+    )
     assert not (tmp_path / "cal").exists()
 
 
 def test_two_boxes_of_one_paint_are_warned_of(shot, pictures, tmp_path):
     x, y = shot[1]["green"]
-    clicks = [word for color in ("green", "blue") for word in ("--click", f"{color}={x:.0f},{y:.0f}")]
+    clicks = [
+        word for color in ("green", "blue") for word in ("--click", f"{color}={x:.0f},{y:.0f}")
+    ]
     result = rhot("colors", "cam", "--video", pictures, "--frames", "1", *clicks, "--out", tmp_path)
     assert "warning: blue and green collide" in result.stderr
 
@@ -151,7 +196,10 @@ def test_frames_are_spread_over_a_recording(pictures):
 
 @pytest.fixture
 def tracker(router, shot, tmp_path):
-    """A tracker on a router, in a thread of its own, with a camera that shows the two tips; yields rig.toml."""
+    """A tracker on a router, in a thread of its own, with a camera that shows the two tips.
+
+    Yields rig.toml.
+    """
     path = tmp_path / "rig.toml"
     path.write_text(f'{RIG}[bus]\nconnect = ["{router}"]\nlisten = ["{router}"]\n')
     stop, ready = threading.Event(), threading.Event()
@@ -161,7 +209,14 @@ def tracker(router, shot, tmp_path):
         publisher = bus.publisher(topics.SIM_FRAME, camera="left")
         seq = 0
         while not stop.is_set():
-            told = SimFrame(camera="left", seq=seq, stamp_ns=10**18 + seq, row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
+            told = SimFrame(
+                camera="left",
+                seq=seq,
+                stamp_ns=10**18 + seq,
+                row_time_ns=1e4,
+                size_px=SIZE,
+                clock_skew_ns=0,
+            )
             publisher.put_bytes(frame.image.tobytes(), told)
             if await bus.get(topics.FRAME, 0.2, camera="left"):
                 ready.set()
@@ -171,7 +226,11 @@ def tracker(router, shot, tmp_path):
     async def live():
         config = load_rig(path)
         with contextlib.suppress(asyncio.CancelledError):
-            async with open_bus("desk", [router]) as bus, open_bus("desk", [router]) as ours, asyncio.TaskGroup() as tasks:
+            async with (
+                open_bus("desk", [router]) as bus,
+                open_bus("desk", [router]) as ours,
+                asyncio.TaskGroup() as tasks,
+            ):
                 ours.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
                 service = Service("pi_tracker", "left", config, bus, tasks)
                 parts = [tasks.create_task(serve(service)), tasks.create_task(service.beat())]
@@ -194,14 +253,32 @@ def test_a_running_camera_is_calibrated_over_the_bus(tracker, shot):
     assert set(made.colors) == {"green", "blue"}
     # One colour again: the other stays, in force and in the file.
     x, y = shot[1]["green"]
-    rhot("colors", "left", "--config", tracker, "--pictures", "1", "--click", f"green={x:.0f},{y:.0f}")
+    rhot(
+        "colors",
+        "left",
+        "--config",
+        tracker,
+        "--pictures",
+        "1",
+        "--click",
+        f"green={x:.0f},{y:.0f}",
+    )
     assert load_colors(tracker.parent / "calibration", "left").colors["blue"] == made.colors["blue"]
     assert load_colors(tracker.parent / "calibration", "left").date >= made.date
 
 
 def test_colours_may_come_one_after_the_other(tracker, shot):
     for color, (x, y) in shot[1].items():
-        rhot("colors", "left", "--config", tracker, "--pictures", "1", "--click", f"{color}={x:.0f},{y:.0f}")
+        rhot(
+            "colors",
+            "left",
+            "--config",
+            tracker,
+            "--pictures",
+            "1",
+            "--click",
+            f"{color}={x:.0f},{y:.0f}",
+        )
     assert set(load_colors(tracker.parent / "calibration", "left").colors) == {"green", "blue"}
 
 

@@ -1,4 +1,6 @@
-"""`rhot calibrate colors` on a real video, and what the tracker finds with what it wrote (data/color_video)."""
+"""`rhot calibrate colors` on a real video, and what the tracker finds with what it wrote
+(data/color_video).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
 
 # Boxes as a person draws them about the ball: by frame; x, y, width, height.
-BOXES = {60: (395, 100, 70, 75), 300: (80, 95, 100, 90), 660: (408, 42, 90, 90), 500: (510, 265, 80, 80), 840: (315, 30, 100, 100)}
+BOXES = {
+    60: (395, 100, 70, 75),
+    300: (80, 95, 100, 90),
+    660: (408, 42, 90, 90),
+    500: (510, 265, 80, 80),
+    840: (315, 30, 100, 100),
+}
 # Looked at one by one; in 824, 488 and 962 a sliver of the ball shows at the edge.
 THERE = {*range(28, 464), *range(488, 788), *range(824, 963)}
 
@@ -39,7 +47,9 @@ def frames(video: Path) -> list[Frame]:
 def test_a_ball_boxed_in_three_frames_is_found_in_all_and_nowhere_else(
     video: Path, frames: list[Frame], tmp_path: Path, numbers: tuple[int, ...]
 ) -> None:
-    boxes = [word for n in numbers for word in ("--at", f"{n}:green=" + ",".join(map(str, BOXES[n])))]
+    boxes = [
+        word for n in numbers for word in ("--at", f"{n}:green=" + ",".join(map(str, BOXES[n])))
+    ]
     words = ["calibrate", "colors", "cam", "--video", str(video), *boxes, "--out", str(tmp_path)]
     result = CliRunner().invoke(application(), words, catch_exceptions=False)
     assert result.exit_code == 0

@@ -26,8 +26,17 @@ def test_the_exercises_are_listed() -> None:
 
 
 def test_lengths_measured_by_hand() -> None:
-    assert lengths_of(["index:proximal=39.5", "thumb:metacarpal=46"]) == {(1, 0): pytest.approx(0.0395), (0, 0): pytest.approx(0.046)}
-    for wrong in ("index:proximal", "toe:distal=3", "index:metacarpal=60", "index:distal=nan", "index:distal=500"):
+    assert lengths_of(["index:proximal=39.5", "thumb:metacarpal=46"]) == {
+        (1, 0): pytest.approx(0.0395),
+        (0, 0): pytest.approx(0.046),
+    }
+    for wrong in (
+        "index:proximal",
+        "toe:distal=3",
+        "index:metacarpal=60",
+        "index:distal=nan",
+        "index:distal=500",
+    ):
         with pytest.raises(CalibrationError, match="DIGIT:BONE=MM"):
             lengths_of([wrong])
 
@@ -37,7 +46,9 @@ def test_what_is_no_recording(tmp_path: Path) -> None:
         recorded(tmp_path, "right", None)
     (tmp_path / "points.jsonl").write_text("")
     assert recorded(tmp_path, "right", None) == []
-    result = CliRunner().invoke(calibrate, ["hand", "right", "--from", str(tmp_path), "--out", str(tmp_path)])
+    result = CliRunner().invoke(
+        calibrate, ["hand", "right", "--from", str(tmp_path), "--out", str(tmp_path)]
+    )
     assert isinstance(result.exception, CalibrationError)
     assert "no points of a right hand" in str(result.exception)
     assert not list(tmp_path.glob("hand.*"))
@@ -49,6 +60,8 @@ def test_a_recording_of_the_rig(tmp_path: Path) -> None:
     path = recorder.start(10**18)
     for hand in ("right", "left"):
         message = msgspec.structs.replace(points, hand=hand)
-        recorder.add(topics.POINTS, topics.POINTS.key("sim", hand=hand), msgspec.json.encode(message), 10**18)
+        recorder.add(
+            topics.POINTS, topics.POINTS.key("sim", hand=hand), msgspec.json.encode(message), 10**18
+        )
     recorder.stop()
     assert recorded(path, "right", None) == [points]

@@ -26,14 +26,27 @@ def test_places_in_single_frames_number_the_frames():
 
 
 @pytest.mark.parametrize(
-    "text", ["green", "green=", "green=1", "green=1,2,3", "green=a,b", "gr een=1,2", "=1,2", "green=1,2,3,4,5", "green=nan,1"]
+    "text",
+    [
+        "green",
+        "green=",
+        "green=1",
+        "green=1,2,3",
+        "green=a,b",
+        "gr een=1,2",
+        "=1,2",
+        "green=1,2,3,4,5",
+        "green=nan,1",
+    ],
 )
 def test_what_is_no_click_says_what_one_is(text):
     with pytest.raises(CalibrationError, match=r"expected color=x,y"):
         everywhere([], [text], range(1))
 
 
-@pytest.mark.parametrize("text", ["green=1,2", "green=1,2,0,4", "green=1,2,3,-4", "green=1,2,1e9,4"])
+@pytest.mark.parametrize(
+    "text", ["green=1,2", "green=1,2,0,4", "green=1,2,3,-4", "green=1,2,1e9,4"]
+)
 def test_what_is_no_box_says_what_one_is(text):
     with pytest.raises(CalibrationError, match=r"expected color=x,y,width,height|must be above 0"):
         everywhere([text], [], range(1))

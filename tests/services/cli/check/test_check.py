@@ -24,7 +24,11 @@ def rig(tmp_path):
 
 
 def texts(path, severity="error"):
-    return [f"{problem.where}: {problem.what}" for problem in check_config(path).problems if problem.severity == severity]
+    return [
+        f"{problem.where}: {problem.what}"
+        for problem in check_config(path).problems
+        if problem.severity == severity
+    ]
 
 
 def append(path, text):
@@ -40,7 +44,10 @@ def replace(path, old, new):
 def test_the_rigs_that_come_along_are_sound():
     assert texts(sim_toml()) == []
     example = check_config(config_dir() / "rig.example.toml")
-    assert all("calibration" in problem.where or problem.severity != "error" for problem in example.problems)
+    assert all(
+        "calibration" in problem.where or problem.severity != "error"
+        for problem in example.problems
+    )
 
 
 def test_every_mistake_of_a_file_is_told_at_once(tmp_path):
@@ -101,7 +108,13 @@ def test_a_file_that_cannot_be_read_is_one_problem(tmp_path, text, part):
 def test_missing_calibrations_come_with_the_command_that_makes_them(rig):
     shutil.rmtree(rig.parent / "calibration")
     found = "\n".join(texts(rig))
-    for part in ("left.lens.json", "right.colors.json", "rig.json", "rhot calibrate lens left", "rhot calibrate colors right"):
+    for part in (
+        "left.lens.json",
+        "right.colors.json",
+        "rig.json",
+        "rhot calibrate lens left",
+        "rhot calibrate colors right",
+    ):
         assert part in found
     assert any("lighthouse frame" in text for text in texts(rig, "warning"))
 
@@ -123,7 +136,10 @@ def test_ranges_that_overlap_are_a_warning(rig):
     colors = json.loads(path.read_text())
     colors["colors"]["blue"] = colors["colors"]["green"]
     path.write_text(json.dumps(colors))
-    assert any("'blue'" in text and "'green'" in text and "overlap" in text for text in texts(rig, "warning"))
+    assert any(
+        "'blue'" in text and "'green'" in text and "overlap" in text
+        for text in texts(rig, "warning")
+    )
 
 
 @pytest.mark.parametrize(
@@ -151,9 +167,17 @@ def test_a_lens_of_another_picture_size(rig):
 def test_a_camera_without_a_place_and_cameras_in_one_place(rig):
     folder = rig.parent / "calibration"
     geometry = load_geometry(folder)
-    save(folder / "rig.json", msgspec.structs.replace(geometry, cameras={"left": geometry.cameras["left"]}))
+    save(
+        folder / "rig.json",
+        msgspec.structs.replace(geometry, cameras={"left": geometry.cameras["left"]}),
+    )
     assert any("'right' is missing" in text for text in texts(rig))
-    save(folder / "rig.json", msgspec.structs.replace(geometry, cameras=dict.fromkeys(("left", "right"), geometry.cameras["left"])))
+    save(
+        folder / "rig.json",
+        msgspec.structs.replace(
+            geometry, cameras=dict.fromkeys(("left", "right"), geometry.cameras["left"])
+        ),
+    )
     assert any("0.0 mm apart" in text for text in texts(rig))
 
 
@@ -174,7 +198,11 @@ def test_sources_that_do_not_exist(rig, source, part):
 
 
 def test_a_camera_of_another_host_is_not_looked_for_here(rig):
-    replace(rig, 'name = "left"\nsource = "simulator"', 'name = "left"\nsource = "v4l2:/dev/no-such-camera"\nhost = "pi"')
+    replace(
+        rig,
+        'name = "left"\nsource = "simulator"',
+        'name = "left"\nsource = "v4l2:/dev/no-such-camera"\nhost = "pi"',
+    )
     found = texts(rig)
     assert not any("/dev/no-such-camera" in text for text in found)
     # But the router must then be reachable from there.

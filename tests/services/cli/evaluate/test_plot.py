@@ -37,7 +37,9 @@ def test_every_kind_of_picture_is_drawn(capture, result, tmp_path):
 def test_the_truth_changes_the_angles_picture(capture, result, tmp_path):
     plot_result(result, tmp_path / "without", None)
     plot_result(result, tmp_path / "with", capture)
-    pictures = [(tmp_path / folder / "angles_right.png").read_bytes() for folder in ("without", "with")]
+    pictures = [
+        (tmp_path / folder / "angles_right.png").read_bytes() for folder in ("without", "with")
+    ]
     assert pictures[0] != pictures[1]
 
 
@@ -55,7 +57,10 @@ def test_a_result_of_markers_alone_gives_marker_pictures_only(result, tmp_path):
     shutil.copytree(result, tmp_path / "result")
     for name in ("points", "poses", "objects"):
         (tmp_path / "result" / f"{name}.jsonl").write_text("")
-    assert [path.name for path in plot_result(tmp_path / "result", tmp_path, None)] == ["markers_left.png", "markers_right.png"]
+    assert [path.name for path in plot_result(tmp_path / "result", tmp_path, None)] == [
+        "markers_left.png",
+        "markers_right.png",
+    ]
 
 
 def test_an_empty_or_missing_result_or_truth(result, tmp_path):

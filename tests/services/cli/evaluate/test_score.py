@@ -25,7 +25,9 @@ def copy(result, tmp_path):
 
 
 def test_the_pipeline_is_as_good_as_promised(capture, result):
-    """Issue 2: finger tips within 5 mm RMS at 0.5 m, joint angles within 10 deg on average, no limit violated."""
+    """Issue 2: finger tips within 5 mm RMS at 0.5 m, joint angles within 10 deg on average, no
+    limit violated.
+    """
     score = score_result(Capture(capture), result)
     hand = score.hands["right"]
     assert hand.distance_m == pytest.approx(0.5, abs=0.05)
@@ -51,10 +53,22 @@ def test_stages_tell_where_the_error_comes_from(capture, result):
 def test_the_command_prints_tables_or_json(capture, result):
     text = CliRunner().invoke(application(), ["score", str(capture), str(result), "--stages"])
     assert text.exit_code == 0
-    for part in ("thumb_tip", "RMS mm", "index pip", "hand orientation", "dropouts", "limit violations", "delay", "cup", "left wrist"):
+    for part in (
+        "thumb_tip",
+        "RMS mm",
+        "index pip",
+        "hand orientation",
+        "dropouts",
+        "limit violations",
+        "delay",
+        "cup",
+        "left wrist",
+    ):
         assert part in text.stdout
     assert "middle abduction" not in text.stdout  # fixed
-    found = json.loads(CliRunner().invoke(application(), ["score", str(capture), str(result), "--json"]).stdout)
+    found = json.loads(
+        CliRunner().invoke(application(), ["score", str(capture), str(result), "--json"]).stdout
+    )
     assert tuple(found["hands"]["right"]["angles"]["thumb"]) == DIGIT_ANGLES[0]
     assert found["stages"] == {}
 
@@ -64,7 +78,10 @@ def test_poses_that_are_off_by_a_known_amount_score_so(capture, copy):
     before = score_result(Capture(capture), copy).hands["right"]
 
     def moved(pose):
-        joints = [msgspec.structs.replace(j, position_m=(j.position_m[0] + 0.01, *j.position_m[1:])) for j in pose.joints]
+        joints = [
+            msgspec.structs.replace(j, position_m=(j.position_m[0] + 0.01, *j.position_m[1:]))
+            for j in pose.joints
+        ]
         return msgspec.structs.replace(pose, joints=joints)
 
     write_lines(copy / "poses.jsonl", [moved(pose) for pose in poses])
@@ -84,10 +101,15 @@ def test_a_capture_without_truth_or_a_folder_that_is_none(capture, copy, tmp_pat
 
 def test_a_result_of_another_capture_or_without_poses(capture, copy):
     poses = list(read_lines(copy / "poses.jsonl", HandPose))
-    write_lines(copy / "poses.jsonl", [msgspec.structs.replace(pose, stamp_ns=pose.stamp_ns + 10**12) for pose in poses])
+    write_lines(
+        copy / "poses.jsonl",
+        [msgspec.structs.replace(pose, stamp_ns=pose.stamp_ns + 10**12) for pose in poses],
+    )
     with pytest.raises(CaptureError, match="not of this capture"):
         score_result(Capture(capture), copy)
-    write_lines(copy / "poses.jsonl", [msgspec.structs.replace(pose, hand="left") for pose in poses])
+    write_lines(
+        copy / "poses.jsonl", [msgspec.structs.replace(pose, hand="left") for pose in poses]
+    )
     with pytest.raises(CaptureError, match="no pose of the right hand"):
         score_result(Capture(capture), copy)
     write_lines(copy / "poses.jsonl", [])

@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from rhot.errors import CaptureError
 from rhot.hand import DIGIT_ANGLES, DIGITS
 from rhot.messages import ObjectPose
-from services.cli.evaluate.score_math import coverage, delay_ms, score_hand, score_object, turn_error
+from services.cli.evaluate.score_math import (
+    coverage,
+    delay_ms,
+    score_hand,
+    score_object,
+    turn_error,
+)
 from services.cli.evaluate.truth_track import hand_track, object_track
 
 PERIOD_NS = 1e9 / 30.0
@@ -52,7 +58,9 @@ def test_late_content_is_measured_as_delay(made_up, late_ms):
 
 def test_noise_does_not_hide_the_delay(made_up):
     rng = np.random.default_rng(3)
-    poses = [made_up.pose(i / 30.0, late_s=0.020, shift_m=rng.normal(0.0, 0.003, 3)) for i in range(90)]
+    poses = [
+        made_up.pose(i / 30.0, late_s=0.020, shift_m=rng.normal(0.0, 0.003, 3)) for i in range(90)
+    ]
     assert scored(made_up, poses).delay_ms == pytest.approx(20.0, abs=3.0)
 
 
@@ -60,7 +68,12 @@ def test_a_still_hand_has_no_delay(made_up):
     truth = made_up.truths(1.0)
     still = [type(line)(stamp_ns=line.stamp_ns, hands=truth[0].hands, objects={}) for line in truth]
     first = made_up.pose(0.0)
-    poses = [type(first)(**{f: getattr(first, f) for f in first.__struct_fields__} | {"stamp_ns": line.stamp_ns}) for line in still]
+    poses = [
+        type(first)(
+            **{f: getattr(first, f) for f in first.__struct_fields__} | {"stamp_ns": line.stamp_ns}
+        )
+        for line in still
+    ]
     assert score_hand(poses, hand_track(still, "right"), made_up.model, PERIOD_NS).delay_ms is None
 
 
@@ -165,7 +178,10 @@ def object_pose(truth, i, *, registered=True, tracking="ok", shift_m=0.0):
 
 def test_an_object_is_scored_like_a_point(made_up):
     lines = made_up.truths()
-    poses = [object_pose(line, i, shift_m=0.002, tracking="lost" if i < 9 else "ok") for i, line in enumerate(lines)]
+    poses = [
+        object_pose(line, i, shift_m=0.002, tracking="lost" if i < 9 else "ok")
+        for i, line in enumerate(lines)
+    ]
     score = score_object(poses, object_track(lines, "cup"), PERIOD_NS)
     assert score.poses == 90
     assert score.scored == 81
@@ -177,7 +193,11 @@ def test_an_object_is_scored_like_a_point(made_up):
 
 def test_an_unregistered_object_is_counted_and_not_scored(made_up):
     lines = made_up.truths()
-    score = score_object([object_pose(line, 0, registered=False) for line in lines], object_track(lines, "cup"), PERIOD_NS)
+    score = score_object(
+        [object_pose(line, 0, registered=False) for line in lines],
+        object_track(lines, "cup"),
+        PERIOD_NS,
+    )
     assert score.unregistered == 90
     assert score.scored == 0
     assert score.position is None

@@ -18,17 +18,30 @@ def test_columns_line_up():
 
 
 def test_a_score_has_all_its_parts(made_up):
-    hand = score_hand(made_up.poses(shift_m=(0.0, 0.0, 0.003)), hand_track(made_up.truths(), "right"), made_up.model, 1e9 / 30)
+    hand = score_hand(
+        made_up.poses(shift_m=(0.0, 0.0, 0.003)),
+        hand_track(made_up.truths(), "right"),
+        made_up.model,
+        1e9 / 30,
+    )
     lost = ObjectScore(
         poses=3,
         scored=0,
         unregistered=3,
         position=None,
         orientation=None,
-        coverage=Coverage(expected=10, missed=10, missed_share=1.0, longest_gap_ms=100.0, outside=0),
+        coverage=Coverage(
+            expected=10, missed=10, missed_share=1.0, longest_gap_ms=100.0, outside=0
+        ),
         delay_ms=None,
     )
-    text = score_text(Score(hands={"right": msgspec.structs.replace(hand, delay_ms=None)}, objects={"cup": lost}, notes=["so it is"]))
+    text = score_text(
+        Score(
+            hands={"right": msgspec.structs.replace(hand, delay_ms=None)},
+            objects={"cup": lost},
+            notes=["so it is"],
+        )
+    )
     for part in ("thumb cmc", "3.00", "0 of 90 instants", "none", "note: so it is"):
         assert part in text
     row = next(line for line in text.splitlines() if line.startswith("cup"))

@@ -8,7 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rhot.errors import CaptureError
-from rhot.geometry.transforms import angle_between, quaternion_from_rotation, rotation_from_quaternion, rotation_from_vector
+from rhot.geometry.transforms import (
+    angle_between,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
 from services.cli.evaluate.truth_track import cubic, hand_track, inside, linear, object_track, slerp
 
 STAMPS = 1_700_000_000_000_000_000 + np.arange(31, dtype=np.int64) * 33_333_333
@@ -56,7 +61,12 @@ def test_a_hand_between_two_lines_is_the_hand_of_that_instant(made_up):
 def test_instants_outside_the_truth_are_told(made_up):
     track = hand_track(made_up.truths(), "right")
     first, last = track.stamps_ns[0], track.stamps_ns[-1]
-    assert inside(track, np.array([first - 1, first, last, last + 1])).tolist() == [False, True, True, False]
+    assert inside(track, np.array([first - 1, first, last, last + 1])).tolist() == [
+        False,
+        True,
+        True,
+        False,
+    ]
 
 
 def test_too_little_truth_or_two_lines_of_one_instant_is_an_error(made_up):

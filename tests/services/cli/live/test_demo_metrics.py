@@ -12,23 +12,44 @@ ANGLES = FingerAngles(abduction=0.0, mcp=0.0, pip=0.0, dip=0.0)
 
 
 def joints_at(x_m):
-    positions, _ = h.forward(h.default_hand("right"), np.eye(3), np.array([x_m, 0.0, 0.5]), np.zeros((5, 4)))
+    positions, _ = h.forward(
+        h.default_hand("right"), np.eye(3), np.array([x_m, 0.0, 0.5]), np.zeros((5, 4))
+    )
     return positions
 
 
 def truth(index, x_m):
-    points = {name: tuple(joints_at(x_m)[h.JOINT_INDEX[name]].tolist()) for name in h.BASIC_LANDMARKS}
+    points = {
+        name: tuple(joints_at(x_m)[h.JOINT_INDEX[name]].tolist()) for name in h.BASIC_LANDMARKS
+    }
     hand = HandTruth(points_m=points, wrist=WRIST, angles_rad=dict.fromkeys(h.DIGITS, ANGLES))
     return Truth(stamp_ns=START_NS + index * FRAME_NS, hands={"right": hand}, objects={})
 
 
 def pose(stamp_ns, x_m):
     joints = [
-        HandJoint(name=name, position_m=tuple(p.tolist()), orientation_wxyz=(1.0, 0.0, 0.0, 0.0), radius_m=0.01, source="solved")
+        HandJoint(
+            name=name,
+            position_m=tuple(p.tolist()),
+            orientation_wxyz=(1.0, 0.0, 0.0, 0.0),
+            radius_m=0.01,
+            source="solved",
+        )
         for name, p in zip(h.JOINTS, joints_at(x_m), strict=True)
     ]
-    fingers = [FingerPose(name=digit, angles_rad=ANGLES, residual_m=0.0, iterations=1, status="solved") for digit in h.DIGITS]
-    return HandPose(hand="right", seq=0, stamp_ns=stamp_ns, method="dls", wrist=WRIST, joints=joints, fingers=fingers)
+    fingers = [
+        FingerPose(name=digit, angles_rad=ANGLES, residual_m=0.0, iterations=1, status="solved")
+        for digit in h.DIGITS
+    ]
+    return HandPose(
+        hand="right",
+        seq=0,
+        stamp_ns=stamp_ns,
+        method="dls",
+        wrist=WRIST,
+        joints=joints,
+        fingers=fingers,
+    )
 
 
 def test_error_is_measured_against_truth_at_the_poses_own_instant():

@@ -37,7 +37,9 @@ def is_running(pid):
 
 
 async def test_a_killed_child_is_started_again(supervisor, heard):
-    task = asyncio.create_task(supervisor.keep(child("import time; print('up', flush=True); time.sleep(60)")))
+    task = asyncio.create_task(
+        supervisor.keep(child("import time; print('up', flush=True); time.sleep(60)"))
+    )
     await until(lambda: ("probe", "info", "up") in heard)
     first = supervisor.pids["probe"]
     os.kill(first, 9)
@@ -66,17 +68,23 @@ async def test_children_die_with_the_supervisor(tmp_path):
         "s = Supervisor(lambda *a: print(s.pids['probe'], flush=True))\n"
         "asyncio.run(s.keep(Child('probe', [sys.executable, '-c', 'import time; print(1, flush=True); time.sleep(60)'])))"
     )
-    parent = await asyncio.create_subprocess_exec(sys.executable, "-c", script, stdout=asyncio.subprocess.PIPE)
+    parent = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", script, stdout=asyncio.subprocess.PIPE
+    )
     async with asyncio.timeout(DEADLINE_S):
         pid = int(await parent.stdout.readline())
     parent.kill()
     await parent.wait()
-    await until(lambda: not is_running(pid) or "Z" in Path(f"/proc/{pid}/stat").read_text().split()[2])
+    await until(
+        lambda: not is_running(pid) or "Z" in Path(f"/proc/{pid}/stat").read_text().split()[2]
+    )
 
 
 async def test_json_log_lines_come_out_as_text(supervisor, heard):
     script = 'print(\'{"level": "warning", "text": "careful", "who": "x"}\', flush=True); print("plain"); import time; time.sleep(60)'
-    task = asyncio.create_task(supervisor.keep(child("import sys; sys.stdout.reconfigure(line_buffering=True)\n" + script)))
+    task = asyncio.create_task(
+        supervisor.keep(child("import sys; sys.stdout.reconfigure(line_buffering=True)\n" + script))
+    )
     await until(lambda: len(heard) >= 2)
     assert heard[:2] == [("probe", "warning", "careful"), ("probe", "info", "plain")]
     task.cancel()

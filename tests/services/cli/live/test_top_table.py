@@ -65,7 +65,9 @@ def test_running_silent_and_gone(watcher, health):
 
 def test_a_slow_stream_is_marked(watcher, health):
     watcher.token("solver", "main", True)
-    watcher.beat(msgspec.structs.replace(health, streams=[stream(ok=False, rate_hz=3.0, rejected=5)]), NOW_NS)
+    watcher.beat(
+        msgspec.structs.replace(health, streams=[stream(ok=False, rate_hz=3.0, rejected=5)]), NOW_NS
+    )
     board = watcher.board(NOW_NS)
     assert not board.healthy
     line = next(line for line in text(board).splitlines() if "hand/right/pose" in line)
@@ -75,4 +77,7 @@ def test_a_slow_stream_is_marked(watcher, health):
 
 def test_uninvited_services_are_listed_too(watcher, health):
     watcher.token("bridge", "vmc", True)
-    assert [(row.service, row.state) for row in watcher.board(NOW_NS).services] == [("solver", "absent"), ("bridge", "silent")]
+    assert [(row.service, row.state) for row in watcher.board(NOW_NS).services] == [
+        ("solver", "absent"),
+        ("bridge", "silent"),
+    ]

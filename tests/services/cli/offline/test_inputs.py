@@ -21,7 +21,9 @@ def rig(tmp_path):
 
 
 def video(path, frames=12):
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), 20.0, (64, 48))
+    writer = cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), 20.0, (64, 48)
+    )
     for value in range(frames):
         writer.write(np.full((48, 64, 3), 5 * value, np.uint8))
     writer.release()

@@ -20,7 +20,10 @@ def frames(camera, stamps):
     return [Frame(camera, i, stamp, 0.0, (2, 2), PICTURE, "bgr") for i, stamp in enumerate(stamps)]
 
 
-@given(st.lists(st.sets(st.integers(0, 100), max_size=20).map(sorted), min_size=1, max_size=4), st.randoms())
+@given(
+    st.lists(st.sets(st.integers(0, 100), max_size=20).map(sorted), min_size=1, max_size=4),
+    st.randoms(),
+)
 def test_frames_come_by_stamp_then_camera_whatever_the_order_of_cameras(stamps, random):
     streams = [frames(f"cam{number}", one) for number, one in enumerate(stamps)]
     expected = sorted((f.stamp_ns, f.camera) for stream in streams for f in stream)

@@ -12,7 +12,15 @@ LINE = Session(running=True, start_ns=1)
 
 
 def summary(**counts) -> Summary:
-    return Summary(rig="r", cameras={}, **(dict.fromkeys(STREAMS, 0) | counts), refusals={}, complete=True, warnings=[], notes=[])
+    return Summary(
+        rig="r",
+        cameras={},
+        **(dict.fromkeys(STREAMS, 0) | counts),
+        refusals={},
+        complete=True,
+        warnings=[],
+        notes=[],
+    )
 
 
 def write(folder, lines=1) -> None:

@@ -20,7 +20,20 @@ def simulate(*arguments):
 
 
 def test_a_capture_is_written_at_the_wanted_rate(tmp_path):
-    ran = simulate("wave", "--seconds", 0.3, "--seed", 4, "--fps", 60, "--speed", 2, "--out", tmp_path / "c", "--json")
+    ran = simulate(
+        "wave",
+        "--seconds",
+        0.3,
+        "--seed",
+        4,
+        "--fps",
+        60,
+        "--speed",
+        2,
+        "--out",
+        tmp_path / "c",
+        "--json",
+    )
     assert ran.exit_code == 0
     told = json.loads(ran.stdout)
     capture = Capture(tmp_path / "c")
@@ -40,13 +53,18 @@ def test_scenes_are_listed():
 
 
 def test_an_unknown_scene_or_a_missing_folder_says_what_is_valid(tmp_path):
-    for arguments, text in ((("fits", "--out", tmp_path / "c"), "did you mean 'fist'"), (("fist",), "needs a scene and a folder")):
+    for arguments, text in (
+        (("fits", "--out", tmp_path / "c"), "did you mean 'fist'"),
+        (("fist",), "needs a scene and a folder"),
+    ):
         error = simulate(*arguments).exception
         assert isinstance(error, ConfigError)
         assert text in str(error)
     assert not (tmp_path / "c").exists()
 
 
-@pytest.mark.parametrize("option", [("--seconds", "0"), ("--fps", "0"), ("--seed", "-1"), ("--speed", "99")])
+@pytest.mark.parametrize(
+    "option", [("--seconds", "0"), ("--fps", "0"), ("--seed", "-1"), ("--speed", "99")]
+)
 def test_absurd_values_are_refused(tmp_path, option):
     assert simulate("fist", "--out", tmp_path / "c", *option).exit_code == 2

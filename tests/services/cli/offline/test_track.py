@@ -30,12 +30,19 @@ def test_a_capture_becomes_markers_points_poses_and_objects_in_wire_format(captu
     summary = json.loads((result / "summary.json").read_text())
     assert summary["complete"]
     assert summary["warnings"] == []
-    assert [summary[name] for name in STREAMS] == [len(frames), len(points), len(poses), len(objects)]
+    assert [summary[name] for name in STREAMS] == [
+        len(frames),
+        len(points),
+        len(poses),
+        len(objects),
+    ]
     assert len(frames) == sum(one.total for one in job_of([str(capture)], None).inputs)
     assert 50 < len(poses) <= 62
     assert len(objects) == 180
     assert all(one.sent_ns == 0 for one in (*frames, *points, *poses, *objects))
-    assert [(f.stamp_ns, f.camera) for f in frames] == sorted((f.stamp_ns, f.camera) for f in frames)
+    assert [(f.stamp_ns, f.camera) for f in frames] == sorted(
+        (f.stamp_ns, f.camera) for f in frames
+    )
 
 
 def test_the_same_capture_gives_the_same_bytes(capture, result, tmp_path):
@@ -46,13 +53,19 @@ def test_the_same_capture_gives_the_same_bytes(capture, result, tmp_path):
 
 def test_videos_with_their_stamps_give_what_the_capture_gives(capture, result, tmp_path):
     """Colour videos are read as they are, so that only the pictures' way in differs."""
-    track([f"left={capture / 'left.mkv'}", f"right={capture / 'right.mkv'}"], tmp_path / "videos", capture / "rig.toml")
+    track(
+        [f"left={capture / 'left.mkv'}", f"right={capture / 'right.mkv'}"],
+        tmp_path / "videos",
+        capture / "rig.toml",
+    )
     for name in ("markers.jsonl", "poses.jsonl"):
         assert (tmp_path / "videos" / name).read_bytes() == (result / name).read_bytes()
 
 
 def test_one_camera_of_two_gives_markers_and_says_why_nothing_more(short_capture, tmp_path):
-    summary = track([f"left={short_capture / 'left.mkv'}"], tmp_path / "out", short_capture / "rig.toml")
+    summary = track(
+        [f"left={short_capture / 'left.mkv'}"], tmp_path / "out", short_capture / "rig.toml"
+    )
     assert summary.markers > 10
     assert (summary.points, summary.poses) == (0, 0)
     assert "needs two cameras" in summary.notes[0]
@@ -62,7 +75,14 @@ def test_without_a_hand_all_calibrated_colours_are_tracked(copy, tmp_path):
     text = (copy / "rig.toml").read_text()
     (copy / "rig.toml").write_text(text[: text.index("[hand]")] + text[text.index("[fusion]") :])
     summary = track([copy], tmp_path / "out")
-    assert set(summary.cameras["left"].colors) == {"violet", "magenta", "blue", "cyan", "green", "lime"}
+    assert set(summary.cameras["left"].colors) == {
+        "violet",
+        "magenta",
+        "blue",
+        "cyan",
+        "green",
+        "lime",
+    }
     assert "no [hand.right.markers]" in summary.notes[0]
 
 
@@ -123,7 +143,9 @@ def test_objects_without_registration_stay_where_they_are_and_it_is_told(copy, t
     (copy / "calibration" / "objects.json").unlink()
     summary = track([copy], tmp_path / "out")
     assert any("lighthouse frame" in note for note in summary.notes)
-    assert not any(pose.registered for pose in read_lines(tmp_path / "out" / "objects.jsonl", ObjectPose))
+    assert not any(
+        pose.registered for pose in read_lines(tmp_path / "out" / "objects.jsonl", ObjectPose)
+    )
 
 
 def test_a_broken_line_of_objects_is_an_error_with_its_number(copy, tmp_path):
@@ -141,16 +163,25 @@ def test_a_broken_rig_toml(copy, tmp_path):
 
 
 def test_a_real_ball_is_found_where_it_is_and_nowhere_else(rhot_data, tmp_path):
-    """1004 frames of a webcam; frame numbers read off the video by eye: the ball is out of sight four times."""
+    """1004 frames of a webcam.
+
+    Frame numbers read off the video by eye: the ball is out of sight four times.
+    """
     (tmp_path / "calibration").mkdir()
     (tmp_path / "rig.toml").write_text('[rig]\nname = "ball"\n')
     # The range the recording's README gives.
     colors = '{"colors": {"green": {"hsv_low": [35, 60, 40], "hsv_high": [85, 255, 255]}}}'
     (tmp_path / "calibration" / "cam.colors.json").write_text(colors)
-    summary = track([f"cam={rhot_data / 'color_video' / 'ball2.mp4'}"], tmp_path / "out", tmp_path / "rig.toml")
+    summary = track(
+        [f"cam={rhot_data / 'color_video' / 'ball2.mp4'}"], tmp_path / "out", tmp_path / "rig.toml"
+    )
     assert summary.cameras["cam"].frames == 1004
     assert summary.cameras["cam"].frames_with_markers >= 865
-    seen = {frame.seq for frame in read_lines(tmp_path / "out" / "markers.jsonl", MarkerFrame) if frame.markers}
+    seen = {
+        frame.seq
+        for frame in read_lines(tmp_path / "out" / "markers.jsonl", MarkerFrame)
+        if frame.markers
+    }
     for first, last in ((0, 26), (466, 486), (790, 822), (964, 1003)):
         assert not seen & set(range(first, last + 1))
 
@@ -162,5 +193,7 @@ def test_the_command_prints_a_summary_and_notes_and_nothing_else_on_a_pipe(short
     assert "note: markers only" in text.stderr
     assert "\r" not in text.stderr
     assert text.stdout.startswith("left: ")
-    found = CliRunner().invoke(application(), ["track", *sources, "--out", str(tmp_path / "b"), "--json"])
+    found = CliRunner().invoke(
+        application(), ["track", *sources, "--out", str(tmp_path / "b"), "--json"]
+    )
     assert json.loads(found.stdout)["cameras"]["left"]["frames"] > 10

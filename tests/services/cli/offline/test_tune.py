@@ -25,9 +25,17 @@ def messages() -> list[HandPoints]:
     for k in range(240):
         place = path(np.array([max(0.0, k / 30.0 - 4.0)]))[0, 2] + random.normal(0.0, 1e-3, 3)
         point = HandPoint(
-            name="index_tip", position_m=tuple(place.tolist()), sigma_m=(1e-3,) * 3, cameras=["left", "right"], source="measured"
+            name="index_tip",
+            position_m=tuple(place.tolist()),
+            sigma_m=(1e-3,) * 3,
+            cameras=["left", "right"],
+            source="measured",
         )
-        found.append(HandPoints(hand="right", seq=k, stamp_ns=START_NS + round(k * 1e9 / 30.0), points=[point]))
+        found.append(
+            HandPoints(
+                hand="right", seq=k, stamp_ns=START_NS + round(k * 1e9 / 30.0), points=[point]
+            )
+        )
     return found
 
 
@@ -48,7 +56,9 @@ def test_prints_a_table_and_toml_to_paste(result):
 
 
 def test_json_and_a_file(result):
-    run = CliRunner().invoke(tune, ["filter", str(result / "points.jsonl"), "--json", "--jitter", "0.7"])
+    run = CliRunner().invoke(
+        tune, ["filter", str(result / "points.jsonl"), "--json", "--jitter", "0.7"]
+    )
     assert run.exit_code == 0, run.output
     assert json.loads(run.output)["best"]["jitter_share"] <= 0.735
 
@@ -57,7 +67,12 @@ def test_reads_recordings(tmp_path):
     path, given = tmp_path / "hand.mcap", messages()[:5]
     with RecordingWriter(path, "desk") as writer:
         for message in given:
-            writer.add(topics.POINTS, topics.POINTS.key("desk", hand="right"), msgspec.json.encode(message), message.stamp_ns)
+            writer.add(
+                topics.POINTS,
+                topics.POINTS.key("desk", hand="right"),
+                msgspec.json.encode(message),
+                message.stamp_ns,
+            )
             writer.add(topics.SESSION, topics.SESSION.key("desk"), b"{}", message.stamp_ns)
     assert list(recorded_messages.messages(path, topics.POINTS, HandPoints, "points")) == given
 

@@ -75,8 +75,20 @@ def recording(tmp_path: Path) -> Path:
     return tmp_path / "some.mcap"
 
 
-def test_record_for_some_seconds(talking: str, rig_toml: Path, tmp_path: Path, invoke: Invoke) -> None:
-    said = invoke("record", "--config", rig_toml, "--connect", talking, "--seconds", 0.5, "--out", tmp_path / "x.mcap")
+def test_record_for_some_seconds(
+    talking: str, rig_toml: Path, tmp_path: Path, invoke: Invoke
+) -> None:
+    said = invoke(
+        "record",
+        "--config",
+        rig_toml,
+        "--connect",
+        talking,
+        "--seconds",
+        0.5,
+        "--out",
+        tmp_path / "x.mcap",
+    )
     count = len(list(read(tmp_path / "x.mcap")))
     assert count > 20
     assert f"{count} messages" in said
@@ -86,8 +98,20 @@ def test_record_for_some_seconds(talking: str, rig_toml: Path, tmp_path: Path, i
 
 def test_record_into_a_folder_until_ctrl_c(talking: str, rig_toml: Path, tmp_path: Path) -> None:
     code = "import typer; from services.cli.record.record import record; typer.run(record)"
-    command = [sys.executable, "-c", code, "--config", str(rig_toml), "--connect", talking, "--out", str(tmp_path / "r")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "--config",
+        str(rig_toml),
+        "--connect",
+        talking,
+        "--out",
+        str(tmp_path / "r"),
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stderr is not None
         assert "recording into" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
@@ -105,7 +129,9 @@ def test_record_nothing(router: str, rig_toml: Path, tmp_path: Path, invoke: Inv
     assert len(list((tmp_path / "recordings").iterdir())) == 1
 
 
-def test_no_router(endpoint: str, rig_toml: Path, recording: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_router(
+    endpoint: str, rig_toml: Path, recording: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("services.cli.router_session._REACH_S", 0.3)
     for arguments in (["record"], ["replay", recording]):
         with pytest.raises(BusError, match="no router answers"):
@@ -114,8 +140,13 @@ def test_no_router(endpoint: str, rig_toml: Path, recording: Path, invoke: Invok
 
 def test_replay(router: str, rig_toml: Path, recording: Path, invoke: Invoke) -> None:
     heard: queue.Queue[str] = queue.Queue()
-    with zenoh.open(client_config([router])) as session, session.declare_subscriber("rhot/**", lambda s: heard.put(str(s.key_expr))):
-        assert "replayed 20 messages" in invoke("replay", recording, "--config", rig_toml, "--connect", router, "--rate", 0)
+    with (
+        zenoh.open(client_config([router])) as session,
+        session.declare_subscriber("rhot/**", lambda s: heard.put(str(s.key_expr))),
+    ):
+        assert "replayed 20 messages" in invoke(
+            "replay", recording, "--config", rig_toml, "--connect", router, "--rate", 0
+        )
         keys = [heard.get(timeout=5.0) for _ in range(20)]
     assert keys == ["rhot/desk/camera/left/markers"] * 20
     assert heard.empty()

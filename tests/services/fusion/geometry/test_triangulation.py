@@ -10,7 +10,9 @@ from testing.synthetic_points import Setup
 
 
 def rays_of(cameras, p):
-    return np.array([(c.T_camera_from_rig[:3, :3] @ p + c.T_camera_from_rig[:3, 3]) for c in cameras])
+    return np.array(
+        [(c.T_camera_from_rig[:3, :3] @ p + c.T_camera_from_rig[:3, 3]) for c in cameras]
+    )
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
@@ -30,11 +32,21 @@ def test_covariance_tells_the_scatter(pair):
     random = np.random.default_rng(1)
     p, sigmas = np.array([0.08, -0.05, 0.7]), np.array([1.2e-4, 2.5e-4])
     q = rays_of(pair, p)
-    found = [triangulate(q[:, :2] / q[:, 2:] + random.normal(size=(2, 2)) * sigmas[:, None], sigmas, R, t, 2.0) for _ in range(3000)]
+    found = [
+        triangulate(
+            q[:, :2] / q[:, 2:] + random.normal(size=(2, 2)) * sigmas[:, None], sigmas, R, t, 2.0
+        )
+        for _ in range(3000)
+    ]
     errors = np.array([f.position_m - p for f in found])
     scatter, told = np.cov(errors.T), found[0].covariance_m2
     np.testing.assert_allclose(np.sqrt(np.diag(scatter)), np.sqrt(np.diag(told)), rtol=0.06)
-    nees = np.mean([e @ np.linalg.solve(f.covariance_m2, e) for e, f in zip(errors, found, strict=True)]) / 3.0
+    nees = (
+        np.mean(
+            [e @ np.linalg.solve(f.covariance_m2, e) for e, f in zip(errors, found, strict=True)]
+        )
+        / 3.0
+    )
     assert nees == pytest.approx(1.0, abs=0.06)
     assert np.mean([f.residual_sigma**2 for f in found]) == pytest.approx(1.0, abs=0.1)
 
@@ -47,7 +59,10 @@ def test_refusals_say_why(pair):
     assert far.status is TriangulationStatus.BEYOND
     crossed = triangulate(np.array([[-0.2, 0.0], [0.2, 0.0]]), sigmas, R, t, 2.0)
     assert crossed.status is TriangulationStatus.BEHIND
-    assert triangulate(np.zeros((1, 2)), sigmas[:1], R[:1], t[:1], 2.0).status is TriangulationStatus.PARALLEL
+    assert (
+        triangulate(np.zeros((1, 2)), sigmas[:1], R[:1], t[:1], 2.0).status
+        is TriangulationStatus.PARALLEL
+    )
     same = triangulate(np.zeros((2, 2)), sigmas, R[[0, 0]], t[[0, 0]], 2.0)
     assert same.status is TriangulationStatus.PARALLEL
 

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.intake.observations import CLOCK_SIGMA_MAX_S, SIGMA_MAX_PX, SIGMA_MIN_PX, Observer, Refusal, View
+from services.fusion.intake.observations import (
+    CLOCK_SIGMA_MAX_S,
+    SIGMA_MAX_PX,
+    SIGMA_MIN_PX,
+    Observer,
+    Refusal,
+    View,
+)
 from testing.synthetic_points import START_NS, Setup
 
 SETUP = Setup()
@@ -37,7 +44,9 @@ def observer() -> Observer:
 
 
 def test_each_marker_has_its_own_instant(observer):
-    view = observer.view(frame(marker("blue", y=0.0), marker("violet", y=479.0), clock_offset_ns=5_000_000))
+    view = observer.view(
+        frame(marker("blue", y=0.0), marker("violet", y=479.0), clock_offset_ns=5_000_000)
+    )
     assert isinstance(view, View)
     assert [observer.slots[slot].landmark for slot in view.slots] == ["wrist", "index_tip"]
     absolute_ns = (view.instant_ns - START_NS + 5_000_000) + 1e9 * view.delay_s
@@ -52,17 +61,30 @@ def test_rays_are_undistorted_and_sigma_is_per_ray(observer):
 
 
 def test_of_two_blobs_of_one_colour_the_better_counts(observer):
-    view = observer.view(frame(marker(x=10.0, quality=0.2), marker(x=400.0, quality=0.9), marker(x=20.0, quality=0.5)))
+    view = observer.view(
+        frame(
+            marker(x=10.0, quality=0.2), marker(x=400.0, quality=0.9), marker(x=20.0, quality=0.5)
+        )
+    )
     assert view.rays[0, 0] > 0.0
     assert view.ignored == 2
 
 
 def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(observer):
-    absurd = [marker(x=1e300), marker("cyan", y=-5.0), marker("green", x=float("nan")), marker("beige"), marker("lime", sigma=float("inf"))]
+    absurd = [
+        marker(x=1e300),
+        marker("cyan", y=-5.0),
+        marker("green", x=float("nan")),
+        marker("beige"),
+        marker("lime", sigma=float("inf")),
+    ]
     view = observer.view(frame(*absurd))
     assert len(view.slots) == 0
     assert view.ignored == 5
-    sigmas = observer.view(frame(marker(sigma=0.0), marker("cyan", sigma=1e9))).sigma * SETUP.rig()["left"].focal_px[0]
+    sigmas = (
+        observer.view(frame(marker(sigma=0.0), marker("cyan", sigma=1e9))).sigma
+        * SETUP.rig()["left"].focal_px[0]
+    )
     np.testing.assert_allclose(sigmas, [SIGMA_MIN_PX, SIGMA_MAX_PX], rtol=0.02)
 
 
@@ -70,7 +92,9 @@ def test_frames_of_no_use_say_why(observer):
     assert observer.view(frame(camera="door")) is Refusal.UNKNOWN_CAMERA
     assert observer.view(frame(size_px=(1280, 960))) is Refusal.WRONG_SIZE
     assert observer.view(frame(stamp_ns=0, clock_offset_ns=2**61)) is Refusal.ABSURD_STAMP
-    assert observer.view(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62))) is Refusal.ABSURD_STAMP
+    assert (
+        observer.view(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62))) is Refusal.ABSURD_STAMP
+    )
 
 
 def test_an_unknown_clock_is_as_bad_as_can_be(observer):
@@ -85,4 +109,7 @@ def test_two_hands_have_their_own_slots():
     hands = {**config.hand, "left": type(config.hand["right"])(markers=left)}
     observer = Observer(msgspec.structs.replace(config, hand=hands), SETUP.rig())
     view = observer.view(frame(marker("orange", x=50.0), marker("blue", x=500.0)))
-    assert [(observer.slots[s].hand, observer.slots[s].landmark) for s in view.slots] == [("left", "index_tip"), ("right", "index_tip")]
+    assert [(observer.slots[s].hand, observer.slots[s].landmark) for s in view.slots] == [
+        ("left", "index_tip"),
+        ("right", "index_tip"),
+    ]

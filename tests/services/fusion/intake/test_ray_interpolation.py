@@ -20,7 +20,11 @@ def track_of(function, times_s, sigma=1e-4) -> RayTrack:
     return track
 
 
-@given(st.tuples(coefficient, coefficient, coefficient, coefficient), st.floats(0.0, 1.0), st.floats(-0.3, 0.3))
+@given(
+    st.tuples(coefficient, coefficient, coefficient, coefficient),
+    st.floats(0.0, 1.0),
+    st.floats(-0.3, 0.3),
+)
 def test_hermite_is_exact_on_cubics(c, share, jitter):
     def cubic(t):
         return c[0] + c[1] * t + c[2] * t**2 + c[3] * t**3
@@ -46,7 +50,9 @@ def test_noise_passes_as_the_weights_say():
     weights = polynomial_weights(np.array([-1.5, -0.5, 0.5, 1.5]), 0.0)
     np.testing.assert_allclose(weights, np.array([-1.0, 9.0, 9.0, -1.0]) / 16.0, atol=1e-12)
     track = track_of(np.zeros_like, PERIOD_S * np.arange(4), sigma=1.0)
-    assert track.at(1.5 * PERIOD_S, "hermite", PERIOD_S).sigma == pytest.approx(np.linalg.norm(weights))
+    assert track.at(1.5 * PERIOD_S, "hermite", PERIOD_S).sigma == pytest.approx(
+        np.linalg.norm(weights)
+    )
 
 
 def test_waits_for_what_it_needs_and_says_when_it_has_less():
@@ -71,7 +77,9 @@ def test_order_does_not_matter_twice_does_not_count_and_memory_is_bounded():
     shuffled = track_of(np.sin, times[[3, 0, 5, 1, 4, 2, 2, 3]])
     ordered = track_of(np.sin, times)
     for at in np.linspace(times[0], 0.99 * times[-1], 20):
-        np.testing.assert_array_equal(shuffled.at(at, "hermite", PERIOD_S).ray, ordered.at(at, "hermite", PERIOD_S).ray)
+        np.testing.assert_array_equal(
+            shuffled.at(at, "hermite", PERIOD_S).ray, ordered.at(at, "hermite", PERIOD_S).ray
+        )
     long = track_of(np.sin, PERIOD_S * np.arange(1000))
     assert len(long.newest(1000)) == SAMPLES
     long.add(0.0, np.zeros(2), 1.0)

@@ -14,10 +14,16 @@ EXACT = Setup(clock_error_s=0.0, clock_sigma_s=2e-5, loss=0.0)
 
 
 def test_the_first_points_of_a_track_are_honest(bench_of):
-    """Test: 30 hands come into view at 0.5 m/s. Expected: the second to tenth instants are within their sigmas, bar a little."""
+    """Test: 30 hands come into view at 0.5 m/s.
+
+    Expected: the second to tenth instants are within their sigmas, bar a little.
+    """
     squared = []
     for seed in range(30):
-        path, bench = Path(seed=seed), bench_of(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5))
+        path, bench = (
+            Path(seed=seed),
+            bench_of(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5)),
+        )
         for frame in frames(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5), path, 0.4):
             instant_s = bench.see(frame)
             found = bench.method.estimate(instant_s)
@@ -50,7 +56,10 @@ def test_one_camera_alone_begins_nothing(bench_of):
 def test_a_wild_observation_is_gated_and_the_track_goes_on(bench_of):
     bench, path = bench_of(EXACT), Path()
     given = frames(EXACT, path, 2.0)
-    given[100] = msgspec.structs.replace(given[100], markers=[msgspec.structs.replace(m, x_px=m.x_px * 0.9) for m in given[100].markers])
+    given[100] = msgspec.structs.replace(
+        given[100],
+        markers=[msgspec.structs.replace(m, x_px=m.x_px * 0.9) for m in given[100].markers],
+    )
     for frame in given:
         instant_s = bench.see(frame)
     assert bench.method.counts.gated == 6
@@ -74,27 +83,40 @@ def test_a_marker_that_jumps_for_good_is_found_again(bench_of):
 
 def test_hold_is_at_least_the_gap_between_two_frames(bench_of):
     bench = bench_of(EXACT, Fusion(hold_s=0.0))
-    found = [bench.method.estimate(bench.see(frame)).found.all() for frame in frames(EXACT, Path(), 1.0)]
+    found = [
+        bench.method.estimate(bench.see(frame)).found.all() for frame in frames(EXACT, Path(), 1.0)
+    ]
     assert all(found[10:])
 
 
 def test_cameras_that_were_never_there_do_not_matter(bench_of):
     bench = bench_of(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5))
-    for frame in frames(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5), Path(), 1.0):
+    for frame in frames(
+        Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5), Path(), 1.0
+    ):
         if frame.camera in ("right", "camera4"):
             instant_s = bench.see(frame)
     found = bench.method.estimate(instant_s)
     assert found.measured.all()
     assert found.cameras.sum(axis=0).tolist() == [0, 6, 0, 6]
-    assert found.positions_m[:, 2] == pytest.approx(Path()(np.array([instant_s]))[0][:, 2], abs=0.01)
+    assert found.positions_m[:, 2] == pytest.approx(
+        Path()(np.array([instant_s]))[0][:, 2], abs=0.01
+    )
 
 
 def test_a_camera_far_later_than_the_other_takes_part(bench_of):
-    """Test: one camera's frames arrive .2 s after the other's. Expected: tracks begin, and where both have looked, they are as exact."""
+    """Test: one camera's frames arrive .2 s after the other's.
+
+    Expected: tracks begin, and where both have looked, they are as exact.
+    """
     bench, path = bench_of(EXACT, Fusion(hold_s=0.5)), Path()
     late_s, errors = {"left": 0.0, "right": 0.2}, []
     given = frames(EXACT, path, 3.0)
-    given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
+    given.sort(
+        key=lambda frame: (
+            (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera]
+        )
+    )
     for frame in given:
         instant_s = bench.see(frame)
         if instant_s > 1.0 and frame.camera == "right":

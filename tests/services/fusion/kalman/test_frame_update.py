@@ -15,7 +15,10 @@ DENSITIES = np.array([1.0, 100.0])
 
 
 def test_every_observation_is_remembered_and_told_of():
-    """Test: a landmark that fits, one that contradicts, one without a track. Expected: three codes; only what fits counts as seen."""
+    """Test: a landmark that fits, one that contradicts, one without a track.
+
+    Expected: three codes; only what fits counts as seen.
+    """
     R, t = extrinsics(tuple(Setup().rig().values()))
     ring, rest, looks = empty_ring(3, 2), empty_rest([np.arange(3)]), no_looks(3, 2)
     for slot in (0, 1):
@@ -24,7 +27,9 @@ def test_every_observation_is_remembered_and_told_of():
     rays = q[:, :2] / q[:, 2:]
     rays[1] += 0.3
     times_s, sigmas = np.array([0.010, 0.011, 0.012]), np.array([1e-4, 2e-4, 3e-4])
-    codes = take_in(ring, rest, looks, np.arange(3), times_s, 1, rays, sigmas, 1e-4, 30.0, R, t, DENSITIES, True)
+    codes = take_in(
+        ring, rest, looks, np.arange(3), times_s, 1, rays, sigmas, 1e-4, 30.0, R, t, DENSITIES, True
+    )
     assert codes.tolist() == [ACCEPTED, GATED, NO_TRACK]
     np.testing.assert_array_equal(looks.look_s[:, 1, 0], times_s)
     np.testing.assert_array_equal(looks.looked_s[:, 1], times_s)
@@ -48,8 +53,36 @@ def test_the_latest_looks_are_kept_and_remembered_ones_are_not_kept_twice():
     ring, rest, looks = empty_ring(1, 2), empty_rest([np.arange(1)]), no_looks(1, 2)
     for k in range(KEPT + 3):
         take_in(
-            ring, rest, looks, np.zeros(1, int), np.array([k / 30]), 0, np.zeros((1, 2)), np.full(1, 1e-4), 0.0, 30.0, R, t, DENSITIES, True
+            ring,
+            rest,
+            looks,
+            np.zeros(1, int),
+            np.array([k / 30]),
+            0,
+            np.zeros((1, 2)),
+            np.full(1, 1e-4),
+            0.0,
+            30.0,
+            R,
+            t,
+            DENSITIES,
+            True,
         )
-    take_in(ring, rest, looks, np.zeros(1, int), np.array([9.0]), 0, np.zeros((1, 2)), np.full(1, 1e-4), 0.0, 30.0, R, t, DENSITIES, False)
+    take_in(
+        ring,
+        rest,
+        looks,
+        np.zeros(1, int),
+        np.array([9.0]),
+        0,
+        np.zeros((1, 2)),
+        np.full(1, 1e-4),
+        0.0,
+        30.0,
+        R,
+        t,
+        DENSITIES,
+        False,
+    )
     np.testing.assert_allclose(np.sort(looks.look_s[0, 0]), np.arange(3, KEPT + 3) / 30)
     assert looks.looked_s[0, 0] == (KEPT + 2) / 30

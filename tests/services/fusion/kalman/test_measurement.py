@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from services.fusion.geometry.triangulation import extrinsics
-from services.fusion.kalman.measurement import NOT_VISIBLE, correct, distance_squared, innovate, project
+from services.fusion.kalman.measurement import (
+    NOT_VISIBLE,
+    correct,
+    distance_squared,
+    innovate,
+    project,
+)
 
 
 def observe(state, cov, R, t, seen, variances):
     H, nu, Si, gain = np.zeros((2, 3)), np.zeros(2), np.zeros((2, 2)), np.zeros((9, 2))
-    likelihood = innovate(state, cov, R, t, np.asarray(seen), np.asarray(variances), H, nu, Si, gain)
+    likelihood = innovate(
+        state, cov, R, t, np.asarray(seen), np.asarray(variances), H, nu, Si, gain
+    )
     return likelihood, H, nu, Si, gain
 
 
@@ -22,7 +30,9 @@ def test_projection_agrees_with_the_camera_and_its_derivative_with_finite_differ
         for c, camera in enumerate(pair):
             ray, H = np.zeros(2), np.zeros((2, 3))
             assert project(p, R[c], t[c], ray, H)
-            np.testing.assert_allclose(camera.pixels_from_rays(ray)[0], camera.project(p)[0], atol=1e-9)
+            np.testing.assert_allclose(
+                camera.pixels_from_rays(ray)[0], camera.project(p)[0], atol=1e-9
+            )
             numeric, step = np.zeros((2, 3)), 1e-6
             for j in range(3):
                 up, down, unused = np.zeros(2), np.zeros(2), np.zeros((2, 3))
@@ -41,11 +51,17 @@ def test_update_is_the_textbook_formula(pair):
     likelihood, H, nu, Si, gain = observe(state, cov, R[1], t[1], [0.02, 0.01], variances)
     full = np.hstack([H, np.zeros((2, 6))])
     image_velocity = H @ state[3:6]
-    S = full @ cov @ full.T + variances[0] * np.eye(2) + variances[1] * np.outer(image_velocity, image_velocity)
+    S = (
+        full @ cov @ full.T
+        + variances[0] * np.eye(2)
+        + variances[1] * np.outer(image_velocity, image_velocity)
+    )
     np.testing.assert_allclose(Si, np.linalg.inv(S), rtol=1e-9)
     np.testing.assert_allclose(gain, cov @ full.T @ np.linalg.inv(S), rtol=1e-9)
     assert distance_squared(nu, Si) == pytest.approx(nu @ np.linalg.inv(S) @ nu)
-    assert likelihood == pytest.approx(-0.5 * (nu @ np.linalg.inv(S) @ nu + np.log(np.linalg.det(2.0 * np.pi * S))))
+    assert likelihood == pytest.approx(
+        -0.5 * (nu @ np.linalg.inv(S) @ nu + np.log(np.linalg.det(2.0 * np.pi * S)))
+    )
     new_state, new_cov = state.copy(), cov.copy()
     correct(new_state, new_cov, H, nu, gain)
     np.testing.assert_allclose(new_state, state + gain @ nu, atol=1e-12)

@@ -15,7 +15,9 @@ ALONE = [[landmark] for landmark in range(6)]
 
 
 def follow(bench, path, seconds, given=None):
-    """Errors (n, 6, 3) and sigmas (n, 6, 3) without lag after two seconds, and belief (n, 6) of all."""
+    """Errors (n, 6, 3) and sigmas (n, 6, 3) without lag after two seconds, and belief (n, 6) of
+    all.
+    """
     errors, sigmas, beliefs = [], [], []
     for frame in given or frames(RIG, path, seconds):
         instant_s = bench.see(frame)
@@ -34,7 +36,10 @@ def rms_mm(errors) -> float:
 
 @pytest.mark.parametrize(("distance_m", "share"), [(0.5, 0.85), (1.0, 0.65)])
 def test_a_resting_hand_is_known_better_than_its_markers_alone(bench_of, distance_m, share):
-    """Test: a hand that sways by millimetres. Expected: less error in depth and sideways, and sigmas that say so."""
+    """Test: a hand that sways by millimetres.
+
+    Expected: less error in depth and sideways, and sigmas that say so.
+    """
     path = Sway(distance_m=distance_m)
     together, sigmas, _ = follow(bench_of(RIG), path, 8.0)
     alone, _, _ = follow(bench_of(RIG, hands=ALONE), path, 8.0)
@@ -44,7 +49,10 @@ def test_a_resting_hand_is_known_better_than_its_markers_alone(bench_of, distanc
 
 
 def test_a_finger_that_plays_is_left_to_itself(bench_of):
-    """Test: one of six moves by a centimetre. Expected: it is as exact as alone, the others go on sharing their motion."""
+    """Test: one of six moves by a centimetre.
+
+    Expected: it is as exact as alone, the others go on sharing their motion.
+    """
     path = Sway(plays=3)
     together, _, beliefs = follow(bench_of(RIG), path, 6.0)
     alone, _, _ = follow(bench_of(RIG, hands=ALONE), path, 6.0)
@@ -64,7 +72,10 @@ def test_a_moving_hand_is_what_it_is_without_sharing(bench_of):
 
 
 def test_rest_is_noticed_within_a_second_and_left_at_once(bench_of):
-    """Test: a hand sweeps, rests from the third second on; then it sweeps again. Expected: shared when at rest, no error when it starts."""
+    """Test: a hand sweeps, rests from the third second on; then it sweeps again.
+
+    Expected: shared when at rest, no error when it starts.
+    """
     coming = Sway(still_from_s=3.0)
     _, _, beliefs = follow(bench_of(RIG), coming, 5.0)
     assert beliefs[-30:].mean() > 0.85
@@ -80,45 +91,68 @@ def test_rest_is_noticed_within_a_second_and_left_at_once(bench_of):
 
 
 def test_late_frames_have_their_share(bench_of):
-    """Test: one camera's frames arrive two frames late. Expected: depth as good as in order, but for what the newest would add."""
+    """Test: one camera's frames arrive two frames late.
+
+    Expected: depth as good as in order, but for what the newest would add.
+    """
     path = Sway()
     given = frames(RIG, path, 8.0)
     late_s = {"left": 0.0, "right": 0.066}
-    given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
+    given.sort(
+        key=lambda frame: (
+            (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera]
+        )
+    )
     bench = bench_of(RIG)
     errors, beliefs = [], []
     for frame in given:
         instant_s = bench.see(frame)
         beliefs.append(bench.method.rest_beliefs())
         if instant_s > 2.0 and frame.camera == "left":
-            errors.append(bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0])
+            errors.append(
+                bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0]
+            )
     assert np.mean(beliefs[120:], axis=0).min() > 0.7
     assert rms_mm(np.array(errors)[..., 2]) < 1.5
 
 
 def test_frames_too_late_for_the_body_leave_the_landmarks_to_themselves(bench_of):
-    """Test: one camera's frames come .15 s late, later than REACH_S. Expected: as without sharing, not a body that one camera steers."""
+    """Test: one camera's frames come .15 s late, later than REACH_S.
+
+    Expected: as without sharing, not a body that one camera steers.
+    """
     path, rms = Sway(), []
     given = frames(RIG, path, 6.0)
     late_s = {"left": 0.0, "right": 0.15}
-    given.sort(key=lambda frame: (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera])
+    given.sort(
+        key=lambda frame: (
+            (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 + late_s[frame.camera]
+        )
+    )
     for hands in ((range(6),), ALONE):
         bench, errors = bench_of(RIG, Fusion(hold_s=0.5), hands), []
         for frame in given:
             instant_s = bench.see(frame)
             if instant_s > 2.0 and frame.camera == "left":
-                errors.append(bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0])
+                errors.append(
+                    bench.method.estimate(instant_s).positions_m - path(np.array([instant_s]))[0]
+                )
         rms.append(rms_mm(np.array(errors)))
     assert rms[0] < 1.05 * rms[1]
 
 
 def test_a_hidden_marker_grows_uncertain_in_a_resting_hand(bench_of):
-    """Test: nobody sees one marker of six any more. Expected: its sigma grows until it is dropped; it may have moved."""
+    """Test: nobody sees one marker of six any more. Expected: its sigma grows until it is dropped.
+
+    It may have moved.
+    """
     bench, depths = bench_of(RIG), []
     for frame in frames(RIG, Sway(), 4.0):
         instant_s = (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9
         if instant_s > 3.0:
-            frame = msgspec.structs.replace(frame, markers=[marker for marker in frame.markers if marker.color != COLORS[3]])
+            frame = msgspec.structs.replace(
+                frame, markers=[marker for marker in frame.markers if marker.color != COLORS[3]]
+            )
         found = bench.method.estimate(bench.see(frame))
         if instant_s > 2.95 and found.found[3]:
             depths.append(float(np.sqrt(found.covariances_m2[3, 2, 2])))

@@ -8,7 +8,18 @@ import pytest
 from services.fusion.geometry.triangulation import extrinsics
 from services.fusion.kalman.measurement import NOT_VISIBLE
 from services.fusion.kalman.motion_model import transition, unit_noise
-from services.fusion.kalman.rigid_body import LOST, SHIFT_DENSITY, TURN_DENSITY, WANDER, advance, begin, empty_rest, look, lost, moved
+from services.fusion.kalman.rigid_body import (
+    LOST,
+    SHIFT_DENSITY,
+    TURN_DENSITY,
+    WANDER,
+    advance,
+    begin,
+    empty_rest,
+    look,
+    lost,
+    moved,
+)
 from testing.synthetic_points import Setup
 
 CENTRE = np.array([0.03, 0.01, 0.7])
@@ -38,11 +49,16 @@ def test_displacement_is_shift_and_turn_about_the_centre(rest):
     shift, turn = np.array([1e-3, -2e-3, 3e-3]), np.array([2e-3, 1e-3, -3e-3])
     for slot in range(3):
         expected = shift + np.cross(turn, ANCHORS[slot] - CENTRE)
-        np.testing.assert_allclose(levers(rest, slot) @ np.concatenate([shift, turn]), expected, atol=1e-15)
+        np.testing.assert_allclose(
+            levers(rest, slot) @ np.concatenate([shift, turn]), expected, atol=1e-15
+        )
 
 
 def test_advancing_is_the_textbook_prediction(rest):
-    """Test: 20 ms. Expected: F P F^T + Q; anchors carried by the displacement, which is then nothing; as if asked for without advancing."""
+    """Test: 20 ms. Expected: F P F^T + Q.
+
+    Anchors carried by the displacement, which is then nothing; as if asked for without advancing.
+    """
     place, J = np.empty(3), np.empty((3, 6))
     moved(rest, 1, 0.02, place, J)
     motion, cov, noise = rest.motion[0].copy(), rest.cov[0].copy(), np.empty((3, 3))
@@ -62,7 +78,10 @@ def test_advancing_is_the_textbook_prediction(rest):
 
 @pytest.mark.parametrize("later_s", [0.0, -0.03, 0.002])
 def test_a_look_is_a_kalman_update_of_body_and_anchor(rest, later_s):
-    """Test: against the dense formula for the joint state of 18 + 3. Expected: equal, the cross-covariance left out."""
+    """Test: against the dense formula for the joint state of 18 + 3.
+
+    Expected: equal, the cross-covariance left out.
+    """
     R, t = extrinsics(tuple(Setup().rig().values()))
     place, J = np.empty(3), np.empty((3, 6))
     moved(rest, 0, later_s, place, J)
@@ -78,8 +97,12 @@ def test_a_look_is_a_kalman_update_of_body_and_anchor(rest, later_s):
     expected = np.concatenate([rest.motion[0].ravel(), rest.anchor[0]]) + K @ nu
     after = P - K @ H @ P
     likelihood = look(rest, 0, later_s, q[:2] / q[2] + nu, variances, R[1], t[1], True, 30.0)
-    assert likelihood == pytest.approx(-0.5 * (nu @ np.linalg.solve(S, nu) + np.log(np.linalg.det(S))) - np.log(2.0 * np.pi))
-    np.testing.assert_allclose(np.concatenate([rest.motion[0].ravel(), rest.anchor[0]]), expected, rtol=1e-9, atol=1e-12)
+    assert likelihood == pytest.approx(
+        -0.5 * (nu @ np.linalg.solve(S, nu) + np.log(np.linalg.det(S))) - np.log(2.0 * np.pi)
+    )
+    np.testing.assert_allclose(
+        np.concatenate([rest.motion[0].ravel(), rest.anchor[0]]), expected, rtol=1e-9, atol=1e-12
+    )
     np.testing.assert_allclose(rest.cov[0], after[:18, :18], rtol=1e-7, atol=1e-14)
     np.testing.assert_allclose(rest.anchor_cov[0], after[18:, 18:], rtol=1e-7, atol=1e-16)
 

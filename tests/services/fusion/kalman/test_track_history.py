@@ -1,4 +1,6 @@
-"""The ring: equal to a dense filter and Rauch-Tung-Striebel smoother, in whatever order observations come."""
+"""The ring: equal to a dense filter and Rauch-Tung-Striebel smoother, in whatever order
+observations come.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,16 @@ import pytest
 
 from services.fusion.geometry.triangulation import extrinsics
 from services.fusion.kalman.motion_model import transition, unit_noise
-from services.fusion.kalman.track_history import ACCEPTED, GATED, LATE, NODES, empty_ring, insert, query_all, start
+from services.fusion.kalman.track_history import (
+    ACCEPTED,
+    GATED,
+    LATE,
+    NODES,
+    empty_ring,
+    insert,
+    query_all,
+    start,
+)
 from testing.synthetic_points import Setup
 
 DENSITIES = np.array([40.0])
@@ -33,7 +44,9 @@ def world():
 
 def put(ring, look, R, t, gate=np.inf, densities=DENSITIES) -> int:
     time_s, camera, ray = look
-    return int(insert(ring, 0, time_s, camera, ray, np.array([SIGMA**2, 0.0]), gate, R, t, densities))
+    return int(
+        insert(ring, 0, time_s, camera, ray, np.array([SIGMA**2, 0.0]), gate, R, t, densities)
+    )
 
 
 def ask(ring, time_s, densities=DENSITIES):
@@ -52,7 +65,9 @@ def filled(world, order=None, densities=DENSITIES):
 
 
 def rts(ring):
-    """Smoothed states of all nodes from the stored filtered ones, by Rauch, Tung and Striebel's recursion."""
+    """Smoothed states of all nodes from the stored filtered ones, by Rauch, Tung and Striebel's
+    recursion.
+    """
     nodes = ring.order[0, : ring.filled[0]]
     x, P, times = ring.state[0, nodes, 0], ring.cov[0, nodes, 0], ring.time_s[0, nodes]
     xs, Ps = x.copy(), P.copy()
@@ -75,7 +90,9 @@ def test_smoothing_equals_rauch_tung_striebel(world):
         mean, cov = ask(ring, times[k])
         np.testing.assert_allclose(mean, xs[k, :6], rtol=0, atol=1e-8)
         scale = np.sqrt(np.diag(Ps[k])[:6])
-        np.testing.assert_allclose(cov / np.outer(scale, scale), Ps[k, :6, :6] / np.outer(scale, scale), rtol=0, atol=1e-3)
+        np.testing.assert_allclose(
+            cov / np.outer(scale, scale), Ps[k, :6, :6] / np.outer(scale, scale), rtol=0, atol=1e-3
+        )
 
 
 def test_between_observations_the_estimate_runs_smoothly(world):
@@ -97,7 +114,9 @@ def test_the_order_of_arrival_hardly_matters(world):
     """Only the derivatives of the projection are taken at slightly different places."""
     ordered, shuffled = filled(world), filled(world, order=[0, 1, 3, 2, 5, 4, 8, 6, 7, 9, 11, 10])
     for time_s in (0.05, 0.1, 0.19):
-        np.testing.assert_allclose(ask(ordered, time_s)[0][:3], ask(shuffled, time_s)[0][:3], atol=5e-5)
+        np.testing.assert_allclose(
+            ask(ordered, time_s)[0][:3], ask(shuffled, time_s)[0][:3], atol=5e-5
+        )
 
 
 def test_smoothing_reduces_and_prediction_grows_the_variance(world):
@@ -137,14 +156,23 @@ def test_belief_goes_to_the_model_that_fits(world):
         for k in range(1, 60):
             p = START_M + ([0.0, 0.05 * np.sin(k * 0.5), 0.0] if lively else 0.0)
             q = R[k % 2] @ p + t[k % 2]
-            put(ring, (k / 60.0, k % 2, q[:2] / q[2] + random.normal(0.0, SIGMA, 2)), R, t, densities=densities)
+            put(
+                ring,
+                (k / 60.0, k % 2, q[:2] / q[2] + random.normal(0.0, SIGMA, 2)),
+                R,
+                t,
+                densities=densities,
+            )
         belief = ring.belief[0, ring.order[0, ring.filled[0] - 1]]
         assert belief.sum() == pytest.approx(1.0)
         assert np.argmax(belief) == int(lively)
 
 
 def test_evidence_is_how_likely_the_latest_observation_was(world):
-    """Test: one model; its innovation is Gaussian. Expected: the log-density of the textbook, and less of it for what fits less."""
+    """Test: one model; its innovation is Gaussian.
+
+    Expected: the log-density of the textbook, and less of it for what fits less.
+    """
     R, t, looks = world
     ring = filled(world)
     node = ring.order[0, ring.filled[0] - 1]

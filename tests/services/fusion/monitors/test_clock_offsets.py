@@ -14,10 +14,14 @@ from testing.synthetic_points import START_NS, Path, Setup, frames
 FPS = 30.0
 
 
-def teach(setup: Setup, path: Path, seconds: float, *, enabled: bool = True, edit=lambda frame: frame) -> ClockTuner:
+def teach(
+    setup: Setup, path: Path, seconds: float, *, enabled: bool = True, edit=lambda frame: frame
+) -> ClockTuner:
     cameras = setup.rig()
     observer = Observer(setup.config(), cameras)
-    tuner = ClockTuner(tuple(cameras.values()), 6, np.full(len(cameras), 1.0 / FPS), enabled=enabled)
+    tuner = ClockTuner(
+        tuple(cameras.values()), 6, np.full(len(cameras), 1.0 / FPS), enabled=enabled
+    )
     for frame in frames(setup, path, seconds):
         view = observer.view(edit(frame))
         tuner.observe(view, (view.instant_ns - START_NS) * 1e-9 + view.delay_s)
@@ -29,7 +33,8 @@ def disagreement_ms(tuner: ClockTuner) -> float:
     return 1e3 * (late["right"] - late["left"])
 
 
-# Announced offsets are too large by +error for the left and -error for the right camera: the left camera's stamps come out early.
+# Announced offsets are too large by +error for the left and -error for the right camera: the left
+# camera's stamps come out early.
 @pytest.mark.parametrize("error_s", [-0.0005, 0.0005, 0.005])
 def test_learns_what_the_announced_offsets_are_wrong_by(error_s):
     tuner = teach(Setup(clock_error_s=error_s, clock_sigma_s=2 * abs(error_s)), Path(), 6.0)
@@ -39,7 +44,12 @@ def test_learns_what_the_announced_offsets_are_wrong_by(error_s):
 
 
 def test_clocks_nobody_knows_are_found_within_two_seconds():
-    tuner = teach(Setup(clock_error_s=0.012), Path(), 2.5, edit=lambda frame: _replace(frame, clock_sigma_ns=-1))
+    tuner = teach(
+        Setup(clock_error_s=0.012),
+        Path(),
+        2.5,
+        edit=lambda frame: _replace(frame, clock_sigma_ns=-1),
+    )
     assert disagreement_ms(tuner) == pytest.approx(24.0, abs=0.3)
 
 
@@ -62,7 +72,10 @@ def _nothing(tuner):
 
 def test_a_bumped_camera_shows_as_a_constant_height():
     def bump(frame):
-        lifted = [_replace(marker, y_px=marker.y_px + 1.5 * (frame.camera == "right")) for marker in frame.markers]
+        lifted = [
+            _replace(marker, y_px=marker.y_px + 1.5 * (frame.camera == "right"))
+            for marker in frame.markers
+        ]
         return _replace(frame, markers=lifted)
 
     tuner = teach(Setup(clock_error_s=0.0, clock_sigma_s=1e-4), Path(), 4.0, edit=bump)
@@ -83,7 +96,11 @@ def test_a_clock_that_is_set_begins_anew():
     def corrected(frame):
         """After 3 s the right camera's clock estimate jumps to the truth, as the left's."""
         late = frame.stamp_ns - START_NS > 3_000_000_000
-        return _replace(frame, clock_offset_ns=frame.clock_offset_ns - late * (3_000_000 if frame.camera == "left" else -3_000_000))
+        return _replace(
+            frame,
+            clock_offset_ns=frame.clock_offset_ns
+            - late * (3_000_000 if frame.camera == "left" else -3_000_000),
+        )
 
     assert given
     tuner = teach(setup, path, 6.0, edit=corrected)
@@ -91,7 +108,9 @@ def test_a_clock_that_is_set_begins_anew():
 
 
 def test_three_cameras_learn_from_every_pair():
-    tuner = teach(Setup(cameras=3, phase_s=1 / 90, clock_error_s=0.002, clock_sigma_s=0.004), Path(), 6.0)
+    tuner = teach(
+        Setup(cameras=3, phase_s=1 / 90, clock_error_s=0.002, clock_sigma_s=0.004), Path(), 6.0
+    )
     late = tuner.late_s
     assert 1e3 * (late["right"] - late["left"]) == pytest.approx(4.0, abs=0.2)
     assert 1e3 * (late["camera3"] - late["left"]) == pytest.approx(0.0, abs=0.2)
@@ -101,6 +120,7 @@ def test_correction_is_worth_millimetres(run):
     setup, path = Setup(clock_error_s=0.003, clock_sigma_s=0.003), Path()
     _, tuned = run(setup, path, Fusion(lag_frames=2))
     _, plain = run(setup, path, Fusion(lag_frames=2, tune_clocks=False))
-    # Even untuned, a claimed uncertainty of the clocks makes the filter distrust the direction of motion: 6 ms would be 16 mm otherwise.
+    # Even untuned, a claimed uncertainty of the clocks makes the filter distrust the direction of
+    # motion: 6 ms would be 16 mm otherwise.
     assert tuned.rms_mm < 1.0
     assert plain.rms_mm > 2.0

@@ -8,7 +8,16 @@ import pytest
 from rhot.hand import default_hand
 from services.fusion.output.hand_plausibility import coherent, reach_m
 
-HAND_M = np.array([[0.0, 0.09, 0.5], [-0.07, 0.02, 0.5], [-0.03, -0.05, 0.49], [0.0, -0.07, 0.49], [0.03, -0.06, 0.5], [0.05, -0.03, 0.51]])
+HAND_M = np.array(
+    [
+        [0.0, 0.09, 0.5],
+        [-0.07, 0.02, 0.5],
+        [-0.03, -0.05, 0.49],
+        [0.0, -0.07, 0.49],
+        [0.03, -0.06, 0.5],
+        [0.05, -0.03, 0.51],
+    ]
+)
 SURE = np.tile(1e-6 * np.eye(3), (6, 1, 1))
 ALL = np.ones(6, dtype=bool)
 

@@ -1,4 +1,6 @@
-"""Where the centroid of a painted finger tip is: by ray-casting two cameras, against surface.py and patch.py."""
+"""Where the centroid of a painted finger tip is: by ray-casting two cameras, against surface.py and
+patch.py.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ EYES = np.array([[0.0, 0.0, 0.0], [BASELINE_M, 0.0, 0.0]])
 
 
 def visible_centroid(eye, tip, direction):
-    """Centroid (x/z, y/z) of the painted part of a capsule that ends at tip, as seen from eye looking along +z."""
+    """Centroid (x/z, y/z) of the painted part of a capsule that ends at tip, as seen from eye
+    looking along +z.
+    """
     middle = tip - 0.5 * PAINT_M * direction - eye
     half = 1.3 * (PAINT_M + RADIUS_M) / middle[2]
     grid = np.linspace(-half, half, 160)
@@ -35,14 +39,19 @@ def visible_centroid(eye, tip, direction):
     cylinder = (b**2 > a * c) & (w_along + t * along <= 0.0)
     b_ball, c_ball = D @ w, w @ w - RADIUS_M**2
     ball = b_ball**2 > c_ball
-    t = np.minimum(np.where(cylinder, t, np.inf), np.where(ball, -b_ball - np.sqrt(np.maximum(b_ball**2 - c_ball, 0.0)), np.inf))
+    t = np.minimum(
+        np.where(cylinder, t, np.inf),
+        np.where(ball, -b_ball - np.sqrt(np.maximum(b_ball**2 - c_ball, 0.0)), np.inf),
+    )
     hit = np.isfinite(t)
     depth_of_paint = -((w + np.where(hit, t, 0.0)[:, None] * D) @ direction) + RADIUS_M
     painted = hit & (depth_of_paint <= PAINT_M)
     return rays[painted].mean(axis=0) if painted.sum() > 20 else None
 
 
-def random_fingers(n: int, *, hidden: float = 0.9) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def random_fingers(
+    n: int, *, hidden: float = 0.9
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Random landmarks and finger directions, with where two cameras locate the visible centroid."""
     random = np.random.default_rng(0)
     found = 0
@@ -68,7 +77,9 @@ def split(error, point):
 
 
 def test_the_constants_are_what_ray_casting_gives():
-    along, across = np.array([split(located - point, point) for point, _, located in random_fingers(150)]).T
+    along, across = np.array(
+        [split(located - point, point) for point, _, located in random_fingers(150)]
+    ).T
     # Nowhere near a radius (6.8 mm) towards the cameras, as if the centroid lay on the skin.
     assert abs(along.mean()) < 1e-3
     assert along.std() / RADIUS_M == pytest.approx(SIGMA_UNKNOWN[0], abs=0.06)
@@ -92,7 +103,8 @@ def test_known_direction_explains_where_the_centroid_is_located():
         assert located_shift(table, located, direction, R, t, shift)
         left.append(split(located - shift - point, point))
     along, across = np.array(left).T
-    # What is left is the coarse grid of the ray-casting here (.25 mm a ray) and that parallel rays stand for a near camera's.
+    # What is left is the coarse grid of the ray-casting here (.25 mm a ray) and that parallel rays
+    # stand for a near camera's.
     assert np.sqrt(np.mean(along**2)) < 0.7e-3
     assert np.sqrt(np.mean(across**2)) < 0.2e-3
 
@@ -106,12 +118,32 @@ def surface() -> Surface:
 
 
 def pose(stamp_ns: int, wxyz, source="solved") -> HandPose:
-    joints = [HandJoint(name=name, position_m=(0.0, 0.0, 0.5), orientation_wxyz=wxyz, radius_m=0.01, source=source) for name in JOINTS]
+    joints = [
+        HandJoint(
+            name=name,
+            position_m=(0.0, 0.0, 0.5),
+            orientation_wxyz=wxyz,
+            radius_m=0.01,
+            source=source,
+        )
+        for name in JOINTS
+    ]
     angles = FingerAngles(abduction=0.0, mcp=0.0, pip=0.0, dip=0.0)
     names = ("thumb", "index", "middle", "ring", "little")
-    fingers = [FingerPose(name=name, angles_rad=angles, residual_m=0.0, iterations=1, status="solved") for name in names]
+    fingers = [
+        FingerPose(name=name, angles_rad=angles, residual_m=0.0, iterations=1, status="solved")
+        for name in names
+    ]
     wrist = WristPose(position_m=(0.0, 0.0, 0.5), orientation_wxyz=wxyz)
-    return HandPose(hand="right", seq=0, stamp_ns=stamp_ns, method="test", wrist=wrist, joints=joints, fingers=fingers)
+    return HandPose(
+        hand="right",
+        seq=0,
+        stamp_ns=stamp_ns,
+        method="test",
+        wrist=wrist,
+        joints=joints,
+        fingers=fingers,
+    )
 
 
 POSITIONS = np.array([[0.0, 0.1, 0.5], [0.03, -0.05, 0.5]])
@@ -127,11 +159,16 @@ SAG_M = dab_sag_m(0.008, 0.021)
 
 def is_untouched(positions) -> bool:
     """The tip is where it was, the dab is nearer to the cameras by its sag."""
-    return np.array_equal(positions[1], POSITIONS[1]) and np.linalg.norm(positions[0]) < np.linalg.norm(POSITIONS[0]) - 0.9 * SAG_M
+    return (
+        np.array_equal(positions[1], POSITIONS[1])
+        and np.linalg.norm(positions[0]) < np.linalg.norm(POSITIONS[0]) - 0.9 * SAG_M
+    )
 
 
 def located_depth_m(normals, weights, places):
-    """How deep below the top two cameras 9 degrees apart locate skin, each by the middle of what it sees, weighed by how it faces it."""
+    """How deep below the top two cameras 9 degrees apart locate skin, each by the middle of what it
+    sees, weighed by how it faces it.
+    """
     shifts = []
     for angle in (-0.08, 0.08):
         facing = weights * (normals @ [np.sin(angle), 0.0, np.cos(angle)])
@@ -140,7 +177,10 @@ def located_depth_m(normals, weights, places):
 
 
 def test_two_cameras_locate_a_dab_at_its_rim():
-    """Against points spread over the cap of a ball, and over a cylinder; a dab on nothing lies where it is seen."""
+    """Against points spread over the cap of a ball, and over a cylinder.
+
+    A dab on nothing lies where it is seen.
+    """
     side = np.linspace(-0.008, 0.008, 801)
     x, y = (grid.ravel() for grid in np.meshgrid(side, side))
     inside = x**2 + y**2 < 0.008**2
@@ -168,11 +208,13 @@ def test_a_pose_corrects_tips_while_it_is_fresh(surface):
     surface.note(pose(10**18, TOWARDS))
     positions, covariances = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 33_000_000)
     # The palm side of the wrist, -y of its frame, turned with the hand.
-    np.testing.assert_allclose(positions[0] - POSITIONS[0], SAG_M * np.array([0.0, -np.cos(0.5), -np.sin(0.5)]), atol=1e-12)
+    np.testing.assert_allclose(
+        positions[0] - POSITIONS[0], SAG_M * np.array([0.0, -np.cos(0.5), -np.sin(0.5)]), atol=1e-12
+    )
     assert -3e-3 < positions[1, 2] - POSITIONS[1, 2] < -1e-3
-    unknown = Surface(SLOTS, {"right": default_hand("right")}, tuple(Setup().rig().values())).to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[
-        1
-    ]
+    unknown = Surface(
+        SLOTS, {"right": default_hand("right")}, tuple(Setup().rig().values())
+    ).to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[1]
     assert covariances[1, 2, 2] < 0.5 * unknown[1, 2, 2]
     late, _ = surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18 + 400_000_000)
     assert is_untouched(late)
@@ -185,15 +227,21 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(surface):
     for angle in (0.0, 0.5, 1.5):
         turn = rotation_from_vector([angle, 0.0, 0.0])
         surface.note(pose(10**18, tuple(quaternion_from_rotation(turn).tolist())))
-        sigmas_mm.append(1e3 * np.sqrt(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1, [1, 2], [1, 2]]))
+        sigmas_mm.append(
+            1e3
+            * np.sqrt(surface.to_axis(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1, [1, 2], [1, 2]])
+        )
     towards, tilted, side = np.array(sigmas_mm)
     assert np.all(towards > tilted)
     assert np.all(tilted > side)
-    # A resting hand's tips, seen from the side, were .13-.2 mm off across and their model .0-.1 mm in depth.
+    # A resting hand's tips, seen from the side, were .13-.2 mm off across and their model .0-.1 mm
+    # in depth.
     assert np.all(side < 0.2)
 
 
-@pytest.mark.parametrize("wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)]
+)
 def test_absurd_or_predicted_poses_are_not_believed(surface, wxyz):
     surface.note(pose(10**18, wxyz))
     surface.note(pose(10**18, TOWARDS, source="predicted"))
@@ -206,6 +254,8 @@ def test_any_number_of_cameras_agrees_on_the_shift():
     for cameras in (2, 4):
         R, t = extrinsics(tuple(Setup(cameras=cameras).rig().values()))
         shift = np.zeros(3)
-        assert located_shift(table, POSITIONS[1], direction / np.linalg.norm(direction), R, t, shift)
+        assert located_shift(
+            table, POSITIONS[1], direction / np.linalg.norm(direction), R, t, shift
+        )
         shifts.append(shift)
     np.testing.assert_allclose(shifts[0], shifts[1], atol=0.3e-3)

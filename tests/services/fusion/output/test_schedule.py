@@ -14,7 +14,9 @@ def drive(pace: Pace, frames) -> list[int]:
 
 
 def both(frames: int, *, lost=(), phase_ns: int = FRAME_NS // 2):
-    events = [(0, k * FRAME_NS) for k in range(frames) if k not in lost] + [(1, k * FRAME_NS + phase_ns) for k in range(frames)]
+    events = [(0, k * FRAME_NS) for k in range(frames) if k not in lost] + [
+        (1, k * FRAME_NS + phase_ns) for k in range(frames)
+    ]
     return sorted(events, key=lambda event: event[1])
 
 
@@ -46,13 +48,29 @@ def test_the_fastest_camera_leads_as_soon_as_it_is_there():
     slow = [(0, k * FRAME_NS) for k in range(10)]
     fast = [(1, 10 * FRAME_NS + k * FRAME_NS // 3) for k in range(30)]
     assert len(drive(pace, slow)) == 10
-    assert len(drive(pace, [event for pair in zip(fast, [(0, f[1] + 1) for f in fast], strict=True) for event in pair])) == 30
+    assert (
+        len(
+            drive(
+                pace,
+                [
+                    event
+                    for pair in zip(fast, [(0, f[1] + 1) for f in fast], strict=True)
+                    for event in pair
+                ],
+            )
+        )
+        == 30
+    )
 
 
 def test_instants_ascend_whatever_comes():
     random = np.random.default_rng(0)
     due = drive(
         Pace(np.array([30.0, 30.0, 60.0]), 1),
-        zip(random.integers(0, 3, 500).tolist(), random.integers(0, 10**10, 500).tolist(), strict=True),
+        zip(
+            random.integers(0, 3, 500).tolist(),
+            random.integers(0, 10**10, 500).tolist(),
+            strict=True,
+        ),
     )
     assert due == sorted(set(due))

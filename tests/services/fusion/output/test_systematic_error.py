@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from services.fusion.intake.observations import View
-from services.fusion.output.systematic_error import OWN_PX, SHARED_SHARE, WHITE_PX, WHITE_SHARE, Bias
+from services.fusion.output.systematic_error import (
+    OWN_PX,
+    SHARED_SHARE,
+    WHITE_PX,
+    WHITE_SHARE,
+    Bias,
+)
 from testing.synthetic_points import Setup
 
 CAMERAS = tuple(Setup(distortion=(0.0,) * 5).rig().values())
@@ -24,7 +30,18 @@ def bias() -> Bias:
 
 def view(sigma_px: float, camera: int = 0) -> View:
     slots = np.array([0, 1])
-    return View(camera, 0, 0, slots, np.zeros(2), np.zeros((2, 2)), np.full(2, sigma_px / FOCAL_PX), 0, 0.0, 0)
+    return View(
+        camera,
+        0,
+        0,
+        slots,
+        np.zeros(2),
+        np.zeros((2, 2)),
+        np.full(2, sigma_px / FOCAL_PX),
+        0,
+        0.0,
+        0,
+    )
 
 
 def test_only_a_part_of_a_large_sigma_is_noise(bias):
@@ -40,7 +57,9 @@ def test_own_errors_are_disparity_and_shared_ones_are_not(bias):
         bias.note(view(0.2))
     covariances = bias.covariances(POINTS, BOTH)
     depth_per_px = DISTANCE_M**2 / (FOCAL_PX * 0.075)
-    assert np.sqrt(covariances[0, 2, 2]) == pytest.approx(np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02)
+    assert np.sqrt(covariances[0, 2, 2]) == pytest.approx(
+        np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02
+    )
     across = np.hypot(SHARED_SHARE * 0.2, OWN_PX / np.sqrt(2.0)) * DISTANCE_M / FOCAL_PX
     assert np.sqrt(covariances[0, 1, 1]) == pytest.approx(across, rel=0.03)
     assert not covariances[1].any()

@@ -22,9 +22,13 @@ def rays_of(cameras, p):
 def test_eq_10_without_alignment_error_is_the_pinhole_law():
     left, right = Setup().rig().values()
     k, z = depth_law(GEOMETRY, rectified_pair(left, right))
-    # B x0 / (2 tan(phi0 / 2)) with 7.5 cm, 640 px, 62.5 deg; the seed's fit is 4543.3 with z = -1.035.
+    # B x0 / (2 tan(phi0 / 2)) with 7.5 cm, 640 px, 62.5 deg; the seed's fit is 4543.3 with z =
+    # -1.035.
     assert (k, z) == (pytest.approx(7.5 * 640 / (2 * np.tan(np.deg2rad(31.25)))), -1.0)
-    assert depth_law(msgspec.structs.replace(GEOMETRY, phi_rad=0.01), rectified_pair(left, right))[0] < k
+    assert (
+        depth_law(msgspec.structs.replace(GEOMETRY, phi_rad=0.01), rectified_pair(left, right))[0]
+        < k
+    )
     assert depth_law(Disparity(), rectified_pair(left, right)) == (4543.3, -1.035)
 
 
@@ -33,7 +37,9 @@ def test_seed_law_is_right_to_4_percent_on_an_ideal_pair():
     pair = rectified_pair(left, right)
     for distance in np.arange(0.3, 1.01, 0.05):
         p = np.array([0.0375, 0.0, distance])
-        found = locate(pair, rays_of((left, right), p), np.full(2, 1e-4), depth_law(Disparity(), pair), 2.0)
+        found = locate(
+            pair, rays_of((left, right), p), np.full(2, 1e-4), depth_law(Disparity(), pair), 2.0
+        )
         assert found.position_m[2] == pytest.approx(distance, rel=0.04)
 
 
@@ -53,9 +59,16 @@ def test_geometry_places_points_of_turned_and_swapped_cameras(swap):
 def test_covariance_tells_the_scatter():
     cameras = tuple(Setup(toe_in_rad=0.03).rig().values())
     pair, random = rectified_pair(*cameras), np.random.default_rng(2)
-    law, sigmas, p = depth_law(Disparity(), pair), np.array([1e-4, 2e-4]), np.array([0.1, -0.08, 0.6])
+    law, sigmas, p = (
+        depth_law(Disparity(), pair),
+        np.array([1e-4, 2e-4]),
+        np.array([0.1, -0.08, 0.6]),
+    )
     rays = rays_of(cameras, p)
-    found = [locate(pair, rays + random.normal(size=(2, 2)) * sigmas[:, None], sigmas, law, 2.0) for _ in range(3000)]
+    found = [
+        locate(pair, rays + random.normal(size=(2, 2)) * sigmas[:, None], sigmas, law, 2.0)
+        for _ in range(3000)
+    ]
     scatter = np.std([f.position_m for f in found], axis=0)
     np.testing.assert_allclose(scatter, np.sqrt(np.diag(found[0].covariance_m2)), rtol=0.06)
 
@@ -64,6 +77,12 @@ def test_refuses_what_has_no_disparity():
     left, right = Setup().rig().values()
     pair, sigmas = rectified_pair(left, right), np.full(2, 1e-4)
     law = depth_law(Disparity(), pair)
-    assert locate(pair, np.array([[0.0, 0.0], [0.1, 0.0]]), sigmas, law, 2.0).status is TriangulationStatus.BEHIND
-    assert locate(pair, np.array([[0.1, 0.0], [0.1 - 1e-3, 0.0]]), sigmas, law, 2.0).status is TriangulationStatus.BEYOND
+    assert (
+        locate(pair, np.array([[0.0, 0.0], [0.1, 0.0]]), sigmas, law, 2.0).status
+        is TriangulationStatus.BEHIND
+    )
+    assert (
+        locate(pair, np.array([[0.1, 0.0], [0.1 - 1e-3, 0.0]]), sigmas, law, 2.0).status
+        is TriangulationStatus.BEYOND
+    )
     assert rectified_pair(left, left) is None

@@ -16,7 +16,10 @@ EXACT = Setup(sigma_px=0.03, clock_error_s=0.0, loss=0.0)
 def seen(fusion: Fusion, path: Path, seconds: float = 1.0) -> tuple[PairedMethod, float]:
     """A method that has seen a hand, and the newest instant its views enclose."""
     cameras = EXACT.rig()
-    observer, method = Observer(EXACT.config(), cameras), PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), fusion)
+    observer, method = (
+        Observer(EXACT.config(), cameras),
+        PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), fusion),
+    )
     instant_s = 0.0
     for frame in frames(EXACT, path, seconds):
         view = observer.view(frame)
@@ -34,7 +37,9 @@ def test_points_are_where_the_hand_is():
 
 
 def test_what_is_no_longer_seen_is_held_with_growing_sigma_then_dropped():
-    method, instant_s = seen(Fusion(method="triangulate", filter="none", hold_s=0.3), Path(speed_m_s=0.0))
+    method, instant_s = seen(
+        Fusion(method="triangulate", filter="none", hold_s=0.3), Path(speed_m_s=0.0)
+    )
     before = method.estimate(instant_s)
     later = method.estimate(instant_s + 0.25)
     assert later.found.all()

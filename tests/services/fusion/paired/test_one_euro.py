@@ -23,7 +23,10 @@ def test_reproduces_the_reference_data(rhot_data):
 def test_joint_filter_commutes_with_rotation():
     random = np.random.default_rng(0)
     R = rotation_from_vector([0.4, -0.8, 0.3])
-    plain, turned = OneEuroFilter(3.0, 30.0, 1.0, joint=True), OneEuroFilter(3.0, 30.0, 1.0, joint=True)
+    plain, turned = (
+        OneEuroFilter(3.0, 30.0, 1.0, joint=True),
+        OneEuroFilter(3.0, 30.0, 1.0, joint=True),
+    )
     for point in random.normal(0.0, 0.1, (50, 3)):
         np.testing.assert_allclose(turned(R @ point, 1 / 30), R @ plain(point, 1 / 30), atol=1e-12)
 

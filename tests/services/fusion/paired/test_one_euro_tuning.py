@@ -14,17 +14,29 @@ from testing.synthetic_points import START_NS, Path
 NOISE_M = 1e-3
 
 
-def recording(still_s: float, fast_s: float, speed_m_s: float = 0.5, noise_m: float = NOISE_M, source="measured"):
+def recording(
+    still_s: float,
+    fast_s: float,
+    speed_m_s: float = 0.5,
+    noise_m: float = NOISE_M,
+    source="measured",
+):
     random, path = np.random.default_rng(0), Path(speed_m_s=speed_m_s)
     for k in range(int(30 * (still_s + fast_s))):
         at_s = max(0.0, k / 30.0 - still_s)
         points = [
             HandPoint(
-                name=name, position_m=tuple((p + random.normal(0.0, noise_m, 3)).tolist()), sigma_m=(1e-3,) * 3, cameras=[], source=source
+                name=name,
+                position_m=tuple((p + random.normal(0.0, noise_m, 3)).tolist()),
+                sigma_m=(1e-3,) * 3,
+                cameras=[],
+                source=source,
             )
             for name, p in zip(("wrist", "index_tip"), path(np.array([at_s]))[0], strict=False)
         ]
-        yield HandPoints(hand="right", seq=k, stamp_ns=START_NS + round(k * 1e9 / 30.0), points=points)
+        yield HandPoints(
+            hand="right", seq=k, stamp_ns=START_NS + round(k * 1e9 / 30.0), points=points
+        )
 
 
 def test_finds_still_and_fast_and_the_noise():
@@ -48,7 +60,9 @@ def test_calm_costs_lag_and_error():
 
 
 def test_more_noise_asks_for_a_lower_beta():
-    quiet, loud = (propose(tracks(recording(4.0, 5.0, noise_m=noise_m))).best.beta for noise_m in (5e-4, 4e-3))
+    quiet, loud = (
+        propose(tracks(recording(4.0, 5.0, noise_m=noise_m))).best.beta for noise_m in (5e-4, 4e-3)
+    )
     assert loud < quiet
 
 
@@ -70,7 +84,10 @@ def test_calm_beyond_reach_is_an_error():
 
 def test_is_the_live_filter():
     track = tracks(recording(3.0, 3.0))[0]
-    live, steps = OneEuroFilter(1.2, 170.0, 1.0, joint=True), [0.0, *np.diff(track.times_s).tolist()]
+    live, steps = (
+        OneEuroFilter(1.2, 170.0, 1.0, joint=True),
+        [0.0, *np.diff(track.times_s).tolist()],
+    )
     expected = np.array([live(point, dt) for point, dt in zip(track.points_m, steps, strict=True)])
     np.testing.assert_allclose(_one_euro(track, 1.2, 170.0), expected, atol=1e-12)
 
@@ -78,5 +95,7 @@ def test_is_the_live_filter():
 def test_reference_has_no_lag_and_survives_gaps():
     times_s = np.delete(np.arange(0.0, 4.0, 1.0 / 30.0), slice(40, 60))
     points_m = Path()(times_s)[:, 2]
-    reference = _smooth(Track(times_s, points_m, np.zeros(len(times_s), bool), np.zeros(len(times_s), bool)))
+    reference = _smooth(
+        Track(times_s, points_m, np.zeros(len(times_s), bool), np.zeros(len(times_s), bool))
+    )
     assert 1e3 * np.sqrt(np.mean(np.sum((reference - points_m) ** 2, axis=1))) < 0.3

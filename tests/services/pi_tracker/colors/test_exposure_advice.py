@@ -20,7 +20,12 @@ def test_automatics_settle_a_second_after_their_last_change():
     settling = Settling()
     settled_at = None
     for number in range(120):
-        settling.add(report(exposure_us=max(8000.0, 20_000.0 - 400.0 * number), red=1.6 + 0.001 * (number % 3)), number * FRAME_NS)
+        settling.add(
+            report(
+                exposure_us=max(8000.0, 20_000.0 - 400.0 * number), red=1.6 + 0.001 * (number % 3)
+            ),
+            number * FRAME_NS,
+        )
         if settled_at is None and settling.settled() is not None:
             settled_at = number
     # 8000 us are reached in frame 30.
@@ -75,7 +80,11 @@ def test_the_advised_gains_make_the_wall_grey(studio):
     light = assess([studio.of(studio.bgr(clean, 2.0, 1))])
     (line,) = advice(light, 0.0, 1.5, 1.5)
     red, blue = (
-        float(word) for word in line.replace("--red-gain ", "|").replace(" --blue-gain ", "|").replace(" mend", "|").split("|")[1:3]
+        float(word)
+        for word in line.replace("--red-gain ", "|")
+        .replace(" --blue-gain ", "|")
+        .replace(" mend", "|")
+        .split("|")[1:3]
     )
     # A gain acts on linear light, of which pictures show the 1 / 2.2th power.
     mended = np.array([130 * (blue / 1.5) ** (1 / 2.2), 150, 168 * (red / 1.5) ** (1 / 2.2)])

@@ -16,7 +16,14 @@ from services.pi_tracker.image.chroma import cells_of, hue_apart
 from services.pi_tracker.step import TrackerStep
 
 SIZE = (240, 120)
-PLACES = {"green": 30.0, "blue": 66.0, "magenta": 102.0, "cyan": 138.0, "violet": 174.0, "lime": 210.0}
+PLACES = {
+    "green": 30.0,
+    "blue": 66.0,
+    "magenta": 102.0,
+    "cyan": 138.0,
+    "violet": 174.0,
+    "lime": 210.0,
+}
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +33,13 @@ def hand(studio, tip):
     def make(count, layout="i420", first=0, **look):
         frames, pointers = [], []
         for number in range(count):
-            tips = [tip(c, x + 2 * number, 60.0 + 3 * number, width_px=13.0, length_px=14.0) for c, x in PLACES.items()]
-            frame, truth = studio.frame(tips, seq=first + number, size_px=SIZE, layout=layout, **look)
+            tips = [
+                tip(c, x + 2 * number, 60.0 + 3 * number, width_px=13.0, length_px=14.0)
+                for c, x in PLACES.items()
+            ]
+            frame, truth = studio.frame(
+                tips, seq=first + number, size_px=SIZE, layout=layout, **look
+            )
             frames.append(frame)
             pointers += [Pointer(color, number, *place) for color, place in truth.items()]
         return frames, pointers
@@ -59,7 +71,9 @@ def test_the_same_input_gives_the_same_ranges(hand):
 
 def test_hues_wrap_through_red(studio, tip, monkeypatch):
     monkeypatch.setitem(studio.paints, "red", (30, 25, 210))
-    frame, truth = studio.frame([tip("red", 60.0, 60.0, width_px=16.0, length_px=18.0)], size_px=SIZE)
+    frame, truth = studio.frame(
+        [tip("red", 60.0, 60.0, width_px=16.0, length_px=18.0)], size_px=SIZE
+    )
     study = gather([frame], [Pointer("red", 0, *truth["red"])])
     span = fit(study.samples)["red"]
     assert span.hsv_low[0] > 150
@@ -81,17 +95,24 @@ def test_two_dabs_of_one_paint_collide(hand):
     twice += [Pointer("blue", p.frame, p.x_px, p.y_px) for p in twice]
     study = gather(frames, twice)
     report = examine(study, fit(study.samples))
-    assert any("blue and green collide" in warning and "cannot be told apart" in warning for warning in report.warnings)
+    assert any(
+        "blue and green collide" in warning and "cannot be told apart" in warning
+        for warning in report.warnings
+    )
     assert report.pairs[0].separation < 1.0
 
 
 def test_paint_of_the_colour_of_skin_is_warned_of(studio, tip, monkeypatch):
     monkeypatch.setitem(studio.paints, "ochre", (105, 140, 205))
-    frame, truth = studio.frame([tip("ochre", 60.0, 60.0, width_px=18.0, length_px=20.0)], size_px=SIZE)
+    frame, truth = studio.frame(
+        [tip("ochre", 60.0, 60.0, width_px=18.0, length_px=20.0)], size_px=SIZE
+    )
     x, y = truth["ochre"]
     study = gather([frame], [Pointer("ochre", 0, x - 10, y - 10, 20, 20)])
     report = examine(study, fit(study.samples))
-    assert any("colour of skin" in warning or "close to skin" in warning for warning in report.warnings)
+    assert any(
+        "colour of skin" in warning or "close to skin" in warning for warning in report.warnings
+    )
 
 
 def test_a_room_of_the_same_hue_is_warned_of_with_its_place(studio, tip):
@@ -99,7 +120,9 @@ def test_a_room_of_the_same_hue_is_warned_of_with_its_place(studio, tip):
     clean[20:50, 180:220] = studio.paints["green"]
     study = gather([studio.of(studio.bgr(clean, 5.0, 1))], [Pointer("green", 0, *truth["green"])])
     report = examine(study, fit(study.samples))
-    (warning,) = [warning for warning in report.warnings if "the room has the hue of green" in warning]
+    (warning,) = [
+        warning for warning in report.warnings if "the room has the hue of green" in warning
+    ]
     (one,) = report.colors
     assert one.room_at is not None
     assert abs(one.room_at[0] - 200) < 4
@@ -166,7 +189,20 @@ def test_cells_are_those_of_the_lookup_table(hand):
     for pointer in pointers:
         hue, saturation, _ = cells[int(pointer.y_px) // 2, int(pointer.x_px) // 2].hsv()
         assert (
-            abs(hue_apart(float(hue), {"green": 57, "blue": 109, "magenta": 165, "cyan": 92, "violet": 135, "lime": 39}[pointer.color])) < 8
+            abs(
+                hue_apart(
+                    float(hue),
+                    {
+                        "green": 57,
+                        "blue": 109,
+                        "magenta": 165,
+                        "cyan": 92,
+                        "violet": 135,
+                        "lime": 39,
+                    }[pointer.color],
+                )
+            )
+            < 8
         )
         assert 80 < float(saturation) <= 255
 
@@ -176,7 +212,11 @@ def test_hues_are_drawn_in_where_skin_begins(studio, tip, monkeypatch):
     monkeypatch.setitem(studio.paints, "sand", (90, 185, 190))
     frames, pointers = [], []
     for seq in range(2):
-        frame, truth = studio.frame([tip("sand", 60.0 + 9 * seq, 60.0, width_px=20.0, length_px=24.0)], seq=seq, size_px=SIZE)
+        frame, truth = studio.frame(
+            [tip("sand", 60.0 + 9 * seq, 60.0, width_px=20.0, length_px=24.0)],
+            seq=seq,
+            size_px=SIZE,
+        )
         frames.append(frame)
         x, y = truth["sand"]
         pointers.append(Pointer("sand", seq, x - 12, y - 12, 24, 24))

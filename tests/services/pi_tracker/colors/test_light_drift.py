@@ -1,4 +1,6 @@
-"""Light that changes while the tracker runs is told, with the range that would fit, and not followed."""
+"""Light that changes while the tracker runs is told, with the range that would fit, and not
+followed.
+"""
 
 from __future__ import annotations
 
@@ -22,21 +24,36 @@ def fitted(studio, tip):
     """Ranges fitted to the studio's light."""
     tips = [tip(c, x, 60.0, width_px=13.0, length_px=14.0) for c, x in PLACES.items()]
     frame, truth = studio.frame(tips, size_px=SIZE)
-    return fit(gather([frame], [Pointer(color, 0, *place) for color, place in truth.items()]).samples)
+    return fit(
+        gather([frame], [Pointer(color, 0, *place) for color, place in truth.items()]).samples
+    )
 
 
 @pytest.fixture(scope="module")
 def places(studio, tip):
     """Pictures of the hand at three places, without noise."""
-    return [studio.clean([tip(c, x, 55.0 + 3 * k, width_px=13.0, length_px=14.0) for c, x in PLACES.items()], SIZE)[0] for k in range(3)]
+    return [
+        studio.clean(
+            [tip(c, x, 55.0 + 3 * k, width_px=13.0, length_px=14.0) for c, x in PLACES.items()],
+            SIZE,
+        )[0]
+        for k in range(3)
+    ]
 
 
 @pytest.fixture
 def run(studio, places, fitted):
-    """Half a minute under light of the given colour (B, G, R); the drift watch at its end, and colours found all the time."""
+    """Half a minute under light of the given colour (B, G, R).
+
+    The drift watch at its end, and colours found all the time.
+    """
 
     def make(light, seconds=12):
-        step, drift, lost = TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES)), Drift(fitted), set()
+        step, drift, lost = (
+            TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES)),
+            Drift(fitted),
+            set(),
+        )
         for number in range(seconds * 2):
             bgr = studio.bgr(places[number % 3] * np.array(light, np.float32), 5.0, number)
             frame = studio.of(bgr, number * 15)
@@ -80,7 +97,9 @@ def test_the_suggested_range_fits(run, fitted, studio, tip):
     clean, _ = studio.clean([tip(one.color, 60.0, 60.0, width_px=13.0, length_px=14.0)], SIZE)
     frame = studio.of(studio.bgr(clean * np.array([1.0, 1.0, 1.12], np.float32), 5.0, 99))
     after = Drift({one.color: one.suggested})
-    step = TrackerStep("left", Colors(colors={one.color: one.suggested}), Tracker(), SIZE, [one.color])
+    step = TrackerStep(
+        "left", Colors(colors={one.color: one.suggested}), Tracker(), SIZE, [one.color]
+    )
     markers = step.step(frame).markers
     assert [marker.color for marker in markers] == [one.color]
     after.look(frame, markers)
@@ -94,7 +113,10 @@ def test_it_looks_once_a_second(studio, places, fitted):
     assert frames[60].stamp_ns - frames[30].stamp_ns == PERIOD_NS
 
 
-@pytest.mark.parametrize(("x", "y", "area"), [(0.0, 0.0, 1.0), (199.0, 119.0, 1e6), (1e300, -1e300, 1e300), (-5.0, 60.0, 0.0)])
+@pytest.mark.parametrize(
+    ("x", "y", "area"),
+    [(0.0, 0.0, 1.0), (199.0, 119.0, 1e6), (1e300, -1e300, 1e300), (-5.0, 60.0, 0.0)],
+)
 def test_absurd_markers_do_no_harm(studio, fitted, x, y, area):
     clean, _ = studio.clean([], SIZE)
     drift = Drift(fitted)

@@ -17,7 +17,10 @@ def scene(studio, tip):
     """Cells of a green and a blue tip, each on a finger."""
 
     def make(layout="i420", **look):
-        tips = [tip("green", 50.0, 60.0, width_px=14.0, length_px=16.0), tip("blue", 110.0, 50.0, width_px=12.0, length_px=14.0)]
+        tips = [
+            tip("green", 50.0, 60.0, width_px=14.0, length_px=16.0),
+            tip("blue", 110.0, 50.0, width_px=12.0, length_px=14.0),
+        ]
         frame, truth = studio.frame(tips, size_px=SIZE, layout=layout, **look)
         return cells_of(frame), truth
 
@@ -39,7 +42,9 @@ def test_the_patch_is_found_and_nothing_else(scene, layout, place):
     cells, truth = scene(layout)
     x, y = truth["green"]
     w, h = place.get("w", 0.0), place.get("h", 0.0)
-    pointer = Pointer("green", 0, x + place.get("x", 0.0) - w / 2, y + place.get("y", 0.0) - h / 2, w, h)
+    pointer = Pointer(
+        "green", 0, x + place.get("x", 0.0) - w / 2, y + place.get("y", 0.0) - h / 2, w, h
+    )
     swatch = find_swatch(cells, pointer)
     rows, columns = np.nonzero(swatch.mask)
     # The paint is 14 px wide and 16 long: some 200 px, 50 cells.
@@ -59,8 +64,13 @@ def test_a_box_that_cuts_the_patch_knows_the_rest_of_it(scene):
 
 
 def test_a_neighbour_in_a_loose_box_is_left_alone(studio, tip):
-    """Fingers held together: the box in the middle of which one tip lies holds half of the next, too."""
-    tips = [tip("green", 60.0, 60.0, width_px=12.0, length_px=12.0), tip("blue", 76.0, 60.0, width_px=12.0, length_px=12.0)]
+    """Fingers held together: the box in the middle of which one tip lies holds half of the next,
+    too.
+    """
+    tips = [
+        tip("green", 60.0, 60.0, width_px=12.0, length_px=12.0),
+        tip("blue", 76.0, 60.0, width_px=12.0, length_px=12.0),
+    ]
     frame, truth = studio.frame(tips, size_px=SIZE)
     cells = cells_of(frame)
     for color, hue_about in (("green", 57.0), ("blue", 109.0)):

@@ -10,7 +10,14 @@ from services.pi_tracker.colors.propose import PAINT_HUES, boxes_of, propose
 from services.pi_tracker.colors.report import examine
 
 SIZE = (240, 160)
-PLACES = {"green": 30.0, "blue": 66.0, "magenta": 102.0, "cyan": 138.0, "violet": 174.0, "lime": 210.0}
+PLACES = {
+    "green": 30.0,
+    "blue": 66.0,
+    "magenta": 102.0,
+    "cyan": 138.0,
+    "violet": 174.0,
+    "lime": 210.0,
+}
 
 
 @pytest.fixture
@@ -18,7 +25,10 @@ def hand(studio, tip):
     def make(colors, count=3, thing=None):
         frames, truths = [], []
         for number in range(count):
-            tips = [tip(c, PLACES[c] + 2 * number, 70.0 + 3 * number, width_px=13.0, length_px=14.0) for c in colors]
+            tips = [
+                tip(c, PLACES[c] + 2 * number, 70.0 + 3 * number, width_px=13.0, length_px=14.0)
+                for c in colors
+            ]
             clean, truth = studio.clean(tips, SIZE)
             if thing is not None:
                 clean[10:40, 20:200] = thing

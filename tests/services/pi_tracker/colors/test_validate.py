@@ -20,8 +20,14 @@ def test_what_is_complete_passes():
     ("colors", "message"),
     [
         ({}, "no colour in it"),
-        ({"red": GOOD}, "'green' of rig.toml's markers, which is tracked, would be lost; it has red"),
-        ({"green": ColorRange(hsv_low=(0, 200, 40), hsv_high=(9, 100, 255))}, "lowest saturation, 200, is above its highest, 100"),
+        (
+            {"red": GOOD},
+            "'green' of rig.toml's markers, which is tracked, would be lost; it has red",
+        ),
+        (
+            {"green": ColorRange(hsv_low=(0, 200, 40), hsv_high=(9, 100, 255))},
+            "lowest saturation, 200, is above its highest, 100",
+        ),
         ({"green": ColorRange(hsv_low=(0, 20, 90), hsv_high=(9, 100, 80))}, "lowest value, 90"),
         ({"green": GOOD, "a b": GOOD}, "'a b' cannot name a colour"),
         ({"green": GOOD, "x" * 5000: GOOD}, "cannot name a colour"),

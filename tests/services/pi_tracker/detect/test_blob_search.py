@@ -31,7 +31,9 @@ def test_six_tips_are_six_blobs(studio, tip, searcher):
 
 
 def test_touching_colours_are_told_apart(studio, tip, searcher):
-    frame, truth = studio.frame([tip("green", 28.0, 32.0, turn_rad=1.57), tip("blue", 37.5, 32.0, turn_rad=1.57)])
+    frame, truth = studio.frame(
+        [tip("green", 28.0, 32.0, turn_rad=1.57), tip("blue", 37.5, 32.0, turn_rad=1.57)]
+    )
     found = {blob.color: blob for blob in blobs_of(searcher, frame)}
     assert set(found) == {0, 1}
     assert (found[0].x_px, found[0].y_px) == pytest.approx(truth["green"], abs=1.5)
@@ -59,12 +61,21 @@ def test_the_quick_look_at_some_rows_misses_nothing(studio, colors, monkeypatch,
         frame, found = studio.of(wall), []
         for large in (0, 1 << 30):
             monkeypatch.setattr(blob_search, "_LARGE_CELLS", large)
-            searcher = Searcher(compile_colors(colors, list(studio.paints)), Tracker(erode=erode, dilate=1))
-            found.append({(blob.color, blob.rect, blob.cells, blob.mask.tobytes()) for blob in blobs_of(searcher, frame)})
+            searcher = Searcher(
+                compile_colors(colors, list(studio.paints)), Tracker(erode=erode, dilate=1)
+            )
+            found.append(
+                {
+                    (blob.color, blob.rect, blob.cells, blob.mask.tobytes())
+                    for blob in blobs_of(searcher, frame)
+                }
+            )
         assert found[0] == found[1] != set()
 
 
-def test_a_crescent_beside_another_paint_is_found_when_asked_for_and_a_seam_between_two_never(studio, colors):
+def test_a_crescent_beside_another_paint_is_found_when_asked_for_and_a_seam_between_two_never(
+    studio, colors
+):
     names = ["green", "cyan", "blue"]
     searcher = Searcher(compile_colors(colors, names), Tracker(erode=0, dilate=0))
     paints = [np.array(studio.paints[name], np.uint8) for name in names]
@@ -86,10 +97,19 @@ def test_specks_below_the_least_area_are_left_out(studio, tip, colors, min_area,
     assert bool(blobs_of(searcher, frame)) is seen
 
 
-@pytest.mark.parametrize("settings", [Tracker(gaussian_px=0, erode=0, dilate=0), Tracker(gaussian_px=7, erode=1, dilate=2), Tracker()])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Tracker(gaussian_px=0, erode=0, dilate=0),
+        Tracker(gaussian_px=7, erode=1, dilate=2),
+        Tracker(),
+    ],
+)
 def test_mask_filters_do_not_move_a_blob(studio, tip, colors, settings):
     searcher = Searcher(compile_colors(colors, ["green"]), settings)
-    frame, truth = studio.frame([tip("green", 31.0, 33.0, width_px=16.0, length_px=16.0)], sigma=1.0)
+    frame, truth = studio.frame(
+        [tip("green", 31.0, 33.0, width_px=16.0, length_px=16.0)], sigma=1.0
+    )
     blob = blobs_of(searcher, frame)[0]
     rows, columns = np.nonzero(blob.mask)
     centre = 2 * (blob.rect[0] + columns.mean()) + 0.5, 2 * (blob.rect[1] + rows.mean()) + 0.5
@@ -97,7 +117,10 @@ def test_mask_filters_do_not_move_a_blob(studio, tip, colors, settings):
 
 
 def test_of_a_room_full_of_colour_only_the_largest_blobs_are_looked_at(studio, searcher):
-    """Test: confetti, 7,000 specks of six colours. Expected: what is looked at is bounded, and a large blob is among it."""
+    """Test: confetti, 7,000 specks of six colours.
+
+    Expected: what is looked at is bounded, and a large blob is among it.
+    """
     rng = np.random.default_rng(3)
     confetti = rng.integers(0, 256, (120, 160, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
     confetti[200:240, 300:340] = studio.paints["green"]

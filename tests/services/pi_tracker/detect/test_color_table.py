@@ -19,12 +19,16 @@ def span(low, high):
 
 @pytest.fixture(scope="module")
 def gamut():
-    """Luma (h, w) and chroma (h, w, 2) of every kind, the HSV that OpenCV gives them, and which of them RGB can show unclipped."""
+    """Luma (h, w) and chroma (h, w, 2) of every kind, the HSV that OpenCV gives them, and which of
+    them RGB can show unclipped.
+    """
     rng = np.random.default_rng(0)
     luma = rng.integers(16, 236, (240, 320), dtype=np.uint8)
     chroma = rng.integers(16, 241, (240, 320, 2), dtype=np.uint8)
     doubled = luma.repeat(2, 0).repeat(2, 1)
-    i420 = np.concatenate([doubled.ravel(), chroma[..., 0].ravel(), chroma[..., 1].ravel()]).reshape(720, 640)
+    i420 = np.concatenate(
+        [doubled.ravel(), chroma[..., 0].ravel(), chroma[..., 1].ravel()]
+    ).reshape(720, 640)
     bgr = cv2.cvtColor(i420, cv2.COLOR_YUV2BGR_I420)[::2, ::2]
     shown = ((bgr > 0) & (bgr < 255)).all(axis=-1)
     return luma, chroma, cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV), shown
@@ -39,7 +43,8 @@ def test_the_table_is_the_hsv_test(gamut, low, high):
     luma, chroma, hsv, shown = gamut
     table = compile_colors(Colors(colors={"a": span(low, high)}), ["a"])
     ours, theirs = table.classify(luma, chroma) > 0, hsv_mask(hsv, span(low, high)) > 0
-    # OpenCV rounds RGB before it takes the hue: where the chroma is small, the hue moves by more than one.
+    # OpenCV rounds RGB before it takes the hue: where the chroma is small, the hue moves by more
+    # than one.
     clear = shown & (np.abs(chroma.astype(int) - 128).max(axis=-1) > 12)
     assert (ours != theirs)[clear].mean() < 0.02
 
@@ -77,7 +82,15 @@ def test_numpy_looks_up_what_opencv_does(gamut, monkeypatch):
 
 def test_a_range_that_is_empty_in_itself_finds_nothing(gamut):
     luma, chroma, _, _ = gamut
-    table = compile_colors(Colors(colors={"a": span((0, 200, 0), (179, 100, 255)), "b": span((0, 0, 200), (179, 255, 100))}), ["a", "b"])
+    table = compile_colors(
+        Colors(
+            colors={
+                "a": span((0, 200, 0), (179, 100, 255)),
+                "b": span((0, 0, 200), (179, 255, 100)),
+            }
+        ),
+        ["a", "b"],
+    )
     assert not table.classify(luma, chroma).any()
 
 
@@ -85,7 +98,13 @@ def test_white_and_black_are_colours_too(gamut):
     luma, chroma, _, _ = gamut
     grey = np.full_like(chroma, 128)
     table = compile_colors(
-        Colors(colors={"white": span((0, 0, 180), (179, 40, 255)), "black": span((0, 0, 0), (179, 255, 40))}), ["white", "black"]
+        Colors(
+            colors={
+                "white": span((0, 0, 180), (179, 40, 255)),
+                "black": span((0, 0, 0), (179, 255, 40)),
+            }
+        ),
+        ["white", "black"],
     )
     found = table.classify(luma, grey)
     assert set(np.unique(found)) == {0, 1, 2}
@@ -94,7 +113,15 @@ def test_white_and_black_are_colours_too(gamut):
 
 def test_overlapping_hues_go_to_the_nearer_colour(gamut):
     luma, chroma, hsv, shown = gamut
-    table = compile_colors(Colors(colors={"a": span((40, 80, 60), (80, 255, 255)), "b": span((70, 80, 60), (110, 255, 255))}), ["a", "b"])
+    table = compile_colors(
+        Colors(
+            colors={
+                "a": span((40, 80, 60), (80, 255, 255)),
+                "b": span((70, 80, 60), (110, 255, 255)),
+            }
+        ),
+        ["a", "b"],
+    )
     assert len(table.layers) == 1
     found = table.classify(luma, chroma)
     hue = hsv[..., 0]
@@ -114,6 +141,14 @@ def test_dark_and_light_of_one_hue_are_told_apart(gamut):
 
 
 def test_a_colour_without_calibration_is_named():
-    colors = Colors(colors={"blue": span((100, 80, 40), (120, 255, 255)), "green": span((50, 80, 40), (80, 255, 255))})
-    with pytest.raises(CalibrationError, match=r"left\.colors\.json: colour 'mauve' .* it has blue, green.*rhot calibrate colors"):
+    colors = Colors(
+        colors={
+            "blue": span((100, 80, 40), (120, 255, 255)),
+            "green": span((50, 80, 40), (80, 255, 255)),
+        }
+    )
+    with pytest.raises(
+        CalibrationError,
+        match=r"left\.colors\.json: colour 'mauve' .* it has blue, green.*rhot calibrate colors",
+    ):
         compile_colors(colors, ["blue", "mauve"], "calibration/left.colors.json")

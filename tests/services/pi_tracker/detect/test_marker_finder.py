@@ -13,7 +13,9 @@ SIZE = (160, 100)
 
 @pytest.fixture
 def shows(studio):
-    """A frame with a green patch at x = 60 and a blue one at a given place, before it, with a rim of another colour."""
+    """A frame with a green patch at x = 60 and a blue one at a given place, before it, with a rim
+    of another colour.
+    """
 
     def make(seq, blue_x, rim_px=0):
         image = np.full((SIZE[1], SIZE[0], 3), 140.0, np.float32)
@@ -31,7 +33,9 @@ def markers(step, frame):
 
 # The last is a single column of cells, which the mask filters take away.
 @pytest.mark.parametrize(("left_px", "rim_px"), [(8, 0), (4, 0), (2, 6)])
-def test_what_is_left_of_a_marker_is_found_where_it_must_be_and_said_to_be_little(shows, colors, left_px, rim_px):
+def test_what_is_left_of_a_marker_is_found_where_it_must_be_and_said_to_be_little(
+    shows, colors, left_px, rim_px
+):
     step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
     for seq in range(6):
         free = markers(step, shows(seq, 110))

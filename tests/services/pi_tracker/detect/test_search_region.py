@@ -13,7 +13,9 @@ SIZE = (320, 240)
 def rects():
     corner = st.tuples(st.integers(0, 319), st.integers(0, 239))
     extent = st.tuples(st.integers(1, 80), st.integers(1, 80))
-    return st.builds(lambda c, e: (c[0], c[1], min(c[0] + e[0], 320), min(c[1] + e[1], 240)), corner, extent)
+    return st.builds(
+        lambda c, e: (c[0], c[1], min(c[0] + e[0], 320), min(c[1] + e[1], 240)), corner, extent
+    )
 
 
 @given(rect=rects(), margin=st.integers(0, 500))

@@ -32,13 +32,18 @@ def config(tmp_path, colors) -> RigConfig:
 @pytest.fixture
 def picture(studio, tip):
     """The frame the camera shows, and where the tips are."""
-    tips = [tip("green", 70.0, 80.0, width_px=14.0, length_px=16.0), tip("blue", 130.0, 70.0, width_px=14.0, length_px=16.0)]
+    tips = [
+        tip("green", 70.0, 80.0, width_px=14.0, length_px=16.0),
+        tip("blue", 130.0, 70.0, width_px=14.0, length_px=16.0),
+    ]
     return studio.frame(tips, size_px=SIZE)
 
 
 @pytest.fixture
 def tracking(running, picture):
-    """`async with tracking(config) as (service, client)`: a running tracker with frames, and a bus to reach it by."""
+    """`async with tracking(config) as (service, client)`: a running tracker with frames, and a bus
+    to reach it by.
+    """
 
     @contextlib.asynccontextmanager
     async def run(config):
@@ -58,7 +63,14 @@ def tracking(running, picture):
 async def _film(bus, frame):
     publisher = bus.publisher(topics.SIM_FRAME, camera="left")
     for seq in range(10_000):
-        told = SimFrame(camera="left", seq=seq, stamp_ns=10**18 + seq * 20_000_000, row_time_ns=1e4, size_px=SIZE, clock_skew_ns=0)
+        told = SimFrame(
+            camera="left",
+            seq=seq,
+            stamp_ns=10**18 + seq * 20_000_000,
+            row_time_ns=1e4,
+            size_px=SIZE,
+            clock_skew_ns=0,
+        )
         publisher.put_bytes(frame.image.tobytes(), told)
         await asyncio.sleep(0.02)
 

@@ -21,11 +21,17 @@ async def fetch(client) -> str:
     return picture_name(png)
 
 
-async def test_clicks_on_two_pictures_give_ranges_that_work(config, tracking, seen, picture, colors):
+async def test_clicks_on_two_pictures_give_ranges_that_work(
+    config, tracking, seen, picture, colors
+):
     async with tracking(config) as (_, client):
         await seen(client, "blue", "green")
         names = [await fetch(client), await fetch(client)]
-        pointed = [PointedAt(color=color, picture=name, x_px=x, y_px=y) for name in names for color, (x, y) in picture[1].items()]
+        pointed = [
+            PointedAt(color=color, picture=name, x_px=x, y_px=y)
+            for name in names
+            for color, (x, y) in picture[1].items()
+        ]
         result = await ask(client, FitRequest(pointed=pointed))
         assert result.error == ""
         assert set(result.colors) == {"green", "blue"}
@@ -33,7 +39,12 @@ async def test_clicks_on_two_pictures_give_ranges_that_work(config, tracking, se
         assert result.residuals["colors"]["green"]["inside"] > 0.9
         # Nothing is in force by asking.
         assert await client.colors("left") == colors
-        await client.set_colors("left", msgspec.structs.replace(colors, date="d", tool="t", colors={**colors.colors, **result.colors}))
+        await client.set_colors(
+            "left",
+            msgspec.structs.replace(
+                colors, date="d", tool="t", colors={**colors.colors, **result.colors}
+            ),
+        )
         await seen(client, "blue", "green")
 
 
@@ -61,7 +72,9 @@ async def test_places_without_paint_are_answered_with_the_reason(config, trackin
         await seen(client, "blue", "green")
         name = await fetch(client)
         for pointed, words in WRONG:
-            result = await ask(client, FitRequest(pointed=[PointedAt(color="green", picture=name, **pointed)]))
+            result = await ask(
+                client, FitRequest(pointed=[PointedAt(color="green", picture=name, **pointed)])
+            )
             assert words in result.error
             assert result.colors == {}
 
@@ -77,7 +90,10 @@ async def test_pictures_are_kept_for_a_while(config, tracking, seen, monkeypatch
         await seen(client, "blue", "green")
         for _ in range(3):
             await client.bus.get(topics.FRAME, 5.0, camera="left")
-        gone = await ask(client, FitRequest(pointed=[PointedAt(color="green", picture=f"{0:016x}", x_px=x, y_px=y)]))
+        gone = await ask(
+            client,
+            FitRequest(pointed=[PointedAt(color="green", picture=f"{0:016x}", x_px=x, y_px=y)]),
+        )
         assert "not kept any more" in gone.error
         used = FitRequest(pointed=[PointedAt(color="green", picture=f"{2:016x}", x_px=x, y_px=y)])
         assert (await ask(client, used)).error == ""

@@ -24,7 +24,12 @@ async def test_a_put_takes_effect_and_is_written_and_told(config, tracking, seen
     async with tracking(config) as (service, client):
         await seen(client, "blue", "green")
         assert await client.colors("left") == colors
-        made = Colors(date="2026-01-02T03:04:05", tool="test", residuals={"x": 1}, colors={**colors.colors, "green": NOTHING})
+        made = Colors(
+            date="2026-01-02T03:04:05",
+            tool="test",
+            residuals={"x": 1},
+            colors={**colors.colors, "green": NOTHING},
+        )
         await client.set_colors("left", made)
         await seen(client, "blue")
         assert await client.colors("left") == made
@@ -37,7 +42,14 @@ async def test_the_file_itself_can_be_put_by_any_tool(config, tracking, seen, co
     """As `zenoh put` does: bytes on the key."""
     async with tracking(config) as (_, client):
         await seen(client, "blue", "green")
-        text = json.dumps({"colors": {name: msgspec.to_builtins(span) for name, span in {**colors.colors, "blue": NOTHING}.items()}})
+        text = json.dumps(
+            {
+                "colors": {
+                    name: msgspec.to_builtins(span)
+                    for name, span in {**colors.colors, "blue": NOTHING}.items()
+                }
+            }
+        )
         client.bus.put_raw(topics.COLORS.key("desk", camera="left"), text.encode())
         await seen(client, "green")
         # Who says nothing of the date gets one.
@@ -48,13 +60,20 @@ async def test_the_file_itself_can_be_put_by_any_tool(config, tracking, seen, co
     ("change", "words"),
     [
         ({"green": None}, "'green' of rig.toml's markers, which is tracked, would be lost"),
-        ({"green": ColorRange(hsv_low=(0, 200, 0), hsv_high=(10, 100, 255))}, "lowest saturation, 200, is above its highest"),
+        (
+            {"green": ColorRange(hsv_low=(0, 200, 0), hsv_high=(10, 100, 255))},
+            "lowest saturation, 200, is above its highest",
+        ),
     ],
 )
-async def test_what_cannot_be_is_refused_with_the_reason(config, tracking, seen, colors, change, words):
+async def test_what_cannot_be_is_refused_with_the_reason(
+    config, tracking, seen, colors, change, words
+):
     async with tracking(config) as (service, client):
         await seen(client, "blue", "green")
-        ranges = {name: span for name, span in {**colors.colors, **change}.items() if span is not None}
+        ranges = {
+            name: span for name, span in {**colors.colors, **change}.items() if span is not None
+        }
         with pytest.raises(CalibrationError, match=words):
             await client.set_colors("left", Colors(date="d", tool="t", colors=ranges))
         assert service.values["colors_refused"] == 1
@@ -62,7 +81,9 @@ async def test_what_cannot_be_is_refused_with_the_reason(config, tracking, seen,
         await seen(client, "blue", "green")
 
 
-async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(config, tracking, seen, colors):
+async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(
+    config, tracking, seen, colors
+):
     async with tracking(config) as (service, client):
         await seen(client, "blue", "green")
         with pytest.raises(CalibrationError):
@@ -100,7 +121,9 @@ async def test_garbage_is_refused_counted_and_does_no_harm(config, tracking, see
         await seen(client, "blue", "green")
 
 
-async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(config, tracking, seen, colors, monkeypatch):
+async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(
+    config, tracking, seen, colors, monkeypatch
+):
     def full(path, calibration):
         raise OSError(28, "No space left on device")
 
@@ -108,13 +131,17 @@ async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(config, tra
         await seen(client, "blue", "green")
         monkeypatch.setattr("services.pi_tracker.endpoints.color_ranges.save", full)
         with pytest.raises(CalibrationError, match=r"cannot be written.*No space left"):
-            await client.set_colors("left", Colors(date="d", tool="t", colors={**colors.colors, "green": NOTHING}))
+            await client.set_colors(
+                "left", Colors(date="d", tool="t", colors={**colors.colors, "green": NOTHING})
+            )
         await seen(client, "blue", "green")
         assert await client.colors("left") == colors
 
 
 @pytest.mark.parametrize("spoil", ["missing", "incomplete", "broken"])
-async def test_a_live_camera_starts_uncalibrated_and_is_calibrated_over_the_bus(config, tracking, seen, colors, tmp_path, spoil):
+async def test_a_live_camera_starts_uncalibrated_and_is_calibrated_over_the_bus(
+    config, tracking, seen, colors, tmp_path, spoil
+):
     path = tmp_path / "calibration" / "left.colors.json"
     match spoil:
         case "missing":
@@ -138,7 +165,9 @@ async def test_drift_is_told_in_health_and_not_followed(config, tracking, seen, 
         # As if the light had turned: the range ends in the middle of the marker's hues.
         low, high = green.hsv_low, green.hsv_high
         turned = ColorRange(hsv_low=(low[0] + 8, *low[1:]), hsv_high=(high[0] + 8, *high[1:]))
-        await client.set_colors("left", Colors(date="d", tool="t", colors={**colors.colors, "green": turned}))
+        await client.set_colors(
+            "left", Colors(date="d", tool="t", colors={**colors.colors, "green": turned})
+        )
         while "has drifted" not in service.last_error:
             await asyncio.sleep(0.02)
         assert "'green'" in service.last_error
@@ -155,7 +184,11 @@ async def test_drift_is_told_in_health_and_not_followed(config, tracking, seen, 
 async def test_a_camera_that_is_not_there_is_said_to_be_missing(config, tracking, seen, colors):
     async with tracking(config) as (_, client):
         await seen(client, "blue", "green")
-        for asked in (client.colors("nobody"), client.set_colors("nobody", colors), client.exposure("nobody")):
+        for asked in (
+            client.colors("nobody"),
+            client.set_colors("nobody", colors),
+            client.exposure("nobody"),
+        ):
             with pytest.raises(BusError, match="no tracker of camera 'nobody' answers"):
                 await asked
 
@@ -168,5 +201,8 @@ async def test_colours_may_come_one_after_the_other(config, tracking, seen, colo
         await client.set_colors("left", green)
         assert "blue not calibrated yet" in service.last_error
         await seen(client, "green")
-        await client.set_colors("left", Colors(date="2", tool="t", colors={**green.colors, "blue": colors.colors["blue"]}))
+        await client.set_colors(
+            "left",
+            Colors(date="2", tool="t", colors={**green.colors, "blue": colors.colors["blue"]}),
+        )
         await seen(client, "blue", "green")

@@ -39,7 +39,9 @@ class Camera:
 
 @pytest.fixture
 def exposing(running, config):
-    """`async with exposing(camera) as client`: the exposure's part of the tracker, with a camera in this loop."""
+    """`async with exposing(camera) as client`: the exposure's part of the tracker, with a camera in
+    this loop.
+    """
 
     @contextlib.asynccontextmanager
     async def run(camera):
@@ -82,7 +84,12 @@ async def test_values_set_by_hand_are_in_force_and_written(exposing, tmp_path):
 
 async def test_automatics_run_once_and_are_frozen(exposing, tmp_path):
     def finds(images):
-        return Exposure(exposure_us=max(9000.0, 20_000.0 - 1000.0 * images), gain=1.5, red_gain=1.8, blue_gain=1.2)
+        return Exposure(
+            exposure_us=max(9000.0, 20_000.0 - 1000.0 * images),
+            gain=1.5,
+            red_gain=1.8,
+            blue_gain=1.2,
+        )
 
     camera = Camera(Controls(), finds)
     async with exposing(camera) as (_, client):
@@ -97,16 +104,26 @@ async def test_automatics_run_once_and_are_frozen(exposing, tmp_path):
 
 async def test_automatics_that_hunt_are_frozen_with_a_note(exposing, monkeypatch):
     monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._PATIENCE_S", 1.5)
-    camera = Camera(Controls(), lambda images: Exposure(exposure_us=5000.0 + 500.0 * (images % 7), gain=1.0, red_gain=1.0, blue_gain=1.0))
+    camera = Camera(
+        Controls(),
+        lambda images: Exposure(
+            exposure_us=5000.0 + 500.0 * (images % 7), gain=1.0, red_gain=1.0, blue_gain=1.0
+        ),
+    )
     async with exposing(camera) as (_, client):
         now = await client.set_exposure("left", ExposureControl(mode="auto"))
         assert now.mode == "fixed"
         assert "had not settled" in now.note
 
 
-async def test_a_driver_that_reports_nothing_is_a_refusal_and_the_old_comes_back(exposing, monkeypatch, tmp_path):
+async def test_a_driver_that_reports_nothing_is_a_refusal_and_the_old_comes_back(
+    exposing, monkeypatch, tmp_path
+):
     monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._PATIENCE_S", 0.3)
-    save(tmp_path / "calibration" / "left.exposure.json", Exposure(exposure_us=7000.0, gain=1.0, red_gain=1.0, blue_gain=1.0))
+    save(
+        tmp_path / "calibration" / "left.exposure.json",
+        Exposure(exposure_us=7000.0, gain=1.0, red_gain=1.0, blue_gain=1.0),
+    )
     camera = Camera(Controls())
     async with exposing(camera) as (service, client):
         with pytest.raises(CalibrationError, match="refused: the driver reports no exposure"):
@@ -137,7 +154,14 @@ async def test_a_source_without_controls_says_so(exposing):
         assert "has no exposure to set" in service.last_error
 
 
-GARBAGE = [b"", b"[]", b'{"mode":"sideways"}', b'{"exposure_us":-1}', b'{"exposure_us":1e300}', b'{"gain":65}']
+GARBAGE = [
+    b"",
+    b"[]",
+    b'{"mode":"sideways"}',
+    b'{"exposure_us":-1}',
+    b'{"exposure_us":1e300}',
+    b'{"gain":65}',
+]
 
 
 async def test_garbage_is_refused_and_counted(exposing):

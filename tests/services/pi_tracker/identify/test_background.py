@@ -24,9 +24,13 @@ def shot(seq, *patches, size=(120, 90)):
     cells[:] = WALL
     for (x0, y0, x1, y1), color in patches:
         cells[y0:y1, x0:x1] = color
-    y, u, v = np.moveaxis(np.clip(np.rint(cells + rng.normal(0, 1.4, cells.shape)), 0, 255).astype(np.uint8), 2, 0)
+    y, u, v = np.moveaxis(
+        np.clip(np.rint(cells + rng.normal(0, 1.4, cells.shape)), 0, 255).astype(np.uint8), 2, 0
+    )
     size_px = (2 * size[0], 2 * size[1])
-    i420 = np.concatenate([y.repeat(2, 0).repeat(2, 1).ravel(), u.ravel(), v.ravel()]).reshape(3 * size[1], size_px[0])
+    i420 = np.concatenate([y.repeat(2, 0).repeat(2, 1).ravel(), u.ravel(), v.ravel()]).reshape(
+        3 * size[1], size_px[0]
+    )
     return picture(Frame("left", seq, 0, 0.0, size_px, i420, "i420"))
 
 
@@ -41,7 +45,14 @@ def learnt(room, noise, *things, count=5, first=0, markers=()):
     """Look at things so many times, 30 times a second."""
     for seq in range(first, first + count):
         image = shot(seq, *((rect, THING) for rect in things))
-        room.learn(image, (0, 0, *image.size), [blob(rect) for rect in things], markers, noise, (1 + seq) * FRAME_NS)
+        room.learn(
+            image,
+            (0, 0, *image.size),
+            [blob(rect) for rect in things],
+            markers,
+            noise,
+            (1 + seq) * FRAME_NS,
+        )
 
 
 def rects(blobs):
@@ -79,14 +90,18 @@ def test_a_marker_before_a_thing_and_beside_it_is_cut_out(noise):
         (part,) = room.without(image, [blob(merged, mask)], noise)
         assert max(abs(np.subtract(part.rect, place))) <= 1
         assert part.cells == pytest.approx(49, abs=8)
-        assert (part.x_px, part.y_px) == pytest.approx((place[0] + place[2] - 0.5, place[1] + place[3] - 0.5), abs=2.0)
+        assert (part.x_px, part.y_px) == pytest.approx(
+            (place[0] + place[2] - 0.5, place[1] + place[3] - 0.5), abs=2.0
+        )
 
 
 def test_markers_and_their_rims_are_not_learnt(noise):
     room, rect = Room(), (20, 20, 30, 30)
     learnt(room, noise, rect, (32, 20, 34, 30), count=8, markers=[rect])
     image = shot(70, (rect, THING))
-    assert left(room, image, [blob(rect), blob((32, 20, 34, 30))], noise) == rects([blob(rect), blob((32, 20, 34, 30))])
+    assert left(room, image, [blob(rect), blob((32, 20, 34, 30))], noise) == rects(
+        [blob(rect), blob((32, 20, 34, 30))]
+    )
 
 
 def test_what_passes_again_and_again_does_not_stand(noise):
@@ -127,7 +142,10 @@ def test_the_tracker_follows_a_marker_across_a_thing_of_its_colour(studio, tip, 
     size, found = (180, 100), []
     room = np.full((100, 180, 3), studio.clean([], (8, 8))[0][0, 0], np.float32)
     room[25:75, 70:110] = 0.6 * np.array(studio.paints["green"])
-    tips = [tip("green", 30.0, 52.0, width_px=13.0, length_px=14.0), tip("blue", 30.0, 25.0, width_px=13.0, length_px=14.0)]
+    tips = [
+        tip("green", 30.0, 52.0, width_px=13.0, length_px=14.0),
+        tip("blue", 30.0, 25.0, width_px=13.0, length_px=14.0),
+    ]
     hand, truth = studio.clean(tips, (60, 100))
     wall, _ = studio.clean([], (60, 100))
     hidden = np.abs(hand - wall).max(axis=2, keepdims=True) > 6.0
@@ -135,7 +153,9 @@ def test_the_tracker_follows_a_marker_across_a_thing_of_its_colour(studio, tip, 
     for seq in range(26):
         left, image = 5 * max(seq - 5, 0), room.copy()
         image[:, left : left + 60] = np.where(hidden, hand, image[:, left : left + 60])
-        markers = {m.color: m for m in step.step(studio.of(studio.bgr(image, 4.0, seq), seq)).markers}
+        markers = {
+            m.color: m for m in step.step(studio.of(studio.bgr(image, 4.0, seq), seq)).markers
+        }
         marker, (x, y) = markers.get("green"), truth["green"]
         found.append(marker is not None and np.hypot(marker.x_px - x - left, marker.y_px - y) < 4.0)
     assert np.mean(found[6:]) > 0.9

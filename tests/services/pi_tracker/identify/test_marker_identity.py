@@ -41,7 +41,9 @@ def chosen(identity, blobs, seq):
     choices = identity.choose(blobs, stamp_ns)
     for color, choice in enumerate(choices):
         if choice is not None:
-            identity.follow(color, choice.blob.x_px, choice.blob.y_px, choice.blob.area_px, stamp_ns)
+            identity.follow(
+                color, choice.blob.x_px, choice.blob.y_px, choice.blob.area_px, stamp_ns
+            )
     return [None if choice is None else choice.blob for choice in choices]
 
 
@@ -60,7 +62,9 @@ def test_a_hand_is_told_from_things_that_keep_company_too():
 
 
 def test_a_marker_half_hidden_by_another_is_known_by_its_place():
-    """A few cells beside a larger blob are that one's rim as a rule, but not where the marker itself must be."""
+    """A few cells beside a larger blob are that one's rim as a rule, but not where the marker
+    itself must be.
+    """
     identity = Identity(6, 40)
     for seq in range(5):
         tips = hand(300 + 9 * seq, 250)
@@ -112,7 +116,9 @@ def test_what_is_hidden_of_a_marker_is_told():
     for share, hidden in ((0.9, 0.0), (0.8, 0.0), (0.7, 0.0), (0.4, 0.5)):
         stamp_ns += FRAME_NS
         assert None not in identity.choose([[left], [right]], stamp_ns)
-        assert identity.follow(0, left.x_px, left.y_px, share * whole_px2, stamp_ns) == pytest.approx(hidden, abs=0.1)
+        assert identity.follow(
+            0, left.x_px, left.y_px, share * whole_px2, stamp_ns
+        ) == pytest.approx(hidden, abs=0.1)
 
 
 def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
@@ -130,7 +136,9 @@ def test_a_wrong_start_is_mended():
     thing = blob(5, 80, 240, 40)
     tips = hand(400, 250)
     chosen(identity, [[], [], [], [], [], [thing]], 0)
-    found = chosen(identity, [[tip] if color != 5 else [thing, tip] for color, tip in enumerate(tips)], 1)
+    found = chosen(
+        identity, [[tip] if color != 5 else [thing, tip] for color, tip in enumerate(tips)], 1
+    )
     assert found == tips
 
 
@@ -195,22 +203,42 @@ def test_the_best_set_of_nothing_is_nothing():
 
 
 def test_of_a_room_full_of_colour_only_the_likeliest_are_compared(monkeypatch):
-    """Test: a followed hand among 400 specks of each colour. Expected: it goes on being followed, at a bounded number of comparisons."""
+    """Test: a followed hand among 400 specks of each colour.
+
+    Expected: it goes on being followed, at a bounded number of comparisons.
+    """
     compared = []
-    monkeypatch.setattr(group_consistency, "_fit", lambda a, b, fit=group_consistency._fit: compared.append(a) or fit(a, b))
+    monkeypatch.setattr(
+        group_consistency,
+        "_fit",
+        lambda a, b, fit=group_consistency._fit: compared.append(a) or fit(a, b),
+    )
     identity, random = Identity(6, 40), np.random.default_rng(4)
     tips = hand(300, 250)
     for seq in range(3):
         chosen(identity, [[tip] for tip in tips], seq)
-    specks = [[blob(color, x, y, 6) for x, y in random.uniform(20, 460, (400, 2)).tolist()] for color in range(6)]
+    specks = [
+        [blob(color, x, y, 6) for x, y in random.uniform(20, 460, (400, 2)).tolist()]
+        for color in range(6)
+    ]
     assert chosen(identity, [[*own, tip] for own, tip in zip(specks, tips, strict=True)], 3) == tips
-    # 96 candidates gather 80 others each, and 15 pairs of what they gathered are summed; of all specks it would be 6 million.
+    # 96 candidates gather 80 others each, and 15 pairs of what they gathered are summed; of all
+    # specks it would be 6 million.
     assert 0 < len(compared) < 10_000
 
 
 def test_at_first_the_largest_of_many_are_compared():
-    """Test: nothing is known yet. Expected: a hand among 400 specks of each colour that are smaller than it is found."""
+    """Test: nothing is known yet.
+
+    Expected: a hand among 400 specks of each colour that are smaller than it is found.
+    """
     random = np.random.default_rng(5)
-    specks = [[blob(color, x, y, 4) for x, y in random.uniform(20, 460, (400, 2)).tolist()] for color in range(6)]
+    specks = [
+        [blob(color, x, y, 4) for x, y in random.uniform(20, 460, (400, 2)).tolist()]
+        for color in range(6)
+    ]
     tips = hand(300, 250)
-    assert chosen(Identity(6, 40), [[*own, tip] for own, tip in zip(specks, tips, strict=True)], 0) == tips
+    assert (
+        chosen(Identity(6, 40), [[*own, tip] for own, tip in zip(specks, tips, strict=True)], 0)
+        == tips
+    )

@@ -22,7 +22,9 @@ def lens():
 
 @pytest.fixture
 def frame(studio, tip):
-    """Two tips of one hand in a corner, at any layout: no further from each other than a hand reaches."""
+    """Two tips of one hand in a corner, at any layout: no further from each other than a hand
+    reaches.
+    """
     tips = [tip("green", 95.0, 70.0), tip("blue", 40.0, 35.0)]
     return lambda layout="i420": studio.frame(tips, 1, layout, size_px=SIZE, sigma=1.0)[0]
 
@@ -31,20 +33,27 @@ def frame(studio, tip):
 @pytest.mark.parametrize("method", ["lut", "seed"])
 def test_markers_are_told_where_the_camera_shows_them(frame, colors, lens, layout, method):
     plain = TrackerStep("left", colors, Tracker(method=method), SIZE, ["green", "blue"])
-    rectifying = TrackerStep("left", colors, Tracker(method=method), SIZE, ["green", "blue"], lens=lens)
+    rectifying = TrackerStep(
+        "left", colors, Tracker(method=method), SIZE, ["green", "blue"], lens=lens
+    )
     expected = {marker.color: marker for marker in plain.step(frame(layout)).markers}
     found = {marker.color: marker for marker in rectifying.step(frame(layout)).markers}
     assert set(found) == set(expected) == {"green", "blue"}
     for name, marker in found.items():
         # Another sampling of the same picture; the seed's whole-pixel contours change more.
-        assert (marker.x_px, marker.y_px) == pytest.approx((expected[name].x_px, expected[name].y_px), abs=0.3 if method == "lut" else 1.0)
+        assert (marker.x_px, marker.y_px) == pytest.approx(
+            (expected[name].x_px, expected[name].y_px), abs=0.3 if method == "lut" else 1.0
+        )
 
 
 @pytest.mark.parametrize("width_px", [7.0, 8.0, 9.0])
 def test_small_tips_are_found_in_rectified_pictures(studio, tip, colors, lens, width_px):
     for number in range(6):
         x, y = 40.0 + 0.37 * number, 35.0 + 0.23 * number
-        tips = [tip("blue", x, y, width_px), tip("green", x + 6 * width_px, y + 4 * width_px, width_px)]
+        tips = [
+            tip("blue", x, y, width_px),
+            tip("green", x + 6 * width_px, y + 4 * width_px, width_px),
+        ]
         seen, _ = studio.frame(tips, number, size_px=SIZE)
         for known in (None, lens):
             step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"], lens=known)

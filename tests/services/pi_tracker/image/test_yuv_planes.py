@@ -43,7 +43,10 @@ def test_chroma_is_averaged_not_sampled():
 
 
 def test_an_odd_row_and_column_are_left_out():
-    assert picture(frame_of(np.zeros((481, 641, 3), np.uint8), (641, 481), "bgr")).size == (320, 240)
+    assert picture(frame_of(np.zeros((481, 641, 3), np.uint8), (641, 481), "bgr")).size == (
+        320,
+        240,
+    )
 
 
 @pytest.mark.parametrize(

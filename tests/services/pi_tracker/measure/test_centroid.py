@@ -18,17 +18,26 @@ def measure(searcher, noise, frame):
 
 
 def pairs(studio, tip, searcher, noise, count=72):
-    """(n, 2, 2): error of both views of a tip, independently noisy, sub-pixel apart; and (n,) sigmas."""
+    """(n, 2, 2): error of both views of a tip, independently noisy, sub-pixel apart.
+
+    And (n,) sigmas.
+    """
     rng = np.random.default_rng(1)
     errors, sigmas = [], []
     for i in range(count):
         name = list(studio.paints)[i % 6]
         x, y, apart = 32 + rng.uniform(-1, 1), 32 + rng.uniform(-1, 1), rng.uniform(-1, 1)
         look = {"wall": tuple(rng.uniform(60, 200) + rng.uniform(-10, 10, 3))}
-        shape = {"length_px": 9 * rng.uniform(0.9, 1.3), "turn_rad": rng.uniform(0, 2 * np.pi), "light_rad": rng.uniform(-1, 1)}
+        shape = {
+            "length_px": 9 * rng.uniform(0.9, 1.3),
+            "turn_rad": rng.uniform(0, 2 * np.pi),
+            "light_rad": rng.uniform(-1, 1),
+        }
         views = []
         for side in range(2):
-            frame, truth = studio.frame([tip(name, x + side * apart, y, 9.0, **shape)], seq=2 * i + side, **look)
+            frame, truth = studio.frame(
+                [tip(name, x + side * apart, y, 9.0, **shape)], seq=2 * i + side, **look
+            )
             found = measure(searcher, noise, frame)[name]
             views.append((found.x_px - truth[name][0], found.y_px - truth[name][1]))
             sigmas.append(found.sigma_px)
@@ -51,7 +60,9 @@ def test_disparity_and_bias_of_a_small_tip(studio, tip, searcher, noise):
 @pytest.mark.parametrize("sigma", [2.0, 5.0, 8.0])
 def test_more_noise_is_more_sigma(studio, tip, searcher, noise, sigma):
     noise.luma, noise.chroma = 0.29 * sigma, 0.28 * sigma
-    frames = [studio.frame([tip("green", 32.0, 32.0)], seq=seq, sigma=sigma)[0] for seq in range(12)]
+    frames = [
+        studio.frame([tip("green", 32.0, 32.0)], seq=seq, sigma=sigma)[0] for seq in range(12)
+    ]
     found = [measure(searcher, noise, frame)["green"] for frame in frames]
     scatter = np.std([(one.x_px, one.y_px) for one in found], axis=0).mean()
     assert scatter < 1.3 * np.mean([one.sigma_px for one in found])
@@ -61,7 +72,9 @@ def test_a_dab_in_the_middle_of_skin_is_unbiased(studio, tip, searcher, noise):
     errors = []
     for seq in range(16):
         x, y = 32 + 0.13 * seq - 1, 31 + 0.07 * seq
-        frame, truth = studio.frame([tip("violet", x, y, 12.0, 12.0, turn_rad=0.3 * seq)], seq=seq, sigma=2.0, shading=0.0)
+        frame, truth = studio.frame(
+            [tip("violet", x, y, 12.0, 12.0, turn_rad=0.3 * seq)], seq=seq, sigma=2.0, shading=0.0
+        )
         found = measure(searcher, noise, frame)["violet"]
         errors.append((found.x_px - truth["violet"][0], found.y_px - truth["violet"][1]))
     assert np.abs(np.mean(errors, axis=0)).max() < 0.06
@@ -69,7 +82,9 @@ def test_a_dab_in_the_middle_of_skin_is_unbiased(studio, tip, searcher, noise):
 
 def test_a_neighbouring_finger_does_not_pull(studio, tip, searcher, noise):
     alone, _ = studio.frame([tip("green", 26.0, 32.0, turn_rad=1.57)], sigma=1.0)
-    both, _ = studio.frame([tip("green", 26.0, 32.0, turn_rad=1.57), tip("blue", 38.0, 32.0, turn_rad=1.57)], sigma=1.0)
+    both, _ = studio.frame(
+        [tip("green", 26.0, 32.0, turn_rad=1.57), tip("blue", 38.0, 32.0, turn_rad=1.57)], sigma=1.0
+    )
     a, b = measure(searcher, noise, alone)["green"], measure(searcher, noise, both)["green"]
     assert np.hypot(a.x_px - b.x_px, a.y_px - b.y_px) < 0.2
 
@@ -80,19 +95,26 @@ def test_layouts_agree(studio, tip, searcher, noise):
     assert (a.x_px, a.y_px) == pytest.approx((b.x_px, b.y_px), abs=0.05)
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.0, 30.0), (63.0, 30.0), (30.0, 0.0), (30.0, 63.0), (1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("x", "y"), [(0.0, 30.0), (63.0, 30.0), (30.0, 0.0), (30.0, 63.0), (1.0, 1.0)]
+)
 def test_at_the_edge_of_the_image(studio, tip, searcher, noise, x, y):
     frame, _ = studio.frame([tip("green", x, y, 14.0, 14.0)])
     found = measure(searcher, noise, frame)["green"]
     assert -0.5 <= found.x_px <= 63.5
     assert -0.5 <= found.y_px <= 63.5
     assert np.isfinite(found.sigma_px)
-    middle = measure(searcher, noise, studio.frame([tip("green", 32.0, 32.0, 14.0, 14.0)])[0])["green"]
+    middle = measure(searcher, noise, studio.frame([tip("green", 32.0, 32.0, 14.0, 14.0)])[0])[
+        "green"
+    ]
     assert found.quality < 0.5 < middle.quality
 
 
 def test_large_blobs_are_measured_beside_small_ones(studio, tip, searcher, noise):
-    frame, truth = studio.frame([tip("green", 60.0, 80.0, 90.0, 90.0), tip("blue", 150.0, 80.0, 9.0, 10.0)], size_px=(180, 160))
+    frame, truth = studio.frame(
+        [tip("green", 60.0, 80.0, 90.0, 90.0), tip("blue", 150.0, 80.0, 9.0, 10.0)],
+        size_px=(180, 160),
+    )
     found = measure(searcher, noise, frame)
     assert (found["green"].x_px, found["green"].y_px) == pytest.approx(truth["green"], abs=1.5)
     assert (found["blue"].x_px, found["blue"].y_px) == pytest.approx(truth["blue"], abs=0.3)
@@ -105,8 +127,15 @@ def test_no_blobs_no_centroids(studio, noise):
 
 def test_blobs_measured_together_are_measured_as_if_alone(studio, tip, searcher, noise):
     # Side by side in one stack of tiles, of several sizes.
-    places = {"green": (30.0, 20.0, 8.0), "blue": (90.0, 24.0, 16.0), "lime": (33.0, 70.0, 9.0), "violet": (92.0, 76.0, 12.0)}
-    frame, _ = studio.frame([tip(name, x, y, width) for name, (x, y, width) in places.items()], size_px=(128, 100))
+    places = {
+        "green": (30.0, 20.0, 8.0),
+        "blue": (90.0, 24.0, 16.0),
+        "lime": (33.0, 70.0, 9.0),
+        "violet": (92.0, 76.0, 12.0),
+    }
+    frame, _ = studio.frame(
+        [tip(name, x, y, width) for name, (x, y, width) in places.items()], size_px=(128, 100)
+    )
     image = picture(frame)
     blobs = searcher.blobs(image, whole(image.size))
     assert len(blobs) == len(places)

@@ -11,7 +11,8 @@ from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure import centroid
 from services.pi_tracker.measure.paint_fraction import Light, Mixture
 
-# BT.601 from R, G, B, as cameras have it, and full range to the power of 1.5 for light, as mixture.py has it.
+# BT.601 from R, G, B, as cameras have it, and full range to the power of 1.5 for light, as
+# mixture.py has it.
 YUV_FROM_RGB = np.linalg.inv([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]])
 SHAPE = (9, 2, 12)
 
@@ -19,7 +20,9 @@ SHAPE = (9, 2, 12)
 def encoded(light):
     """Cells (4, h, n, w) of light (h, n, w, 3), R, G, B of 0..255."""
     yuv = (255.0 * (light / 255.0) ** (1 / 1.5)) @ YUV_FROM_RGB.T
-    return np.concatenate([np.moveaxis(yuv, -1, 0), np.ones((1, *light.shape[:-1]))]).astype(np.float32)
+    return np.concatenate([np.moveaxis(yuv, -1, 0), np.ones((1, *light.shape[:-1]))]).astype(
+        np.float32
+    )
 
 
 @pytest.fixture
@@ -39,13 +42,16 @@ def alone(shares):
 def mixed(shares):
     """Blue paint before a wall four times brighter, once in full light and once in half of it."""
     paint, wall = np.array([20.0, 40.0, 90.0]), np.array([200.0, 190.0, 180.0])
-    return (shares[..., None] * paint + (1 - shares[..., None]) * wall) * np.array([1.0, 0.5])[:, None, None]
+    return (shares[..., None] * paint + (1 - shares[..., None]) * wall) * np.array([1.0, 0.5])[
+        :, None, None
+    ]
 
 
 def test_a_known_mixture_is_recovered(shares, alone, mixed):
     mixture = Mixture(Light(encoded(mixed)), alone)
     share, _, variance = mixture.share(Noise())
-    # Cells of the slope that are in reach of both; further away there is no more than the mean of all, which here is as good.
+    # Cells of the slope that are in reach of both; further away there is no more than the mean of
+    # all, which here is as good.
     assert share == pytest.approx(shares, abs=2e-3)
     assert mixture.ratio() == pytest.approx(shares, abs=2e-3)
     assert (variance > 0.0).all()
@@ -55,7 +61,9 @@ def test_shade_on_paint_and_background_alike_leaves_the_ratio(shares, alone, mix
     # In the slope it is darker than where either is seen alone.
     between = ((shares > 0.0) & (shares < 1.0))[..., None]
     shaded = np.where(between, 0.6 * mixed, mixed)
-    assert Mixture(Light(encoded(shaded)), alone, rough=True).ratio() == pytest.approx(shares, abs=5e-3)
+    assert Mixture(Light(encoded(shaded)), alone, rough=True).ratio() == pytest.approx(
+        shares, abs=5e-3
+    )
 
 
 def test_slopes_are_the_derivatives_by_what_the_camera_says():
@@ -66,7 +74,10 @@ def test_slopes_are_the_derivatives_by_what_the_camera_says():
     for channel in range(3):
         step = np.zeros_like(cells)
         step[channel] = 0.5
-        above, below = (np.sum(by_light * Light((cells + sign * step).astype(np.float32)).cells[:3], axis=0) for sign in (1, -1))
+        above, below = (
+            np.sum(by_light * Light((cells + sign * step).astype(np.float32)).cells[:3], axis=0)
+            for sign in (1, -1)
+        )
         assert slopes[channel] == pytest.approx(above - below, rel=0.01, abs=0.01)
 
 
@@ -78,7 +89,10 @@ def test_noise_of_the_share_is_as_told(shares, alone, mixed):
     for _ in range(200):
         noisy = cells.copy()
         # Only where both are mixed: what is known of paint and background stays.
-        noisy[:3, :, :, 5:7] += rng.normal(0.0, 1.0, (3, *SHAPE[:2], 2)) * np.array([1.0, 0.7, 0.7])[:, None, None, None]
+        noisy[:3, :, :, 5:7] += (
+            rng.normal(0.0, 1.0, (3, *SHAPE[:2], 2))
+            * np.array([1.0, 0.7, 0.7])[:, None, None, None]
+        )
         seen.append(Mixture(Light(noisy), alone).share(noise)[0][:, :, 5:7])
     assert np.std(seen, axis=0).mean() == pytest.approx(told.mean(), rel=0.1)
 
@@ -102,11 +116,17 @@ def test_a_wall_of_two_colours_biases_less_than_in_grey_levels(studio, tip, sear
     errors = {Light: [], Grey: []}
     for number, name in enumerate([*studio.paints] * 2):
         x = 31.6 + 0.07 * number
-        frame, truth = studio.frame([tip(name, x, 32.0, turn_rad=1.57)], seq=number, sigma=1.0, shading=0.0, wall=wall)
+        frame, truth = studio.frame(
+            [tip(name, x, 32.0, turn_rad=1.57)], seq=number, sigma=1.0, shading=0.0, wall=wall
+        )
         image = picture(frame)
         for light, found in errors.items():
             monkeypatch.setattr(centroid, "Light", light)
-            blobs = [blob for blob in searcher.blobs(image, whole(image.size)) if searcher.names[blob.color] == name]
+            blobs = [
+                blob
+                for blob in searcher.blobs(image, whole(image.size))
+                if searcher.names[blob.color] == name
+            ]
             (one,) = centroid.centroids(image, blobs, Noise(0.4, 0.4))
             found.append(one.x_px - truth[name][0])
     light, grey = (float(np.sqrt(np.mean(np.square(found)))) for found in errors.values())

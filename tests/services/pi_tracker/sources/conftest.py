@@ -1,4 +1,6 @@
-"""Stand-ins of the cameras' libraries: what picamera2 and cv2.VideoCapture do and check, as far as the sources use it."""
+"""Stand-ins of the cameras' libraries: what picamera2 and cv2.VideoCapture do and check, as far as
+the sources use it.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ import pytest
 
 
 class FakeRequest:
-    """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name, to be released once."""
+    """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name, to be
+    released once.
+    """
 
     def __init__(self, camera):
         self._camera = camera
@@ -47,11 +51,16 @@ class FakeJob:
             self._future.set_result(result)
 
     def get_result(self, timeout=None):
-        return self._future.result(timeout=min(timeout, 0.01) if not self._future.done() else timeout)
+        return self._future.result(
+            timeout=min(timeout, 0.01) if not self._future.done() else timeout
+        )
 
 
 class FakePicamera2:
-    """picamera2.Picamera2 as far as it is used, with its checks; controls that were set while it ran are in `set`."""
+    """picamera2.Picamera2 as far as it is used, with its checks.
+
+    Controls that were set while it ran are in `set`.
+    """
 
     WALL_NS = 1_700_000_000_123_456_789
     made: ClassVar[list[FakePicamera2]] = []
@@ -64,7 +73,12 @@ class FakePicamera2:
 
     def __init__(self, camera_num=0):
         self.camera_properties = {"Model": FakePicamera2.cameras[camera_num]["Model"]}
-        self.metadata = {"FrameWallClock": self.WALL_NS, "ExposureTime": 8000, "AnalogueGain": 2.5, "ColourGains": (1.7, 1.4)}
+        self.metadata = {
+            "FrameWallClock": self.WALL_NS,
+            "ExposureTime": 8000,
+            "AnalogueGain": 2.5,
+            "ColourGains": (1.7, 1.4),
+        }
         self.set = []
         self.started = self.closed = self.silent = False
         self.requests = []
@@ -73,7 +87,12 @@ class FakePicamera2:
 
     @property
     def sensor_modes(self):
-        mode = {"format": "SGBRG10", "unpacked": "SGBRG10", "bit_depth": 10, "exposure_limits": (134, 1_000_000)}
+        mode = {
+            "format": "SGBRG10",
+            "unpacked": "SGBRG10",
+            "bit_depth": 10,
+            "exposure_limits": (134, 1_000_000),
+        }
         return [
             {**mode, "size": (640, 480), "fps": 58.92, "crop_limits": (16, 0, 2560, 1920)},
             {**mode, "size": (1296, 972), "fps": 46.34, "crop_limits": (0, 0, 2592, 1944)},
@@ -81,7 +100,9 @@ class FakePicamera2:
             {"format": "MJPEG"},
         ]
 
-    def create_video_configuration(self, main=None, colour_space=None, buffer_count=6, controls=None, queue=True, sensor=None):
+    def create_video_configuration(
+        self, main=None, colour_space=None, buffer_count=6, controls=None, queue=True, sensor=None
+    ):
         assert main["format"] == "YUV420"
         assert set(sensor) <= {"bit_depth", "output_size"}
         return {
@@ -96,7 +117,10 @@ class FakePicamera2:
     def configure(self, config):
         assert not self.started
         width, _ = config["main"]["size"]
-        self._config = {**config, "main": {**config["main"], "stride": width + FakePicamera2.padding}}
+        self._config = {
+            **config,
+            "main": {**config["main"], "stride": width + FakePicamera2.padding},
+        }
 
     def camera_configuration(self):
         return self._config
@@ -131,7 +155,10 @@ def picamera2(monkeypatch):
 
 
 class FakeCapture:
-    """cv2.VideoCapture of a V4L2 camera, as far as it is used; controls in `refused` cannot be set, device 9 is not there."""
+    """cv2.VideoCapture of a V4L2 camera, as far as it is used.
+
+    Controls in `refused` cannot be set, device 9 is not there.
+    """
 
     def __init__(self, device=0, api=cv2.CAP_V4L2, refused=()):
         self.device, self.api, self.refused = device, api, refused

@@ -18,14 +18,19 @@ SIZE = (64, 48)
 def images(count, size=SIZE):
     """Different pictures, each with its number as its grey."""
     rng = np.random.default_rng(0)
-    return [np.clip(10 * n + rng.integers(0, 20, (size[1], size[0], 3)), 0, 255).astype(np.uint8) for n in range(count)]
+    return [
+        np.clip(10 * n + rng.integers(0, 20, (size[1], size[0], 3)), 0, 255).astype(np.uint8)
+        for n in range(count)
+    ]
 
 
 def write_video(path, pictures, fps=20.0):
     """A lossless video."""
     height, width = pictures[0].shape[:2]
     code = cv2.VideoWriter_fourcc(*"FFV1")
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, (width, height), pictures[0].ndim == 3)
+    writer = cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, code, fps, (width, height), pictures[0].ndim == 3
+    )
     for picture in pictures:
         writer.write(picture)
     writer.release()
@@ -54,7 +59,10 @@ def capture(tmp_path):
     """A capture folder with two cameras of five frames."""
     for name, first_ns in (("left", 1_000_000_000), ("right", 1_004_000_000)):
         write_video(tmp_path / f"{name}.mkv", images(5))
-        write_stamps(tmp_path / f"{name}.csv", [FrameStamp(n, first_ns + n * 50_000_000, 33_700.5) for n in range(5)])
+        write_stamps(
+            tmp_path / f"{name}.csv",
+            [FrameStamp(n, first_ns + n * 50_000_000, 33_700.5) for n in range(5)],
+        )
     return tmp_path
 
 
@@ -64,8 +72,13 @@ def test_a_video_has_stamps_from_its_frame_rate(tmp_path):
     frames = read_all(VideoReader("left", tmp_path / "a.mkv", 99.0, start_ns=7))
     assert [frame.seq for frame in frames] == list(range(6))
     assert [frame.stamp_ns for frame in frames] == [7 + n * 50_000_000 for n in range(6)]
-    assert {(frame.camera, frame.size_px, frame.layout, frame.row_time_ns) for frame in frames} == {("left", SIZE, "bgr", 0.0)}
-    assert all(np.array_equal(frame.image, picture) for frame, picture in zip(frames, pictures, strict=True))
+    assert {(frame.camera, frame.size_px, frame.layout, frame.row_time_ns) for frame in frames} == {
+        ("left", SIZE, "bgr", 0.0)
+    }
+    assert all(
+        np.array_equal(frame.image, picture)
+        for frame, picture in zip(frames, pictures, strict=True)
+    )
 
 
 def test_a_video_that_breaks_off_tells_how_far_it_came(tmp_path):
@@ -75,7 +88,9 @@ def test_a_video_that_breaks_off_tells_how_far_it_came(tmp_path):
     reader = VideoReader("left", path, 20.0)
     reader.open()
     count = 0
-    with pytest.raises(CaptureError, match=r"a\.mkv: ends after \d+ of 40 frames: cut short or damaged"):
+    with pytest.raises(
+        CaptureError, match=r"a\.mkv: ends after \d+ of 40 frames: cut short or damaged"
+    ):
         while reader.read() is not None:
             count += 1
     assert 10 < count < 30
@@ -103,9 +118,14 @@ def test_a_missing_video_is_named(tmp_path):
 
 def test_a_capture_has_its_own_stamps(capture):
     frames = read_all(CaptureReader("right", capture))
-    assert [frame.stamp_ns for frame in frames] == [1_004_000_000 + n * 50_000_000 for n in range(5)]
+    assert [frame.stamp_ns for frame in frames] == [
+        1_004_000_000 + n * 50_000_000 for n in range(5)
+    ]
     assert {frame.row_time_ns for frame in frames} == {33_700.5}
-    assert all(np.array_equal(frame.image, picture) for frame, picture in zip(frames, images(5), strict=True))
+    assert all(
+        np.array_equal(frame.image, picture)
+        for frame, picture in zip(frames, images(5), strict=True)
+    )
 
 
 def test_cameras_of_a_capture_move_together(capture):
@@ -115,11 +135,16 @@ def test_cameras_of_a_capture_move_together(capture):
 
 
 def test_a_grey_capture_holds_i420(capture):
-    pictures = [np.random.default_rng(n).integers(0, 256, (72, 64), dtype=np.uint8) for n in range(5)]
+    pictures = [
+        np.random.default_rng(n).integers(0, 256, (72, 64), dtype=np.uint8) for n in range(5)
+    ]
     write_video(capture / "left.mkv", pictures)
     frames = read_all(CaptureReader("left", capture))
     assert {(frame.layout, frame.size_px) for frame in frames} == {("i420", SIZE)}
-    assert all(np.array_equal(frame.image, picture) for frame, picture in zip(frames, pictures, strict=True))
+    assert all(
+        np.array_equal(frame.image, picture)
+        for frame, picture in zip(frames, pictures, strict=True)
+    )
 
 
 @pytest.mark.parametrize(
@@ -140,12 +165,20 @@ def test_a_capture_whose_parts_differ_is_damaged(capture, stamps, message):
     ("spoil", "message"),
     [
         (
-            lambda folder: (folder / "left.csv").write_text("frame,stamp_ns,row_time_ns\n0,zero,1\n"),
+            lambda folder: (folder / "left.csv").write_text(
+                "frame,stamp_ns,row_time_ns\n0,zero,1\n"
+            ),
             r"left\.csv: line 2: expected three numbers",
         ),
         (lambda folder: (folder / "left.csv").unlink(), r"left\.csv: cannot be read"),
-        (lambda folder: (folder / "left.mkv").unlink(), "has no video of camera 'left'; it has right"),
-        (lambda folder: cut(folder / "left.mkv", 0.1), r"left\.mkv: (cannot be decoded|ends after)"),
+        (
+            lambda folder: (folder / "left.mkv").unlink(),
+            "has no video of camera 'left'; it has right",
+        ),
+        (
+            lambda folder: cut(folder / "left.mkv", 0.1),
+            r"left\.mkv: (cannot be decoded|ends after)",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_capture_is_said(capture, spoil, message):
@@ -166,7 +199,10 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     (tmp_path / "notes.txt").write_text("not an image")
     frames = read_all(FolderReader("left", tmp_path, 10.0, start_ns=3))
     assert [frame.stamp_ns for frame in frames] == [3 + n * 100_000_000 for n in range(12)]
-    assert all(np.array_equal(frame.image, picture) for frame, picture in zip(frames, pictures, strict=True))
+    assert all(
+        np.array_equal(frame.image, picture)
+        for frame, picture in zip(frames, pictures, strict=True)
+    )
 
 
 def test_a_broken_image_is_named(tmp_path):

@@ -27,7 +27,9 @@ def test_a_pi_camera_delivers_packed_i420(picamera2, monkeypatch, padding):
     camera.open()
     frame = camera.read()
     assert (frame.image.shape, frame.layout, frame.size_px) == ((720, 640), "i420", (640, 480))
-    assert np.array_equal(frame.image[:480], np.broadcast_to((np.arange(480) % 200)[:, None], (480, 640)))
+    assert np.array_equal(
+        frame.image[:480], np.broadcast_to((np.arange(480) % 200)[:, None], (480, 640))
+    )
     chroma = frame.image[480:].reshape(2, 240, 320)
     assert (np.unique(chroma[0]), np.unique(chroma[1])) == ([90], [160])
     assert camera.read().seq == 1
@@ -82,7 +84,12 @@ def test_a_pi_camera_without_calibration_says_so(picamera2):
 def roles(picamera2, monkeypatch):
     """libcamera with software synchronisation: its controls.rpi.SyncModeEnum."""
     found = types.SimpleNamespace(Off=0, Server=1, Client=2)
-    monkeypatch.setattr(sys.modules["libcamera"], "controls", types.SimpleNamespace(rpi=types.SimpleNamespace(SyncModeEnum=found)), False)
+    monkeypatch.setattr(
+        sys.modules["libcamera"],
+        "controls",
+        types.SimpleNamespace(rpi=types.SimpleNamespace(SyncModeEnum=found)),
+        False,
+    )
     return found
 
 
@@ -154,7 +161,9 @@ def test_a_pi_camera_in_use_is_named(picamera2, monkeypatch):
         raise RuntimeError("Failed to acquire camera: Device or resource busy")
 
     monkeypatch.setattr(picamera2, "start", busy)
-    with pytest.raises(SourceError, match=r"cannot be started: .*busy; does another program use it"):
+    with pytest.raises(
+        SourceError, match=r"cannot be started: .*busy; does another program use it"
+    ):
         PiCamera(table(), 0, EXPOSURE).open()
 
 
@@ -179,11 +188,21 @@ def test_a_pi_camera_runs_its_automatics_and_freezes_them(picamera2):
     camera.controls.adjust(None)
     camera.read()
     assert fake.set == [{"AeEnable": True, "AwbEnable": True}]
-    assert camera.controls.reported == Exposure(exposure_us=12_000.0, gain=1.5, red_gain=1.9, blue_gain=1.3)
+    assert camera.controls.reported == Exposure(
+        exposure_us=12_000.0, gain=1.5, red_gain=1.9, blue_gain=1.3
+    )
     camera.controls.adjust(EXPOSURE)
     camera.read()
     camera.read()
-    assert fake.set[1:] == [{"AeEnable": False, "AwbEnable": False, "ExposureTime": 8000, "AnalogueGain": 2.5, "ColourGains": (1.7, 1.4)}]
+    assert fake.set[1:] == [
+        {
+            "AeEnable": False,
+            "AwbEnable": False,
+            "ExposureTime": 8000,
+            "AnalogueGain": 2.5,
+            "ColourGains": (1.7, 1.4),
+        }
+    ]
 
 
 @pytest.mark.parametrize("missing", ["ExposureTime", "AnalogueGain", "ColourGains"])

@@ -41,15 +41,26 @@ def test_each_word_has_its_reader(tmp_path, source, kind, file):
     assert is_file(table) is file
 
 
-@pytest.mark.parametrize("source", ["", "webcam", "video:", "picamera2:one", "v4l2", "capture", "simulator", "Video:a.mp4"])
+@pytest.mark.parametrize(
+    "source",
+    ["", "webcam", "video:", "picamera2:one", "v4l2", "capture", "simulator", "Video:a.mp4"],
+)
 def test_an_unknown_word_is_answered_with_the_list(source):
-    with pytest.raises(ConfigError, match=r"camera 'left': unknown source .* valid: picamera2, .*capture:DIR, simulator"):
+    with pytest.raises(
+        ConfigError,
+        match=r"camera 'left': unknown source .* valid: picamera2, .*capture:DIR, simulator",
+    ):
         open_reader(CameraTable(name="left", source=source), RigConfig())
 
 
 def test_a_camera_takes_its_exposure_from_the_calibration(tmp_path):
-    save(tmp_path / "calibration" / "left.exposure.json", Exposure(exposure_us=5000.0, gain=1.0, red_gain=1.0, blue_gain=1.0))
-    reader = open_reader(CameraTable(name="left", source="picamera2"), RigConfig(folder=str(tmp_path)))
+    save(
+        tmp_path / "calibration" / "left.exposure.json",
+        Exposure(exposure_us=5000.0, gain=1.0, red_gain=1.0, blue_gain=1.0),
+    )
+    reader = open_reader(
+        CameraTable(name="left", source="picamera2"), RigConfig(folder=str(tmp_path))
+    )
     assert reader._exposure.exposure_us == 5000.0
 
 
@@ -148,7 +159,14 @@ async def test_leaving_the_stream_closes_the_reader():
 
 
 def attachment(**fields):
-    values = {"camera": "left", "seq": 4, "stamp_ns": 99, "row_time_ns": 30e3, "size_px": (8, 4), "clock_skew_ns": 2_000_000_000}
+    values = {
+        "camera": "left",
+        "seq": 4,
+        "stamp_ns": 99,
+        "row_time_ns": 30e3,
+        "size_px": (8, 4),
+        "clock_skew_ns": 2_000_000_000,
+    }
     return SimFrame(**{**values, **fields})
 
 
@@ -177,7 +195,13 @@ async def test_simulated_frames_come_over_the_bus_and_nonsense_is_counted(router
                     await asyncio.sleep(0.005)
             publisher.put_bytes(image.tobytes(), attachment())
             taken = await waiting
-    assert (taken.seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.layout) == (4, 99, 30e3, (8, 4), "i420")
+    assert (taken.seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.layout) == (
+        4,
+        99,
+        30e3,
+        (8, 4),
+        "i420",
+    )
     assert np.array_equal(taken.image.ravel(), image)
     assert source.now_ns() - clock.now_ns() == pytest.approx(2e9, abs=1e8)
     assert msgspec.json.decode(msgspec.json.encode(attachment()), type=SimFrame) == attachment()

@@ -46,7 +46,9 @@ def test_a_usb_camera_is_set_by_hand_and_stamped_by_its_driver(video_capture):
     made[0].position_ms = 0.0
     assert clock.now_ns() - camera.read().stamp_ns == pytest.approx(4e6, abs=5e6)
     camera.read()
-    with pytest.raises(SourceError, match="camera 'left': 0 delivers no more images; is it unplugged"):
+    with pytest.raises(
+        SourceError, match="camera 'left': 0 delivers no more images; is it unplugged"
+    ):
         camera.read()
     camera.close()
     assert not made[0].opened
@@ -70,7 +72,10 @@ def test_a_usb_camera_runs_its_automatics_and_freezes_them(video_capture):
     assert camera.controls.reported.exposure_us == 12_000.0
     camera.controls.adjust(EXPOSURE)
     camera.read()
-    assert (fake.values[cv2.CAP_PROP_AUTO_EXPOSURE], fake.values[cv2.CAP_PROP_EXPOSURE]) == (1, 80.0)
+    assert (fake.values[cv2.CAP_PROP_AUTO_EXPOSURE], fake.values[cv2.CAP_PROP_EXPOSURE]) == (
+        1,
+        80.0,
+    )
 
 
 def test_a_usb_driver_without_values_reports_nothing(video_capture):

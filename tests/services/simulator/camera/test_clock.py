@@ -9,7 +9,9 @@ from services.simulator.camera.clock import CameraClock, camera_clock
 
 
 def pair(seed: int = 1, fps: float = 30.0) -> tuple[CameraClock, CameraClock]:
-    left, right = (camera_clock(name, i, 2, fps, 480, 0.008, seed) for i, name in enumerate(("left", "right")))
+    left, right = (
+        camera_clock(name, i, 2, fps, 480, 0.008, seed) for i, name in enumerate(("left", "right"))
+    )
     return left, right
 
 

@@ -35,7 +35,11 @@ def folder(fist: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_pictures_come_back_bit_for_bit(fist, folder, planes):
     for name in fist.cameras:
         source = FrameSource(fist, name, recorded=True)
-        kept = [taken for k in range(source.clock.first_frame(SECONDS)) if (taken := source.take(k, START_NS)).image is not None]
+        kept = [
+            taken
+            for k in range(source.clock.first_frame(SECONDS))
+            if (taken := source.take(k, START_NS)).image is not None
+        ]
         stamps = read_stamps(Capture(folder).stamps(name))
         video = cv2.VideoCapture(str(Capture(folder).video(name)))
         pictures = []
@@ -49,17 +53,23 @@ def test_pictures_come_back_bit_for_bit(fist, folder, planes):
             b, g, r = (bgr[..., i].astype(float) for i in range(3))
             y, u, v = planes(taken.image)
             np.testing.assert_allclose(16 + 0.257 * r + 0.504 * g + 0.098 * b, y, atol=1.01)
-            mean = (128 - 0.148 * r - 0.291 * g + 0.439 * b).reshape(240, 2, 320, 2).mean(axis=(1, 3))
+            mean = (
+                (128 - 0.148 * r - 0.291 * g + 0.439 * b).reshape(240, 2, 320, 2).mean(axis=(1, 3))
+            )
             # Grey levels clip in BGR where YUV would not: a few pixels of saturated paint.
             assert np.mean(np.abs(mean - u) > 1.0) < 0.001
-            mean = (128 + 0.439 * r - 0.368 * g - 0.071 * b).reshape(240, 2, 320, 2).mean(axis=(1, 3))
+            mean = (
+                (128 + 0.439 * r - 0.368 * g - 0.071 * b).reshape(240, 2, 320, 2).mean(axis=(1, 3))
+            )
             assert np.mean(np.abs(mean - v) > 1.0) < 0.001
 
 
 def test_truth_is_at_the_first_cameras_instants_on_the_masters_clock(fist, folder):
     lines = list(read_lines(Capture(folder).truth, Truth))
     clock = fist.clocks["left"]
-    assert [line.stamp_ns for line in lines] == [START_NS + round(clock.time_s(k) * 1e9) for k in range(len(lines))]
+    assert [line.stamp_ns for line in lines] == [
+        START_NS + round(clock.time_s(k) * 1e9) for k in range(len(lines))
+    ]
     assert len(lines) == clock.first_frame(SECONDS)
     assert lines[7] == fist.truth(clock.time_s(7), lines[7].stamp_ns)
 
@@ -83,7 +93,11 @@ def test_the_rig_stands_alone(fist, folder):
 def test_the_same_again_is_the_same_bytes(fist, folder, tmp_path):
     write_capture(fist, SECONDS, tmp_path / "again")
     names = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
-    assert names == sorted(str(p.relative_to(tmp_path / "again")) for p in (tmp_path / "again").rglob("*") if p.is_file())
+    assert names == sorted(
+        str(p.relative_to(tmp_path / "again"))
+        for p in (tmp_path / "again").rglob("*")
+        if p.is_file()
+    )
     _, different, odd = filecmp.cmpfiles(folder, tmp_path / "again", names, shallow=False)
     assert (different, odd) == ([], [])
 

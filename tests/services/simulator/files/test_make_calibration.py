@@ -1,4 +1,6 @@
-"""The simulated rig's calibration: loadable, near the nominal rig, and with colours that tell paints apart."""
+"""The simulated rig's calibration: loadable, near the nominal rig, and with colours that tell
+paints apart.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,11 @@ def test_cameras_are_like_the_papers_and_each_its_own(config):
     assert not np.array_equal(left.distortion, right.distortion)
     np.testing.assert_array_equal(left.T_rig_from_camera, np.eye(4))
     np.testing.assert_allclose(right.centre_rig, (0.075, 0.0, 0.0), atol=2e-3)
-    assert 0.0 < np.rad2deg(angle_between(left.T_rig_from_camera[:3, :3], right.T_rig_from_camera[:3, :3])) < 1.0
+    assert (
+        0.0
+        < np.rad2deg(angle_between(left.T_rig_from_camera[:3, :3], right.T_rig_from_camera[:3, :3]))
+        < 1.0
+    )
     assert "cup" in load_objects(config.calibration_dir).objects
 
 
@@ -44,7 +50,11 @@ def test_any_number_of_cameras_of_any_size(config, tmp_path, monkeypatch):
     paths = make_calibration.write_all(own, "2025-01-01")
     assert len(paths) == 3 * 3 + 2
     scene = load_scene(own, "piano")
-    assert [round(float(c.centre_rig[0]), 2) for c in scene.cameras.values()] == [0.0, 0.07, 0.15] or len(scene.cameras) == 3
+    assert [round(float(c.centre_rig[0]), 2) for c in scene.cameras.values()] == [
+        0.0,
+        0.07,
+        0.15,
+    ] or len(scene.cameras) == 3
     assert Renderer(scene, "pi2").picture(3).shape == (360, 320)
     assert load_colors(own.calibration_dir, "pi1").date == "2025-01-01"
 

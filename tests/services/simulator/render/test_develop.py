@@ -24,7 +24,9 @@ def test_chroma_is_the_mean_of_four_pixels():
     grey = 255.0 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     r, g, b = grey[..., 0], grey[..., 1], grey[..., 2]
     np.testing.assert_allclose(luma, 16 + 0.257 * r + 0.504 * g + 0.098 * b, atol=0.3)
-    for plane, full in zip(chroma, (-0.148 * r - 0.291 * g + 0.439 * b, 0.439 * r - 0.368 * g - 0.071 * b), strict=True):
+    for plane, full in zip(
+        chroma, (-0.148 * r - 0.291 * g + 0.439 * b, 0.439 * r - 0.368 * g - 0.071 * b), strict=True
+    ):
         mean = 128 + full.reshape(16, 2, 24, 2).mean(axis=(1, 3))
         np.testing.assert_allclose(plane, mean, atol=0.3)
         # What OpenCV would take instead, one pixel of the four, is far from it.
@@ -38,7 +40,10 @@ def test_colours_come_back_through_opencv():
         bank = np.zeros((160, 176), np.int8), np.zeros((2, 80, 88), np.int8)
         develop.expose(luma, chroma, *bank, 0, 0, 1.0, 0.0, out)
         bgr = cv2.cvtColor(out, cv2.COLOR_YUV2BGR_I420)
-        grey = [255 * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055) for v in reversed(linear)]
+        grey = [
+            255 * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055)
+            for v in reversed(linear)
+        ]
         np.testing.assert_allclose(bgr[16, 24], grey, atol=3.0)
 
 

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from services.simulator.render.motion_paths import columns_of, parabola, rows_of
-from services.simulator.render.ray_capsule import FAR, PLACED, hit, hit_row, lens_of, place, project, rays_of
+from services.simulator.render.ray_capsule import (
+    FAR,
+    PLACED,
+    hit,
+    hit_row,
+    lens_of,
+    place,
+    project,
+    rays_of,
+)
 
 
 def placed(a, b, ra: float, rb: float) -> np.ndarray:
@@ -17,8 +26,12 @@ def placed(a, b, ra: float, rb: float) -> np.ndarray:
     return g
 
 
-def distance_to(points: np.ndarray, a: np.ndarray, b: np.ndarray, ra: float, rb: float) -> np.ndarray:
-    """Signed distance of points (n, 3) to the hull of two balls, by dense sampling of the balls between them."""
+def distance_to(
+    points: np.ndarray, a: np.ndarray, b: np.ndarray, ra: float, rb: float
+) -> np.ndarray:
+    """Signed distance of points (n, 3) to the hull of two balls, by dense sampling of the balls
+    between them.
+    """
     s = np.linspace(0.0, 1.0, 4001)[:, None]
     middles, radii = a + s * (b - a), ra + s[:, 0] * (rb - ra)
     # The hull of two balls is the union of the balls between them whose radius grows linearly.
@@ -86,7 +99,9 @@ def test_rays_undo_the_projection(fist):
     rays = rays_of(camera)
     assert rays.shape == (480, 3, 640)
     for x, y in ((0, 0), (639, 479), (320, 240), (17, 401)):
-        np.testing.assert_allclose(camera.project_camera(rays[y, :, x].astype(float) * 0.7)[0], (x, y), atol=2e-4)
+        np.testing.assert_allclose(
+            camera.project_camera(rays[y, :, x].astype(float) * 0.7)[0], (x, y), atol=2e-4
+        )
 
 
 def test_parabolas_meet_their_three_instants():

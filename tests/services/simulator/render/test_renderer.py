@@ -35,8 +35,11 @@ def test_paint_lies_where_the_truth_says(config, camera):
                 if sight.share < 0.95:
                     continue
                 own_s = t_s + sight.centre_px[1] * renderer.clock.row_time_ns * 1e-9
-                off = np.array(sight.centre_px) - projected(scene, scene.cameras[camera], landmark, own_s)
-                # The middle of a patch seen at a slant is not the point that stands for it: up to 2 px = 2 mm at 0.5 m.
+                off = np.array(sight.centre_px) - projected(
+                    scene, scene.cameras[camera], landmark, own_s
+                )
+                # The middle of a patch seen at a slant is not the point that stands for it: up to 2
+                # px = 2 mm at 0.5 m.
                 assert np.hypot(*off) < 2.5, (name, frame, landmark, off)
                 # Pixels of a tip: 14 mm by twice its radius, seen from the side or from its end.
                 assert 80 < sight.seen_px < 420, (name, frame, landmark)
@@ -50,7 +53,9 @@ def test_rows_are_taken_one_after_the_other(fast):
         t_s = renderer.clock.time_s(frame)
         for (_, landmark), sight in sights(renderer, t_s).items():
             rows_later_s = sight.centre_px[1] * row_s
-            right.append(sight.centre_px[0] - projected(fast, camera, landmark, t_s + rows_later_s)[0])
+            right.append(
+                sight.centre_px[0] - projected(fast, camera, landmark, t_s + rows_later_s)[0]
+            )
             wrong.append(sight.centre_px[0] - projected(fast, camera, landmark, t_s)[0])
     # The patch's own shape makes up to a pixel; 6 ms at 1.3 m/s would be 8.
     assert np.std(right) < 0.8
@@ -100,7 +105,9 @@ def test_outlines_are_smooth(config):
     times = 0.5 + np.arange(0.0, 0.5, 0.02)
     seen = np.array([centroid(float(t)) for t in times])
     row_s = rows.mean() * renderer.clock.row_time_ns * 1e-9
-    true = np.array([projected(renderer.scene, renderer.camera, "index_tip", float(t) + row_s) for t in times])
+    true = np.array(
+        [projected(renderer.scene, renderer.camera, "index_tip", float(t) + row_s) for t in times]
+    )
     wobble = (seen - seen.mean(axis=0)) - (true - true.mean(axis=0))
     assert np.ptp(true, axis=0).max() > 0.3
     assert np.abs(wobble).max() < 0.08
@@ -131,10 +138,12 @@ def test_noise_is_as_strong_as_said_and_new_in_every_frame(renderer, planes):
 
     first, second = noise(4), noise(5)
     sigma = renderer.scene.spec.noise
-    # Independent channels of sigma each make .574 sigma of luma (BT.601); one of the three is as noisy as the others.
+    # Independent channels of sigma each make .574 sigma of luma (BT.601); one of the three is as
+    # noisy as the others.
     assert np.std(first[0]) == pytest.approx(0.574 * sigma, rel=0.12)
     for plane in (1, 2):
-        # White noise would average to half of .55 sigma over 2x2 pixels; demosaiced noise is correlated and stays stronger.
+        # White noise would average to half of .55 sigma over 2x2 pixels; demosaiced noise is
+        # correlated and stays stronger.
         assert 0.3 * sigma < np.std(first[plane]) < 0.55 * sigma
     for a, b in zip(first, second, strict=True):
         assert abs(np.corrcoef(a.ravel(), b.ravel())[0, 1]) < 0.05
@@ -157,7 +166,9 @@ def test_a_hand_outside_the_picture_leaves_the_wall(config):
     from services.simulator.scene.scene import build_scene
 
     bare = msgspec.structs.replace(config, object=[])
-    away = build_scene(bare, dataclasses.replace(SCENES["still"], shift_m=(5.0, 0.0)), "away", seed=1)
+    away = build_scene(
+        bare, dataclasses.replace(SCENES["still"], shift_m=(5.0, 0.0)), "away", seed=1
+    )
     near = build_scene(bare, dataclasses.replace(SCENES["still"], distance_m=0.01), "near", seed=1)
     for scene in (away, near):
         renderer = Renderer(scene, "left")

@@ -24,11 +24,17 @@ def test_fingers_end_at_their_tips_and_the_wrist_is_as_thick_as_said(hand):
         joint = JOINT_INDEX[name]
         middle, radius, c = ends[joint]
         # The skin's end, along the bone.
-        np.testing.assert_allclose(middle - radius * rotations[joint][:, 2], positions[joint], atol=1e-9)
+        np.testing.assert_allclose(
+            middle - radius * rotations[joint][:, 2], positions[joint], atol=1e-9
+        )
         assert table.kind[c, 1] == (3 if name == "index_tip" else -1)
     assert table.dab_surface.tolist() == [4]
     wrist = JOINT_INDEX["wrist"]
-    reach = [r[0] for f, o, r in zip(table.frame, table.offset, table.radius, strict=True) if f[0] == wrist and not o[0].any()]
+    reach = [
+        r[0]
+        for f, o, r in zip(table.frame, table.offset, table.radius, strict=True)
+        if f[0] == wrist and not o[0].any()
+    ]
     assert max(reach) == model.wrist_radius_m
     assert np.linalg.norm(table.dab_offset[0]) == pytest.approx(model.wrist_radius_m)
     assert table.frame.max() < HAND_FRAMES

@@ -27,4 +27,7 @@ def test_the_asked_joint_moves_most() -> None:
             continue
         times = EXERCISE_S * number + np.linspace(0.5, EXERCISE_S - 0.2, 40)
         moved = np.ptp(np.array([motion(t).angles_rad for t in times]), axis=0)[:, 1:3]
-        assert np.unravel_index(moved.argmax(), (5, 2)) == (exercise.digit, 0 if exercise.kind == "knuckle" else 1)
+        assert np.unravel_index(moved.argmax(), (5, 2)) == (
+            exercise.digit,
+            0 if exercise.kind == "knuckle" else 1,
+        )

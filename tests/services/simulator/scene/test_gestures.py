@@ -13,7 +13,9 @@ from services.simulator.scene.gestures import MOTIONS, Unrest, bump, smooth
 
 
 def narrow_hand() -> HandModel:
-    """A stiff left hand: two thirds of each range, DIP at most 30 deg, and a middle finger that does abduct."""
+    """A stiff left hand: two thirds of each range, DIP at most 30 deg, and a middle finger that
+    does abduct.
+    """
     model = default_hand("left", 0.8)
     digits = []
     for digit in model.digits:
@@ -44,7 +46,12 @@ def test_second_derivatives_are_continuous(name):
     def jumps(step_s: float) -> float:
         """The largest change of the second derivative from step to step."""
         t = np.arange(0.0, 8.2, step_s)
-        states = np.array([np.concatenate([g.angles_rad.ravel(), g.turn_rad, 10.0 * g.shift_m]) for g in map(motion, t)])
+        states = np.array(
+            [
+                np.concatenate([g.angles_rad.ravel(), g.turn_rad, 10.0 * g.shift_m])
+                for g in map(motion, t)
+            ]
+        )
         return float(np.abs(np.diff(np.diff(states, 2, axis=0) / step_s**2, axis=0)).max())
 
     # A jump of the second derivative would stay the same however fine the steps.
@@ -71,7 +78,12 @@ def test_fist_closes_in_two_seconds_and_mcp_lags():
 def test_all_motions_but_still_move_all_fingers_or_the_hand():
     for name, make in MOTIONS.items():
         motion = make(default_hand("right"), 1)
-        states = np.array([np.concatenate([motion(t).angles_rad.ravel(), motion(t).turn_rad]) for t in np.arange(0.0, 8.0, 0.1)])
+        states = np.array(
+            [
+                np.concatenate([motion(t).angles_rad.ravel(), motion(t).turn_rad])
+                for t in np.arange(0.0, 8.0, 0.1)
+            ]
+        )
         moving = np.ptp(states, axis=0).max()
         assert (moving < 1e-12) if name == "still" else (moving > 0.2)
 
@@ -95,7 +107,10 @@ def test_unrest_is_small_and_never_rests():
 
 @pytest.mark.parametrize("name", ["still", "fist"])
 def test_resting_fingers_wander_a_little_inside_their_limits(name):
-    """Test: an open hand, and one that closes to near its limits. Expected: tenths of a degree, coupled, the same every time."""
+    """Test: an open hand, and one that closes to near its limits.
+
+    Expected: tenths of a degree, coupled, the same every time.
+    """
     model = default_hand("right")
     meant, unrest = MOTIONS[name](model, 1), Unrest(1)
     times_s = np.arange(0.0, 20.0, 0.02)
@@ -107,7 +122,9 @@ def test_resting_fingers_wander_a_little_inside_their_limits(name):
     assert np.rad2deg(off[..., movable].std(axis=0)).min() > 0.02
     assert np.rad2deg(np.abs(off).max()) < 0.5
     np.testing.assert_allclose(off[:, 1:, 3], off[:, 1:, 2] * model.digits[1].coupling, atol=2e-3)
-    np.testing.assert_array_equal(angles[7], Unrest(1).fingers(times_s[7], meant(times_s[7]).angles_rad, model))
+    np.testing.assert_array_equal(
+        angles[7], Unrest(1).fingers(times_s[7], meant(times_s[7]).angles_rad, model)
+    )
 
 
 def test_ramps_begin_and_end_where_they_should():

@@ -18,5 +18,9 @@ def test_equal_to_the_reference(hand):
     for _ in range(20):
         rotation, wrist = rotation_from_quaternion(rng.normal(size=4)), rng.normal(size=3)
         angles = rng.uniform(-0.5, 1.9, (5, 4))
-        for ours, reference in zip(skeleton.joints(rotation, wrist, angles), forward(model, rotation, wrist, angles), strict=True):
+        for ours, reference in zip(
+            skeleton.joints(rotation, wrist, angles),
+            forward(model, rotation, wrist, angles),
+            strict=True,
+        ):
             np.testing.assert_allclose(ours, reference, atol=1e-12)

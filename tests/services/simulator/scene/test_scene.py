@@ -56,7 +56,9 @@ def test_defaults_come_from_rig_toml(config):
 
 
 def test_speed_moves_faster_and_tremor_does_not(config):
-    slow, fast = (load_scene(config, "wave", seed=1, speed=speed).hands["right"] for speed in (0.5, 2.0))
+    slow, fast = (
+        load_scene(config, "wave", seed=1, speed=speed).hands["right"] for speed in (0.5, 2.0)
+    )
     np.testing.assert_array_equal(slow.unrest(1.0)[1], fast.unrest(1.0)[1])
     np.testing.assert_allclose(slow.motion(0.5 * 4.0).turn_rad, fast.motion(2.0 * 1.0).turn_rad)
 
@@ -64,7 +66,9 @@ def test_speed_moves_faster_and_tremor_does_not(config):
 def test_unknown_names_are_told_the_valid_ones(config):
     with pytest.raises(ConfigError, match=r"did you mean 'piano'.*still"):
         load_scene(config, "pianno")
-    wrong = msgspec.structs.replace(config, hand={"right": HandTable(markers={"index_tip": "mauve"})})
+    wrong = msgspec.structs.replace(
+        config, hand={"right": HandTable(markers={"index_tip": "mauve"})}
+    )
     with pytest.raises(ConfigError, match=r"no paint 'mauve'.*magenta"):
         cast_of(load_scene(wrong, "still"))
 
@@ -85,7 +89,9 @@ def test_an_object_is_taken_without_a_jump_and_then_rides_along(config):
     scene = load_scene(config, "grab", seed=1)
     times = np.arange(0.0, 8.0, 0.005)
     poses = np.array([scene.thing_poses(float(t))["cup"] for t in times])
-    assert np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).max() < 0.005 * 0.35  # under 0.35 m/s, no jump
+    assert (
+        np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).max() < 0.005 * 0.35
+    )  # under 0.35 m/s, no jump
     assert np.ptp(poses[:, :3, 3], axis=0).max() > 0.05
     held = [t for t in times if scene.hand_states(float(t))["right"].grip == 1.0]
     assert held[-1] - held[0] > 3.0
@@ -93,7 +99,9 @@ def test_an_object_is_taken_without_a_jump_and_then_rides_along(config):
     for t in held[:: len(held) // 10]:
         state = scene.hand_states(float(t))["right"]
         relative.append(np.linalg.inv(state.T_rig_from_wrist) @ scene.thing_poses(float(t))["cup"])
-    np.testing.assert_allclose(relative, np.broadcast_to(relative[0], np.shape(relative)), atol=1e-9)
+    np.testing.assert_allclose(
+        relative, np.broadcast_to(relative[0], np.shape(relative)), atol=1e-9
+    )
     np.testing.assert_array_equal(poses[0], poses[20])  # and rests before
 
 
@@ -115,7 +123,9 @@ def test_two_hands_and_their_truth(config):
     assert set(truth.hands) == {"left", "right"}
     assert set(TIPS) <= set(truth.hands["left"].points_m)
     assert scene.hands["left"].landmarks == {}
-    apart = np.array(truth.hands["left"].wrist.position_m) - np.array(truth.hands["right"].wrist.position_m)
+    apart = np.array(truth.hands["left"].wrist.position_m) - np.array(
+        truth.hands["right"].wrist.position_m
+    )
     assert apart[0] > 0.15
 
 
@@ -128,7 +138,9 @@ def test_the_world_frame_moves_everything_together(config):
     a, b = plain.bodies(2.0), turned.bodies(2.0)
     np.testing.assert_allclose(b.positions, apply(T, a.positions), atol=1e-9)
     for name, camera in turned.cameras.items():
-        np.testing.assert_allclose(camera.project(b.positions), plain.cameras[name].project(a.positions), atol=1e-6)
+        np.testing.assert_allclose(
+            camera.project(b.positions), plain.cameras[name].project(a.positions), atol=1e-6
+        )
 
 
 def test_more_objects_stand_in_a_row(config):

@@ -14,9 +14,16 @@ def test_points_follow_from_wrist_and_angles(fist, t_s):
     truth = fist.truth(t_s)
     assert truth.stamp_ns == round(t_s * 1e9)
     hand = truth.hands["right"]
-    angles = np.array([[getattr(hand.angles_rad[d], a) for a in names] for d, names in zip(DIGITS, DIGIT_ANGLES, strict=True)])
+    angles = np.array(
+        [
+            [getattr(hand.angles_rad[d], a) for a in names]
+            for d, names in zip(DIGITS, DIGIT_ANGLES, strict=True)
+        ]
+    )
     rotation = rotation_from_quaternion(hand.wrist.orientation_wxyz)
-    positions, _ = forward(fist.hands["right"].model, rotation, np.array(hand.wrist.position_m), angles)
+    positions, _ = forward(
+        fist.hands["right"].model, rotation, np.array(hand.wrist.position_m), angles
+    )
     np.testing.assert_allclose([hand.points_m[name] for name in JOINTS], positions, atol=3e-6)
     assert hand.angles_rad["thumb"].pip == 0.0
 

@@ -12,7 +12,10 @@ from services.simulator.scene.vive_trackers import tracker_pose
 
 
 def poses(scene, times, first_seq=0):
-    return [tracker_pose(scene, scene.things[0], 1, float(t), first_seq + k, 1000 + k) for k, t in enumerate(times)]
+    return [
+        tracker_pose(scene, scene.things[0], 1, float(t), first_seq + k, 1000 + k)
+        for k, t in enumerate(times)
+    ]
 
 
 def matrix(pose) -> np.ndarray:
@@ -24,8 +27,13 @@ def test_the_objects_pose_follows_from_the_trackers(config):
     truth = scene.thing_poses(0.0)["cup"]
     objects = load_objects(config.calibration_dir)
     place = objects.objects["cup"]
-    T_tracker_from_object = transform(rotation_from_quaternion(place.orientation_wxyz), place.offset_m)
-    seen = [np.array(objects.T_rig_from_lighthouse) @ matrix(p) @ T_tracker_from_object for p in poses(scene, np.zeros(400))]
+    T_tracker_from_object = transform(
+        rotation_from_quaternion(place.orientation_wxyz), place.offset_m
+    )
+    seen = [
+        np.array(objects.T_rig_from_lighthouse) @ matrix(p) @ T_tracker_from_object
+        for p in poses(scene, np.zeros(400))
+    ]
     off_m = np.array([T[:3, 3] for T in seen]) - truth[:3, 3]
     turns = [angle_between(T[:3, :3], truth[:3, :3]) for T in seen]
     np.testing.assert_allclose(off_m.mean(axis=0), 0.0, atol=2e-4)
@@ -37,7 +45,12 @@ def test_the_objects_pose_follows_from_the_trackers(config):
 def test_valves_fields(config):
     scene = load_scene(config, "piano")
     (pose,) = poses(scene, [1.0])
-    assert (pose.v, pose.eTrackingResult, pose.bPoseIsValid, pose.bDeviceIsConnected) == (1, 200, True, True)
+    assert (pose.v, pose.eTrackingResult, pose.bPoseIsValid, pose.bDeviceIsConnected) == (
+        1,
+        200,
+        True,
+        True,
+    )
     assert pose.device.serial == "LHR-SIM00001"
     assert pose.device.device_class == "GenericTracker"
     assert (pose.seq, pose.stamp_ns) == (0, 1000)
@@ -64,4 +77,7 @@ def test_velocities_are_those_of_the_motion(config):
 def test_deterministic(config):
     scene = load_scene(config, "grab")
     assert poses(scene, [1.0, 2.0]) == poses(scene, [1.0, 2.0])
-    assert poses(scene, [1.0])[0].mDeviceToAbsoluteTracking != poses(scene, [1.0], first_seq=1)[0].mDeviceToAbsoluteTracking
+    assert (
+        poses(scene, [1.0])[0].mDeviceToAbsoluteTracking
+        != poses(scene, [1.0], first_seq=1)[0].mDeviceToAbsoluteTracking
+    )

@@ -71,7 +71,9 @@ wild = st.one_of(st.floats(allow_nan=True, allow_infinity=True, width=64), st.fl
     st.lists(wild, min_size=4, max_size=4),
     st.lists(st.sampled_from([0.0, 1e-12, 0.02, 0.05]), min_size=3, max_size=3),
 )
-def test_nothing_leaves_the_limits(point: list[float], start: list[float], bones: list[float]) -> None:
+def test_nothing_leaves_the_limits(
+    point: list[float], start: list[float], bones: list[float]
+) -> None:
     chain = INDEX._replace(lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]]))
     q = np.array(start)
     used, left, _ = analytic.solve(chain, np.array(point), q, 1e-4)

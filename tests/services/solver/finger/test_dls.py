@@ -1,4 +1,6 @@
-"""Damped least squares: the issue's figures, all kinds of goals, limits under fuzzing, targets that cannot be had."""
+"""Damped least squares: the issue's figures, all kinds of goals, limits under fuzzing, targets that
+cannot be had.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ FIRST = (0.0, np.pi / 2, 0.0, 0.0)
 
 @pytest.mark.parametrize("straight", [False, True])
 def test_grasps_of_37_frames_from_the_studys_start(grasp: Callable, straight: bool) -> None:
-    """Tip pose as the goal: first frame within 10 iterations, later ones 5, tip within 1e-6 mm, never the mirror elbow."""
+    """Tip pose as the goal: first frame within 10 iterations, later ones 5, tip within 1e-6 mm,
+    never the mirror elbow.
+    """
     rng = np.random.default_rng(5)
     for _ in range(200):
         chain = INDEX._replace(lengths=INDEX.lengths * rng.uniform(0.8, 1.2))
@@ -41,7 +45,9 @@ def test_grasps_from_position_and_coupling(grasp: Callable) -> None:
     for round_ in range(100):
         q = np.array(FIRST)
         for frame, angles in enumerate(grasp(rng, True, straight=round_ % 2 == 0)):
-            used, left, _ = dls.solve(INDEX, dls.goal(dls.COUPLED, k.tip(INDEX, angles)), q, 60, 1e-7)
+            used, left, _ = dls.solve(
+                INDEX, dls.goal(dls.COUPLED, k.tip(INDEX, angles)), q, 60, 1e-7
+            )
             # A straight finger is singular: its first bend takes one more.
             assert used <= (10 if frame == 0 else 6)
             assert left <= 1e-9
@@ -91,7 +97,10 @@ def test_out_of_reach_is_the_nearest_posture(within: Callable) -> None:
         _, left, state = dls.solve(INDEX, dls.goal(dls.POSITION, point), q, 60, 1e-7)
         assert state == dls.UNREACHABLE
         best = min(
-            least_squares(lambda a, p=point: k.tip(INDEX, a) - p, within(rng, limits, False), bounds=limits.T).cost for _ in range(4)
+            least_squares(
+                lambda a, p=point: k.tip(INDEX, a) - p, within(rng, limits, False), bounds=limits.T
+            ).cost
+            for _ in range(4)
         )
         # A start of ours may end in another valley than the best of four; most must not.
         assert left <= np.sqrt(2.0 * best) + 0.03
@@ -103,7 +112,9 @@ def test_beyond_reach_it_points_there() -> None:
     dls.solve(INDEX, dls.goal(dls.COUPLED, np.array([-0.02, -0.1, -1.0])), q, 60, 1e-7)
     direction = k.tip(INDEX, q)
     np.testing.assert_allclose(
-        direction / np.linalg.norm(direction), np.array([-0.02, -0.1, -1.0]) / np.linalg.norm([0.02, 0.1, 1.0]), atol=0.02
+        direction / np.linalg.norm(direction),
+        np.array([-0.02, -0.1, -1.0]) / np.linalg.norm([0.02, 0.1, 1.0]),
+        atol=0.02,
     )
 
 
@@ -114,7 +125,11 @@ def test_turning_the_world_changes_nothing(within: Callable) -> None:
     results = []
     for _ in range(100):
         turn, shift = rotation_from_quaternion(rng.normal(size=4)), rng.normal(size=3)
-        base, axes, point = turn @ CHAINS.base_m[1] + shift, turn @ CHAINS.base_rotation[1], turn @ in_wrist + shift
+        base, axes, point = (
+            turn @ CHAINS.base_m[1] + shift,
+            turn @ CHAINS.base_rotation[1],
+            turn @ in_wrist + shift,
+        )
         q = np.array(FIRST)
         dls.solve(INDEX, dls.goal(dls.COUPLED, k.to_canonical(base, axes, 1.0, point)), q, 60, 1e-7)
         results.append(q)
@@ -131,7 +146,9 @@ wild = st.floats(allow_nan=True, allow_infinity=True, width=64)
     st.lists(st.sampled_from([0.0, 1e-12, 0.02, 0.05, 0.2]), min_size=3, max_size=3),
     st.sampled_from([dls.POSITION, dls.POSE, dls.COUPLED]),
 )
-def test_nothing_leaves_the_limits(point: list[float], start: list[float], bones: list[float], kind: int) -> None:
+def test_nothing_leaves_the_limits(
+    point: list[float], start: list[float], bones: list[float], kind: int
+) -> None:
     chain = INDEX._replace(lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]]))
     q = np.array(start)
     used, left, state = dls.solve(chain, dls.goal(kind, np.array(point)), q, 60, 1e-7)
@@ -145,7 +162,12 @@ def test_nothing_leaves_the_limits(point: list[float], start: list[float], bones
 def test_all_digits_at_once_are_each_alone(within: Callable) -> None:
     rng = np.random.default_rng(11)
     angles = np.array([within(rng, CHAINS.limits_rad[row], True) for row in range(5)])
-    points = np.array([CHAINS.base_m[r] + CHAINS.base_rotation[r] @ k.tip(k.chain_of(CHAINS, r), angles[r]) for r in range(5)])
+    points = np.array(
+        [
+            CHAINS.base_m[r] + CHAINS.base_rotation[r] @ k.tip(k.chain_of(CHAINS, r), angles[r])
+            for r in range(5)
+        ]
+    )
     together, ends = np.full((5, 4), 0.2), np.zeros((5, 3))
     start = np.clip(together, CHAINS.limits_rad[..., 0], CHAINS.limits_rad[..., 1])
     seen = np.array([1, 1, 0, 1, 1])

@@ -1,4 +1,6 @@
-"""The finger study's damped least squares: its order of iterations under our reading, and what the other readings do."""
+"""The finger study's damped least squares: its order of iterations under our reading, and what the
+other readings do.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ def test_the_studys_order_of_iterations(form: paper.Form, grasp: Callable) -> No
 
 
 def test_taken_literally_it_does_not_stay_in_the_limits(grasp: Callable) -> None:
-    """Nothing but the damping keeps the angles in their range, and from the study's start it does not."""
+    """Nothing but the damping keeps the angles in their range, and from the study's start it does
+    not.
+    """
     rng = np.random.default_rng(2)
     for _ in range(5):
         frames, _ = _follow(grasp(rng), paper.Reading(clip=False))
@@ -50,7 +54,9 @@ def test_taken_literally_it_does_not_stay_in_the_limits(grasp: Callable) -> None
 
 
 def test_the_printed_filter_diverges_near_a_singularity() -> None:
-    """sigma / (sigma + lambda^2), as printed, tends to 1 and not to 1 / sigma: steps come out in the wrong unit."""
+    """sigma / (sigma + lambda^2), as printed, tends to 1 and not to 1 / sigma: steps come out in
+    the wrong unit.
+    """
     p, J = np.empty(3), np.empty((6, 4))
     jac = k.scaled(INDEX, 1e3)
     k.jacobian(jac, np.array([0.0, 0.5, 0.5, 0.3]), p, J)
@@ -69,8 +75,12 @@ def test_both_forms_agree_far_from_limits() -> None:
     factors = paper.damping(q, INDEX.limits)
     np.testing.assert_allclose(factors, [0.0, 0.0, 0.0, 0.0, 0.7, 0.7], atol=1e-12)
     e = J @ np.array([0.01, 0.02, -0.01, 0.01])
-    np.testing.assert_allclose(paper.step(J, e, factors, "svd"), [0.01, 0.02, -0.01, 0.01], atol=1e-12)
-    np.testing.assert_allclose(paper.step(J, e, factors, "normal"), [0.01, 0.02, -0.01, 0.01], atol=2e-3)
+    np.testing.assert_allclose(
+        paper.step(J, e, factors, "svd"), [0.01, 0.02, -0.01, 0.01], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        paper.step(J, e, factors, "normal"), [0.01, 0.02, -0.01, 0.01], atol=2e-3
+    )
 
 
 def test_damping_grows_at_the_limits() -> None:
@@ -84,6 +94,8 @@ def test_damping_grows_at_the_limits() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_absurd_targets(bad: float) -> None:
-    frame = paper.solve(INDEX, np.full(3, bad), np.eye(3), np.array([9.0, 0.1, 0.1, 0.1]), paper.Reading())
+    frame = paper.solve(
+        INDEX, np.full(3, bad), np.eye(3), np.array([9.0, 0.1, 0.1, 0.1]), paper.Reading()
+    )
     assert frame.state == NOT_CONVERGED
     assert np.all(frame.angles_rad <= INDEX.limits[:, 1])

@@ -54,7 +54,12 @@ def test_turning_the_world_changes_nothing(within: Callable) -> None:
         for _ in range(100):
             turn, shift = rotation_from_quaternion(rng.normal(size=4)), rng.normal(size=3)
             q = start.copy()
-            point = k.to_canonical(turn @ CHAINS.base_m[1] + shift, turn @ CHAINS.base_rotation[1], 1.0, turn @ in_wrist + shift)
+            point = k.to_canonical(
+                turn @ CHAINS.base_m[1] + shift,
+                turn @ CHAINS.base_rotation[1],
+                1.0,
+                turn @ in_wrist + shift,
+            )
             fabrik.solve(INDEX, point, q, BOX, 1000, 1e-4)
             results.append(q)
         assert np.ptp(results, axis=0).max() < 1e-6
@@ -65,7 +70,9 @@ def test_a_target_on_the_line_of_a_straight_chain() -> None:
     limits = INDEX.limits.copy()
     limits[1, 0] = -np.pi / 3
     chain, point = INDEX._replace(limits=limits), np.array([0.0, 0.0, -0.05])
-    joints = fabrik_paper.joints_of(np.zeros(4), np.array([*INDEX.lengths[:2], -INDEX.tool[2]]), 0.0)
+    joints = fabrik_paper.joints_of(
+        np.zeros(4), np.array([*INDEX.lengths[:2], -INDEX.tool[2]]), 0.0
+    )
     fabrik_paper.reach(joints, point, INDEX.lengths, 200, 1e-4)
     assert not joints[:, 1].any()
     q = np.zeros(4)
@@ -75,7 +82,9 @@ def test_a_target_on_the_line_of_a_straight_chain() -> None:
 
 
 def test_a_limit_deadlock_is_left() -> None:
-    """From a hook (knuckle straight, the rest curled) to a target that needs the knuckle bent: limits alone hang there."""
+    """From a hook (knuckle straight, the rest curled) to a target that needs the knuckle bent:
+    limits alone hang there.
+    """
     angles = np.array([0.0, 1.5, 0.05, 0.0333])
     q = np.array([0.0, 0.0, 1.9, 1.5])
     _, left, state = fabrik.solve(INDEX, k.tip(INDEX, angles), q, BOX, 1000, 1e-4)
@@ -113,7 +122,9 @@ near = st.floats(-0.12, 0.12)
     st.lists(st.sampled_from([0.0, 1e-12, 0.02, 0.05, 0.2]), min_size=3, max_size=3),
     st.sampled_from(["fabrik", "seed"]),
 )
-def test_nothing_leaves_the_limits(point: list[float], start: list[float], bones: list[float], method: str) -> None:
+def test_nothing_leaves_the_limits(
+    point: list[float], start: list[float], bones: list[float], method: str
+) -> None:
     chain = INDEX._replace(lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]]))
     q, target = np.array(start), np.array(point)
     if method == "fabrik":
@@ -137,7 +148,9 @@ def test_the_seed_reaches_in_space_but_not_with_a_hands_joints(within: Callable)
         joints = fabrik_paper.joints_of(q, bones, 0.0)
         fabrik_paper.reach(joints, point, bones, 200, 1e-5)
         reached += np.linalg.norm(joints[3] - point) <= 1e-4
-        np.testing.assert_allclose(np.linalg.norm(np.diff(joints, axis=0), axis=1), bones, atol=1e-12)
+        np.testing.assert_allclose(
+            np.linalg.norm(np.diff(joints, axis=0), axis=1), bones, atol=1e-12
+        )
         anatomical += fabrik_paper.solve(INDEX, point, q, 200, 1e-4)[2] == SOLVED
     assert reached > 270
     assert anatomical < 150

@@ -32,10 +32,15 @@ def test_a_corner_of_the_box() -> None:
     corner = LIMITS[:, 1]
     assert swing(BOX, LIMITS, *corner) == tuple(corner)
     # The ellipse cuts it off on the ray from the centre; the parabola has its apex there.
-    np.testing.assert_allclose(swing(ELLIPSE, LIMITS, *corner), LIMITS.mean(axis=1) + (LIMITS[:, 1] - LIMITS[:, 0]) / np.sqrt(8.0))
+    np.testing.assert_allclose(
+        swing(ELLIPSE, LIMITS, *corner),
+        LIMITS.mean(axis=1) + (LIMITS[:, 1] - LIMITS[:, 0]) / np.sqrt(8.0),
+    )
     np.testing.assert_allclose(swing(PARABOLA, LIMITS, *corner), (0.0, LIMITS[1, 1]), atol=1e-12)
     assert swing(PARABOLA, LIMITS, LIMITS[0, 1], LIMITS[1, 0]) == (LIMITS[0, 1], LIMITS[1, 0])
-    assert np.hypot(*(np.array(swing(CIRCLE, LIMITS, *corner)) - LIMITS.mean(axis=1))) == pytest.approx(0.26)
+    assert np.hypot(
+        *(np.array(swing(CIRCLE, LIMITS, *corner)) - LIMITS.mean(axis=1))
+    ) == pytest.approx(0.26)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -9,7 +9,9 @@ from scipy.optimize import lsq_linear
 from services.solver.maths.box_qp import box_qp, newton4
 
 
-def _problem(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _problem(
+    rng: np.random.Generator, n: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     A = rng.normal(size=(n + 3, n)) * 10.0 ** rng.uniform(-2.0, 0.5, n)
     b = rng.normal(size=n + 3)
     low, high = -(10.0 ** rng.uniform(-3.0, 1.0, n)), 10.0 ** rng.uniform(-3.0, 1.0, n)
@@ -43,19 +45,38 @@ def test_the_same_as_scipy() -> None:
         x = np.empty(6)
         box_qp(H, -A.T @ b, low, high, x, np.empty((7, 6)), np.empty((2, 6), np.int64))
         theirs = lsq_linear(A, b, (low, high), tol=1e-14)
-        assert 0.5 * x @ H @ x - x @ A.T @ b <= 0.5 * theirs.x @ H @ theirs.x - theirs.x @ A.T @ b + 1e-9
+        assert (
+            0.5 * x @ H @ x - x @ A.T @ b
+            <= 0.5 * theirs.x @ H @ theirs.x - theirs.x @ A.T @ b + 1e-9
+        )
 
 
 def test_infinite_bounds_are_newtons_step() -> None:
     H, g, x = np.diag([2.0, 4.0]), np.array([-2.0, 4.0]), np.empty(2)
-    assert box_qp(H, g, np.full(2, -np.inf), np.full(2, np.inf), x, np.empty((3, 2)), np.empty((2, 2), np.int64))
+    assert box_qp(
+        H,
+        g,
+        np.full(2, -np.inf),
+        np.full(2, np.inf),
+        x,
+        np.empty((3, 2)),
+        np.empty((2, 2), np.int64),
+    )
     np.testing.assert_allclose(x, [1.0, -1.0])
 
 
 @pytest.mark.parametrize("broken", [np.zeros((2, 2)), -np.eye(2), np.full((2, 2), np.nan)])
 def test_what_is_not_definite_is_refused_inside_the_bounds(broken: np.ndarray) -> None:
     x = np.empty(2)
-    assert not box_qp(broken, np.ones(2), np.full(2, -1.0), np.full(2, 1.0), x, np.empty((3, 2)), np.empty((2, 2), np.int64))
+    assert not box_qp(
+        broken,
+        np.ones(2),
+        np.full(2, -1.0),
+        np.full(2, 1.0),
+        x,
+        np.empty((3, 2)),
+        np.empty((2, 2), np.int64),
+    )
     assert np.all(np.abs(x) <= 1.0)
 
 

@@ -1,4 +1,6 @@
-"""Kinematics: kernels against their plain twins, finite differences, the finger study's printed Jacobian, rhot.hand.forward."""
+"""Kinematics: kernels against their plain twins, finite differences, the finger study's printed
+Jacobian, rhot.hand.forward.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,12 @@ NAMES: tuple[HandName, ...] = ("right", "left")
 def _random(seed: int) -> tuple[k.Chain, np.ndarray]:
     rng = np.random.default_rng(seed)
     limits = np.array([[-0.3, 0.3], [-0.4, 1.6], [0.0, 1.9], [-0.5, 1.6]])
-    chain = k.Chain(rng.uniform(0.02, 0.05, 3), np.array([*rng.normal(0.0, 0.003, 2), -0.013]), limits, np.array([2 / 3, 1.0]))
+    chain = k.Chain(
+        rng.uniform(0.02, 0.05, 3),
+        np.array([*rng.normal(0.0, 0.003, 2), -0.013]),
+        limits,
+        np.array([2 / 3, 1.0]),
+    )
     return chain, rng.uniform(limits[:, 0], limits[:, 1])
 
 
@@ -69,14 +76,22 @@ def _study_a1(theta: np.ndarray, length: np.ndarray) -> np.ndarray:
 def _dh(theta: float, a: float, alpha: float) -> np.ndarray:
     """One standard Denavit-Hartenberg row, R_z(theta) T_x(a) R_x(alpha)."""
     c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-    return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0.0, sa, ca, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [c, -s * ca, s * sa, a * c],
+            [s, c * ca, -c * sa, a * s],
+            [0.0, sa, ca, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_the_studys_jacobian_is_ours_with_its_axes_renamed(seed: int) -> None:
     chain, q = _random(seed)
     chain = chain._replace(tool=np.array([0.0, 0.0, -chain.lengths[2]]))
-    # x_DH = -z, y_DH = x, z_DH = -y turns our axes into the study's; its abduction turns the other way.
+    # x_DH = -z, y_DH = x, z_DH = -y turns our axes into the study's; its abduction turns the other
+    # way.
     rename = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     assert np.linalg.det(rename) == pytest.approx(1.0)
     theta = q * [-1.0, 1.0, 1.0, 1.0]
@@ -114,8 +129,12 @@ def test_a_chain_ends_in_the_painted_tip(hand: HandName) -> None:
     joints = forward(model, np.eye(3), np.zeros(3), angles)
     for row, name in enumerate(DIGITS):
         point = landmark_point(model, f"{name}_tip", *joints)
-        canonical = k.to_canonical(chains.base_m[row], chains.base_rotation[row], chains.side, point)
-        np.testing.assert_allclose(k.tip(k.chain_of(chains, row), angles[row]), canonical, atol=1e-14)
+        canonical = k.to_canonical(
+            chains.base_m[row], chains.base_rotation[row], chains.side, point
+        )
+        np.testing.assert_allclose(
+            k.tip(k.chain_of(chains, row), angles[row]), canonical, atol=1e-14
+        )
 
 
 def test_left_and_right_are_mirror_images() -> None:

@@ -1,4 +1,6 @@
-"""The whole-hand problem: its gradient, what it recovers, what it does without markers and with a wrong one."""
+"""The whole-hand problem: its gradient, what it recovers, what it does without markers and with a
+wrong one.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,10 @@ from services.solver.whole_hand import fit
 from services.solver.whole_hand.motion_prior import Belief, unknown
 from services.solver.whole_hand.posture_prior import habit
 
-FULL = (*BASIC_LANDMARKS, *(name for name in LANDMARKS if name.endswith(("proximal", "intermediate", "distal"))))
+FULL = (
+    *BASIC_LANDMARKS,
+    *(name for name in LANDMARKS if name.endswith(("proximal", "intermediate", "distal"))),
+)
 
 
 def _marks(model, places, sigma_m: float = 1e-3) -> fit.Marks:
@@ -73,7 +78,9 @@ def test_the_covariance_tells_the_error(world: Callable) -> None:
     ours, rng, ratios = world("right"), np.random.default_rng(3), []
     chains, nothing = hand_chains(ours.model), unknown(habit(ours.model))
     for instant in ours.motion(3, 200)[::4]:
-        places = {name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant, FULL).items()}
+        places = {
+            name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant, FULL).items()
+        }
         R, t, q = instant.rotation.copy(), instant.position_m.copy(), nothing.angles.copy()
         information = np.empty((26, 26))
         fit.fit(chains, _marks(ours.model, places), nothing, R, t, q, 60, information)
@@ -92,7 +99,9 @@ def test_one_wrong_marker_does_not_bend_the_hand(world: Callable) -> None:
     R, t, q = instant.rotation.copy(), instant.position_m.copy(), nothing.angles.copy()
     fit.fit(chains, _marks(ours.model, places), nothing, R, t, q, 60, np.empty((26, 26)))
     assert angle_between(R, instant.rotation) < np.deg2rad(1.0)
-    np.testing.assert_allclose(q[[1, 2, 4], 1:], instant.angles_rad[[1, 2, 4], 1:], atol=np.deg2rad(6.0))
+    np.testing.assert_allclose(
+        q[[1, 2, 4], 1:], instant.angles_rad[[1, 2, 4], 1:], atol=np.deg2rad(6.0)
+    )
 
 
 def test_without_markers_the_belief_stands(world: Callable) -> None:
@@ -113,7 +122,16 @@ def test_the_middle_finger_never_abducts(world: Callable) -> None:
     places["middle_tip"] = places["middle_tip"] + instant.rotation @ np.array([0.02, 0.0, 0.0])
     nothing = unknown(habit(ours.model))
     R, t, q = instant.rotation.copy(), instant.position_m.copy(), nothing.angles.copy()
-    fit.fit(hand_chains(ours.model), _marks(ours.model, places), nothing, R, t, q, 60, np.empty((26, 26)))
+    fit.fit(
+        hand_chains(ours.model),
+        _marks(ours.model, places),
+        nothing,
+        R,
+        t,
+        q,
+        60,
+        np.empty((26, 26)),
+    )
     assert q[2, 0] == 0.0
 
 

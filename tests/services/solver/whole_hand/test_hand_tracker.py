@@ -1,4 +1,6 @@
-"""A hand over time: missing and returning markers, gaps, stamps from another year, a locked mirror image."""
+"""A hand over time: missing and returning markers, gaps, stamps from another year, a locked mirror
+image.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,10 @@ FRAME_NS = 33_333_333
 
 def _seen(places_m: dict, rng: np.random.Generator | None = None) -> dict[str, Seen]:
     noise = rng.normal(0.0, 1e-3, (len(places_m), 3)) if rng else np.zeros((len(places_m), 3))
-    return {name: Seen(p + n, np.full(3, 1e3), True) for (name, p), n in zip(places_m.items(), noise, strict=True)}
+    return {
+        name: Seen(p + n, np.full(3, 1e3), True)
+        for (name, p), n in zip(places_m.items(), noise, strict=True)
+    }
 
 
 @pytest.fixture
@@ -32,8 +37,17 @@ def test_nothing_before_the_wrist_and_three_tips(world: Callable, tracker: HandT
     found = ours.points(ours.motion(1, 1)[0])
     assert tracker.look(0, {}) is None
     assert tracker.look(1, _seen({name: found[name] for name in TIPS})) is None
-    assert tracker.look(2, _seen({name: found[name] for name in ("wrist", "index_tip", "ring_tip")})) is None
-    assert tracker.look(3, _seen({name: found[name] for name in ("wrist", "index_tip", "ring_tip", "thumb_tip")})) is not None
+    assert (
+        tracker.look(2, _seen({name: found[name] for name in ("wrist", "index_tip", "ring_tip")}))
+        is None
+    )
+    assert (
+        tracker.look(
+            3,
+            _seen({name: found[name] for name in ("wrist", "index_tip", "ring_tip", "thumb_tip")}),
+        )
+        is not None
+    )
 
 
 def test_follows_and_is_surer_than_a_single_look(world: Callable, tracker: HandTracker) -> None:
@@ -52,12 +66,22 @@ def test_follows_and_is_surer_than_a_single_look(world: Callable, tracker: HandT
 
 
 def test_markers_come_and_go(world: Callable, tracker: HandTracker) -> None:
-    """Each marker hidden a fifth of the time, in stretches; the tips that are seen stay matched, and nothing jumps away."""
+    """Each marker hidden a fifth of the time, in stretches.
+
+    The tips that are seen stay matched, and nothing jumps away.
+    """
     ours, rng, tips = world("right"), np.random.default_rng(3), []
     for frame, instant in enumerate(ours.motion(3, 240, "fist")):
         found = ours.points(instant)
-        hidden = {name for i, name in enumerate(found) if (frame // 12 + 3 * i) % 5 == 0} if frame else set()
-        look = tracker.look(frame * FRAME_NS, _seen({name: p for name, p in found.items() if name not in hidden}, rng))
+        hidden = (
+            {name for i, name in enumerate(found) if (frame // 12 + 3 * i) % 5 == 0}
+            if frame
+            else set()
+        )
+        look = tracker.look(
+            frame * FRAME_NS,
+            _seen({name: p for name, p in found.items() if name not in hidden}, rng),
+        )
         assert look is not None
         tips.append(angle_between(look.rotation, instant.rotation))
         # The wrist itself is out of sight for 0.4 s at a time.
@@ -100,7 +124,9 @@ def test_stamps_that_jump_start_anew(world: Callable, tracker: HandTracker, jump
 
 
 @pytest.mark.parametrize("flip", [(np.pi, 0.0, 0.0), (0.0, np.pi, 0.0), (0.0, 0.0, np.pi)])
-def test_a_mirrored_orientation_does_not_last(world: Callable, tracker: HandTracker, flip: tuple) -> None:
+def test_a_mirrored_orientation_does_not_last(
+    world: Callable, tracker: HandTracker, flip: tuple
+) -> None:
     ours, rng = world("right"), np.random.default_rng(8)
     motion = ours.motion(8, 30)
     look = tracker.look(0, _seen(ours.points(motion[0])))

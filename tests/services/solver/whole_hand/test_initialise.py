@@ -18,18 +18,26 @@ from services.solver.whole_hand.posture_prior import habit
 
 def _begin(ours, places: dict):
     where = [place_of(ours.model, name) for name in places]
-    marks = Marks(*(np.array([w[i] for w in where]) for i in range(4)), np.array(list(places.values())), np.full((len(where), 3), 1e3))
+    marks = Marks(
+        *(np.array([w[i] for w in where]) for i in range(4)),
+        np.array(list(places.values())),
+        np.full((len(where), 3), 1e3),
+    )
     return begin(hand_chains(ours.model), unknown(habit(ours.model)), marks)
 
 
 @pytest.mark.parametrize("hand", ["right", "left"])
 @pytest.mark.parametrize("kind", ["random", "fist"])
 def test_never_the_mirror_image(world: Callable, hand: HandName, kind: str) -> None:
-    """Palm towards the cameras or away, open or closed: within 45 deg, 8 deg on average (a mirror image is 180 deg off)."""
+    """Palm towards the cameras or away, open or closed: within 45 deg, 8 deg on average (a mirror
+    image is 180 deg off).
+    """
     ours, rng, errors = world(hand), np.random.default_rng(1), []
     for seed in range(8):
         for instant in ours.motion(seed, 120, kind)[::24]:
-            places = {name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant).items()}
+            places = {
+                name: p + rng.normal(0.0, 1e-3, 3) for name, p in ours.points(instant).items()
+            }
             _, R, t, q, _ = _begin(ours, places)
             errors.append(np.rad2deg(angle_between(R, instant.rotation)))
             assert np.linalg.norm(t - instant.position_m) < 0.05
@@ -49,10 +57,15 @@ def test_turning_the_world_turns_the_pose(world: Callable) -> None:
     assert angle_between(Ra.T @ a.rotation, Rb.T @ b.rotation) < 2e-3
 
 
-@pytest.mark.parametrize("names", [("wrist", "index_tip", "middle_tip", "little_tip"), BASIC_LANDMARKS])
+@pytest.mark.parametrize(
+    "names", [("wrist", "index_tip", "middle_tip", "little_tip"), BASIC_LANDMARKS]
+)
 def test_absurd_markers_are_no_error(world: Callable, names: tuple[str, ...]) -> None:
     ours = world("right")
-    for places in ({name: np.zeros(3) for name in names}, {name: np.array([0.1 * i, 0.0, 0.0]) for i, name in enumerate(names)}):
+    for places in (
+        {name: np.zeros(3) for name in names},
+        {name: np.array([0.1 * i, 0.0, 0.0]) for i, name in enumerate(names)},
+    ):
         cost, R, t, q, _ = _begin(ours, places)
         assert cost > 100.0
         assert np.all(np.isfinite(R))
@@ -64,4 +77,6 @@ def test_absurd_markers_are_no_error(world: Callable, names: tuple[str, ...]) ->
 def test_postures_are_within_limits(world: Callable) -> None:
     chains = hand_chains(world("left").model)
     for posture in postures(chains):
-        assert np.all((posture >= chains.limits_rad[..., 0]) & (posture <= chains.limits_rad[..., 1]))
+        assert np.all(
+            (posture >= chains.limits_rad[..., 0]) & (posture <= chains.limits_rad[..., 1])
+        )

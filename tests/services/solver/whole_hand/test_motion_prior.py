@@ -32,7 +32,9 @@ def test_after_long_the_fingers_are_as_ever() -> None:
     known = habit(default_hand())
     expected, information = predict(known, np.full((5, 4), 1.2), 1e-4 * np.eye(26), 60.0)
     np.testing.assert_allclose(expected.ravel(), known.mean, atol=1e-9)
-    np.testing.assert_allclose(np.linalg.inv(information)[6:, 6:], known.covariance, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.inv(information)[6:, 6:], known.covariance, rtol=1e-6, atol=1e-9
+    )
 
 
 def test_waiting_twice_is_waiting_once() -> None:

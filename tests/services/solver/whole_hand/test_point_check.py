@@ -39,8 +39,15 @@ def test_absurd_places_are_dropped(message: HandPoints, world: Callable, value: 
 
 
 @pytest.mark.parametrize("sigma", [np.nan, np.inf, 1e300, 0.2])
-def test_points_that_know_nothing_are_dropped(message: HandPoints, world: Callable, sigma: float) -> None:
-    assert len(usable(_replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3)), places(world("right").model))) == 5
+def test_points_that_know_nothing_are_dropped(
+    message: HandPoints, world: Callable, sigma: float
+) -> None:
+    assert (
+        len(
+            usable(_replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3)), places(world("right").model))
+        )
+        == 5
+    )
 
 
 def test_too_good_a_sigma_is_not_believed(message: HandPoints, world: Callable) -> None:
@@ -56,7 +63,11 @@ def test_predicted_points_weigh_less(message: HandPoints, world: Callable) -> No
 
 def test_unknown_names_and_repetitions(message: HandPoints, world: Callable) -> None:
     twice = msgspec.structs.replace(
-        message, points=[*message.points, msgspec.structs.replace(message.points[0], position_m=(0.0, 0.0, 0.0))]
+        message,
+        points=[
+            *message.points,
+            msgspec.structs.replace(message.points[0], position_m=(0.0, 0.0, 0.0)),
+        ],
     )
     nose = _replaced(twice, 3, name="nose")
     seen = usable(nose, places(world("right").model))
@@ -65,7 +76,9 @@ def test_unknown_names_and_repetitions(message: HandPoints, world: Callable) -> 
 
 
 @pytest.mark.parametrize("index", [0, 1, 4])
-def test_a_point_of_another_hand_is_dropped(message: HandPoints, world: Callable, index: int) -> None:
+def test_a_point_of_another_hand_is_dropped(
+    message: HandPoints, world: Callable, index: int
+) -> None:
     place = np.array(message.points[index].position_m) + np.array([0.6, 0.0, 0.0])
     seen = usable(_replaced(message, index, position_m=tuple(place)), places(world("right").model))
     assert message.points[index].name not in seen

@@ -10,7 +10,10 @@ from services.solver.whole_hand.posture_prior import clamp, habit
 
 
 def _with_coupling(model: HandModel, ratio: float, weight: float) -> HandModel:
-    digits = tuple(msgspec.structs.replace(digit, coupling=ratio, coupling_weight=weight) for digit in model.digits)
+    digits = tuple(
+        msgspec.structs.replace(digit, coupling=ratio, coupling_weight=weight)
+        for digit in model.digits
+    )
     return msgspec.structs.replace(model, digits=digits)
 
 
@@ -27,7 +30,9 @@ def test_the_coupling_draws_by_its_weight() -> None:
     def spread(weight: float) -> float:
         row = np.zeros(20)
         row[7], row[6] = 1.0, -2.0 / 3.0
-        return float(np.sqrt(row @ habit(_with_coupling(default_hand(), 2.0 / 3.0, weight)).covariance @ row))
+        return float(
+            np.sqrt(row @ habit(_with_coupling(default_hand(), 2.0 / 3.0, weight)).covariance @ row)
+        )
 
     assert spread(0.0) > np.deg2rad(25.0)
     assert spread(1.0) < np.deg2rad(5.1)
@@ -35,11 +40,15 @@ def test_the_coupling_draws_by_its_weight() -> None:
 
 
 def test_three_bent_fingers_say_that_the_fourth_is_bent() -> None:
-    """The Gaussian's own forecast of the index finger from the other fingers at 80 and 100 deg, and of MCP from PIP."""
+    """The Gaussian's own forecast of the index finger from the other fingers at 80 and 100 deg, and
+    of MCP from PIP.
+    """
     known = habit(default_hand())
 
     def forecast(wanted: list[int], given: list[int], values: list[float]) -> np.ndarray:
-        gain = known.covariance[np.ix_(wanted, given)] @ np.linalg.inv(known.covariance[np.ix_(given, given)])
+        gain = known.covariance[np.ix_(wanted, given)] @ np.linalg.inv(
+            known.covariance[np.ix_(given, given)]
+        )
         return np.rad2deg(known.mean[wanted] + gain @ (np.deg2rad(values) - known.mean[given]))
 
     mcp, pip = forecast([5, 6], [9, 10, 13, 14, 17, 18], [80.0, 100.0] * 3)

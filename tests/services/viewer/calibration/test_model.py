@@ -73,7 +73,9 @@ def test_undo_and_start_over(session: Session) -> None:
 
 
 def test_a_proposal_counts_as_pointing_at_the_rigs_colours(session: Session) -> None:
-    patches = [Patch(color=color, picture=PICTURE, box_px=(1, 2, 3, 4)) for color in ("blue", "orange")]
+    patches = [
+        Patch(color=color, picture=PICTURE, box_px=(1, 2, 3, 4)) for color in ("blue", "orange")
+    ]
     assert session.take_proposal(FitResult(colors={"blue": NEW, "orange": NEW}, patches=patches))
     assert set(session.ranges) == {"green", "blue"}
     assert [one.color for one in session.pointed] == ["blue"]
@@ -115,7 +117,14 @@ def test_texts_escape_and_survive_whatever_the_network_says(session: Session) ->
         "colors": {"green": {"inside": "x", "skin": 1e300}, "blue": 7},
         "separation": {"green/blue": 3, "a": {"d": "no"}, "green/cyan": {"d": 1e308}},
     }
-    session.take(FitResult(colors={"green": NEW, "blue": NEW}, residuals=odd, warnings=["<script>"] * 50, notes=["<i>"]))
+    session.take(
+        FitResult(
+            colors={"green": NEW, "blue": NEW},
+            residuals=odd,
+            warnings=["<script>"] * 50,
+            notes=["<i>"],
+        )
+    )
     html = text.report(session)
     assert "<script>" not in html
     assert html.count("&lt;script&gt;") == 8

@@ -1,4 +1,6 @@
-"""The calibration page without a browser: switches, clicks and answers, against a tracker made of three answers."""
+"""The calibration page without a browser: switches, clicks and answers, against a tracker made of
+three answers.
+"""
 
 from __future__ import annotations
 
@@ -64,17 +66,27 @@ class Page:
         self.browser = browser
 
     async def uuid(self, type_: str, label: str) -> str:
-        message = await asyncio.to_thread(self.browser.wait_for, type_, props=lambda props: props.get("label") == label)
+        message = await asyncio.to_thread(
+            self.browser.wait_for, type_, props=lambda props: props.get("label") == label
+        )
         return str(message["uuid"])
 
     async def says(self, words: str) -> str:
-        message = await asyncio.to_thread(self.browser.wait_for, "GuiUpdateMessage", updates=lambda u: words in u.get("content", ""))
+        message = await asyncio.to_thread(
+            self.browser.wait_for,
+            "GuiUpdateMessage",
+            updates=lambda u: words in u.get("content", ""),
+        )
         return str(message["updates"]["content"])
 
     def click_picture(self, x: float, y: float) -> None:
         """x, y from 0 to 1, of a picture twice as high as wide is 4:3."""
         at = ((x - 0.5) * 4.0 / 3.0, y - 0.5, PLANE_Z - 2.0)
-        self.browser._send(_messages.SceneNodeClickMessage("/calibrate", None, at, (0.0, 0.0, 1.0), (0.5, 0.5), None))
+        self.browser._send(
+            _messages.SceneNodeClickMessage(
+                "/calibrate", None, at, (0.0, 0.0, 1.0), (0.5, 0.5), None
+            )
+        )
 
 
 async def open_page(service: Service, browse: Callable[..., Any]) -> Page:
@@ -83,7 +95,9 @@ async def open_page(service: Service, browse: Callable[..., Any]) -> Page:
     return page
 
 
-async def test_a_click_is_fitted_shown_and_put_in_force(running: Callable, config: RigConfig, browse: Callable) -> None:
+async def test_a_click_is_fitted_shown_and_put_in_force(
+    running: Callable, config: RigConfig, browse: Callable
+) -> None:
     async with running("viewer", serve, config) as (service, bus):
         tracker = Tracker(bus)
         puts = asyncio.create_task(tracker.take_puts())
@@ -99,7 +113,11 @@ async def test_a_click_is_fitted_shown_and_put_in_force(running: Callable, confi
         assert (pointed.color, pointed.x_px, pointed.y_px) == ("blue", 16.0, 24.0)
         assert pointed.picture == picture_name(tracker.png)
         await page.says("not in force yet")
-        page.browser._send(_messages.GuiUpdateMessage(await page.uuid("GuiButtonMessage", "put in force"), {"value": True}))
+        page.browser._send(
+            _messages.GuiUpdateMessage(
+                await page.uuid("GuiButtonMessage", "put in force"), {"value": True}
+            )
+        )
         await page.says("in force on camera left")
         assert tracker.colors.colors == {"violet": GREEN, "blue": GREEN}
         assert tracker.colors.tool == "rhot viewer"
@@ -107,7 +125,9 @@ async def test_a_click_is_fitted_shown_and_put_in_force(running: Callable, confi
         puts.cancel()
 
 
-async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(running: Callable, config: RigConfig, browse: Callable) -> None:
+async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(
+    running: Callable, config: RigConfig, browse: Callable
+) -> None:
     async with running("viewer", serve, config) as (service, bus):
         tracker = Tracker(bus)
         tracker.refuses = "that is <grey>"
@@ -125,7 +145,9 @@ async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(runni
         assert [len(request.pointed) for request in tracker.requests] == [1, 1]
 
 
-async def test_pictures_are_asked_for_only_while_the_page_shows_one(running: Callable, config: RigConfig, browse: Callable) -> None:
+async def test_pictures_are_asked_for_only_while_the_page_shows_one(
+    running: Callable, config: RigConfig, browse: Callable
+) -> None:
     async with running("viewer", serve, config) as (service, bus):
         tracker = Tracker(bus)
         await until(lambda: service.state == "running")
@@ -138,7 +160,9 @@ async def test_pictures_are_asked_for_only_while_the_page_shows_one(running: Cal
         assert tracker.pictures_asked <= count + 1
 
 
-async def test_no_tracker_is_said_to_be_missing(running: Callable, config: RigConfig, browse: Callable) -> None:
+async def test_no_tracker_is_said_to_be_missing(
+    running: Callable, config: RigConfig, browse: Callable
+) -> None:
     async with running("viewer", serve, config) as (service, _):
         await until(lambda: service.state == "running")
         page = await open_page(service, browse)

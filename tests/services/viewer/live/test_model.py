@@ -16,7 +16,9 @@ from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
 STAMP_NS = 1_700_000_000_000_000_000
 
 
-def test_a_hand_is_shown_until_it_is_stale(make_pose: Callable[..., HandPose], make_points: Callable[..., HandPoints]) -> None:
+def test_a_hand_is_shown_until_it_is_stale(
+    make_pose: Callable[..., HandPose], make_points: Callable[..., HandPoints]
+) -> None:
     model = ViewModel()
     assert model.view(0.0).hands == {}
     pose = make_pose()
@@ -35,13 +37,17 @@ def test_a_hand_is_shown_until_it_is_stale(make_pose: Callable[..., HandPose], m
 
 
 @pytest.mark.parametrize("wall_ns", [0, STAMP_NS - 11 * 10**9, STAMP_NS + 11 * 10**9, 2**63])
-def test_stamps_of_another_time_say_nothing_about_latency(make_pose: Callable[..., HandPose], wall_ns: int) -> None:
+def test_stamps_of_another_time_say_nothing_about_latency(
+    make_pose: Callable[..., HandPose], wall_ns: int
+) -> None:
     model = ViewModel()
     model.pose(make_pose(), 0.0, wall_ns)
     assert model.view(0.0).latency_ms == {"right": None}
 
 
-@pytest.mark.parametrize("at", [(math.nan, 0.0, 0.0), (0.0, 1e300, 0.0), (0.0, 0.0, -101.0), (math.inf, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "at", [(math.nan, 0.0, 0.0), (0.0, 1e300, 0.0), (0.0, 0.0, -101.0), (math.inf, 0.0, 0.0)]
+)
 def test_absurd_positions_are_not_drawn(
     make_pose: Callable[..., HandPose],
     make_points: Callable[..., HandPoints],
@@ -57,8 +63,12 @@ def test_absurd_positions_are_not_drawn(
     assert model.absurd == 3
 
 
-@pytest.mark.parametrize("wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1e300, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)])
-def test_absurd_orientations_are_not_drawn(make_object: Callable[..., ObjectPose], wxyz: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    "wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1e300, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)]
+)
+def test_absurd_orientations_are_not_drawn(
+    make_object: Callable[..., ObjectPose], wxyz: tuple[float, ...]
+) -> None:
     model = ViewModel()
     model.object(make_object(orientation_wxyz=wxyz), 0.0)
     assert model.view(0.0).objects == {}
@@ -66,15 +76,24 @@ def test_absurd_orientations_are_not_drawn(make_object: Callable[..., ObjectPose
 
 @pytest.mark.parametrize(
     ("fields", "drawn"),
-    [({}, True), ({"tracking": "rotation_only"}, True), ({"tracking": "lost"}, False), ({"registered": False}, False)],
+    [
+        ({}, True),
+        ({"tracking": "rotation_only"}, True),
+        ({"tracking": "lost"}, False),
+        ({"registered": False}, False),
+    ],
 )
-def test_objects_are_drawn_where_they_are_known(make_object: Callable[..., ObjectPose], fields: dict[str, object], drawn: bool) -> None:
+def test_objects_are_drawn_where_they_are_known(
+    make_object: Callable[..., ObjectPose], fields: dict[str, object], drawn: bool
+) -> None:
     model = ViewModel()
     model.object(make_object(**fields), 0.0)
     assert model.view(0.0).objects["cup"].drawn is drawn
 
 
-def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(make_pose: Callable[..., HandPose]) -> None:
+def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(
+    make_pose: Callable[..., HandPose],
+) -> None:
     model = ViewModel()
     for i in range(TRAIL + 10):
         model.pose(make_pose((0.001 * i, 0.0, 0.5)), 0.03 * i, STAMP_NS)
@@ -85,7 +104,9 @@ def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(make_pose: 
     assert model.view(100.0).trails["right"].shape == (1, 5, 3)
 
 
-def test_state_is_bounded(make_object: Callable[..., ObjectPose], make_health: Callable[..., Health]) -> None:
+def test_state_is_bounded(
+    make_object: Callable[..., ObjectPose], make_health: Callable[..., Health]
+) -> None:
     model = ViewModel()
     for i in range(1000):
         model.object(make_object(f"o{i}"), 0.0)
@@ -103,9 +124,17 @@ numbers = st.floats(allow_nan=True, allow_infinity=True)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(at=st.tuples(numbers, numbers, numbers), wxyz=st.tuples(numbers, numbers, numbers, numbers), wall_ns=st.integers(-(2**70), 2**70))
+@given(
+    at=st.tuples(numbers, numbers, numbers),
+    wxyz=st.tuples(numbers, numbers, numbers, numbers),
+    wall_ns=st.integers(-(2**70), 2**70),
+)
 def test_whatever_comes_only_finite_things_are_drawn(
-    make_pose: Callable[..., HandPose], make_object: Callable[..., ObjectPose], at: tuple[float, ...], wxyz: tuple[float, ...], wall_ns: int
+    make_pose: Callable[..., HandPose],
+    make_object: Callable[..., ObjectPose],
+    at: tuple[float, ...],
+    wxyz: tuple[float, ...],
+    wall_ns: int,
 ) -> None:
     model = ViewModel()
     model.pose(make_pose(at), 0.0, wall_ns)

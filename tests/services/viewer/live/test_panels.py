@@ -1,4 +1,6 @@
-"""The panel's texts: what is missing is said, and nothing from the network reaches the browser as code."""
+"""The panel's texts: what is missing is said, and nothing from the network reaches the browser as
+code.
+"""
 
 from __future__ import annotations
 
@@ -37,24 +39,35 @@ def assert_harmless(text: str) -> None:
     assert found.attributes <= {"style", "colspan"}
 
 
-def test_waiting_is_said_with_what_to_look_at(config: RigConfig, make_health: Callable[..., Health]) -> None:
+def test_waiting_is_said_with_what_to_look_at(
+    config: RigConfig, make_health: Callable[..., Health]
+) -> None:
     model = ViewModel()
     said = panels.status(config, model.view(0.0), ["camera left is not drawn"])
     assert "waiting for hand poses of the right hand" in said
     assert "no camera's tracker is heard" in said
     assert "waiting for the object cup" in said
     assert "camera left is not drawn" in said
-    for service, next_missing in (("pi_tracker", "rhot-fusion"), ("fusion", "rhot-solver"), ("solver", "two cameras")):
+    for service, next_missing in (
+        ("pi_tracker", "rhot-fusion"),
+        ("fusion", "rhot-solver"),
+        ("solver", "two cameras"),
+    ):
         model.health(make_health(service), 0.0)
         assert next_missing in panels.status(config, model.view(0.0), [])
 
 
 def test_what_is_there_is_said(
-    config: RigConfig, make_pose: Callable[..., HandPose], make_points: Callable[..., HandPoints], make_object: Callable[..., ObjectPose]
+    config: RigConfig,
+    make_pose: Callable[..., HandPose],
+    make_points: Callable[..., HandPoints],
+    make_object: Callable[..., ObjectPose],
 ) -> None:
     model = ViewModel()
     model.points(make_points("wrist"), 0.0)
-    assert "waiting for poses ... (is rhot-solver running?)" in panels.status(config, model.view(0.0), [])
+    assert "waiting for poses ... (is rhot-solver running?)" in panels.status(
+        config, model.view(0.0), []
+    )
     model.pose(make_pose(), 0.0, STAMP_NS + 31_400_000)
     model.object(make_object(registered=False), 0.0)
     said = panels.status(config, model.view(0.0), [])
@@ -79,8 +92,12 @@ def test_angles_are_degrees_of_every_finger(make_pose: Callable[..., HandPose]) 
 def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]) -> None:
     pose = make_pose()
     angles = FingerAngles(abduction=1e300, mcp=-1e300, pip=0.0, dip=0.0)
-    finger = msgspec.structs.replace(pose.fingers[1], angles_rad=angles, residual_m=1e300, status="not_converged")
-    said = panels.angles(msgspec.structs.replace(pose, fingers=[pose.fingers[0], finger, *pose.fingers[2:]]))
+    finger = msgspec.structs.replace(
+        pose.fingers[1], angles_rad=angles, residual_m=1e300, status="not_converged"
+    )
+    said = panels.angles(
+        msgspec.structs.replace(pose, fingers=[pose.fingers[0], finger, *pose.fingers[2:]])
+    )
     assert "index (not converged)" in said
     assert "401&deg;" in said
     assert "999.0 mm" in said
@@ -93,7 +110,14 @@ def test_rates_against_expectation(make_health: Callable[..., Health]) -> None:
     assert "29.9" in good
     assert "1.2" in good
     assert "#c0392b" not in good
-    bad = panels.rates([make_health(last_error="camera gone", stream={"ok": False, "rate_hz": 3.0, "dropped": 4, "rejected": 3})])
+    bad = panels.rates(
+        [
+            make_health(
+                last_error="camera gone",
+                stream={"ok": False, "rate_hz": 3.0, "dropped": 4, "rejected": 3},
+            )
+        ]
+    )
     assert '<span style="color:#c0392b">3.0</span>' in bad
     assert ">7<" in bad
     assert "camera gone" in bad
@@ -103,13 +127,26 @@ def test_rates_against_expectation(make_health: Callable[..., Health]) -> None:
 def test_rates_are_bounded(make_health: Callable[..., Health]) -> None:
     said = panels.rates([make_health(f"s{i}") for i in range(64)])
     assert "and 69 more" in said
-    huge = make_health(cpu_percent=1e300, stream={"rate_hz": 1e300, "expected_hz": 1e300, "latency_p50_ms": 1e300, "dropped": 2**63 - 1})
+    huge = make_health(
+        cpu_percent=1e300,
+        stream={
+            "rate_hz": 1e300,
+            "expected_hz": 1e300,
+            "latency_p50_ms": 1e300,
+            "dropped": 2**63 - 1,
+        },
+    )
     assert len(panels.rates([huge])) < 2000
 
 
 @pytest.mark.parametrize("evil", [EVIL, "x" * 100_000, "\u202e\u2028\ufeff", "</td></table>"])
 def test_nothing_from_the_network_is_code(make_health: Callable[..., Health], evil: str) -> None:
-    said = panels.rates([make_health(last_error=evil, stream={"key": evil}), make_health("x", stream={"key": f"rhot/desk/*/{evil}"})])
+    said = panels.rates(
+        [
+            make_health(last_error=evil, stream={"key": evil}),
+            make_health("x", stream={"key": f"rhot/desk/*/{evil}"}),
+        ]
+    )
     assert_harmless(said)
     assert len(said) < 5000
     assert "\u202e" not in said

@@ -15,7 +15,11 @@ def test_bones_connect_every_joint_but_the_palm() -> None:
     assert BONES.shape == (27, 2)
     assert set(range(26)) - set(BONES.ravel().tolist()) == {JOINTS.index("palm")}
     names = {(JOINTS[a], JOINTS[b]) for a, b in BONES}
-    assert {("wrist", "thumb_metacarpal"), ("wrist", "index_metacarpal"), ("index_distal", "index_tip")} < names
+    assert {
+        ("wrist", "thumb_metacarpal"),
+        ("wrist", "index_metacarpal"),
+        ("index_distal", "index_tip"),
+    } < names
 
 
 def test_cylinders_reach_from_start_to_end() -> None:
@@ -39,7 +43,9 @@ def test_a_bone_without_length_is_no_nan() -> None:
     assert wxyz.tolist() == [[1.0, 0.0, 0.0, 0.0]]
 
 
-def normals(mesh: tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def normals(
+    mesh: tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     a, b, c = (mesh[0][mesh[1][:, i]] for i in range(3))
     return np.cross(b - a, c - a), (a + b + c) / 3.0
 
