@@ -49,7 +49,7 @@ from rhot.files.config import RigConfig, Tracker, load_rig
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import Blob, Searcher
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.detect.paper_finder import SeedFinder
+from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import Rect, picture
 from services.pi_tracker.sources.video import VideoReader
@@ -115,7 +115,7 @@ def speed(frames: list[Frame], colors: Colors, wanted: Sequence[str]) -> Rounds:
     times: Times = defaultdict(list)
     searcher = Searcher(compile_colors(colors, wanted), Tracker())
     step = TrackerStep(CAMERA, colors, Tracker(), (640, 480), wanted, time.thread_time_ns)
-    encoder, tracking = msgspec.json.Encoder(), SeedFinder(colors, Tracker(), wanted)
+    encoder, tracking = msgspec.json.Encoder(), PaperFinder(colors, Tracker(), wanted)
     for start in range(0, len(frames), TURN):
         ours = frames[start : start + TURN]
         theirs = [as_bgr(frame) for frame in ours]
@@ -138,7 +138,7 @@ def speed(frames: list[Frame], colors: Colors, wanted: Sequence[str]) -> Rounds:
             )
             times["refine"].append(round(step.times_ms["centroid"] * 1e6))
         for frame in map(in_hand, theirs):
-            timed(times, "seed_search", partial(SeedFinder(colors, Tracker(), wanted).find, frame))
+            timed(times, "seed_search", partial(PaperFinder(colors, Tracker(), wanted).find, frame))
         for frame in map(in_hand, theirs):
             timed(times, "seed_roi", partial(tracking.find, frame))
     # The first frames of all warm the machine up.
@@ -221,7 +221,7 @@ def precision() -> dict[str, float]:
             (ours,) = TrackerStep("left", colors, settings, size, [name]).step(
                 synthetic_images.frame_of(bgr)
             ).markers or (None,)
-            (seed,) = SeedFinder(colors, settings, [name]).find(
+            (seed,) = PaperFinder(colors, settings, [name]).find(
                 synthetic_images.frame_of(bgr, layout="bgr")
             ) or (None,)
             for kind, marker in (("ours", ours), ("seed", seed)):
@@ -256,10 +256,10 @@ def real_video(path: Path, colors: Colors) -> dict[str, float]:
 
     Jitter is the RMS second difference of the centre's x, px.
     """
-    paths: dict[str, dict[int, float]] = {"lut": {}, "seed": {}}
+    paths: dict[str, dict[int, float]] = {"lut": {}, "paper": {}}
     steps = {
         method: TrackerStep("cam", BALL, Tracker(method=method), (640, 480), ["green"])
-        for method in ("lut", "seed")
+        for method in ("lut", "paper")
     }  # type: ignore[arg-type]
     reader, frames = VideoReader("cam", path, 30.0), []
     reader.open()

@@ -57,11 +57,11 @@ class CameraTable(Table, frozen=True, kw_only=True):
 
 
 class Tracker(Table, frozen=True, kw_only=True):
-    # "lut": chroma lookup tables on YUV420; "seed": the RHOT paper's HSV pipeline, for comparison.
-    method: Literal["lut", "seed"] = "lut"
+    # "lut": chroma lookup tables on YUV420; "paper": the RHOT paper's HSV pipeline, for comparison.
+    method: Literal["lut", "paper"] = "lut"
     # RHOT, section 9.1: 40 px gave the most consistent tracking.
     roi_margin_px: Annotated[int, msgspec.Meta(ge=0, le=500)] = 40
-    # The lens's distortion taken out of whole pictures, as the seed did at first; needs
+    # The lens's distortion taken out of whole pictures, as the RHOT paper did at first; needs
     # <camera>.lens.json. For comparison: it costs time, and fusion takes it out of the markers'
     # positions anyway.
     rectify: bool = False
@@ -117,7 +117,7 @@ class Fusion(Table, frozen=True, kw_only=True):
 
 
 class Solver(Table, frozen=True, kw_only=True):
-    method: Literal["dls", "fabrik", "analytic", "dls-paper", "fabrik-seed"] = "dls"
+    method: Literal["dls", "fabrik", "analytic", "dls-paper", "fabrik-paper"] = "dls"
     max_iterations: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 60
     tolerance_m: Positive = 1e-4
 

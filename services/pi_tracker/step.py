@@ -17,7 +17,7 @@ from rhot.files.config import Tracker
 from rhot.messages import Marker, MarkerFrame
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.marker_finder import LutFinder
-from services.pi_tracker.detect.paper_finder import SeedFinder
+from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier
 
@@ -63,9 +63,9 @@ class TrackerStep:
         Raises CalibrationError and keeps the old ones.
         """
         table = compile_colors(colors, self._wanted, path)
-        self._finder: LutFinder | SeedFinder
-        if self._settings.method == "seed":
-            self._finder = SeedFinder(colors, self._settings, self._wanted)
+        self._finder: LutFinder | PaperFinder
+        if self._settings.method == "paper":
+            self._finder = PaperFinder(colors, self._settings, self._wanted)
         else:
             self._finder = LutFinder(table, self._settings, self._lap)
 

@@ -24,7 +24,7 @@ _SIGMA_PX = 0.155
 Box = tuple[int, int, int, int]
 
 
-class SeedFinder:
+class PaperFinder:
     """Markers as the seed found them."""
 
     def __init__(self, colors: Colors, settings: Tracker, wanted: Sequence[str]) -> None:

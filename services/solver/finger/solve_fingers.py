@@ -118,7 +118,7 @@ def _one(
             return fabrik.solve(chain, target, q, BOX, most, tolerance)
         case "analytic":
             return analytic.solve(chain, target, q, tolerance)
-        case "fabrik-seed":
+        case "fabrik-paper":
             return fabrik_paper.solve(chain, target, q, most, tolerance)
         case _:
             frame = dls_paper.solve(

@@ -35,7 +35,7 @@ def tracker(colors, wanted=("green", "blue", "magenta"), clock=None, **settings)
 
 
 @pytest.mark.parametrize("layout", ["i420", "bgr"])
-@pytest.mark.parametrize(("method", "tolerance_px"), [("lut", 0.4), ("seed", 1.2)])
+@pytest.mark.parametrize(("method", "tolerance_px"), [("lut", 0.4), ("paper", 1.2)])
 def test_markers_are_where_the_paint_is(moving, colors, layout, method, tolerance_px):
     step = tracker(colors, method=method)
     for frame, truth in moving(layout):
@@ -56,7 +56,7 @@ def test_markers_are_where_the_paint_is(moving, colors, layout, method, toleranc
             assert marker.quality > 0.5
 
 
-@pytest.mark.parametrize("method", ["lut", "seed"])
+@pytest.mark.parametrize("method", ["lut", "paper"])
 def test_a_frame_without_markers_is_a_message_too(studio, colors, method):
     frame, _ = studio.frame([], 3, size_px=SIZE)
     message = tracker(colors, method=method).step(frame)
@@ -139,7 +139,7 @@ def test_new_colours_are_in_force_with_the_next_frame(studio, tip, colors):
     assert step.step(frame).markers == []
 
 
-@pytest.mark.parametrize("method", ["lut", "seed"])
+@pytest.mark.parametrize("method", ["lut", "paper"])
 def test_a_colour_without_calibration_ends_the_start(colors, method):
     with pytest.raises(
         CalibrationError,

@@ -31,7 +31,7 @@ from services.solver.whole_hand.posture_prior import habit
 MODEL = default_hand()
 CHAINS = k.hand_chains(MODEL)
 LOW, HIGH = MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]
-METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-seed")
+METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-paper")
 few = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 wild = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),

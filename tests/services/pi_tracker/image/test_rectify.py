@@ -30,7 +30,7 @@ def frame(studio, tip):
 
 
 @pytest.mark.parametrize("layout", ["i420", "bgr"])
-@pytest.mark.parametrize("method", ["lut", "seed"])
+@pytest.mark.parametrize("method", ["lut", "paper"])
 def test_markers_are_told_where_the_camera_shows_them(frame, colors, lens, layout, method):
     plain = TrackerStep("left", colors, Tracker(method=method), SIZE, ["green", "blue"])
     rectifying = TrackerStep(
