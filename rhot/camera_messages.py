@@ -1,9 +1,8 @@
-"""What is set on a camera from any machine: colour ranges, exposure, and patches of paint to fit
-ranges to.
+"""What is set on a camera from any machine: colour ranges, exposure, patches of paint to fit to.
 
 Colors and Exposure are calibration files (rhot/files/calibration.py) that travel as they are: what
-is put on the bus is what the tracker writes on its machine. Like all messages they are untrusted:
-what does not decode or cannot be is refused, and the old stays in force.
+is sent is what the tracker writes on its machine. Like all messages they are untrusted: what does
+not decode or cannot be is refused with a Refusal, and the tracker keeps what it had.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ class ColorRange(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Colors(Calibration, frozen=True, kw_only=True):
-    """<camera>.colors.json, and the ranges in force or to be put in force."""
+    """<camera>.colors.json, and the colour ranges that a tracker uses or is asked to use."""
 
     colors: dict[str, ColorRange]
 
@@ -63,13 +62,13 @@ class Exposure(Calibration, frozen=True, kw_only=True):
 
 
 class ExposureControl(Message, frozen=True, kw_only=True):
-    """Exposure to be set, or in force.
+    """The exposure a camera has, or is asked to have.
 
-    Put with mode "auto", the camera's automatics run until they have settled; then their values are
-    frozen, written, and told with mode "fixed". Numbers are 0 where nobody knows them; of a put, a
-    0 leaves that value as it is. adjustable is false of sources that have no such controls (files,
-    the simulator); note says what a person should know, and why a put was refused; changed_ns is
-    when the tracker last took or refused one.
+    Asked for with mode "auto", the camera's automatics run until they have settled; then their
+    values are frozen, written, and told with mode "fixed". Numbers are 0 where nobody knows them;
+    a 0 that is asked for leaves that value as it is. adjustable is false of sources that have no
+    such controls (files, the simulator); note says what a person should know; changed_ns is when
+    the tracker last changed it.
     """
 
     mode: Literal["fixed", "auto"] = "fixed"
@@ -117,9 +116,9 @@ class Patch(Message, frozen=True, kw_only=True):
 
 
 class FitResult(Message, frozen=True, kw_only=True):
-    """Fitted ranges with statistics, and warnings and notes for a person.
+    """Fitted ranges with statistics, and warnings and notes for a person; error if there are none.
 
-    Error says why there are none. Nothing is in force by this.
+    A proposal: the tracker goes on with the ranges it has.
     """
 
     colors: dict[str, ColorRange] = msgspec.field(default_factory=dict)

@@ -11,25 +11,21 @@ queue=n it delivers every message through a queue of n that drops the oldest.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import time
 from collections.abc import AsyncIterator
 from typing import TypeVar
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.streams import AliveWatch, Subscription
+from rhot.bus.liveliness import AliveWatch
+from rhot.bus.subscription import Subscription
 from rhot.camera_messages import Colors, ExposureControl
-from rhot.errors import BusError, CalibrationError
+from rhot.errors import BusError
 from rhot.hand import HandName
 from rhot.messages import HandPoints, HandPose, Health, MarkerFrame, ObjectPose, Session
 from rhot.topics import Topic
 
 T = TypeVar("T")
-
-# Between two looks at what is in force.
-_LOOK_S = 0.1
 
 
 class RigClient:
@@ -84,77 +80,32 @@ class RigClient:
         self.bus.publisher(topics.SESSION).put(Session(running=False, start_ns=clock.now_ns()))
 
     async def colors(self, camera: str) -> Colors:
-        """The colour ranges in force; raises BusError if no tracker of that camera answers."""
+        """The colour ranges a camera's tracker uses; raises BusError if no such tracker answers."""
         return _one(await self.bus.get(topics.COLORS, camera=camera), camera)
 
-    async def set_colors(self, camera: str, colors: Colors, timeout_s: float = 5.0) -> None:
-        """Put colour ranges in force, and in their file on the camera's machine; colors.date and
-        .tool tell this change from others.
+    async def set_colors(self, camera: str, colors: Colors, timeout_s: float = 5.0) -> Colors:
+        """Have a camera's tracker use these colour ranges, and keep them in its calibration file.
 
-        Raises CalibrationError with the tracker's words if it refuses them, BusError if none
-        answers.
+        Returns what it uses then. Raises RefusedError with the tracker's reason if it refuses them,
+        BusError if none answers.
         """
-        health = self.bus.every(topics.HEALTH, 16, service="pi_tracker", instance=camera)
-        refusal = asyncio.ensure_future(
-            _refusal(health, f"colours of {colors.date} by {colors.tool}")
-        )
-        try:
-            await self.colors(camera)
-            await self._put(topics.COLORS, colors, camera)
-            deadline_s = time.monotonic() + timeout_s
-            while time.monotonic() < deadline_s:
-                now = await self.colors(camera)
-                if now.colors == colors.colors and now.date == colors.date:
-                    return
-                await asyncio.wait([refusal], timeout=_LOOK_S)
-                if refusal.done():
-                    raise CalibrationError(refusal.result())
-        finally:
-            refusal.cancel()
-            self.bus.close(health)
-        raise CalibrationError(
-            f"camera {camera!r} did not take the colours within {timeout_s:g} s, and does not say why; see its log"
-        )
+        await self.colors(camera)
+        return await self.bus.request(topics.COLORS, colors, timeout_s, camera=camera)
 
     async def exposure(self, camera: str) -> ExposureControl:
-        """The exposure in force; raises BusError if no tracker of that camera answers."""
+        """A camera's exposure now; raises BusError if no tracker of that camera answers."""
         return _one(await self.bus.get(topics.EXPOSURE, camera=camera), camera)
 
     async def set_exposure(
         self, camera: str, wanted: ExposureControl, timeout_s: float = 20.0
     ) -> ExposureControl:
-        """Set exposure, gain and white balance, or run the automatics once; what is in force then.
+        """Set exposure, gain and white balance, or run the camera's automatics once.
 
-        Raises CalibrationError with the tracker's words if it refuses, or if the camera has no such
-        controls.
+        Returns the values that hold then. Raises RefusedError with the tracker's reason if it
+        refuses, or if the camera has no such controls; BusError if no tracker answers.
         """
-        now = await self.exposure(camera)
-        if not now.adjustable:
-            raise CalibrationError(f"camera {camera!r}: {now.note}")
-        before = now
-        await self._put(topics.EXPOSURE, wanted, camera)
-        deadline_s = time.monotonic() + timeout_s
-        while time.monotonic() < deadline_s:
-            await asyncio.sleep(_LOOK_S)
-            now = await self.exposure(camera)
-            if now.changed_ns != before.changed_ns and "refused" in now.note:
-                raise CalibrationError(now.note)
-            if now.changed_ns != before.changed_ns and now.mode == "fixed":
-                return now
-        raise CalibrationError(f"camera {camera!r} has not set its exposure within {timeout_s:g} s")
-
-    async def _put(self, topic: Topic[T], message: T, camera: str) -> None:
-        publisher = self.bus.publisher(topic, camera=camera)
-        try:
-            # The tracker has just answered, so it is there: its subscription is known to the router
-            # within milliseconds.
-            for _ in range(100):
-                if publisher.wanted:
-                    break
-                await asyncio.sleep(0.01)
-            publisher.put(message)
-        finally:
-            publisher.undeclare()
+        await self.exposure(camera)
+        return await self.bus.request(topics.EXPOSURE, wanted, timeout_s, camera=camera)
 
     def _stream(self, topic: Topic[T], queue: int | None, **names: str | None) -> Subscription[T]:
         given = {field: name for field, name in names.items() if name is not None}
@@ -168,17 +119,10 @@ class RigClient:
 def _one(answers: list[T], camera: str) -> T:
     if not answers:
         raise BusError(
-            f"no tracker of camera {camera!r} answers; is it running, and is the name right? `rhot top` shows them"
+            f"no tracker of camera {camera!r} answers; is it running, and is the name right? "
+            "`rhot top` shows them"
         )
     return answers[0]
-
-
-async def _refusal(health: Subscription[Health], made: str) -> str:
-    """The tracker's words, once it has refused what was made so."""
-    async for beat in health:
-        if made in beat.last_error:
-            return beat.last_error
-    return "the bus was closed"
 
 
 @contextlib.asynccontextmanager

@@ -8,6 +8,11 @@ it and exit.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
+
+# Why a request was refused: it does not decode; what it asks for cannot be; the service has no
+# such thing; its machine could not keep the result; it failed, which is a fault of the service.
+RefusalCode = Literal["malformed", "invalid", "unsupported", "not_saved", "failed"]
 
 
 class RhotError(Exception):
@@ -32,6 +37,14 @@ class SourceError(RhotError):
 
 class BusError(RhotError):
     """Zenoh refused a session, a key or a query."""
+
+
+class RefusedError(RhotError):
+    """A service refused a request; the reason travels as a Refusal message."""
+
+    def __init__(self, reason: str, code: RefusalCode = "invalid") -> None:
+        super().__init__(reason)
+        self.code = code
 
 
 def leaves(error: BaseException) -> Iterator[BaseException]:

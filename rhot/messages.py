@@ -12,9 +12,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from rhot.errors import RefusalCode
 from rhot.hand import HandName
 
-Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 # A name that is one chunk of a Zenoh key.
@@ -237,10 +237,7 @@ class ObjectPose(Message, frozen=True, kw_only=True):
 
 
 class Session(Message, frozen=True, kw_only=True):
-    """The start broadcast: trackers work while running is true.
-
-    start_ns is on the master's clock.
-    """
+    """The start broadcast: trackers work while running is true; start_ns is on the master's clock."""
 
     running: bool
     start_ns: Stamp
@@ -251,6 +248,13 @@ class ClockEcho(Message, frozen=True, kw_only=True):
     """Answer to a clock query: the master's clock when it answered."""
 
     master_ns: Stamp
+
+
+class Refusal(Message, frozen=True, kw_only=True):
+    """Why a request was refused: the payload of a query's error reply. What was before stays."""
+
+    code: RefusalCode
+    reason: str
 
 
 class StreamHealth(Message, frozen=True, kw_only=True):
@@ -293,43 +297,3 @@ class Health(Message, frozen=True, kw_only=True):
     rss_mb: NonNegative
     values: dict[str, float] = {}
     sent_ns: Stamp = 0
-
-
-class HandTruth(Message, frozen=True, kw_only=True):
-    """What the simulator knows of one hand.
-
-    points_m maps a landmark to its OpenXR joint's position in the rig frame.
-    """
-
-    points_m: dict[str, Vec3]
-    wrist: WristPose
-    angles_rad: dict[str, FingerAngles]
-
-
-class ObjectTruth(Message, frozen=True, kw_only=True):
-    """What the simulator knows of one object, in the rig frame."""
-
-    position_m: Vec3
-    orientation_wxyz: Quat
-
-
-class Truth(Message, frozen=True, kw_only=True):
-    """One line of truth.jsonl, and the simulator's live topic."""
-
-    stamp_ns: Stamp
-    hands: dict[str, HandTruth]
-    objects: dict[str, ObjectTruth]
-    sent_ns: Stamp = 0
-
-
-class SimFrame(Message, frozen=True, kw_only=True):
-    """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far
-    its computer's clock is ahead now.
-    """
-
-    camera: Name
-    seq: Count
-    stamp_ns: Stamp
-    row_time_ns: NonNegative
-    size_px: tuple[int, int]
-    clock_skew_ns: Offset

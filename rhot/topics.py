@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 
 import rhot.camera_messages as c
 import rhot.messages as m
+import rhot.simulator_messages as s
 from rhot.errors import BusError
 
 T = TypeVar("T")
@@ -115,12 +116,19 @@ class Topic(Generic[T]):
         return match.groupdict() if match else None
 
 
-def _stream(
-    template: str, message: type[T], rate: Rate, about: str, *, recorded: bool = True
-) -> Topic[T]:
-    return Topic(template, message, Kind.STREAM, rate, Priority.REAL_TIME, recorded, about)
+def _stream(template: str, message: type[T], rate: Rate, about: str) -> Topic[T]:
+    return Topic(template, message, Kind.STREAM, rate, Priority.REAL_TIME, True, about)
 
 
+def _query(template: str, message: type[T], priority: Priority, about: str) -> Topic[T]:
+    return Topic(template, message, Kind.QUERY, Rate.DEMAND, priority, False, about)
+
+
+def _setting(template: str, message: type[T], about: str) -> Topic[T]:
+    return Topic(template, message, Kind.STATE, Rate.DEMAND, Priority.DATA, False, about)
+
+
+# What every camera, hand and object sends, frame by frame.
 MARKERS = _stream(
     "camera/{camera}/markers", m.MarkerFrame, Rate.CAMERA, "coloured blobs of every image"
 )
@@ -130,17 +138,19 @@ OPENVR = _stream(
     "openvr/{serial}/pose", m.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them"
 )
 OBJECT = _stream("object/{object}/pose", m.ObjectPose, Rate.OBJECT, "objects in the rig frame")
-TRUTH = _stream("sim/truth", m.Truth, Rate.CAMERA, "the simulator's ground truth")
+TRUTH = _stream("sim/truth", s.Truth, Rate.CAMERA, "the simulator's ground truth")
+
+# Pictures: only for who asks.
 PREVIEW: Topic[bytes] = Topic(
     "camera/{camera}/preview",
     None,
     Kind.STREAM,
     Rate.DEMAND,
     Priority.BACKGROUND,
-    False,
-    "JPEG, published while somebody subscribes",
-    "image/jpeg",
-    4_000_000,
+    recorded=False,
+    about="JPEG, published while somebody subscribes",
+    media_type="image/jpeg",
+    max_bytes=4_000_000,
 )
 FRAME: Topic[bytes] = Topic(
     "camera/{camera}/frame",
@@ -148,10 +158,10 @@ FRAME: Topic[bytes] = Topic(
     Kind.QUERY,
     Rate.DEMAND,
     Priority.BACKGROUND,
-    False,
-    "one lossless frame for calibration",
-    "image/png",
-    40_000_000,
+    recorded=False,
+    about="one lossless frame for calibration",
+    media_type="image/png",
+    max_bytes=40_000_000,
 )
 SIM_FRAME: Topic[bytes] = Topic(
     "camera/{camera}/image",
@@ -159,65 +169,49 @@ SIM_FRAME: Topic[bytes] = Topic(
     Kind.STREAM,
     Rate.CAMERA,
     Priority.DATA,
-    False,
-    "I420 images of a simulated camera; SimFrame in the attachment",
-    "application/octet-stream",
-    40_000_000,
-    "rhot-sim",
+    recorded=False,
+    about="I420 images of a simulated camera; SimFrame in the attachment",
+    media_type="application/octet-stream",
+    max_bytes=40_000_000,
+    root="rhot-sim",
 )
-COLORS = Topic(
-    "camera/{camera}/colors",
-    c.Colors,
-    Kind.STATE,
-    Rate.DEMAND,
-    Priority.DATA,
-    False,
-    "colour ranges; a put changes them",
+
+# What is set on a camera. A query with a payload changes it and is answered with what holds then,
+# or with a Refusal; a put changes it, too, but hears of a refusal in health only.
+COLORS = _setting(
+    "camera/{camera}/colors", c.Colors, "colour ranges; a query with a payload, or a put, sets them"
 )
-EXPOSURE = Topic(
+EXPOSURE = _setting(
     "camera/{camera}/exposure",
     c.ExposureControl,
-    Kind.STATE,
-    Rate.DEMAND,
-    Priority.DATA,
-    False,
-    "exposure in force; a put changes it, or runs the automatics once",
+    "exposure; a query with a payload, or a put, sets it or runs the automatics once",
 )
-FIT = Topic(
+FIT = _query(
     "camera/{camera}/fit",
     c.FitResult,
-    Kind.QUERY,
-    Rate.DEMAND,
     Priority.BACKGROUND,
-    False,
     "ranges fitted to the patches of a FitRequest",
 )
+
+# The rig as a whole.
 SESSION = Topic(
     "control/session",
     m.Session,
     Kind.STATE,
     Rate.DEMAND,
     Priority.REAL_TIME,
-    True,
-    "the start broadcast",
+    recorded=True,
+    about="the start broadcast",
 )
-CLOCK = Topic(
-    "control/clock",
-    m.ClockEcho,
-    Kind.QUERY,
-    Rate.DEMAND,
-    Priority.REAL_TIME,
-    False,
-    "the master's clock",
-)
+CLOCK = _query("control/clock", m.ClockEcho, Priority.REAL_TIME, "the master's clock")
 HEALTH = Topic(
     "service/{service}/{instance}/health",
     m.Health,
     Kind.STREAM,
     Rate.BEAT,
     Priority.DATA,
-    True,
-    "state of each service",
+    recorded=True,
+    about="state of each service",
 )
 ALIVE: Topic[bytes] = Topic(
     "service/{service}/{instance}/alive",
@@ -225,10 +219,10 @@ ALIVE: Topic[bytes] = Topic(
     Kind.TOKEN,
     Rate.DEMAND,
     Priority.DATA,
-    False,
-    "liveliness token",
-    "",
-    0,
+    recorded=False,
+    about="liveliness token",
+    media_type="",
+    max_bytes=0,
 )
 
 TOPICS: tuple[Topic, ...] = (

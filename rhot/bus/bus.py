@@ -17,30 +17,32 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, TypeVar
 
 import msgspec
 import zenoh
 
-from rhot import clock, topics
-from rhot.bus.stats import StreamStats
-from rhot.bus.streams import (
-    Alive,
-    AliveWatch,
-    Payload,
-    Publisher,
-    RawSubscription,
-    Sample,
-    Subscription,
+from rhot import topics
+from rhot.bus.liveliness import Alive, AliveWatch
+from rhot.bus.publisher import Payload, Publisher
+from rhot.bus.queries import (
+    UNDECODABLE,
+    Answerer,
+    Asker,
+    Handler,
+    RequestHandler,
+    decoded,
+    only_answer,
 )
+from rhot.bus.stats import StreamStats
+from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.errors import BusError
 from rhot.messages import ClockEcho
 from rhot.topics import Kind, Topic
 
 T = TypeVar("T")
-Answer = msgspec.Struct | bytes | None
 log = logging.getLogger("rhot.bus")
 
 __all__ = [
@@ -109,6 +111,7 @@ class Bus:
         self.streams: list[StreamStats] = []
         self._session = session
         self._loop = asyncio.get_running_loop()
+        self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -161,136 +164,66 @@ class Bus:
         request: msgspec.Struct | None = None,
         **names: str,
     ) -> list[T]:
-        """Answers to a query, decoded; those that do not decode are left out.
+        """All answers to a query, decoded; those that do not decode, and refusals, are left out.
 
         Empty after timeout_s without any.
         """
-        decoder = msgspec.json.Decoder(topic.message) if topic.message else None
-        answers: list[T] = []
-        for payload, _ in await self._query(topic, timeout_s, names, clock.now_ns, request):
-            if decoder is None:
-                answers.append(payload)  # type: ignore[arg-type]
-                continue
-            with contextlib.suppress(msgspec.DecodeError, UnicodeDecodeError):
-                answers.append(decoder.decode(payload))
-        return answers
+        key = topic.key(self.rig, **names)
+        return decoded(topic, await self._asker.replies(topic, key, timeout_s, request))
+
+    async def request(
+        self, topic: Topic[T], request: msgspec.Struct, timeout_s: float = 5.0, **names: str
+    ) -> T:
+        """Ask one service for something, and return its answer.
+
+        Raises RefusedError with the service's own reason if it refuses, BusError if nobody answers
+        within timeout_s.
+        """
+        key = topic.key(self.rig, **names)
+        return only_answer(topic, key, await self._asker.replies(topic, key, timeout_s, request))
 
     async def echo(
         self, now_ns: Callable[[], int], timeout_s: float = 1.0
     ) -> tuple[int, int, int] | None:
-        """One exchange with the master's clock: (asked, the master's answer, answered) in ns, or
-        None without an answer.
+        """One exchange with the master's clock.
 
-        Both own stamps are read from now_ns as close to the wire as Python gets.
+        (asked, the master's answer, answered) in ns, or None without an answer. Both own stamps are
+        read from now_ns as close to the wire as Python gets.
         """
         asked_ns = now_ns()
-        decoder = msgspec.json.Decoder(ClockEcho)
-        for payload, answered_ns in await self._query(topics.CLOCK, timeout_s, {}, now_ns):
-            with contextlib.suppress(msgspec.DecodeError, UnicodeDecodeError):
-                return asked_ns, decoder.decode(payload).master_ns, answered_ns
+        key = topics.CLOCK.key(self.rig)
+        replies = await self._asker.replies(topics.CLOCK, key, timeout_s, now_ns=now_ns)
+        for reply in replies.good:
+            with contextlib.suppress(*UNDECODABLE):
+                echo = msgspec.json.decode(reply.payload, type=ClockEcho)
+                return asked_ns, echo.master_ns, reply.received_ns
         return None
 
-    async def _query(
-        self,
-        topic: Topic[Any],
-        timeout_s: float,
-        names: dict[str, str],
-        now_ns: Callable[[], int],
-        request: msgspec.Struct | None = None,
-    ) -> list[tuple[bytes, int]]:
-        replies: list[tuple[bytes, int]] = []
-        asked = None if request is None else msgspec.json.encode(request)
-        done: asyncio.Future[None] = self._loop.create_future()
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            arrived_ns = now_ns()
-            if reply.ok is not None and len(reply.ok.payload) <= topic.max_bytes:
-                replies.append((reply.ok.payload.to_bytes(), arrived_ns))
-
-        def finish() -> None:
-            if not done.done():
-                done.set_result(None)
-
-        def on_end() -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is gone, and nobody waits
-                self._loop.call_soon_threadsafe(finish)
-
-        self._session.get(
-            topic.key(self.rig, **names),
-            zenoh.handlers.Callback(on_reply, on_end),
-            payload=asked,
-            timeout=timeout_s,
-        )
-        # Zenoh ends every query at its timeout; a second more covers a link that dies meanwhile.
-        # (Not wait_for: where the answer and a cancellation meet, Python 3.11's swallows the
-        # cancellation, and its task runs for ever.)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(timeout_s + 1.0):
-                await done
-        return replies
-
-    def answer(
-        self, topic: Topic[Any], handler: Callable[[], Answer | Awaitable[Answer]], **names: str
-    ) -> None:
+    def answer(self, topic: Topic[Any], handler: Handler, **names: str) -> None:
         """Answer queries for the rest of the session.
 
         A plain function runs in Zenoh's thread (quick and thread-safe); a coroutine function runs
         on the event loop. It returns a message, bytes, or None for no answer; what it raises goes
-        to the asker as an error, and to the log.
+        to the asker as a Refusal.
         """
         key = topic.key(self.rig, **names)
-
-        async def answer_later(query: zenoh.Query) -> None:
-            with query:
-                await self._reply(query, key, topic, handler)
-
-        def on_query(query: zenoh.Query) -> None:
-            if asyncio.iscoroutinefunction(handler):
-                with contextlib.suppress(RuntimeError):
-                    self._loop.call_soon_threadsafe(self._spawn, answer_later(query))
-                return
-            with query:
-                try:
-                    _send(query, key, topic, handler())  # type: ignore[arg-type]
-                except Exception as error:  # the asker waits: it must hear of any failure
-                    log.exception("query %s failed", key)
-                    query.reply_err(str(error))
-
+        on_query = Answerer(topic, key, self._spawn_threadsafe).plain(handler)
         self._open.append(self._session.declare_queryable(key, on_query))
 
-    def answer_requests(
-        self, topic: Topic[Any], handler: Callable[[bytes], Awaitable[Answer]], **names: str
-    ) -> None:
+    def answer_requests(self, topic: Topic[Any], handler: RequestHandler, **names: str) -> None:
         """As answer(), with a coroutine function that takes the request's payload.
 
-        A request larger than max_bytes gets no answer.
+        The payload is empty for a plain question. A request larger than max_bytes gets no answer.
         """
         key = topic.key(self.rig, **names)
-
-        async def answer_later(query: zenoh.Query) -> None:
-            with query:
-                await self._reply(
-                    query,
-                    key,
-                    topic,
-                    lambda: handler(query.payload.to_bytes() if query.payload else b""),
-                )
-
-        def on_query(query: zenoh.Query) -> None:
-            if query.payload is None or len(query.payload) <= topic.max_bytes:
-                with contextlib.suppress(RuntimeError):
-                    self._loop.call_soon_threadsafe(self._spawn, answer_later(query))
-
+        on_query = Answerer(topic, key, self._spawn_threadsafe).with_request(handler)
         self._open.append(self._session.declare_queryable(key, on_query))
 
-    async def _reply(
-        self, query: zenoh.Query, key: str, topic: Topic[Any], handler: Callable[[], Any]
-    ) -> None:
+    def _spawn_threadsafe(self, coroutine: Any) -> None:
         try:
-            _send(query, key, topic, await handler())
-        except Exception as error:  # likewise
-            log.exception("query %s failed", key)
-            query.reply_err(str(error))
+            self._loop.call_soon_threadsafe(self._spawn, coroutine)
+        except RuntimeError:  # the loop is gone
+            coroutine.close()
 
     def _spawn(self, coroutine: Any) -> None:
         task = self._loop.create_task(coroutine)
@@ -332,10 +265,3 @@ class Bus:
             with contextlib.suppress(zenoh.ZError):
                 entity.undeclare()
         self._open.clear()
-
-
-def _send(query: zenoh.Query, key: str, topic: Topic[Any], answer: Answer) -> None:
-    if answer is None:
-        return
-    payload = answer if isinstance(answer, bytes) else msgspec.json.encode(answer)
-    query.reply(key, payload, encoding=topic.encoding)

@@ -10,7 +10,7 @@ from rhot.clock import OffsetEstimator
 
 
 async def follow_master(bus: Bus, estimator: OffsetEstimator, own_ns: Callable[[], int]) -> None:
-    """Keep an estimator fed for ever: eight exchanges at once for a quick start, then one a second."""
+    """Keep an estimator fed for ever: eight exchanges for a quick start, then one a second."""
     exchanges = 0
     while True:
         exchange = await bus.echo(own_ns)

@@ -163,8 +163,8 @@ def load_cameras(folder: Path, names: list[str]) -> dict[str, Camera]:
         place = geometry.cameras.get(name)
         if place is None:
             raise CalibrationError(
-                f"{folder / 'rig.json'}: camera {name!r} is missing; it has {sorted(geometry.cameras)}. "
-                "Run `rhot calibrate stereo` with all cameras"
+                f"{folder / 'rig.json'}: camera {name!r} is missing; "
+                f"it has {sorted(geometry.cameras)}. Run `rhot calibrate stereo` with all cameras"
             )
         lens = load_lens(folder, name)
         T = np.array(place.T_rig_from_camera)
@@ -207,6 +207,7 @@ def _rigid(T: np.ndarray, path: Path, name: str) -> np.ndarray:
         or np.abs(R @ R.T - np.eye(3)).max() > 1e-4
     ):
         raise CalibrationError(
-            f"{path}: T_rig_from_camera of {name!r} is not a rigid transform (rotation and metres); run `rhot calibrate stereo` again"
+            f"{path}: T_rig_from_camera of {name!r} is not a rigid transform "
+            "(rotation and metres); run `rhot calibrate stereo` again"
         )
     return T

@@ -77,7 +77,8 @@ def _stamp(path: Path, number: int, row: list[str]) -> FrameStamp:
         return FrameStamp(int(frame), int(stamp_ns), float(row_time_ns))
     except ValueError:
         raise CaptureError(
-            f"{path}: line {number}: expected three numbers `{','.join(CSV_HEADER)}`, got {','.join(row)!r}"
+            f"{path}: line {number}: expected three numbers `{','.join(CSV_HEADER)}`, "
+            f"got {','.join(row)!r}"
         ) from None
 
 

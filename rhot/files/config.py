@@ -159,7 +159,7 @@ class Recorder(Table, frozen=True, kw_only=True):
 
 
 class World(Table, frozen=True, kw_only=True):
-    """Turns the rig frame away from the first camera: T_rig_from_first_camera as 4x4 rows, metres."""
+    """Turns the rig frame away from the first camera: T_rig_from_camera as 4x4 rows, metres."""
 
     T_rig_from_camera: tuple[
         tuple[float, float, float, float],
@@ -201,7 +201,8 @@ class RigConfig(Table, frozen=True, kw_only=True):
             if camera.name == name:
                 return camera
         raise ConfigError(
-            f"rig {self.rig.name!r} has no camera {name!r}; it has {[c.name for c in self.camera]}. Add a [[camera]] table to rig.toml"
+            f"rig {self.rig.name!r} has no camera {name!r}; "
+            f"it has {[c.name for c in self.camera]}. Add a [[camera]] table to rig.toml"
         )
 
     @property

@@ -24,13 +24,15 @@ def explain(error: str, root: type) -> str:
     text = error[: at.start()] if at else error
     unknown = _UNKNOWN.search(text)
     if "enum value" in text:
-        text += f"; valid: {', '.join(map(str, _choices(_node_at(root, path), of_keys='`key`' in error)))}"
+        valid = _choices(_node_at(root, path), of_keys="`key`" in error)
+        text += f"; valid: {', '.join(map(str, valid))}"
     if unknown is None:
         return f"`{path or 'file'}`: {text[:1].lower()}{text[1:]}"
-    valid = _keys_of(_node_at(root, path), root)
-    near = difflib.get_close_matches(unknown[1], valid, n=1)
+    keys = _keys_of(_node_at(root, path), root)
+    near = difflib.get_close_matches(unknown[1], keys, n=1)
     hint = f", did you mean `{near[0]}`?" if near else "."
-    return f"{f'[{path}]' if path else 'top level'}: unknown key `{unknown[1]}`{hint} Valid keys: {', '.join(valid)}"
+    where = f"[{path}]" if path else "top level"
+    return f"{where}: unknown key `{unknown[1]}`{hint} Valid keys: {', '.join(keys)}"
 
 
 def _node_at(root: type, path: str) -> Any:

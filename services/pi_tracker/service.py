@@ -2,8 +2,8 @@
 
 It waits for the start broadcast; a camera that fails ends it with SourceError, and systemd starts
 it anew; a file that ends, ends it in peace. Colour ranges and exposure are changed without a
-restart, by their files or over the bus (sinks/coloring.py, exposing.py); a live camera starts
-without them, so that it can be calibrated.
+restart, by their files or over the bus (endpoints/color_ranges.py, exposure_control.py); a live
+camera starts without them, so that it can be calibrated.
 """
 
 from __future__ import annotations
@@ -15,76 +15,86 @@ from collections.abc import Coroutine
 from rhot import topics
 from rhot.bus.master_clock import follow_master
 from rhot.clock import OffsetEstimator
+from rhot.messages import MarkerFrame
 from rhot.process.service import Service
 from services.pi_tracker import sources
-from services.pi_tracker.endpoints.color_fitting import Fitting
-from services.pi_tracker.endpoints.color_ranges import Coloring
-from services.pi_tracker.endpoints.exposure_control import Exposing
-from services.pi_tracker.endpoints.picture_cache import Album
+from services.pi_tracker.endpoints.color_fitting import ColorFitting
+from services.pi_tracker.endpoints.color_ranges import ColorRanges
+from services.pi_tracker.endpoints.exposure_control import ExposureEndpoint
+from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.endpoints.session_gate import SessionGate
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.tracker import CameraTracker
 
 
 async def serve(service: Service) -> None:
     """Finds the coloured markers in one camera's images."""
-    tracker = CameraTracker(service)
+    camera = CameraService(service)
     gate = SessionGate(service.bus)
-    companions = [
-        service.tasks.create_task(task) for task in (gate.follow(), *tracker.companions())
-    ]
+    companions = [service.tasks.create_task(task) for task in (gate.follow(), *camera.companions())]
     try:
         service.ready()
         service.state = "waiting"
         table = service.config.camera_named(service.instance)
         start_ns = (await gate.started()).start_ns if sources.is_file(table) else 0
         source = sources.open_source(table, service.config, service.bus, start_ns)
-        tracker.exposing.attach(source.controls)
+        camera.exposure.attach(source.controls)
         companions.append(
-            service.tasks.create_task(follow_master(service.bus, tracker.offset, source.now_ns))
+            service.tasks.create_task(follow_master(service.bus, camera.offset, source.now_ns))
         )
         async with contextlib.aclosing(source.frames()) as frames:
             async for frame in frames:
                 service.state = "running" if gate.running else "waiting"
-                tracker.take(frame, source, running=gate.running)
+                camera.take(frame, source, running=gate.running)
     finally:
         for task in companions:
             task.cancel()
 
 
-class CameraTracker:
-    """What the service does with each frame."""
+class CameraService:
+    """One camera's tracker with its endpoints on the bus: what the service does with each frame."""
 
     def __init__(self, service: Service) -> None:
         self.offset = OffsetEstimator()
         self._service = service
         camera = service.config.camera_named(service.instance)
-        self.coloring = Coloring(service, live=not sources.is_file(camera))
-        self.exposing = Exposing(service)
+        self._tracker = CameraTracker(service.config, camera, time.perf_counter_ns)
+        self._colors = ColorRanges(service, self._tracker, live=not sources.is_file(camera))
+        self.exposure = ExposureEndpoint(service)
         self._markers = service.bus.publisher(topics.MARKERS, camera=camera.name)
-        self._pictures = Album(service.bus, camera.name, service.tasks)
-        Fitting(service, self._pictures, self.coloring)
-        self._noted = 0
+        self._pictures = PictureCache(service.bus, camera.name, service.tasks)
+        ColorFitting(service, self._pictures, self._tracker)
+        self._notes_told = 0
 
     def companions(self) -> list[Coroutine[None, None, None]]:
         """What runs beside the frames, for ever."""
-        return [self.coloring.follow_file(), self.coloring.follow_bus(), self.exposing.follow()]
+        return [self._colors.follow_file(), self._colors.follow_bus(), self.exposure.follow()]
 
     def take(self, frame: Frame, source: sources.Source, *, running: bool) -> None:
         """One frame: markers while the session runs, pictures always."""
         if running:
-            offset = self.offset.at(frame.stamp_ns)
-            found = self.coloring.step.step(frame, offset.offset_ns, offset.sigma_ns)
-            self._markers.put(found)
-            values = self._service.values
-            values["markers"] = len(found.markers)
-            values["clock_offset_ms"] = offset.offset_ns * 1e-6
-            values["clock_sigma_ms"] = offset.sigma_ns * 1e-6 if offset.sigma_ns >= 0 else -1.0
-            values["skipped_frames"] = source.dropped
-            values["rejected_frames"] = source.rejected
-            self.coloring.look(frame, found.markers)
-            for stage, took_ms in self.coloring.step.times_ms.items():
-                values[f"{stage}_ms"] = took_ms
+            found = self._track(frame)
+            self._service.values["skipped_frames"] = source.dropped
+            self._service.values["rejected_frames"] = source.rejected
+            self._watch_drift(frame, found)
         self._pictures.show(frame, time.monotonic_ns())
-        for note in source.notes[self._noted :]:
+        for note in source.notes[self._notes_told :]:
             self._service.error(note)
-        self._noted = len(source.notes)
+        self._notes_told = len(source.notes)
+
+    def _track(self, frame: Frame) -> MarkerFrame:
+        offset = self.offset.at(frame.stamp_ns)
+        found = self._tracker.step(frame, offset)
+        self._markers.put(found)
+        values = self._service.values
+        values["markers"] = len(found.markers)
+        values["clock_offset_ms"] = offset.offset_ns * 1e-6
+        values["clock_sigma_ms"] = offset.sigma_ns * 1e-6 if offset.sigma_ns >= 0 else -1.0
+        for stage, took_ms in self._tracker.times_ms.items():
+            values[f"{stage}_ms"] = took_ms
+        return found
+
+    def _watch_drift(self, frame: Frame, found: MarkerFrame) -> None:
+        values, drifted = self._tracker.watch_drift(frame, found)
+        self._service.values.update(values)
+        self._colors.tell_drift(drifted, frame.stamp_ns)

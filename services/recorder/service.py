@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
-from rhot.bus.streams import RawSubscription
+from rhot.bus.subscription import RawSubscription
 from rhot.errors import CaptureError
 from rhot.files.config import RigConfig
 from rhot.process.service import Service, rhot_version

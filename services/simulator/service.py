@@ -19,8 +19,8 @@ import cv2
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.messages import SimFrame
 from rhot.process.service import Service
+from rhot.simulator_messages import SimFrame
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.scene.scene import Scene, load_scene
 from services.simulator.scene.vive_trackers import tracker_pose

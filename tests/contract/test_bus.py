@@ -11,7 +11,7 @@ import zenoh
 from rhot import clock, topics
 from rhot.bus.bus import open_bus, router_config
 from rhot.bus.stats import StreamStats
-from rhot.bus.streams import RawSubscription, Sample
+from rhot.bus.subscription import RawSubscription, Sample
 from rhot.errors import BusError
 from rhot.messages import ClockEcho, HandPoint, HandPoints, Session
 

@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from rhot.errors import CaptureError
 from rhot.files.capture import Capture, read_lines
 from rhot.hand import HANDS
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose, Truth
+from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
+from rhot.simulator_messages import Truth
 from services.cli.evaluate.plot_figures import (
     Track,
     angles_figure,

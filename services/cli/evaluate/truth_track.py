@@ -19,7 +19,8 @@ from scipy.interpolate import CubicSpline
 from rhot.errors import CaptureError
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS, TIPS
-from rhot.messages import FingerAngles, HandTruth, ObjectTruth, Truth
+from rhot.messages import FingerAngles
+from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
 
 Stamps = npt.NDArray[np.int64]
 

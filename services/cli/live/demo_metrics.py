@@ -14,7 +14,8 @@ import numpy as np
 
 from rhot.bus.stats import percentiles_ms
 from rhot.hand import JOINT_INDEX, TIPS
-from rhot.messages import HandPose, Truth
+from rhot.messages import HandPose
+from rhot.simulator_messages import Truth
 
 # Truth kept: two seconds at 90 Hz, far longer than any pose takes.
 _TRUTH = 180

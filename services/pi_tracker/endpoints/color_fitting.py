@@ -1,8 +1,7 @@
-"""Fits colour ranges for whoever points at paint in this camera's pictures; the pictures themselves
-stay here.
+"""Fits colour ranges to paint that somebody points at in this camera's pictures.
 
-Nothing is put in force by it. What is asked for wrongly, or points at a picture that is gone, gets
-an answer with the reason.
+The pictures stay here, and the tracker keeps its ranges: a fit is a proposal. What is asked for
+wrongly, or points at a picture that is gone, gets an answer with the reason.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from collections.abc import Sequence
 import msgspec
 
 from rhot import topics
+from rhot.bus.queries import UNDECODABLE
 from rhot.camera_messages import FitRequest, FitResult, Patch
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ColorRange, Colors
@@ -21,19 +21,18 @@ from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.paint_patch import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import examine, statistics
-from services.pi_tracker.endpoints.color_ranges import Coloring
-from services.pi_tracker.endpoints.picture_cache import Album
+from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.tracker import CameraTracker
 
 
-class Fitting:
-    """Answers fit requests with the pictures of an album."""
+class ColorFitting:
+    """Answers fit requests with the pictures of a cache."""
 
-    def __init__(self, service: Service, album: Album, coloring: Coloring) -> None:
-        self._album, self._coloring = album, coloring
+    def __init__(self, service: Service, pictures: PictureCache, tracker: CameraTracker) -> None:
+        self._pictures, self._tracker = pictures, tracker
         self._wanted = service.config.colors
-        # One at a time: it takes most of a Pi's core for a second, and the tracker goes on beside
-        # it.
+        # One at a time: it takes most of a Pi's core for a second, beside the tracker.
         self._lock = asyncio.Lock()
         service.bus.answer_requests(topics.FIT, self._answer, camera=service.instance)
 
@@ -43,12 +42,12 @@ class Fitting:
             names = list(
                 dict.fromkeys([one.picture for one in request.pointed] + list(request.pictures))
             )
-            frames = [self._album.frame(name) for name in names]
+            frames = [self._pictures.frame(name) for name in names]
             async with self._lock:
                 return await asyncio.to_thread(
-                    answer, request, names, frames, self._wanted, self._coloring.in_force
+                    answer, request, names, frames, self._wanted, self._tracker.colors
                 )
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
+        except (*UNDECODABLE, CalibrationError) as error:
             return FitResult(error=str(error))
 
 
@@ -57,7 +56,7 @@ def answer(
     names: list[str],
     frames: Sequence[Frame],
     wanted: Sequence[str],
-    in_force: Colors,
+    current: Colors,
 ) -> FitResult:
     """The result of a request on pictures of these names; raises CalibrationError."""
     notes = []
@@ -79,7 +78,7 @@ def answer(
     study = gather(frames, pointers)
     fitted = fit(study.samples)
     known: dict[str, ColorRange] = {
-        name: span for name, span in in_force.colors.items() if name not in fitted
+        name: span for name, span in current.colors.items() if name not in fitted
     }
     report = examine(study, fitted, known)
     patches = [

@@ -1,9 +1,9 @@
-"""The exposure in force: asked for and set over the bus, found by the camera's automatics if
-wished, written to its file.
+"""The camera's exposure over the bus: asked for, set, found by the camera's automatics if wished.
 
-A source without such controls (a file, the simulator) says so and refuses; automatics that do not
-settle in time are frozen at the last values, with a note, and a driver that reports nothing is a
-refusal. What cannot be is refused, and the old stays.
+What holds is written to its file. A source without such controls (a file, the simulator) says so
+and refuses; automatics that do not settle in time are frozen at the last values, with a note; a
+driver that reports nothing is a refusal. What is refused leaves the old values: who asked by a
+query gets a typed Refusal, who put finds the reason in health.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ import time
 import msgspec
 
 from rhot import clock, topics
+from rhot.bus.queries import UNDECODABLE
 from rhot.camera_messages import ExposureControl
-from rhot.errors import CalibrationError
+from rhot.errors import CalibrationError, RefusalCode, RefusedError
 from rhot.files.calibration import Exposure, load_exposure, save
 from rhot.process.service import Service
 from services.pi_tracker.colors.exposure_advice import Settling
 from services.pi_tracker.sources.controls import Controls
 
 # picamera2's automatics settle in one to two seconds, a webcam's in five.
-_PATIENCE_S = 15.0
+_SETTLE_TIMEOUT_S = 15.0
 # Twice a frame at 30 fps: every report is seen.
-_LOOK_EVERY_S = 0.015
+_POLL_S = 0.015
 
 
-class Exposing:
+class ExposureEndpoint:
     """Exposure of one camera; attach() it once the source is open."""
 
     def __init__(self, service: Service) -> None:
@@ -37,7 +38,9 @@ class Exposing:
         self._path = service.config.calibration_dir / f"{self._camera.name}.exposure.json"
         self._controls: Controls | None = None
         self._state = ExposureControl(adjustable=False, note="the camera is not open yet")
-        service.bus.answer(topics.EXPOSURE, self._answer, camera=self._camera.name)
+        # One change at a time: automatics run for seconds.
+        self._lock = asyncio.Lock()
+        service.bus.answer_requests(topics.EXPOSURE, self._answer, camera=self._camera.name)
 
     def attach(self, controls: Controls | None) -> None:
         """The source's controls, None if it has none."""
@@ -51,31 +54,43 @@ class Exposing:
                 load_exposure(self._path.parent, self._camera.name), controls.note, 0
             )
         except CalibrationError:
-            note = "not calibrated: the camera's automatics run all the time, and colours drift with them"
+            note = (
+                "not calibrated: the camera's automatics run all the time, "
+                "and colours drift with them"
+            )
             self._state = ExposureControl(mode="auto", note=note)
 
     async def follow(self) -> None:
-        """Do what is put on the bus, for ever."""
+        """Do what is put on the bus, for ever. A put has no reply: refusals go to health."""
         async for sample in self._service.bus.raw(topics.EXPOSURE, 4, camera=self._camera.name):
             try:
-                await self._do(msgspec.json.decode(sample.payload, type=ExposureControl))
-            except (
-                msgspec.DecodeError,
-                UnicodeDecodeError,
-                RecursionError,
-                CalibrationError,
-            ) as error:
-                text = (
-                    f"exposure put on the bus for camera {self._camera.name!r} is refused: {error}"
-                )
-                self._service.error(text)
-                self._state = msgspec.structs.replace(
-                    self._state, note=text[:400], changed_ns=clock.now_ns()
-                )
+                await self._change(sample.payload)
+            except RefusedError as error:
+                self._service.error(str(error))
 
-    async def _do(self, wanted: ExposureControl) -> None:
+    async def _answer(self, payload: bytes) -> ExposureControl:
+        """The exposure, after the change that the payload asks for."""
+        if payload:
+            await self._change(payload)
+        return self._state
+
+    async def _change(self, payload: bytes) -> None:
+        try:
+            wanted = msgspec.json.decode(payload, type=ExposureControl)
+            async with self._lock:
+                await self._set(wanted)
+        except RefusedError as error:
+            raise self._refusal(error.code, error) from None
+        except UNDECODABLE as error:
+            raise self._refusal("malformed", error) from None
+
+    def _refusal(self, code: RefusalCode, error: Exception) -> RefusedError:
+        name = self._camera.name
+        return RefusedError(f"exposure for camera {name!r} is refused: {error}", code)
+
+    async def _set(self, wanted: ExposureControl) -> None:
         if self._controls is None:
-            raise CalibrationError(self._state.note.partition("refused: ")[2] or self._state.note)
+            raise RefusedError(self._state.note, "unsupported")
         if wanted.mode == "auto":
             await self._settle(self._controls)
             return
@@ -95,9 +110,9 @@ class Exposing:
         self._state = ExposureControl(mode="auto", note="the automatics are running")
         controls.adjust(None)
         settling, last = Settling(), None
-        deadline_s = time.monotonic() + _PATIENCE_S
+        deadline_s = time.monotonic() + _SETTLE_TIMEOUT_S
         while (found := settling.settled()) is None and time.monotonic() < deadline_s:
-            await asyncio.sleep(_LOOK_EVERY_S)
+            await asyncio.sleep(_POLL_S)
             report = controls.reported
             if report is not None and report is not last:
                 settling.add(report, time.monotonic_ns())
@@ -106,13 +121,16 @@ class Exposing:
             self._state = before
             if before.exposure_us > 0.0 and before.mode == "fixed":
                 controls.adjust(_exposure(before))
-            raise CalibrationError(
-                f"the driver reports no exposure within {_PATIENCE_S:.0f} s; set the values by hand"
+            raise RefusedError(
+                f"the driver reports no exposure within {_SETTLE_TIMEOUT_S:.0f} s; "
+                "set the values by hand",
+                "unsupported",
             )
         note = (
             controls.note
             if found
-            else f"the automatics had not settled after {_PATIENCE_S:.0f} s: is the picture still?"
+            else f"the automatics had not settled after {_SETTLE_TIMEOUT_S:.0f} s: "
+            "is the picture still?"
         )
         await self._fix(found or last or _exposure(before), controls, "automatics, once", note)
 
@@ -126,18 +144,16 @@ class Exposing:
             await asyncio.to_thread(save, self._path, made)
         except OSError as error:
             self._state = _state(made, note, 0)
-            raise CalibrationError(
-                f"{self._path} cannot be written: {error}; the values are in force until the tracker ends"
+            raise RefusedError(
+                f"{self._path} cannot be written: {error}; the values hold until the tracker ends",
+                "not_saved",
             ) from None
         self._state = _state(made, note, clock.now_ns())
 
-    def _answer(self) -> ExposureControl:
-        return self._state
-
 
 def _unknown(what: str) -> float:
-    raise CalibrationError(
-        f"{what} must be given once: nobody knows what is in force; or run the automatics once"
+    raise RefusedError(
+        f"{what} must be given once: nobody knows the camera's own; or run the automatics once"
     )
 
 

@@ -1,5 +1,4 @@
-"""Pictures that were asked for, kept for a while: who calibrates points at a picture by its name,
-and its frame must still be there.
+"""Pictures that were asked for, kept for a while: a fit request names them by their hash.
 
 A picture that was not used for long, or was pushed out by many others, is gone; pointing at it is a
 CalibrationError that says so.
@@ -13,7 +12,7 @@ from collections import OrderedDict
 from rhot.bus.bus import Bus
 from rhot.camera_messages import picture_name
 from rhot.errors import CalibrationError
-from services.pi_tracker.endpoints.preview import Pictures, png
+from services.pi_tracker.endpoints.preview import Preview, png
 from services.pi_tracker.image.frame import Frame
 
 # The page asks four times a second: pictures somebody may still click on, and those that were
@@ -23,7 +22,7 @@ _RECENT, _USED = 16, 24
 _MOST_BYTES = 24_000_000
 
 
-class Album(Pictures):
+class PictureCache(Preview):
     """Previews and single frames of a camera; the single ones are kept by name."""
 
     def __init__(self, bus: Bus, camera: str, tasks: asyncio.TaskGroup) -> None:
@@ -51,8 +50,8 @@ class Album(Pictures):
         return picture
 
 
-def _keep(shelf: OrderedDict[str, Frame], name: str, frame: Frame, most: int) -> None:
-    shelf[name] = frame
-    shelf.move_to_end(name)
-    while len(shelf) > most or (len(shelf) > 1 and len(shelf) * frame.image.nbytes > _MOST_BYTES):
-        shelf.popitem(last=False)
+def _keep(kept: OrderedDict[str, Frame], name: str, frame: Frame, most: int) -> None:
+    kept[name] = frame
+    kept.move_to_end(name)
+    while len(kept) > most or (len(kept) > 1 and len(kept) * frame.image.nbytes > _MOST_BYTES):
+        kept.popitem(last=False)

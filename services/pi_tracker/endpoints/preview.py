@@ -1,5 +1,4 @@
-"""The camera's pictures for people: a JPEG preview while somebody watches, and the last frame,
-lossless, when somebody asks.
+"""The camera's pictures for people: JPEG while somebody watches, the last frame as PNG when asked.
 
 Encoding runs in a worker thread: a preview never delays a marker. No frame yet: a request gets no
 answer.
@@ -40,7 +39,7 @@ def png(frame: Frame) -> bytes:
     return cv2.imencode(".png", bgr(frame), [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[1].tobytes()
 
 
-class Pictures:
+class Preview:
     """Publishes previews and answers requests for frames of one camera."""
 
     def __init__(self, bus: Bus, camera: str, tasks: asyncio.TaskGroup) -> None:

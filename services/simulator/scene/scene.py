@@ -21,7 +21,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, rotation_x, rotation_z, transform
 from rhot.hand import HANDS, HandName
-from rhot.messages import Truth
+from rhot.simulator_messages import Truth
 from services.simulator.camera.clock import CameraClock, camera_clock
 from services.simulator.scene.actors import GRIP_M, Hand, HandState, Stage, Thing, beside, stage_of
 from services.simulator.scene.calibration_exercises import guided

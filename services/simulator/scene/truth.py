@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rhot.geometry.transforms import Array, quaternion_from_rotation
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandName
-from rhot.messages import FingerAngles, HandTruth, ObjectTruth, Truth, WristPose
+from rhot.messages import FingerAngles, WristPose
+from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
 from services.simulator.scene.actors import Hand, HandState
 
 

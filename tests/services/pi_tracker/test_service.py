@@ -15,8 +15,9 @@ from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.calibration import save
 from rhot.files.config import CameraTable, HandTable, RigConfig, RigTable
-from rhot.messages import Session, SimFrame
+from rhot.messages import Session
 from rhot.process.service import Service
+from rhot.simulator_messages import SimFrame
 from services.pi_tracker.service import serve
 
 DEADLINE_S = 15.0

@@ -16,8 +16,9 @@ from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError
 from rhot.files.config import CameraTable, Objects
-from rhot.messages import OpenVrPose, SimFrame, Truth
+from rhot.messages import OpenVrPose
 from rhot.process.service import Service
+from rhot.simulator_messages import SimFrame, Truth
 from services.simulator.scene.scene import load_scene
 from services.simulator.service import StageClock, serve
 

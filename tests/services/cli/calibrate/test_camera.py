@@ -18,8 +18,9 @@ from rhot.bus.bus import open_bus
 from rhot.errors import BusError, CalibrationError, CaptureError
 from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import load_rig
-from rhot.messages import Session, SimFrame
+from rhot.messages import Session
 from rhot.process.service import Service
+from rhot.simulator_messages import SimFrame
 from services.cli.__main__ import application
 from services.cli.calibrate.pictures import recorded, spread
 from services.pi_tracker.service import serve

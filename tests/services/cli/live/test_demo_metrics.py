@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from rhot import hand as h
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, Truth, WristPose
+from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from rhot.simulator_messages import HandTruth, Truth
 from services.cli.live.demo_metrics import LiveFigures
 
 START_NS = 1_700_000_000_000_000_000

@@ -11,7 +11,8 @@ from rhot import topics
 from rhot.client import RigClient
 from rhot.files.calibration import save
 from rhot.files.config import CameraTable, HandTable, RigConfig, RigTable
-from rhot.messages import Session, SimFrame
+from rhot.messages import Session
+from rhot.simulator_messages import SimFrame
 from services.pi_tracker.service import serve
 
 SIZE = (240, 160)

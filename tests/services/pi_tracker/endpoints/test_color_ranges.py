@@ -9,8 +9,9 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.errors import BusError, CalibrationError
+from rhot.errors import BusError, RefusedError
 from rhot.files.calibration import ColorRange, Colors, load_colors
+from rhot.messages import Refusal
 
 NOTHING = ColorRange(hsv_low=(150, 250, 250), hsv_high=(151, 255, 255))
 
@@ -74,8 +75,12 @@ async def test_what_cannot_be_is_refused_with_the_reason(
         ranges = {
             name: span for name, span in {**colors.colors, **change}.items() if span is not None
         }
-        with pytest.raises(CalibrationError, match=words):
+        with pytest.raises(RefusedError, match=words) as caught:
             await client.set_colors("left", Colors(date="d", tool="t", colors=ranges))
+        assert caught.value.code == "invalid"
+        assert "of d by t for camera 'left' are refused" in str(caught.value)
+        # Who asked has been told: health is for what nobody hears of.
+        assert service.errors == 0
         assert service.values["colors_refused"] == 1
         assert await client.colors("left") == colors
         await seen(client, "blue", "green")
@@ -86,9 +91,10 @@ async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(
 ):
     async with tracking(config) as (service, client):
         await seen(client, "blue", "green")
-        with pytest.raises(CalibrationError):
-            await client.set_colors("left", Colors(date="d", tool="t", colors={"green": NOTHING}))
-        assert "are refused" in service.last_error
+        bad = Colors(date="d", tool="t", colors={"green": NOTHING})
+        client.bus.put_raw(topics.COLORS.key("desk", camera="left"), msgspec.json.encode(bad))
+        await refused(service, 1)
+        assert "of d by t for camera 'left' are refused" in service.last_error
         await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
         assert service.last_error == ""
         service.error("something else")
@@ -121,6 +127,24 @@ async def test_garbage_is_refused_counted_and_does_no_harm(config, tracking, see
         await seen(client, "blue", "green")
 
 
+async def test_garbage_in_a_request_is_refused_with_a_typed_reply(config, tracking, seen, colors):
+    """As a query of any Zenoh tool with a payload: the error reply is a Refusal."""
+    async with tracking(config) as (service, client):
+        await seen(client, "blue", "green")
+        key = topics.COLORS.key("desk", camera="left")
+        session = client.bus._session
+        # An empty payload is a plain question.
+        for payload in GARBAGE[1:]:
+            (reply,) = await asyncio.to_thread(lambda p=payload: list(session.get(key, payload=p)))
+            refusal = msgspec.json.decode(reply.err.payload.to_bytes(), type=Refusal)
+            assert refusal.code in ("malformed", "invalid")
+            assert "are refused" in refusal.reason
+            assert str(reply.err.encoding) == "application/json;rhot.Refusal.1"
+        assert service.values["colors_refused"] == len(GARBAGE) - 1
+        assert service.errors == 0
+        assert await client.colors("left") == colors
+
+
 async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(
     config, tracking, seen, colors, monkeypatch
 ):
@@ -130,10 +154,11 @@ async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(
     async with tracking(config) as (_, client):
         await seen(client, "blue", "green")
         monkeypatch.setattr("services.pi_tracker.endpoints.color_ranges.save", full)
-        with pytest.raises(CalibrationError, match=r"cannot be written.*No space left"):
+        with pytest.raises(RefusedError, match=r"cannot be written.*No space left") as caught:
             await client.set_colors(
                 "left", Colors(date="d", tool="t", colors={**colors.colors, "green": NOTHING})
             )
+        assert caught.value.code == "not_saved"
         await seen(client, "blue", "green")
         assert await client.colors("left") == colors
 

@@ -10,9 +10,9 @@ import pytest
 from rhot import topics
 from rhot.camera_messages import ExposureControl
 from rhot.client import RigClient
-from rhot.errors import CalibrationError
+from rhot.errors import RefusedError
 from rhot.files.calibration import Exposure, load_exposure, save
-from services.pi_tracker.endpoints.exposure_control import Exposing
+from services.pi_tracker.endpoints.exposure_control import ExposureEndpoint
 from services.pi_tracker.sources.controls import Controls
 
 
@@ -46,7 +46,7 @@ def exposing(running, config):
     @contextlib.asynccontextmanager
     async def run(camera):
         async def serve(service):
-            part = Exposing(service)
+            part = ExposureEndpoint(service)
             part.attach(camera.controls if camera else None)
             service.ready()
             await part.follow()
@@ -76,9 +76,13 @@ async def test_values_set_by_hand_are_in_force_and_written(exposing, tmp_path):
         assert (saved.exposure_us, saved.red_gain, saved.blue_gain) == (6000.0, 1.5, 1.7)
         assert saved.date
         assert saved.inputs["how"] == "by hand"
+        while len(camera.got) < 1:
+            await asyncio.sleep(0.01)
         # One value alone leaves the others.
         now = await client.set_exposure("left", ExposureControl(gain=3.0))
         assert (now.exposure_us, now.gain, now.red_gain) == (6000.0, 3.0, 1.5)
+        while len(camera.got) < 2:
+            await asyncio.sleep(0.01)
         assert [one.gain for one in camera.got] == [2.0, 3.0]
 
 
@@ -103,7 +107,7 @@ async def test_automatics_run_once_and_are_frozen(exposing, tmp_path):
 
 
 async def test_automatics_that_hunt_are_frozen_with_a_note(exposing, monkeypatch):
-    monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._PATIENCE_S", 1.5)
+    monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._SETTLE_TIMEOUT_S", 1.5)
     camera = Camera(
         Controls(),
         lambda images: Exposure(
@@ -119,16 +123,17 @@ async def test_automatics_that_hunt_are_frozen_with_a_note(exposing, monkeypatch
 async def test_a_driver_that_reports_nothing_is_a_refusal_and_the_old_comes_back(
     exposing, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._PATIENCE_S", 0.3)
+    monkeypatch.setattr("services.pi_tracker.endpoints.exposure_control._SETTLE_TIMEOUT_S", 0.3)
     save(
         tmp_path / "calibration" / "left.exposure.json",
         Exposure(exposure_us=7000.0, gain=1.0, red_gain=1.0, blue_gain=1.0),
     )
     camera = Camera(Controls())
     async with exposing(camera) as (service, client):
-        with pytest.raises(CalibrationError, match="refused: the driver reports no exposure"):
+        with pytest.raises(RefusedError, match="refused: the driver reports no exposure") as caught:
             await client.set_exposure("left", ExposureControl(mode="auto"))
-        assert service.errors == 1
+        assert caught.value.code == "unsupported"
+        assert service.errors == 0
         assert (await client.exposure("left")).exposure_us == 7000.0
         while len(camera.got) < 2:
             await asyncio.sleep(0.01)
@@ -137,7 +142,7 @@ async def test_a_driver_that_reports_nothing_is_a_refusal_and_the_old_comes_back
 
 async def test_half_a_setting_without_the_rest_is_refused(exposing):
     async with exposing(Camera(Controls())) as (_, client):
-        with pytest.raises(CalibrationError, match="exposure_us must be given once"):
+        with pytest.raises(RefusedError, match="exposure_us must be given once"):
             await client.set_exposure("left", ExposureControl(gain=2.0))
 
 
@@ -145,7 +150,7 @@ async def test_a_source_without_controls_says_so(exposing):
     async with exposing(None) as (service, client):
         state = await client.exposure("left")
         assert not state.adjustable
-        with pytest.raises(CalibrationError, match="'simulator' has no exposure to set"):
+        with pytest.raises(RefusedError, match="'simulator' has no exposure to set"):
             await client.set_exposure("left", ExposureControl(gain=2.0))
         # And so does a put by another tool.
         client.bus.put_raw(topics.EXPOSURE.key("desk", camera="left"), b'{"mode":"auto"}')

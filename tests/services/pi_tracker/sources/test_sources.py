@@ -14,7 +14,7 @@ from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError, SourceError
 from rhot.files.calibration import Exposure, save
 from rhot.files.config import CameraTable, RigConfig
-from rhot.messages import SimFrame
+from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources import Threaded, is_file, open_reader
 from services.pi_tracker.sources.simulator import SimulatorSource

@@ -35,7 +35,7 @@ class Tracker:
         image = np.full((48, 64, 3), 128, np.uint8)
         self.png = cv2.imencode(".png", image)[1].tobytes()
         bus.answer(topics.FRAME, self._picture, camera="left")
-        bus.answer(topics.COLORS, lambda: self.colors, camera="left")
+        bus.answer_requests(topics.COLORS, self._colors, camera="left")
         bus.answer_requests(topics.FIT, self._fit, camera="left")
 
     def _picture(self) -> bytes:
@@ -49,9 +49,10 @@ class Tracker:
         patch = Patch(color="blue", picture=picture_name(self.png), box_px=(10, 10, 8, 8))
         return FitResult(colors={"blue": GREEN}, patches=[patch], warnings=["<b>mind</b> the lamp"])
 
-    async def take_puts(self) -> None:
-        async for message in self.bus.every(topics.COLORS, 4, camera="left"):
-            self.colors = message
+    async def _colors(self, payload: bytes) -> Colors:
+        if payload:
+            self.colors = msgspec.json.decode(payload, type=Colors)
+        return self.colors
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -100,7 +101,6 @@ async def test_a_click_is_fitted_shown_and_put_in_force(
 ) -> None:
     async with running("viewer", serve, config) as (service, bus):
         tracker = Tracker(bus)
-        puts = asyncio.create_task(tracker.take_puts())
         await until(lambda: service.state == "running")
         assert tracker.pictures_asked == 0
         page = await open_page(service, browse)
@@ -122,7 +122,6 @@ async def test_a_click_is_fitted_shown_and_put_in_force(
         assert tracker.colors.colors == {"violet": GREEN, "blue": GREEN}
         assert tracker.colors.tool == "rhot viewer"
         assert tracker.colors.date
-        puts.cancel()
 
 
 async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(

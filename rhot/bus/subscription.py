@@ -1,0 +1,116 @@
+"""The receiving end of a stream: undecoded samples, or decoded messages of one topic.
+
+What does not decode, or names another sender than its key, is rejected and counted, never raised.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import msgspec
+import zenoh
+
+from rhot import clock
+from rhot.bus.buffer import Buffer
+from rhot.bus.stats import StreamStats
+from rhot.errors import BusError
+from rhot.topics import Topic
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread."""
+
+    key: str
+    payload: bytes
+    attachment: bytes
+    received_ns: int
+
+
+class RawSubscription(Buffer[Sample]):
+    """Undecoded samples of a key expression."""
+
+    def __init__(
+        self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None
+    ) -> None:
+        super().__init__(loop, capacity)
+        self.stats = stats
+
+    def declare(self, session: zenoh.Session, key: str) -> None:
+        self._entity = session.declare_subscriber(key, self._on_sample)
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        received_ns = clock.now_ns()
+        if len(sample.payload) > self.stats.topic.max_bytes:
+            self.stats.rejected += 1
+            return
+        attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        key = str(sample.key_expr)
+        self.stats.dropped += self.push(
+            key, Sample(key, sample.payload.to_bytes(), attachment, received_ns)
+        )
+
+    def __aiter__(self) -> RawSubscription:
+        return self
+
+    async def __anext__(self) -> Sample:
+        sample = await self.take()
+        self.stats.count += 1
+        return sample
+
+
+class Subscription(Generic[T]):
+    """Decoded messages of one topic: `async for message in subscription`."""
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        topic: Topic[T],
+        stats: StreamStats,
+        capacity: int | None,
+    ) -> None:
+        if topic.message is None:
+            raise BusError(
+                f"topic {topic.template} carries {topic.media_type}, no message; use raw()"
+            )
+        self.stats = stats
+        self._topic = topic
+        self._raw = RawSubscription(loop, stats, capacity)
+        self._decoder = msgspec.json.Decoder(topic.message)
+
+    def declare(self, session: zenoh.Session, key: str) -> None:
+        self._raw.declare(session, key)
+
+    def __aiter__(self) -> Subscription[T]:
+        return self
+
+    async def __anext__(self) -> T:
+        while True:
+            sample = await self._raw.take()
+            message = self._decode(sample)
+            if message is None:
+                self.stats.rejected += 1
+                continue
+            self.stats.count += 1
+            sent_ns = getattr(message, "sent_ns", 0)
+            if sent_ns:
+                self.stats.latencies_ns.append(sample.received_ns - sent_ns)
+            return message
+
+    def _decode(self, sample: Sample) -> T | None:
+        try:
+            message = self._decoder.decode(sample.payload)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+            return None
+        # A message that says another name than its key would be taken for another sender's.
+        names = self._topic.names(sample.key) or {}
+        if any(getattr(message, field, value) != value for field, value in names.items()):
+            return None
+        return message
+
+    def undeclare(self) -> None:
+        self._raw.undeclare()

@@ -1,0 +1,56 @@
+"""What only the simulator sends: ground truth, and what goes with a virtual camera's picture."""
+
+from __future__ import annotations
+
+from rhot.messages import (
+    Count,
+    FingerAngles,
+    Message,
+    Name,
+    NonNegative,
+    Offset,
+    Quat,
+    Stamp,
+    Vec3,
+    WristPose,
+)
+
+
+class HandTruth(Message, frozen=True, kw_only=True):
+    """What the simulator knows of one hand.
+
+    points_m maps a landmark to its OpenXR joint's position in the rig frame.
+    """
+
+    points_m: dict[str, Vec3]
+    wrist: WristPose
+    angles_rad: dict[str, FingerAngles]
+
+
+class ObjectTruth(Message, frozen=True, kw_only=True):
+    """What the simulator knows of one object, in the rig frame."""
+
+    position_m: Vec3
+    orientation_wxyz: Quat
+
+
+class Truth(Message, frozen=True, kw_only=True):
+    """One line of truth.jsonl, and the simulator's live topic."""
+
+    stamp_ns: Stamp
+    hands: dict[str, HandTruth]
+    objects: dict[str, ObjectTruth]
+    sent_ns: Stamp = 0
+
+
+class SimFrame(Message, frozen=True, kw_only=True):
+    """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far
+    its computer's clock is ahead now.
+    """
+
+    camera: Name
+    seq: Count
+    stamp_ns: Stamp
+    row_time_ns: NonNegative
+    size_px: tuple[int, int]
+    clock_skew_ns: Offset

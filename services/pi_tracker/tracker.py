@@ -1,0 +1,82 @@
+"""One camera's tracker: its step, the colour ranges it uses, and the watch over their drift. Pure.
+
+New ranges are prepared first, which may fail, and used from the next frame on: the endpoints decide
+when (endpoints/color_ranges.py), the service feeds the frames (service.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rhot.clock import Offset
+from rhot.files.calibration import Colors, load_lens
+from rhot.files.config import CameraTable, RigConfig
+from rhot.messages import MarkerFrame
+from services.pi_tracker.colors.light_drift import Drift, Drifted
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.step import TrackerStep
+
+
+class CameraTracker:
+    """Finds one camera's markers with the ranges it was last told to use.
+
+    Until `use` is called there is no step, and `step` must not be called.
+    """
+
+    def __init__(
+        self, config: RigConfig, camera: CameraTable, clock: Callable[[], int] | None = None
+    ) -> None:
+        """clock, if given, times the stages of each step, in ns."""
+        self.camera = camera
+        self.colors_path = config.calibration_dir / f"{camera.name}.colors.json"
+        self.colors = Colors(colors={})
+        self._config, self._clock = config, clock
+        self._step: TrackerStep
+        self._drift: Drift
+
+    def wanted(self, colors: Colors) -> list[str]:
+        """The colours that rig.toml's hands use; without a hand, all that there are."""
+        return self._config.colors or sorted(colors.colors)
+
+    def calibrated(self, colors: Colors) -> list[str]:
+        """Those of the wanted colours that have a range."""
+        return [name for name in self.wanted(colors) if name in colors.colors]
+
+    def prepare(self, colors: Colors, names: list[str]) -> TrackerStep:
+        """A step that looks for the named colours.
+
+        Raises CalibrationError if one of them has no range, or the lens is needed and missing.
+        """
+        config, camera = self._config, self.camera
+        lens = load_lens(config.calibration_dir, camera.name) if config.tracker.rectify else None
+        return TrackerStep(
+            camera.name,
+            colors,
+            config.tracker,
+            camera.size_px,
+            names,
+            self._clock,
+            self.colors_path,
+            lens,
+        )
+
+    def use(self, colors: Colors, step: TrackerStep) -> None:
+        """Track with a prepared step from the next frame on."""
+        self.colors, self._step, self._drift = colors, step, Drift(colors)
+
+    def step(self, frame: Frame, offset: Offset) -> MarkerFrame:
+        """The markers of one frame; offset is that of the camera's clock."""
+        return self._step.step(frame, offset.offset_ns, offset.sigma_ns)
+
+    @property
+    def times_ms(self) -> dict[str, float]:
+        """Duration of each stage of the last step."""
+        return self._step.times_ms
+
+    def watch_drift(
+        self, frame: Frame, found: MarkerFrame
+    ) -> tuple[dict[str, float], list[Drifted]]:
+        """Figures for health, and the colours that have drifted; both empty between two checks."""
+        if not self._drift.look(frame, found.markers):
+            return {}, []
+        return self._drift.values(), self._drift.drifted()
