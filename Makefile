@@ -3,23 +3,26 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# What a machine can check of the house without running it.
+HOUSE := tests/test_architecture.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
 SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench format docs clean system install browser
+.PHONY: demo test check bench format docs clean system install browser wheel
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
 
+# Everything but the suites that need more than Python: `make browser`, `make wheel`.
 test: $(STAMP)
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest --durations=10 -m "not browser and not wheel" $(ARGS)
 
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -q tests/test_architecture.py
+	$(BIN)/pytest -q $(HOUSE)
 
 bench: $(STAMP)
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
@@ -27,7 +30,11 @@ bench: $(STAMP)
 browser: $(STAMP)
 	@command -v chromium >/dev/null || { echo "Chromium is missing: sudo apt install chromium"; exit 1; }
 	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[browser]'
-	$(BIN)/pytest -q tests/browser $(ARGS)
+	$(BIN)/pytest -q --durations=10 tests/browser $(ARGS)
+
+# The built wheel in new environments, with each extra alone; takes minutes and downloads packages.
+wheel: $(STAMP)
+	$(BIN)/pytest -q --durations=10 tests/wheel $(ARGS)
 
 docs: $(STAMP)
 	$(BIN)/python docs/make_topics.py

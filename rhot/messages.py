@@ -237,7 +237,7 @@ class ObjectPose(Message, frozen=True, kw_only=True):
 
 
 class Session(Message, frozen=True, kw_only=True):
-    """The start broadcast: trackers work while running is true; start_ns is on the master's clock."""
+    """The start broadcast: trackers work while running; start_ns is on the master's clock."""
 
     running: bool
     start_ns: Stamp

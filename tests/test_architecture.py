@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
-from statistics import median
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-CLI = ROOT / "services" / "cli"
-CODE = sorted([*(ROOT / "rhot").rglob("*.py"), *(ROOT / "services").rglob("*.py")])
-
-MAX_FILE_LINES, MAX_MEDIAN_LINES, MAX_FUNCTION_LINES, MAX_MAIN_LINES = 300, 120, 50, 40
+from testing.source_tree import (
+    CODE,
+    ROOT,
+    file_of,
+    imports_of,
+    only_for_types,
+    relative,
+    room_of,
+    tree_of,
+    uses,
+)
 
 # Only these may touch the outside world: sockets, threads, clocks, logs.
 IMPURE_MODULES = {
@@ -28,170 +35,134 @@ IMPURE_MODULES = {
     "threading",
     "subprocess",
 }
-IMPURE_RHOT = {
-    "bus.py",
-    "bus_config.py",
-    "bus_streams.py",
-    "lifecycle.py",
-    "service.py",
-    "clock.py",
-    "client.py",
-    "systemd.py",
+IMPURE_FILES = {"service.py", "__main__.py", "rhot/clock.py", "rhot/client.py"}
+IMPURE_ROOMS = {
+    "rhot/bus",
+    "rhot/process",
+    "services/pi_tracker/endpoints",
+    "services/pi_tracker/sources",
+    "services/object_tracker/sources",
+    "services/recorder/sources",
+    "services/viewer/calibration/page.py",
+    "services/cli",
 }
-IMPURE_SERVICE_FILES = {"service.py", "__main__.py"}
-IMPURE_FOLDERS = {"sources", "sinks", "cli"}
+# Rooms of the command that work on files alone: what they find must not depend on when they run.
+PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offline"}
 
+# The floors of rhot/, from the lowest: each uses only what is named, and what lies below it.
+FLOORS_OF_RHOT = (
+    {"rhot/errors", "rhot/clock", "rhot/geometry"},
+    {"rhot/hand", "rhot/hand_exercises"},
+    {"rhot/messages", "rhot/camera_messages", "rhot/simulator_messages"},
+    {"rhot/topics"},
+    {"rhot/files", "rhot/bus"},
+    {"rhot/process"},
+    {"rhot/client"},
+    {"rhot/__init__"},
+)
 # services/cli is the one place that knows all services: it composes their pure steps offline.
 COMPOSERS = {"cli"}
-# Rooms of the command that work on files alone: what they find must not depend on when they run.
-PURE_CLI_ROOMS = {"check", "evaluate", "offline"}
-# Which rooms of the command may use which others. No circles: keep it so.
-CLI_ROOM_USES = {"calibrate": {"offline"}, "evaluate": {"offline"}}
 
 
-def relative(path: Path) -> str:
-    return str(path.relative_to(ROOT))
+def circle_in(graph: dict[str, set[str]]) -> list[str]:
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
 
 
-def imports_of(tree: ast.AST, *, top_level_only: bool = False) -> set[str]:
-    """Full names of everything imported, `from a import b` as a.b.
+def test_no_file_imports_itself_through_others():
+    """Imports inside functions and for the type checker count: they are circles all the same."""
+    graph = {relative(path): {relative(one) for one in uses(path)} for path in CODE}
+    assert not circle_in(graph), " -> ".join(circle_in(graph))
 
-    Without what only the type checker sees.
-    """
-    names: set[str] = set()
-    guarded = {
-        id(inner) for node in ast.walk(tree) if _is_type_checking(node) for inner in ast.walk(node)
-    }
-    nodes = ast.iter_child_nodes(tree) if top_level_only else ast.walk(tree)
-    for node in nodes:
-        if id(node) in guarded:
+
+def test_no_room_imports_itself_through_others():
+    graph: dict[str, set[str]] = {}
+    for path in CODE:
+        # A package's docstring and its numba cache are no room.
+        if path.name != "__init__.py" or relative(path) == "rhot/__init__.py":
+            here = graph.setdefault(room_of(path), set())
+            here |= {room_of(one) for one in uses(path) if one.name != "__init__.py"} - {
+                room_of(path)
+            }
+    assert not circle_in(graph), " -> ".join(circle_in(graph))
+
+
+def test_every_file_of_rhot_is_on_a_floor_and_imports_only_from_below():
+    floor_of = {room: floor for floor, rooms in enumerate(FLOORS_OF_RHOT) for room in rooms}
+    for path in CODE:
+        if path.relative_to(ROOT).parts[0] != "rhot" or path.read_text() == "":
             continue
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
-
-
-def _is_type_checking(node: ast.AST) -> bool:
-    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-
-
-def may_be_impure(path: Path) -> bool:
-    parts = path.relative_to(ROOT).parts
-    if parts[0] == "rhot":
-        return path.name in IMPURE_RHOT
-    if parts[1] == "cli" and parts[2] in PURE_CLI_ROOMS:
-        return False
-    return (
-        path.name in IMPURE_SERVICE_FILES
-        or bool(set(parts[1:-1]) & IMPURE_FOLDERS)
-        or path.stem in IMPURE_FOLDERS
-    )
-
-
-def own_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Lines of a function without its docstring."""
-    lines = (node.end_lineno or node.lineno) - node.lineno + 1
-    if ast.get_docstring(node):
-        lines -= (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
-    return lines
+        assert room_of(path) in floor_of, f"{relative(path)} is on no floor of FLOORS_OF_RHOT"
+        for other in uses(path):
+            same = room_of(other) == room_of(path)
+            assert same or floor_of[room_of(other)] <= floor_of[room_of(path)], (
+                f"{relative(path)} imports {relative(other)} from a higher floor"
+            )
 
 
 @pytest.mark.parametrize("path", CODE, ids=relative)
 def test_rhot_imports_no_service_and_services_not_each_other(path):
     parts = path.relative_to(ROOT).parts
-    for name in imports_of(ast.parse(path.read_text())):
+    for name in imports_of(path):
         if not name.startswith("services."):
             continue
-        assert parts[0] == "services", (
-            f"{relative(path)} imports {name}: the shared vocabulary must not know its users"
-        )
-        assert parts[1] in {name.split(".")[1], *COMPOSERS}, (
+        assert parts[0] == "services", f"{relative(path)} imports {name}: rhot knows no service"
+        assert parts[1] in {name.split(".")[1], *COMPOSERS} or file_of(name) is None, (
             f"{relative(path)} imports {name}: services meet on the bus only"
         )
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in CODE if path.is_relative_to(CLI) and path.name != "__main__.py"],
-    ids=relative,
-)
-def test_rooms_of_the_command_use_no_others_but_those_named(path):
-    rooms = {folder.parent.name for folder in CLI.glob("*/__init__.py")}
-    own = path.parent.name if path.parent != CLI else None
-    used = {
-        parts[2]
-        for name in imports_of(ast.parse(path.read_text()))
-        if len(parts := name.split(".")) > 2 and name.startswith("services.cli.")
-    }
-    foreign = (used & rooms) - {own} - CLI_ROOM_USES.get(own, set())
-    assert not foreign, (
-        f"{relative(path)} imports from {sorted(foreign)}: what rooms share belongs beside them in services/cli"
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_the_wheel_stands_by_itself(path):
+    """What is beside the packages (testing/, tests/, benchmarks/) is not installed."""
+    foreign = {name.split(".")[0] for name in imports_of(path)} & {"testing", "tests", "benchmarks"}
+    assert not foreign, f"{relative(path)} imports {sorted(foreign)}"
+
+
+def may_be_impure(path: Path) -> bool:
+    name = relative(path)
+    if any(name.startswith(f"{room}/") for room in PURE_ROOMS):
+        return False
+    return (
+        name in IMPURE_FILES
+        or path.name in IMPURE_FILES
+        or any(name == room or name.startswith(f"{room}/") for room in IMPURE_ROOMS)
     )
 
 
 @pytest.mark.parametrize("path", [path for path in CODE if not may_be_impure(path)], ids=relative)
 def test_pure_modules_stay_pure(path):
-    impure = {
-        name
-        for name in imports_of(ast.parse(path.read_text()))
-        if name.split(".")[0] in IMPURE_MODULES
-    }
-    impure |= {
-        n
-        for n in imports_of(ast.parse(path.read_text()))
-        if n.startswith(("rhot.bus.bus", "rhot.process.lifecycle", "rhot.clock.now_ns"))
-    }
-    assert not impure, (
-        f"{relative(path)} imports {sorted(impure)}: algorithms take time as an argument"
-    )
+    names = imports_of(path) - only_for_types(path)
+    impure = {name for name in names if name.split(".")[0] in IMPURE_MODULES}
+    impure |= {n for n in names if n.startswith(("rhot.bus", "rhot.clock.now_ns"))}
+    impure |= {n for n in names if n.startswith(("rhot.process.lifecycle", "rhot.process.service"))}
+    assert not impure, f"{relative(path)} imports {sorted(impure)}: time is an argument"
 
 
 def test_keys_are_written_in_the_topics_table_only():
+    roots = ("rhot/", "camera/", "hand/", "openvr/", "object/", "control/")
     for path in CODE:
         if path.name == "topics.py":
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
-            if (
-                isinstance(node, ast.Constant)
-                and isinstance(node.value, str)
-                and not isinstance(node, ast.Expr)
-            ):
-                assert (
-                    not node.value.startswith(
-                        ("rhot/", "camera/", "hand/", "openvr/", "object/", "control/")
-                    )
-                    or " " in node.value
-                ), f"{relative(path)}:{node.lineno} writes the key {node.value!r}"
-
-
-@pytest.mark.parametrize("path", CODE, ids=relative)
-def test_files_and_functions_stay_small(path):
-    text = path.read_text()
-    assert text.count("\n") <= MAX_FILE_LINES, f"{relative(path)} has outgrown its room"
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            limit = MAX_MAIN_LINES if node.name == "serve" else MAX_FUNCTION_LINES
-            assert own_lines(node) <= limit, (
-                f"{relative(path)}:{node.lineno} {node.name} has {own_lines(node)} lines"
-            )
-
-
-def test_the_median_file_is_short():
-    assert median(path.read_text().count("\n") for path in CODE) <= MAX_MEDIAN_LINES
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                is_key = node.value.startswith(roots) and " " not in node.value
+                assert not is_key, f"{relative(path)}:{node.lineno} writes the key {node.value!r}"
 
 
 @pytest.mark.parametrize("path", CODE, ids=relative)
 def test_modules_and_public_names_say_what_they_are(path):
-    tree = ast.parse(path.read_text())
+    tree = tree_of(path)
     if not tree.body:
         return
     assert ast.get_docstring(tree), f"{relative(path)} has no docstring"
+    kinds = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
     for node in tree.body:
-        if isinstance(
-            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
-        ) and not node.name.startswith("_"):
+        if isinstance(node, kinds) and not node.name.startswith("_"):
+            # The tables of rig.toml are explained key by key.
             is_table = isinstance(node, ast.ClassDef) and path.name == "config.py"
             assert is_table or ast.get_docstring(node), (
                 f"{relative(path)}:{node.lineno} {node.name} has no docstring"
@@ -200,10 +171,34 @@ def test_modules_and_public_names_say_what_they_are(path):
 
 @pytest.mark.parametrize("path", CODE, ids=relative)
 def test_no_assert_on_input(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         assert not isinstance(node, ast.Assert), (
             f"{relative(path)}:{node.lineno}: raise an error that says what to do"
         )
+
+
+def test_tests_mirror_the_tree():
+    """A test file of a service lies in the room of what it tests, or at the service's door."""
+    for path in (ROOT / "tests" / "services").rglob("test_*.py"):
+        room = path.parent.relative_to(ROOT / "tests")
+        assert (ROOT / room).is_dir(), f"{relative(path)}: there is no {room.as_posix()}/"
+        tested = ROOT / room / f"{path.stem.removeprefix('test_')}.py"
+        assert (
+            tested.exists()
+            or len(room.parts) <= 2
+            or room.parts[1] == "cli"
+            or (
+                path.stem.removeprefix("test_")
+                in ROOMS_TESTED_AS_A_WHOLE.get(room.as_posix(), set())
+            )
+        ), f"{relative(path)} tests no file of {room.as_posix()}/"
+
+
+# Tests of a whole room, by name.
+ROOMS_TESTED_AS_A_WHOLE = {
+    "services/pi_tracker/sources": {"files", "sources"},
+    "services/object_tracker/sources": {"sources"},
+}
 
 
 @pytest.mark.parametrize(
@@ -217,18 +212,36 @@ def test_no_assert_on_input(path):
             "services.object_tracker.__main__",
             {"scipy", "numba", "viser", "cv2", "mcap", "matplotlib"},
         ),
-        ("rhot.client", {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib"}),
+        (
+            "rhot.client",
+            {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib"},
+        ),
         ("services.cli.__main__", {"scipy", "numba", "viser", "cv2", "matplotlib"}),
     ],
 )
 def test_a_process_imports_only_what_it_needs(module, forbidden):
     script = f"import sys, {module}; print(*{{name.split('.')[0] for name in sys.modules}})"
-    loaded = subprocess.run(
-        [sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-        cwd=ROOT,
-    ).stdout.split()
-    assert not forbidden & set(loaded)
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60, cwd=ROOT)
+    assert not forbidden & set(done.stdout.split())
+
+
+ARCHITECTURE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+
+
+def test_the_plan_of_the_house_names_every_room_and_no_other():
+    plan = re.search(r"<!-- rooms -->(.*?)<!-- end -->", ARCHITECTURE, re.DOTALL)
+    assert plan, "docs/architecture.md has no list of rooms"
+    named = set(re.findall(r"^(\S+/) ", plan[1], re.MULTILINE))
+    there = {relative(path.parent) + "/" for path in CODE if path.read_text()} | {"testing/"}
+    there -= {"services/"}
+    assert named == there, f"not named: {there - named}; not there: {named - there}"
+
+
+def test_where_is_what():
+    rows = re.search(r"## Where is \.\.\.\?\n(.*?)\n## ", ARCHITECTURE, re.DOTALL)
+    assert rows, "docs/architecture.md has no 'Where is ...?'"
+    files = re.findall(r"\| `([^`]+)` \|$", rows[1], re.MULTILINE)
+    assert len(files) >= 20
+    for name in files:
+        assert (ROOT / name).is_file(), f"docs/architecture.md sends to {name}, which is not there"

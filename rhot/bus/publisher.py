@@ -44,7 +44,8 @@ class Publisher(Generic[T]):
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes."""
-        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined] # the stub says bool
+        # Zenoh's stub says bool.
+        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]
 
     def put(self, message: T) -> None:
         """Send a message, with sent_ns filled in.

@@ -60,4 +60,5 @@ def percentiles_ms(latencies_ns: deque[int] | list[int]) -> tuple[float, float]:
         return -1.0, -1.0
     ordered = sorted(latencies_ns)
     last = len(ordered) - 1
-    return tuple(round(ordered[min(last, round(q * last))] * 1e-6, 3) for q in (0.5, 0.99))  # type: ignore[return-value]
+    p50, p99 = (round(ordered[min(last, round(q * last))] * 1e-6, 3) for q in (0.5, 0.99))
+    return p50, p99
