@@ -7,7 +7,7 @@ SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench format docs clean system install browser
+.PHONY: demo test check bench format docs figures clean system install browser
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
@@ -29,8 +29,14 @@ browser: $(STAMP)
 	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[browser]'
 	$(BIN)/pytest -q tests/browser $(ARGS)
 
+# The generated reference pages, and the tables of figures from docs/figures/*.json.
 docs: $(STAMP)
-	$(BIN)/python docs/make_topics.py
+	$(BIN)/python -m docs.generate
+
+# Runs the benchmarks that the pages quote (docs/notes/README.md), then renders the pages.
+figures: $(STAMP)
+	$(BIN)/python -m docs.generate.run_figures $(ARGS)
+	$(BIN)/python -m docs.generate
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .
