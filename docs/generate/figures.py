@@ -20,7 +20,7 @@ themselves. In a template
                                             not installed); anywhere else that is an error
     \\ at the end of a line                 continues it in the next
 
-The commands that make the figures are named below each region that is a table.
+The commands that make the figures are named below each table.
 """
 
 from __future__ import annotations
@@ -96,11 +96,7 @@ def body(template: str, folder: Path = FOLDER) -> str:
         except MissingFigureError:
             if not line.startswith("?"):
                 raise
-    text = "\n".join(lines)
-    if lines[0].startswith("|"):
-        return f"{text}\n\n{_made_by(template, folder)}\n"
-    # Prose: filled anew, as figures change the length of a line.
-    return "\n\n".join(wrapped(part) for part in text.split("\n\n")) + "\n"
+    return "\n".join([*lines, "", _made_by(template, folder), ""])
 
 
 def template_lines(template: str) -> list[str]:

@@ -21,6 +21,8 @@ def wrapped(text: str, indent: str = "", first: str | None = None) -> str:
     What stands in backticks stays on one line where it fits there.
     """
     joined = _CODE.sub(lambda match: _kept(match[0]), " ".join(text.split()))
+    # A line that began with such a sign would be an item of a list.
+    joined = re.sub(r" ([-+*#]) ", rf"{_SPACE}\1 ", joined)
     filled = textwrap.fill(
         joined,
         COLUMNS,

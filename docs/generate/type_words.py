@@ -59,10 +59,10 @@ def default_of(field: inspect.Field) -> str | None:
 def _bounds(kind: Any) -> str:
     low, high = kind.ge, kind.le
     if kind.gt is not None:
-        return f"> {kind.gt:g}" + (f", <= {high:g}" if high is not None else "")
+        return f"> {kind.gt:.9g}" + (f", <= {high:.9g}" if high is not None else "")
     if low is not None and high is not None and high < _WIDE:
-        return f"{low:g}..{high:g}"
-    return f">= {low:g}" if low is not None and low > -_WIDE else ""
+        return f"{low:.9g}..{high:.9g}"
+    return f">= {low:.9g}" if low is not None and low > -_WIDE else ""
 
 
 def _length(kind: Any) -> str:

@@ -56,7 +56,6 @@ def test_numbers_in_the_readme_come_from_figures():
     for line in template_lines(template)[2:]:
         cells = line.removeprefix("?").strip().strip("|").split("|")[1:]
         written = figures.PLACEHOLDER.sub("", "|".join(cells))
-        # The disparity law of eq. (9), the 1-Euro filter, ... are names.
         assert not re.search(r"\d", written), f"a number that is no figure: {line}"
 
 
