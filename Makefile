@@ -9,7 +9,7 @@ SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench format docs clean system install browser wheel
+.PHONY: demo test check bench format docs figures clean system install browser wheel
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
@@ -36,8 +36,14 @@ browser: $(STAMP)
 wheel: $(STAMP)
 	$(BIN)/pytest -q --durations=10 tests/wheel $(ARGS)
 
+# The generated reference pages, and the tables of figures from docs/figures/*.json.
 docs: $(STAMP)
-	$(BIN)/python docs/make_topics.py
+	$(BIN)/python -m docs.generate
+
+# Runs the benchmarks that the pages quote (docs/notes/README.md), then renders the pages.
+figures: $(STAMP)
+	$(BIN)/python -m docs.generate.run_figures $(ARGS)
+	$(BIN)/python -m docs.generate
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

@@ -156,6 +156,9 @@ def still_figures(scenes: list[Pictures]) -> dict[str, Any]:
         "still_nees_depth": {
             distance: score.figures()["nees_z"] for distance, score in scores.items()
         },
+        "still_with_finger_direction": {
+            distance: score.figures() for distance, score in scores.items()
+        },
         "still_without_finger_direction": {
             str(scene.distance_m): scene.score(Fusion(), feedback=False).figures()
             for scene in scenes

@@ -166,13 +166,14 @@ def main() -> None:
         "--frames", type=int, default=10_000, help="of all cameras and seeds together"
     )
     parser.add_argument("--seeds", type=int, default=5, help="different rooms and motions")
+    parser.add_argument("--first-seed", type=int, default=1, help="1 to 5 were tuned on")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     cv2.setNumThreads(1)
     config = load_rig(ROOT / "config" / "sim.toml")
     tallies = {color: Tally() for color in config.colors}
     each = max(1, options.frames // (options.seeds * len(config.camera)))
-    for seed in range(1, options.seeds + 1):
+    for seed in range(options.first_seed, options.first_seed + options.seeds):
         for camera in config.camera:
             run(config, camera.name, seed, each, tallies)
             print(f"seed {seed}, camera {camera.name}: {each} frames", file=sys.stderr)

@@ -301,7 +301,7 @@ def at_rest(config: RigConfig, colors: Colors, count: int) -> tuple[dict[str, fl
     frames = simulated(config, "still", count)
     tips = {config.hand["right"].markers[tip]: number for tip, number in TIPS.items()}
     result: dict[str, float] = {}
-    for method, prefix in (("lut", ""), ("seed", "seed_")):
+    for method, prefix in (("lut", ""), ("paper", "seed_")):
         step = TrackerStep(CAMERA, colors, Tracker(method=method), (640, 480), list(tips))  # type: ignore[arg-type]
         found = [
             {marker.color: marker.x_px for marker in step.step(frame).markers} for frame in frames

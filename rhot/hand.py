@@ -1,8 +1,9 @@
 """The one description of a hand: joints, bones, limits, painted landmarks, and where they all are
 for given angles.
 
-Frames (docs/frames.md): the wrist frame is OpenXR's: -z towards the finger tips, +y out of the back
-of the hand, +x right. Each joint frame has -z along the bone that starts there. Angles in radians:
+Frames (docs/reference/frames.md): the wrist frame is OpenXR's: -z towards the finger tips, +y out
+of the back of the hand, +x right. Each joint frame has -z along the bone that starts there. Angles
+in radians:
   flexion    positive towards the palm (a rotation about -x of the joint frame);
   abduction  positive towards the thumb side of the hand (radial); for the thumb, away from the palm
              plane (palmar).

@@ -1,8 +1,8 @@
 """THE table of topics: key, message, expected rate, quality of service, recorded or not.
 
 No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and
-docs/topics.md derive from TOPICS. A key is `<root>/<rig>/` + the template with its fields filled
-in, root being `rhot` for all but raw pictures; a field left out becomes the wildcard `*`.
+docs/reference/topics.md derive from TOPICS. A key is `<root>/<rig>/` + the template with its fields
+filled in, root being `rhot` for all but raw pictures; a field left out becomes the wildcard `*`.
 """
 
 from __future__ import annotations

@@ -159,13 +159,6 @@ def test_every_file_that_a_text_names_exists():
     assert not wrong, "\n".join(wrong)
 
 
-def test_every_link_of_a_page_leads_somewhere():
-    for path in PAGES:
-        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
-            if "://" not in target and not target.startswith("mailto:"):
-                assert (path.parent / target).exists(), f"{relative(path)} links to {target}"
-
-
 @pytest.mark.parametrize("name", TO_COME)
 def test_what_is_to_come_is_still_named_and_still_missing(name):
     """An exception nobody needs any more goes."""

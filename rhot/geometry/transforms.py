@@ -1,9 +1,9 @@
 """Rigid transforms and quaternions.
 
-Conventions (docs/frames.md): right-handed, metres, radians; quaternions are (w, x, y, z) with w >=
-0; `T_a_from_b` is a (4, 4) matrix with p_a = T_a_from_b @ p_b, so that names cancel: T_a_from_c =
-T_a_from_b @ T_b_from_c. Input that is not finite is the caller's error: these functions neither
-check nor repair it.
+Conventions (docs/reference/frames.md): right-handed, metres, radians; quaternions are (w, x, y, z)
+with w >= 0; `T_a_from_b` is a (4, 4) matrix with p_a = T_a_from_b @ p_b, so that names cancel:
+T_a_from_c = T_a_from_b @ T_b_from_c. Input that is not finite is the caller's error: these
+functions neither check nor repair it.
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ from rhot.messages import OpenVrDevice, OpenVrPose, Vec3
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
 _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{0,63})"')
-# libsurvive's z-up world to the `lighthouse` frame of docs/frames.md (x right, y up, -z forward):
-# -90 deg about x.
+# libsurvive's z-up world to the `lighthouse` frame of docs/reference/frames.md (x right, y up, -z
+# forward): -90 deg about x.
 R_LIGHTHOUSE_FROM_SURVIVE: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 # Devices libsurvive can name at once are a handful; more names are garbage.
 _MAX_DEVICES = 64

@@ -34,6 +34,6 @@ def test_foreign_keys_belong_to_no_topic():
 
 
 def test_docs_page_is_generated_from_the_table(repository):
-    page = (repository / "docs" / "topics.md").read_text()
+    page = (repository / "docs" / "reference" / "topics.md").read_text()
     for topic in topics.TOPICS:
         assert f"{topic.template}`" in page

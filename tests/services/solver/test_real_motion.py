@@ -1,7 +1,7 @@
 """Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three
 OpenXR poses as a test of frames.
 
-`pytest -rP tests/services/solver/test_real_motion.py` prints the table of docs/accuracy.md.
+`pytest -rP tests/services/solver/test_real_motion.py` prints the table of docs/notes/solver.md.
 """
 
 from __future__ import annotations
