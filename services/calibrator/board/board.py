@@ -1,5 +1,4 @@
-"""Calibration boards: chessboards and ChArUco boards, as points in the board's own frame. Pure
-data, no pictures.
+"""Calibration boards, chessboard and ChArUco, as points in the board's own frame. Pure.
 
 The board frame: origin in the first inner corner, x along a row of corners, y down the rows, z away
 from whoever looks at the printed side, metres. A board is counted in inner corners, the points
@@ -19,7 +18,7 @@ from rhot.geometry.transforms import Array
 
 BoardKind = Literal["chessboard", "charuco"]
 
-# OpenCV's name and number of markers.
+# Dictionaries of ChArUco markers: OpenCV's name, and how many markers it has.
 DICTIONARIES = {
     "DICT_4X4_50": 50,
     "DICT_4X4_100": 100,
@@ -30,12 +29,15 @@ DICTIONARIES = {
     "DICT_6X6_250": 250,
     "DICT_APRILTAG_36H11": 587,
 }
-# A board of more corners than this on one page has squares no camera resolves; OpenCV's detector
-# needs three.
+# OpenCV's detector needs three. A board of more than forty on one page has squares that no camera
+# resolves.
 _MIN_CORNERS, _MAX_CORNERS = 3, 40
 # Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in
 # millimetres, or a slip.
 _MIN_SQUARE_M, _MAX_SQUARE_M = 0.001, 2.0
+# Sides of a marker in squares: a smaller one has too few pixels to be decoded, a larger one comes
+# too near the corners.
+_MIN_MARKER, _MAX_MARKER = 0.3, 0.9
 
 
 @dataclass(frozen=True)
@@ -58,17 +60,19 @@ class Board:
     def __post_init__(self) -> None:
         if min(self.cols, self.rows) < _MIN_CORNERS or max(self.cols, self.rows) > _MAX_CORNERS:
             raise CalibrationError(
-                f"a board of {self.cols}x{self.rows} inner corners cannot be used; both numbers must be {_MIN_CORNERS}..{_MAX_CORNERS}. "
-                "Inner corners are the points where black squares touch: one less than the squares each way"
+                f"a board of {self.cols}x{self.rows} inner corners cannot be used; both numbers "
+                f"must be {_MIN_CORNERS}..{_MAX_CORNERS}. Inner corners are the points where black "
+                "squares touch: one less than the squares each way"
             )
         if not _MIN_SQUARE_M <= self.square_m <= _MAX_SQUARE_M:
             raise CalibrationError(
-                f"squares of {self.square_m:g} m cannot be right; give the side of one square in metres, "
-                f"{_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}, e.g. --square 0.025"
+                f"squares of {self.square_m:g} m cannot be right; give the side of one square in "
+                f"metres, {_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}, e.g. --square 0.025"
             )
-        if not 0.3 <= self.marker <= 0.9:
+        if not _MIN_MARKER <= self.marker <= _MAX_MARKER:
             raise CalibrationError(
-                f"markers of {self.marker:g} squares cannot be used; give 0.3..0.9, e.g. --marker 0.7"
+                f"markers of {self.marker:g} squares cannot be used; give "
+                f"{_MIN_MARKER:g}..{_MAX_MARKER:g}, e.g. --marker 0.7"
             )
         if self.dictionary not in DICTIONARIES:
             raise CalibrationError(
@@ -77,8 +81,9 @@ class Board:
         markers = (self.cols + 1) * (self.rows + 1) // 2
         if self.kind == "charuco" and markers > DICTIONARIES[self.dictionary]:
             raise CalibrationError(
-                f"a ChArUco board of {self.cols}x{self.rows} inner corners has {markers} markers, {self.dictionary} only "
-                f"{DICTIONARIES[self.dictionary]}; use a larger dictionary: {', '.join(DICTIONARIES)}"
+                f"a ChArUco board of {self.cols}x{self.rows} inner corners has {markers} markers, "
+                f"{self.dictionary} only {DICTIONARIES[self.dictionary]}; use a larger dictionary: "
+                f"{', '.join(DICTIONARIES)}"
             )
 
     @property
@@ -89,10 +94,9 @@ class Board:
     @property
     def grid(self) -> Array:
         """Column and row of every corner, in the order of their numbers; (n, 2)."""
-        return np.stack(
-            [np.tile(np.arange(self.cols), self.rows), np.repeat(np.arange(self.rows), self.cols)],
-            axis=1,
-        ).astype(np.float64)
+        column = np.tile(np.arange(self.cols), self.rows)
+        row = np.repeat(np.arange(self.rows), self.cols)
+        return np.stack([column, row], axis=1).astype(np.float64)
 
     @property
     def points(self) -> Array:
@@ -105,29 +109,24 @@ class Board:
         return f"{self.kind} {self.cols}x{self.rows}, {1e3 * self.square_m:g} mm squares"
 
     def neighbours(self, ids: np.ndarray) -> np.ndarray:
-        """Pairs of positions in ids whose corners are next to each other on the board.
-
-        (k, 2) int.
-        """
-        place = {int(corner): position for position, corner in enumerate(ids)}
+        """Pairs (k, 2) int of positions in `ids` whose corners are neighbours on the board."""
+        position_of = {int(corner): position for position, corner in enumerate(ids)}
         pairs = []
-        for corner, position in place.items():
+        for corner, position in position_of.items():
             right, below = corner + 1, corner + self.cols
-            if right % self.cols and right in place:
-                pairs.append((position, place[right]))
-            if below in place:
-                pairs.append((position, place[below]))
+            if right % self.cols and right in position_of:
+                pairs.append((position, position_of[right]))
+            if below in position_of:
+                pairs.append((position, position_of[below]))
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def parse_corners(text: str) -> tuple[int, int]:
-    """`9x6` -> (9, 6).
-
-    Raises CalibrationError for anything else.
-    """
+    """Columns and rows of a text such as `9x6`; raises CalibrationError for any other text."""
     match = re.fullmatch(r"\s*(\d{1,3})\s*[xX×,]\s*(\d{1,3})\s*", text)
     if not match:
         raise CalibrationError(
-            f"board {text!r} is not understood; write its inner corners as COLSxROWS, e.g. --board 9x6"
+            f"board {text!r} is not understood; write its inner corners as COLSxROWS, "
+            "e.g. --board 9x6"
         )
     return int(match[1]), int(match[2])

@@ -1,16 +1,13 @@
-"""Picture folders: which file is which camera's view of which board position, found out from the
-names.
+"""A folder of pictures: which file is which camera's picture of which board position.
 
 Understood are a folder per camera (`left/03.png`, `right/03.png`) and names in which one part is
 the camera and the rest the position (`left03.jpg`, `right_03.png`, `03-cam0.png`, `imgL3.png`).
-Files that do not fit, or that have no partner, are listed, not used. A folder whose names say
-nothing is a CalibrationError with examples of names that work.
+Files that do not fit, or that have no partner, are listed, not used. A folder whose names tell
+nothing is a CalibrationError with examples of names that do.
 """
 
 from __future__ import annotations
 
-import re
-from collections import Counter, defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,27 +15,28 @@ import cv2
 import numpy as np
 
 from rhot.errors import CalibrationError
+from services.calibrator.board.picture_names import Files, name_parts, natural_key, read_names
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
-_TOKEN = re.compile(r"[A-Za-z]+|\d+")
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
-_EXAMPLES = "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera (both views in one picture: --side-by-side)"
-# More cameras than this are never one rig here: the varying part is then the number of the picture.
-_MAX_CAMERAS = 16
+_EXAMPLES = (
+    "name them <camera><number>, e.g. left01.png and right01.png, or use one folder per camera "
+    "(both views in one picture: --side-by-side)"
+)
 # Two pictures of 4:3 side by side are 2.67 times as wide as high, one of 16:9 is 1.78.
 _WIDE = 2.2
-Key = tuple[str, ...]
+# Names of the cameras of pictures side by side, unless they are given.
+_SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
 class PictureSet:
-    """files[camera][key] is a picture; one key is one position of the board. left_out are files
-    that were not understood.
+    """files[camera][key] is a picture; one key is one position of the board.
 
-    side_by_side: a file holds the pictures of all cameras, the first one on the left.
+    left_out are files that were not understood. side_by_side: a file holds the pictures of all
+    cameras, the first one on the left.
     """
 
-    files: dict[str, dict[str, Path]]
+    files: Files
     left_out: tuple[Path, ...] = ()
     side_by_side: bool = False
 
@@ -48,8 +46,9 @@ class PictureSet:
         return list(self.files)
 
     def positions(self) -> list[str]:
-        """Every board position some camera has a picture of, in order."""
-        return sorted({key for pictures in self.files.values() for key in pictures}, key=natural)
+        """The keys of all board positions that some camera has a picture of, in order."""
+        keys = {key for pictures in self.files.values() for key in pictures}
+        return sorted(keys, key=natural_key)
 
     def read(self, camera: str, key: str) -> np.ndarray:
         """One camera's picture as grey (h, w) uint8.
@@ -57,22 +56,31 @@ class PictureSet:
         Raises CalibrationError if it cannot be read.
         """
         image = read_grey(self.files[camera][key])
-        return (
-            split_side_by_side(image, len(self.files))[self.cameras.index(camera)]
-            if self.side_by_side
-            else image
-        )
+        if not self.side_by_side:
+            return image
+        return split_side_by_side(image, len(self.files))[self.cameras.index(camera)]
 
 
-def read_grey(path: Path) -> np.ndarray:
-    """A picture as grey (h, w) uint8, as the sensor delivered it (EXIF rotation is not applied).
+def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
+    """The pictures of a rig's cameras in a folder; `cameras` are the names to expect, if known.
 
-    Raises CalibrationError if the file is no picture.
+    Names of one series only, of pictures as wide as two, are taken for both views side by side.
+    Raises CalibrationError if the names do not tell cameras and positions apart.
     """
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-    if image is None:
-        raise CalibrationError(f"{path}: is not a picture that can be read; use PNG or JPEG")
-    return image
+    paths = _pictures(folder)
+    reading = read_names(paths, folder, cameras)
+    if reading is None and _is_wide(paths[0]):
+        return side_by_side(folder, cameras or list(_SIDES))
+    if reading is None:
+        expected = f" of {' and '.join(cameras)}" if cameras else ""
+        some = ", ".join(str(path.relative_to(folder)) for path in paths[:4])
+        raise CalibrationError(
+            f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); "
+            f"{_EXAMPLES}"
+        )
+    used = {path for pictures in reading.files.values() for path in pictures.values()}
+    left_out = tuple(path for path in paths if path not in used)
+    return PictureSet(_paired_in_order(reading.files), left_out)
 
 
 def one_camera(folder: Path, camera: str) -> PictureSet:
@@ -80,27 +88,24 @@ def one_camera(folder: Path, camera: str) -> PictureSet:
 
     Raises CalibrationError if there is none.
     """
-    files = _pictures(folder)
+    paths = _pictures(folder)
     own = [
-        path for path in files if camera in (path.parent.name, *_parts(path.relative_to(folder)))
-    ] or files
-    return PictureSet({camera: {str(path.relative_to(folder)): path for path in own}})
+        path
+        for path in paths
+        if camera in (path.parent.name, *name_parts(path.relative_to(folder)))
+    ]
+    return PictureSet({camera: {str(path.relative_to(folder)): path for path in own or paths}})
 
 
 def picture_of(folder: Path, camera: str) -> Path | None:
-    """The first picture in a folder that is named after the camera (`left.png`, `desk_left.jpg`);
-    None without one.
+    """The first picture that is named after the camera (`left.png`, `desk_left.jpg`), or None.
 
     Raises CalibrationError if the folder has no pictures at all.
     """
-    return next(
-        (
-            path
-            for path in _pictures(folder)
-            if path.stem == camera or camera in _parts(path.relative_to(folder))
-        ),
-        None,
-    )
+    for path in _pictures(folder):
+        if path.stem == camera or camera in name_parts(path.relative_to(folder)):
+            return path
+    return None
 
 
 def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
@@ -110,68 +115,56 @@ def side_by_side(folder: Path, cameras: list[str]) -> PictureSet:
     """
     if len(cameras) < 2:
         raise CalibrationError(
-            f"pictures side by side need the names of two cameras or more, e.g. --cameras left,right; got {cameras}"
+            "pictures side by side need the names of two cameras or more, "
+            f"e.g. --cameras left,right; got {cameras}"
         )
     files = {str(path.relative_to(folder).with_suffix("")): path for path in _pictures(folder)}
     return PictureSet(dict.fromkeys(cameras, files), side_by_side=True)
 
 
-def find_pictures(folder: Path, cameras: list[str] | None = None) -> PictureSet:
-    """The pictures of a rig's cameras in a folder; cameras says which names to expect, if they are
-    known.
+def read_grey(path: Path) -> np.ndarray:
+    """A picture as grey (h, w) uint8, as the sensor delivered it (EXIF rotation is not applied).
 
-    Names that tell one series only, of pictures as wide as two, are taken for both views side by
-    side.
-
-    Raises CalibrationError if the names do not tell cameras and positions apart.
+    Raises CalibrationError if the file is no picture.
     """
-    files = _pictures(folder)
-    groups: dict[tuple[str, ...], list[tuple[Path, list[str]]]] = defaultdict(list)
-    for path in files:
-        parts = _parts(path.relative_to(folder))
-        groups[_shape(parts)].append((path, parts))
-    best: _Reading | None = None
-    for group in groups.values():
-        found = _split(group, cameras)
-        if found and (best is None or _worth(found) > _worth(best)):
-            best = found
-    if best is None and _is_wide(files[0]):
-        return side_by_side(folder, cameras or ["left", "right"])
-    if best is None:
-        expected = f" of {' and '.join(cameras)}" if cameras else ""
-        some = ", ".join(str(path.relative_to(folder)) for path in files[:4])
+    image = _grey_or_none(path)
+    if image is None:
         raise CalibrationError(
-            f"{folder}: cannot tell pictures{expected} apart by their names ({some}, ...); {_EXAMPLES}"
+            f"{path}: is not a picture that can be read; use PNG or JPEG, or take it out of the "
+            "folder"
         )
-    used = {path for pictures in best.files.values() for path in pictures.values()}
-    return PictureSet(_in_step(best.files), tuple(path for path in files if path not in used))
-
-
-def _is_wide(path: Path) -> bool:
-    """Whether a picture is as wide as two; no if it cannot be read."""
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-    return image is not None and image.shape[1] >= _WIDE * image.shape[0]
+    return image
 
 
 def split_side_by_side(image: np.ndarray, count: int) -> list[np.ndarray]:
-    """The pictures of `count` cameras that stand side by side in one; (h, w) -> count times (h, w /
-    count).
+    """The `count` pictures (h, w / count) that stand side by side in one (h, w).
 
     Raises CalibrationError if the width cannot be shared.
     """
     width = image.shape[1]
     if width % count:
         raise CalibrationError(
-            f"a picture {width} px wide cannot be {count} equal ones side by side"
+            f"a picture {width} px wide cannot be {count} equal ones side by side; name as many "
+            "cameras as each picture has views, e.g. --cameras left,right"
         )
     return [np.ascontiguousarray(part) for part in np.split(image, count, axis=1)]
 
 
-def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
-    """Pictures named by the time they were taken share no name: as many from each camera are paired
-    in their order.
+def _is_wide(path: Path) -> bool:
+    """Whether a picture is as wide as two; no if it cannot be read."""
+    image = _grey_or_none(path)
+    return image is not None and image.shape[1] >= _WIDE * image.shape[0]
 
-    Wrongly paired ones are found out by the calibration, which refuses them.
+
+def _grey_or_none(path: Path) -> np.ndarray | None:
+    return cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+
+
+def _paired_in_order(files: Files) -> Files:
+    """As many pictures from each camera that share no key are paired in their order.
+
+    Pictures named by the time they were taken are such. Wrongly paired ones are found out by the
+    calibration, which refuses them.
     """
     counts = {len(pictures) for pictures in files.values()}
     if len(counts) > 1 or set.intersection(*(set(pictures) for pictures in files.values())):
@@ -179,120 +172,26 @@ def _in_step(files: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
     return {
         camera: {
             str(number): pictures[key]
-            for number, key in enumerate(sorted(pictures, key=natural), start=1)
+            for number, key in enumerate(sorted(pictures, key=natural_key), start=1)
         }
         for camera, pictures in files.items()
     }
 
 
 def _pictures(folder: Path) -> list[Path]:
+    """All picture files in and below a folder, in natural order.
+
+    Hidden folders are passed over: they hold thumbnails and the like.
+    """
     if not folder.is_dir():
         raise CalibrationError(f"{folder}: no such folder; give the folder of the board's pictures")
-    files = [
-        path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file()
-    ]
-    # Hidden folders hold thumbnails and the like.
-    files = [
+    paths = [
         path
-        for path in files
-        if not any(part.startswith(".") for part in path.relative_to(folder).parts)
+        for path in folder.rglob("*")
+        if path.suffix.lower() in SUFFIXES
+        and path.is_file()
+        and not any(part.startswith(".") for part in path.relative_to(folder).parts)
     ]
-    if not files:
+    if not paths:
         raise CalibrationError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)}); {_EXAMPLES}")
-    return sorted(files, key=lambda path: natural(str(path)))
-
-
-def _parts(path: Path) -> list[str]:
-    """Folder names as they are, then the letters and numbers of the file's name."""
-    return [*path.parts[:-1], *_TOKEN.findall(path.stem)]
-
-
-def _shape(parts: list[str]) -> Key:
-    return (str(len(parts)), *("9" if part.isdigit() else "a" for part in parts))
-
-
-def _split(group: list[tuple[Path, list[str]]], cameras: list[str] | None) -> _Reading | None:
-    """One part of the names as the camera: the one with which the most positions are seen by all
-    cameras.
-    """
-    best: _Reading | None = None
-    for place in range(len(group[0][1])):
-        values = Counter(parts[place] for _, parts in group)
-        if cameras and not set(cameras) <= set(values):
-            continue
-        if not cameras and not 2 <= len(values) <= _MAX_CAMERAS:
-            continue
-        found = _by_place(group, place, cameras)
-        # On a draw the earlier part wins, and letters win over numbers: 1_left, 1_right.
-        if found and (best is None or _worth(found) > _worth(best)):
-            best = found
-    return best
-
-
-def _by_place(
-    group: list[tuple[Path, list[str]]], place: int, cameras: list[str] | None
-) -> _Reading | None:
-    files: dict[str, dict[str, Path]] = defaultdict(dict)
-    for path, parts in group:
-        # A camera's name may be repeated, as in left/left01.png, and its partner's number may have
-        # other leading zeros.
-        rest = [
-            part
-            for part in parts[:place] + parts[place + 1 :]
-            if part != parts[place] or part.isdigit()
-        ]
-        key = "-".join(str(int(part)) if part.isdigit() else part for part in rest) or "0"
-        if key in files[parts[place]]:
-            return None
-        files[parts[place]][key] = path
-    named = {
-        _camera_name(group, place, value): pictures
-        for value, pictures in files.items()
-        if cameras is None or value in cameras
-    }
-    if len(named) < 2 or not all(_NAME.match(name) for name in named):
-        return None
-    # One picture of each is a series of one camera, or pictures side by side, whose numbers are
-    # positions.
-    if len(group) > 2 and all(len(pictures) == 1 for pictures in named.values()):
-        return None
-    order = cameras or sorted(named, key=lambda name: (_side(name), natural(name)))
-    return _Reading({name: named[name] for name in order}, all(value.isdigit() for value in files))
-
-
-def _camera_name(group: list[tuple[Path, list[str]]], place: int, value: str) -> str:
-    """The camera's name: a bare number takes the letters before it along (`cam` + `0`)."""
-    before = {parts[place - 1] for _, parts in group} if place else set()
-    if value.isdigit() and len(before) == 1 and (word := next(iter(before))).isalpha():
-        return word + value
-    return value
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """One way to read the names: the cameras' pictures, and whether only a number tells the cameras
-    apart.
-    """
-
-    files: dict[str, dict[str, Path]]
-    numbered: bool
-
-
-def _worth(found: _Reading) -> tuple[int, int, int]:
-    """How much speaks for a reading of the names: positions all cameras share, named rather than
-    numbered, few cameras.
-    """
-    shared = set.intersection(*(set(pictures) for pictures in found.files.values()))
-    return len(shared) * len(found.files), 0 if found.numbered else 1, -len(found.files)
-
-
-def _side(name: str) -> int:
-    return {"l": 0, "left": 0, "r": 2, "right": 2}.get(name.lower(), 1)
-
-
-def natural(text: str) -> list[tuple[int, int, str]]:
-    """Sort key in which 2 comes before 10."""
-    return [
-        (0, int(part), "") if part.isdigit() else (1, 0, part)
-        for part in re.findall(r"\d+|\D+", text)
-    ]
+    return sorted(paths, key=lambda path: natural_key(str(path)))

@@ -6,18 +6,15 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from rhot.geometry.transforms import Array
-from services.calibrator.board.coverage import Coverage, coverage
-from services.calibrator.bundle.adjust import Adjusted
-from services.calibrator.bundle.lens_model import CX, CY, FX, FY, rays
-from services.calibrator.bundle.views import LeftOut
+from services.calibrator.board.board_views import LeftOut
+from services.calibrator.board.coverage import Coverage
+from services.calibrator.bundle.lens_model import CX, CY, FX, FY, rays_from_pixels
+from services.calibrator.lens.result import LensEstimate, LensFit
 
 # Zhang (2000) needs three views in theory; with three, none can be held out.
 MIN_VIEWS = 4
-# A picture is left out if its corners are this many times as far off as the median picture's, and
-# further than _OFF_PX at 640 px width.
-_OFF_TIMES, _OFF_PX = 4.0, 0.6
-# More pictures than this share are never left out: then the median is not to be trusted either.
-_OFF_SHARE = 0.34
+# Pictures left out that an error names.
+_NAMED = 6
 # One sigma of the focal length: 1 % of it is 1 % of every distance. The real pairs reach .08 %, a
 # board never tilted 5 % and more.
 _FOCAL_REFUSED, _FOCAL_WARNED = 0.02, 0.004
@@ -35,123 +32,143 @@ _COVERED_REFUSED, _COVERED_WARNED = 0.2, 0.6
 # Held-out error on the board in squares. The real pairs reach .005; a wrong count of corners or a
 # bent board gives more than .1.
 _SQUARES_REFUSED, _SQUARES_WARNED = 0.1, 0.03
+# Pixels along each side of the picture where the inverse of the distortion is tried.
+_BORDER_X, _BORDER_Y = 33, 25
 
 _HOW_TO = (
-    "Show the board near the camera so that it fills a third of the picture or more, in the middle, in every corner and at every edge, "
-    "tilted 20 to 45 degrees to the left, right, up and down"
+    "Show the board near the camera so that it fills a third of the picture or more, in the "
+    "middle, in every corner and at every edge, tilted 20 to 45 degrees to the left, right, up and "
+    "down"
 )
 
 
-def check_views(camera: str, count: int, left_out: list[LeftOut] | None = None) -> None:
-    """Raise CalibrationError if that is too few pictures of a camera."""
+def check_count(camera: str, count: int, left_out: list[LeftOut] | None = None) -> None:
+    """Raise CalibrationError if a camera has too few pictures of the board."""
     if count >= MIN_VIEWS:
         return
-    reason = f"camera {camera!r}: only {count} usable pictures of the board, at least {MIN_VIEWS} are needed (12 to 20 are good)"
+    reason = (
+        f"camera {camera!r}: only {count} usable pictures of the board, at least {MIN_VIEWS} are "
+        "needed (12 to 20 are good)"
+    )
     if left_out:
-        reason += "; left out: " + "; ".join(f"{item.key} ({item.reason})" for item in left_out[:6])
+        named = (f"{item.key} ({item.reason})" for item in left_out[:_NAMED])
+        reason += "; left out: " + "; ".join(named)
     raise CalibrationError(f"{reason}. {_HOW_TO}")
 
 
-def contradicting(errors: list[float], width_px: int) -> list[int]:
-    """Positions of errors (px) far above the median; none if there are too many of them."""
-    limit = max(_OFF_TIMES * float(np.median(errors)), _OFF_PX * width_px / 640.0)
-    bad = [k for k, error in enumerate(errors) if not error <= limit]
-    return bad if len(bad) <= _OFF_SHARE * len(errors) else []
-
-
-def check_fit(camera: str, size_px: tuple[int, int], fit: Adjusted, corners: list[Array]) -> None:
-    """Raise CalibrationError, with the reason, if a lens fitted to these corners (n, 2) by view
-    must not be used.
-    """
-    if not fit.rms_px <= _RMS_REFUSED * size_px[0] / 640.0:
+def check_fit(fit: LensFit) -> None:
+    """Raise CalibrationError, with the reason, if the lens of a fit must not be used."""
+    if not fit.found.rms_px <= _RMS_REFUSED * fit.size_px[0] / 640.0:
         raise CalibrationError(
-            f"camera {camera!r}: no lens explains the pictures; their corners are {fit.rms_px:.1f} px off (.2 is good). Is "
-            "--board its number of inner corners, is the board flat, are all pictures of the same camera, lens and focus?"
+            f"camera {fit.camera!r}: no lens explains the pictures; their corners are "
+            f"{fit.found.rms_px:.1f} px off (.2 is good). Is --board its number of inner corners, "
+            "is the board flat, are all pictures of the same camera, lens and focus?"
         )
-    seen = coverage(size_px, corners, list(fit.state.T_rig_from_board))
-    check_lens(camera, size_px, fit.state.lenses[0], fit.lens_sigma[0], 0.0, seen)
+    _refuse_geometry(fit.estimate())
 
 
-def check_lens(
-    camera: str,
-    size_px: tuple[int, int],
-    lens: Array,
-    sigma: Array,
-    held_out_squares: float,
-    seen: Coverage,
-) -> tuple[str, ...]:
-    """Warnings about a lens (9,) with sigmas (9,).
+def check_lens(estimate: LensEstimate, held_out_squares: float | None = None) -> tuple[str, ...]:
+    """Warnings about a lens; its held-out error is checked as well if it is given.
 
-    Raises CalibrationError, with the reason, if it must not be used.
+    Raises CalibrationError, with the reason, if the lens must not be used.
     """
-    focal = float(max(sigma[FX] / abs(lens[FX]), sigma[FY] / abs(lens[FY])))
-    _refuse_fit(camera, held_out_squares)
-    _refuse_geometry(camera, size_px, lens, focal, seen)
+    if held_out_squares is not None:
+        _refuse_held_out(estimate.camera, held_out_squares)
+    _refuse_geometry(estimate)
+    covered = estimate.coverage
+    focal_share = _focal_share(estimate)
     warnings = []
-    if focal > _FOCAL_WARNED:
+    if focal_share > _FOCAL_WARNED:
         warnings.append(
-            f"the focal length is known to {100 * focal:.1f} % only; add pictures with the board tilted more"
+            f"the focal length is known to {100 * focal_share:.1f} % only; add pictures with the "
+            "board tilted more"
         )
-    if seen.share < _COVERED_WARNED or seen.missing:
-        where = f" (missing: {seen.missing})" if seen.missing else ""
+    if covered.share < _COVERED_WARNED or covered.missing:
+        where = f" (missing: {covered.missing})" if covered.missing else ""
         warnings.append(
-            f"corners cover {100 * seen.share:.0f} % of the image{where}; lens errors are larger where they are missing"
+            f"corners cover {100 * covered.share:.0f} % of the image{where}; lens errors are "
+            "larger where they are missing; add pictures of the board there"
         )
-    if held_out_squares > _SQUARES_WARNED:
+    if held_out_squares is not None and held_out_squares > _SQUARES_WARNED:
         warnings.append(
-            f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were the pictures sharp?"
+            f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were "
+            "the pictures sharp?"
         )
-    border = _border(size_px)
-    if not np.all(np.isfinite(rays(lens, border))):
+    if not np.all(np.isfinite(rays_from_pixels(estimate.lens, _border(estimate.size_px)))):
         warnings.append(
-            "the distortion cannot be undone at the edge of the image: pixels there are not measured; add pictures that reach it"
+            "the distortion cannot be undone at the edge of the image: pixels there are not "
+            "measured; add pictures that reach it"
         )
     return tuple(warnings)
 
 
-def _refuse_fit(camera: str, held_out_squares: float) -> None:
+def _focal_share(estimate: LensEstimate) -> float:
+    """One sigma of the focal length as a share of it, the larger of x and y."""
+    lens, sigma = estimate.lens, estimate.sigma
+    return float(max(sigma[FX] / abs(lens[FX]), sigma[FY] / abs(lens[FY])))
+
+
+def _refuse_held_out(camera: str, held_out_squares: float) -> None:
     if held_out_squares > _SQUARES_REFUSED:
         raise CalibrationError(
-            f"camera {camera!r}: no lens explains the pictures; corners left out of the fit are {held_out_squares:.2f} squares off "
-            f"(.01 is good, {_SQUARES_REFUSED:g} the limit). Is the board flat and rigid, are all pictures of the same camera, lens and "
-            "focus, is --board its number of inner corners? A fisheye lens of more than about 120 degrees cannot be described by this model"
+            f"camera {camera!r}: no lens explains the pictures; corners left out of the fit are "
+            f"{held_out_squares:.2f} squares off (.01 is good, {_SQUARES_REFUSED:g} the limit). Is "
+            "the board flat and rigid, are all pictures of the same camera, lens and focus, is "
+            "--board its number of inner corners? A fisheye lens of more than about 120 degrees "
+            "cannot be described by this model"
         )
 
 
-def _refuse_geometry(
-    camera: str, size_px: tuple[int, int], lens: Array, focal: float, seen: Coverage
-) -> None:
-    inside = 0 <= lens[CX] < size_px[0] and 0 <= lens[CY] < size_px[1]
-    if not (
-        inside and all(_FOCALS[0] <= lens[name] / size_px[0] <= _FOCALS[1] for name in (FX, FY))
-    ):
+def _refuse_geometry(estimate: LensEstimate) -> None:
+    camera, covered = estimate.camera, estimate.coverage
+    if not _is_possible(estimate):
+        lens = estimate.lens
         raise CalibrationError(
-            f"camera {camera!r}: the pictures do not determine the lens: the best fit has its centre at {lens[CX]:.0f}, {lens[CY]:.0f} px "
-            f"and a focal length of {lens[FX]:.0f} px, which no camera has. Was the board never tilted? {_HOW_TO}"
+            f"camera {camera!r}: the pictures do not determine the lens: the best fit has its "
+            f"centre at {lens[CX]:.0f}, {lens[CY]:.0f} px and a focal length of {lens[FX]:.0f} px, "
+            f"which no camera has. Was the board never tilted? {_HOW_TO}"
         )
-    span = f"its normals are at most {seen.normals_deg:.0f} degrees apart, its tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f}"
-    if seen.normals_deg < _PARALLEL_DEG:
+    if covered.normals_deg < _PARALLEL_DEG:
         raise CalibrationError(
-            f"camera {camera!r}: the board was always held at about the same angle ({span}), so focal length and distance cannot "
-            f"be told apart. {_HOW_TO}"
+            f"camera {camera!r}: the board was always held at about the same angle "
+            f"({_tilt_text(covered)}), so focal length and distance cannot be told apart. {_HOW_TO}"
         )
-    if not np.isfinite(focal) or focal > _FOCAL_REFUSED:
+    focal_share = _focal_share(estimate)
+    if not np.isfinite(focal_share) or focal_share > _FOCAL_REFUSED:
         raise CalibrationError(
-            f"camera {camera!r}: the pictures leave the focal length uncertain by {100 * focal:.1f} % (at most {100 * _FOCAL_REFUSED:g} %; "
-            f"board: {span}; corners cover {100 * seen.share:.0f} % of the image). {_HOW_TO}"
+            f"camera {camera!r}: the pictures leave the focal length uncertain by "
+            f"{100 * focal_share:.1f} % (at most {100 * _FOCAL_REFUSED:g} %; board: "
+            f"{_tilt_text(covered)}; corners cover {100 * covered.share:.0f} % of the image). "
+            f"{_HOW_TO}"
         )
-    if seen.share < _COVERED_REFUSED:
+    if covered.share < _COVERED_REFUSED:
         raise CalibrationError(
-            f"camera {camera!r}: corners cover {100 * seen.share:.0f} % of the image (at least {100 * _COVERED_REFUSED:.0f} % are needed; "
-            f"missing: {seen.missing or 'all over'}). {_HOW_TO}"
+            f"camera {camera!r}: corners cover {100 * covered.share:.0f} % of the image (at least "
+            f"{100 * _COVERED_REFUSED:.0f} % are needed; missing: "
+            f"{covered.missing or 'all over'}). {_HOW_TO}"
         )
+
+
+def _is_possible(estimate: LensEstimate) -> bool:
+    """Whether the principal point is in the picture, and the focal length one that lenses have."""
+    lens, (width, height) = estimate.lens, estimate.size_px
+    inside = 0 <= lens[CX] < width and 0 <= lens[CY] < height
+    return bool(inside and all(_FOCALS[0] <= lens[axis] / width <= _FOCALS[1] for axis in (FX, FY)))
+
+
+def _tilt_text(covered: Coverage) -> str:
+    tilts = covered.tilt_deg
+    return (
+        f"its normals are at most {covered.normals_deg:.0f} degrees apart, its tilts "
+        f"{min(tilts):.0f} to {max(tilts):.0f}"
+    )
 
 
 def _border(size_px: tuple[int, int]) -> Array:
-    """Pixels around the edge of the picture; (n, 2)."""
+    """Pixels (n, 2) around the edge of the picture."""
     width, height = size_px
-    x, y = np.linspace(0.0, width - 1.0, 33), np.linspace(0.0, height - 1.0, 25)
-    return np.concatenate(
-        [np.stack([x, np.full_like(x, edge)], axis=1) for edge in (0.0, height - 1.0)]
-        + [np.stack([np.full_like(y, edge), y], axis=1) for edge in (0.0, width - 1.0)]
-    )
+    x = np.linspace(0.0, width - 1.0, _BORDER_X)
+    y = np.linspace(0.0, height - 1.0, _BORDER_Y)
+    along_x = [np.stack([x, np.full_like(x, edge)], axis=1) for edge in (0.0, height - 1.0)]
+    along_y = [np.stack([np.full_like(y, edge), y], axis=1) for edge in (0.0, width - 1.0)]
+    return np.concatenate(along_x + along_y)

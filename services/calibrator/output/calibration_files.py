@@ -17,9 +17,9 @@ from rhot.geometry.transforms import Array, inverse
 from services.calibrator.board.board import Board
 from services.calibrator.board.detect import Detection
 from services.calibrator.bundle.lens_model import CX, CY, FX, FY, K1, lens_vector
-from services.calibrator.lens.calibrate import LensResult
+from services.calibrator.lens.result import LensResult
 from services.calibrator.recalibrate.refine_rig import Refined
-from services.calibrator.rig.calibrate import RigResult
+from services.calibrator.rig.result import RigResult
 
 
 def lens_file(

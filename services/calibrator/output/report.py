@@ -11,11 +11,11 @@ import numpy as np
 
 from rhot.geometry.transforms import Array, inverse
 from services.calibrator.board.board import Board
+from services.calibrator.board.board_views import LeftOut
 from services.calibrator.bundle.lens_model import FX, FY, K1
-from services.calibrator.bundle.views import LeftOut
-from services.calibrator.lens.calibrate import LensResult
+from services.calibrator.lens.result import LensResult
 from services.calibrator.recalibrate.refine_rig import Refined
-from services.calibrator.rig.calibrate import RigResult
+from services.calibrator.rig.result import RigResult
 
 
 def lens_text(result: LensResult, board: Board) -> str:
@@ -32,7 +32,7 @@ def lens_text(result: LensResult, board: Board) -> str:
     ]
     lines += [
         f"  {each.key:<16} {each.rms_px:>7.3f} {each.held_out_px:>13.3f} {each.held_out_squares:>9.4f} "
-        f"{each.pull_percent:>10.1f} %{_hurts(each.hurts)}"
+        f"{each.influence_percent:>10.1f} %{_hurts(each.suspect)}"
         for each in result.pictures
     ]
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
@@ -57,7 +57,9 @@ def rig_text(result: RigResult) -> str:
             f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, {known}"
         )
         if k:
-            lines.append(f"    {_place(result.state.T_camera_from_rig[k], result.place_sigma[k])}")
+            lines.append(
+                f"    {_place(result.state.T_camera_from_rig[k], result.extrinsics_sigma[k])}"
+            )
         lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")
         lines += ["      " + row for row in result.coverage[k].drawing().splitlines()]
     lines.append(
@@ -71,7 +73,7 @@ def rig_text(result: RigResult) -> str:
             else f"{'seen by one camera only':>55}"
         )
         lines.append(
-            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.pull_percent:>10.1f} %{_hurts(position.hurts)}"
+            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.influence_percent:>10.1f} %{_hurts(position.suspect)}"
         )
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 

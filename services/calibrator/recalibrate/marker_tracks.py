@@ -21,7 +21,7 @@ from rhot.errors import CalibrationError
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.messages import MarkerFrame
-from services.calibrator.bundle.lens_model import lens_vector, rays
+from services.calibrator.bundle.lens_model import lens_vector, rays_from_pixels
 
 # Samples further apart than this many usual steps enclose nobody knows what: a lost frame is 2.
 _GAP_STEPS = 2.5
@@ -139,7 +139,7 @@ def _track(lens: Array, rows: list[tuple[float, float, float]]) -> Track:
     # Frames may come twice or out of order.
     _, first = np.unique(table[:, 0], return_index=True)
     table = table[first]
-    seen = rays(lens, table[:, 1:])
+    seen = rays_from_pixels(lens, table[:, 1:])
     known = np.isfinite(seen).all(axis=1)
     return _without_leaps(Track(table[known, 0], seen[known]))
 

@@ -39,7 +39,7 @@ def lens(
     # Not above: OpenCV takes longer to import than other commands take to run.
     from rhot.files.calibration import save
     from services.calibrator.board.picture_folder import one_camera
-    from services.calibrator.lens.calibrate import calibrate_camera
+    from services.calibrator.lens.calibrate import calibrate_lens
     from services.calibrator.output.calibration_files import lens_of
     from services.calibrator.output.report import lens_text
 
@@ -51,7 +51,7 @@ def lens(
         known = collect(rig, [name], folder, known, square or options.SQUARE_M, count, connect)
     pictures = one_camera(folder, name)
     known, found, blind = options.detect_all(pictures, known, square or options.SQUARE_M, progress)
-    result = calibrate_camera(name, found[name], known)
+    result = calibrate_lens(name, found[name], known)
     result = replace(result, left_out=(*blind, *result.left_out))
     made = lens_of(result, known, options.now_text(), str(folder))
     path = options.out_folder(out, rig) / f"{name}.lens.json"

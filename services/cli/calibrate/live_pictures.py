@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from services.calibrator.board.board import Board
     from services.calibrator.board.detect import Detection
-    from services.calibrator.board.live_selection import Collector
+    from services.calibrator.board.live_selection import LiveSelection
 
 # A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
 _ANSWER_S = 5.0
@@ -128,10 +128,10 @@ class _Job:
 
     async def run(self, board: Board | None, endpoints: list[str]) -> None:
         """Ask, judge, keep, until there are enough."""
-        from services.calibrator.board.live_selection import Collector, Verdict
+        from services.calibrator.board.live_selection import LiveSelection, Verdict
 
         async with reach(self._rig.rig.name, endpoints) as bus:
-            collector: Collector | None = None
+            collector: LiveSelection | None = None
             news_s = time.monotonic()
             while collector is None or not collector.done:
                 pictures = await self._pictures(bus)
@@ -141,7 +141,7 @@ class _Job:
                 }
                 if collector is None:
                     board = board or await asyncio.to_thread(self._counted, images)
-                    collector = Collector(self._names, board, self._count) if board else None
+                    collector = LiveSelection(self._names, board, self._count) if board else None
                 if collector is not None:
                     take = collector.offer(
                         {
@@ -170,9 +170,9 @@ class _Job:
 
     def _counted(self, images: dict[str, np.ndarray]) -> Board | None:
         from services.calibrator.board.board import Board
-        from services.calibrator.board.board_size import guess_corners
+        from services.calibrator.board.board_size import find_board_size
 
-        before, self._size = self._size, guess_corners(images.values())
+        before, self._size = self._size, find_board_size(images.values())
         # A board that is just coming into the picture is counted too small: two takes must agree.
         if self._size is None or self._size != before:
             self._teller.status("looking for the board: show all of it, and hold it still")
@@ -185,12 +185,12 @@ class _Job:
             (self._folder / f"{name}_{self._next:02d}.png").write_bytes(picture)
         self._next += 1
 
-    def _given_up(self, collector: Collector | None) -> str:
+    def _given_up(self, collector: LiveSelection | None) -> str:
         state = collector.text() if collector else "no board was seen"
         return f"nothing new was shown for {_PATIENCE_S:.0f} s ({state}); the pictures so far are in {self._folder}"
 
 
-def _seen(image: np.ndarray, collector: Collector) -> Detection | None:
+def _seen(image: np.ndarray, collector: LiveSelection) -> Detection | None:
     from services.calibrator.board.detect import detect
 
     return detect(image, collector.board, quick=True)

@@ -15,9 +15,9 @@ from services.cli.progress import Progress
 
 if TYPE_CHECKING:
     from services.calibrator.board.board import Board
-    from services.calibrator.board.find_boards import Found
+    from services.calibrator.board.board_views import LeftOut
+    from services.calibrator.board.detect import Detections
     from services.calibrator.board.picture_folder import PictureSet
-    from services.calibrator.bundle.views import LeftOut
 
 # The side of the squares that `rhot board` prints unless told otherwise.
 SQUARE_M = 0.025
@@ -123,16 +123,20 @@ def square_note(square_m: float | None) -> str:
 
 def detect_all(
     pictures: PictureSet, board: Board | None, square_m: float, progress: bool | None
-) -> tuple[Board, Found, list[LeftOut]]:
+) -> tuple[Board, Detections, list[LeftOut]]:
     """The board (counted if not given) and where each picture shows it, with a progress line."""
     import cv2
 
-    from services.calibrator.board.find_boards import find_boards, larger_board, the_board
+    from services.calibrator.board.find_boards import (
+        determine_board,
+        find_boards,
+        larger_board_note,
+    )
 
     # More threads than one gain nothing here, and change the order of sums.
     cv2.setNumThreads(1)
-    known = the_board(pictures, board, square_m)
-    if board is not None and (note := larger_board(pictures, board)):
+    known = determine_board(pictures, board, square_m)
+    if board is not None and (note := larger_board_note(pictures, board)):
         typer.echo(f"note: {note}", err=True)
     shown = Progress(
         "rhot calibrate: looking for the board,",

@@ -19,7 +19,7 @@ from services.cli.options import ConnectOption, ProgressOption
 
 if TYPE_CHECKING:
     from services.calibrator.board.picture_folder import PictureSet
-    from services.calibrator.rig.calibrate import RigResult
+    from services.calibrator.rig.result import RigResult
 
 
 def stereo(

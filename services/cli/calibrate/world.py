@@ -34,7 +34,8 @@ def world(
 ) -> None:
     """Put the rig's frame on the desk (z up): prints [rig.world] for rig.toml."""
     from services.calibrator.board.picture_folder import PictureSet, picture_of
-    from services.calibrator.rig.world_frame import desk_text, find_desk
+    from services.calibrator.output.world_table import world_table
+    from services.calibrator.rig.world_frame import find_world_frame
 
     rig = options.rig_if_named(config)
     if rig is None:
@@ -52,7 +53,7 @@ def world(
             f"{folder}: has no picture of {' or '.join(names)}; name them left.png, right.png, ... or add --live"
         )
     known, found, _ = options.detect_all(PictureSet(files), known, square or options.SQUARE_M, None)
-    desk = find_desk(cameras, {name: seen["desk"] for name, seen in found.items() if seen}, known)
-    typer.echo(desk_text(desk, cameras[names[0]]))
+    on_desk = {name: seen["desk"] for name, seen in found.items() if seen}
+    typer.echo(world_table(find_world_frame(cameras, on_desk, known), cameras[names[0]]))
     if note := options.square_note(square):
         typer.echo(note, err=True)

@@ -9,7 +9,8 @@ import pytest
 
 from rhot.errors import CalibrationError
 from services.calibrator.board.board import Board
-from services.calibrator.board.board_pdf import PAPERS_MM, board_pdf, rectangles
+from services.calibrator.board.board_pattern import black_rectangles
+from services.calibrator.board.board_pdf import PAPERS_MM, board_pdf
 from services.calibrator.board.detect import detect
 
 MM = 72.0 / 25.4
@@ -20,7 +21,7 @@ def raster(board: Board, per_mm: int = 4, margin_mm: int = 20) -> np.ndarray:
     side = 1e3 * board.square_m
     height, width = ((n + 1) * side + 2 * margin_mm for n in (board.rows, board.cols))
     page = np.full((round(height * per_mm), round(width * per_mm)), 235, dtype=np.uint8)
-    for x, y, w, h in rectangles(board):
+    for x, y, w, h in black_rectangles(board):
         left, top, right, bottom = (
             round((value + margin_mm) * per_mm) for value in (x, y, x + w, y + h)
         )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from services.calibrator.board.board import Board
-from services.calibrator.board.board_size import guess_corners
+from services.calibrator.board.board_size import find_board_size
 from services.calibrator.board.detect import as_grey, charuco_board, detect
 
 
@@ -79,8 +79,8 @@ def test_a_part_of_a_charuco_board_is_found_with_its_own_numbers(legacy):
 @pytest.mark.parametrize("size", [(9, 6), (7, 7), (5, 4), (11, 8)])
 def test_the_size_of_a_board_is_counted(make_bench, size):
     bench = make_bench(positions=4, board=Board(*size, 0.2 / size[0]))
-    assert guess_corners(bench.picture(bench.cameras[0], key) for key in bench.poses) == size
+    assert find_board_size(bench.picture(bench.cameras[0], key) for key in bench.poses) == size
 
 
 def test_without_a_board_there_is_no_size():
-    assert guess_corners([np.full((240, 320), 100, dtype=np.uint8)]) is None
+    assert find_board_size([np.full((240, 320), 100, dtype=np.uint8)]) is None

@@ -9,7 +9,7 @@ import pytest
 from rhot.errors import CalibrationError
 from services.calibrator.board.board import Board
 from services.calibrator.board.detect import charuco_board
-from services.calibrator.board.find_boards import find_boards, larger_board, the_board
+from services.calibrator.board.find_boards import determine_board, find_boards, larger_board_note
 from services.calibrator.board.picture_folder import PictureSet, find_pictures
 
 
@@ -37,11 +37,11 @@ def test_boards_are_found_and_pictures_without_are_listed(pictures):
 
 
 def test_the_board_is_counted_if_it_is_not_given(pictures):
-    assert the_board(pictures, None, 0.03) == Board(7, 5, 0.03)
+    assert determine_board(pictures, None, 0.03) == Board(7, 5, 0.03)
     given = Board(6, 4, 0.03)
-    assert the_board(pictures, given, 0.03) is given
-    assert "7x5 inner corners" in larger_board(pictures, given)
-    assert larger_board(pictures, Board(7, 5, 0.03)) == ""
+    assert determine_board(pictures, given, 0.03) is given
+    assert "7x5 inner corners" in larger_board_note(pictures, given)
+    assert larger_board_note(pictures, Board(7, 5, 0.03)) == ""
 
 
 def test_the_pattern_of_a_charuco_board_is_found_out(tmp_path):
@@ -54,7 +54,7 @@ def test_the_pattern_of_a_charuco_board_is_found_out(tmp_path):
         flat = charuco_board(board).generateImage((300 + 20 * n, 360 + 24 * n), marginSize=20)
         cv2.imwrite(str(tmp_path / f"left{n}.png"), flat)
     pictures = PictureSet({"left": {path.stem: path for path in sorted(tmp_path.iterdir())}})
-    assert the_board(pictures, Board(4, 5, 0.03, "charuco"), 0.03) == board
+    assert determine_board(pictures, Board(4, 5, 0.03, "charuco"), 0.03) == board
     found, _ = find_boards(pictures, board)
     assert all(len(detection.ids) == 20 for detection in found["left"].values())
 
@@ -62,4 +62,4 @@ def test_the_pattern_of_a_charuco_board_is_found_out(tmp_path):
 def test_no_board_anywhere_is_refused_with_what_to_do(tmp_path):
     cv2.imwrite(str(tmp_path / "a.png"), np.full((60, 80), 90, dtype=np.uint8))
     with pytest.raises(CalibrationError, match="--board COLSxROWS"):
-        the_board(PictureSet({"left": {"a": tmp_path / "a.png"}}), None, 0.025)
+        determine_board(PictureSet({"left": {"a": tmp_path / "a.png"}}), None, 0.025)

@@ -6,61 +6,61 @@ from dataclasses import replace
 
 import pytest
 
-from services.calibrator.board.live_selection import Collector, Verdict
+from services.calibrator.board.live_selection import LiveSelection, Verdict
 
 
 @pytest.fixture
 def seen(make_bench):
-    """A collector for two cameras, and what they see position by position."""
+    """A selection for two cameras, and what they see position by position."""
     bench = make_bench(positions=10)
     found = bench.detections(0.05)
     both = [key for key in bench.poses if key in found["left"] and key in found["right"]]
-    return Collector(["left", "right"], bench.board, 3), [
+    return LiveSelection(["left", "right"], bench.board, 3), [
         {camera: found[camera][key] for camera in found} for key in both
     ]
 
 
 def test_a_position_is_kept_once_it_stands_still(seen):
-    collector, positions = seen
-    assert collector.offer(positions[0]).verdict is Verdict.MOVING
-    assert collector.offer(positions[0]).verdict is Verdict.KEPT
-    assert collector.offer(positions[0]).verdict is Verdict.KNOWN
-    assert len(collector.kept) == 1
+    selection, positions = seen
+    assert selection.offer(positions[0]).verdict is Verdict.MOVING
+    assert selection.offer(positions[0]).verdict is Verdict.KEPT
+    assert selection.offer(positions[0]).verdict is Verdict.KNOWN
+    assert len(selection.kept) == 1
 
 
 def test_a_board_that_moves_is_not_kept(seen):
-    collector, positions = seen
-    collector.offer(positions[0])
+    selection, positions = seen
+    selection.offer(positions[0])
     moved = {
         camera: replace(shown, corners=shown.corners + 2.0)
         for camera, shown in positions[0].items()
     }
-    take = collector.offer(moved)
-    assert take.verdict is Verdict.MOVING
-    assert take.cameras == ("left", "right")
+    result = selection.offer(moved)
+    assert result.verdict is Verdict.MOVING
+    assert result.cameras == ("left", "right")
 
 
 def test_a_camera_that_does_not_see_the_board_is_named_and_breaks_the_stillness(seen):
-    collector, positions = seen
-    collector.offer(positions[0])
-    take = collector.offer({**positions[0], "right": None})
-    assert (take.verdict, take.cameras) == (Verdict.UNSEEN, ("right",))
-    assert collector.offer(positions[0]).verdict is Verdict.MOVING
-    assert "right" in collector.text(take)
+    selection, positions = seen
+    selection.offer(positions[0])
+    result = selection.offer({**positions[0], "right": None})
+    assert (result.verdict, result.cameras) == (Verdict.UNSEEN, ("right",))
+    assert selection.offer(positions[0]).verdict is Verdict.MOVING
+    assert "right" in selection.text(result)
 
 
 def test_enough_positions_are_enough(seen):
-    collector, positions = seen
+    selection, positions = seen
     for position in positions[:3]:
-        assert not collector.done
-        collector.offer(position)
-        assert collector.offer(position).verdict is Verdict.KEPT
-    assert collector.done
-    text = collector.text()
+        assert not selection.done
+        selection.offer(position)
+        assert selection.offer(position).verdict is Verdict.KEPT
+    assert selection.done
+    text = selection.text()
     assert text.startswith("3/3 positions; covered left ")
     assert "right" in text
 
 
 def test_the_first_line_needs_no_position(seen):
-    collector, _ = seen
-    assert collector.text() == "0/3 positions"
+    selection, _ = seen
+    assert selection.text() == "0/3 positions"

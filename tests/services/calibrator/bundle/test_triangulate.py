@@ -7,7 +7,7 @@ import pytest
 
 from rhot.geometry.transforms import apply, rotation_from_vector, transform
 from services.calibrator.board.board import Board
-from services.calibrator.bundle.lens_model import lens_vector, rays
+from services.calibrator.bundle.lens_model import lens_vector, rays_from_pixels
 from services.calibrator.bundle.triangulate import epipolar_px, rigid_fit, triangulate
 
 
@@ -16,7 +16,10 @@ def test_exact_pixels_give_exact_points_on_exact_epipolar_lines(make_bench, came
     bench = make_bench(cameras, positions=1)
     true = apply(bench.poses["01"], bench.board.points)
     seen = np.stack(
-        [rays(lens_vector(c.matrix, c.distortion), c.project(true)) for c in bench.cameras]
+        [
+            rays_from_pixels(lens_vector(c.matrix, c.distortion), c.project(true))
+            for c in bench.cameras
+        ]
     )
     places = np.stack([camera.T_camera_from_rig for camera in bench.cameras])
     np.testing.assert_allclose(triangulate(places, seen, np.full(cameras, 527.0)), true, atol=1e-9)

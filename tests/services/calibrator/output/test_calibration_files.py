@@ -8,7 +8,7 @@ import pytest
 from rhot.errors import CalibrationError
 from rhot.files.calibration import load_cameras, load_lens, save
 from rhot.geometry.transforms import apply
-from services.calibrator.lens.calibrate import calibrate_camera
+from services.calibrator.lens.calibrate import calibrate_lens
 from services.calibrator.output.calibration_files import given_lenses, lens_of, lenses_of, rig_of
 from services.calibrator.rig.calibrate import calibrate_rig
 
@@ -57,7 +57,7 @@ def test_files_say_how_they_were_made(calibrated):
 
 def test_one_lens_is_read_back(make_bench, tmp_path):
     bench = make_bench(1, positions=8)
-    result = calibrate_camera("left", bench.detections(0.05)["left"], bench.board)
+    result = calibrate_lens("left", bench.detections(0.05)["left"], bench.board)
     save(tmp_path / "left.lens.json", lens_of(result, bench.board, "2025-01-01", "pictures"))
     lens = load_lens(tmp_path, "left")
     assert lens.size_px == (640, 480)

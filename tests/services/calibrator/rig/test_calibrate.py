@@ -12,10 +12,11 @@ import pytest
 from rhot.errors import CalibrationError
 from rhot.geometry.transforms import angle_between, inverse
 from services.calibrator.board.board import Board
-from services.calibrator.board.corner_order import turns
+from services.calibrator.board.corner_order import rotated_numberings
 from services.calibrator.bundle.lens_model import lens_vector
 from services.calibrator.output.report import rig_text
-from services.calibrator.rig.calibrate import RigResult, calibrate_rig
+from services.calibrator.rig.calibrate import calibrate_rig
+from services.calibrator.rig.result import RigResult
 
 
 def place_errors(bench, result: RigResult) -> list[tuple[float, float]]:
@@ -61,7 +62,7 @@ def test_boards_that_look_the_same_turned_are_numbered_alike(make_bench, size):
     Expected: the cameras agree all the same.
     """
     bench = make_bench(positions=8, board=Board(*size, 0.025))
-    found, options = bench.detections(0.1), turns(*size)
+    found, options = bench.detections(0.1), rotated_numberings(*size)
     for k, key in enumerate(found["right"]):
         found["right"][key] = replace(
             found["right"][key], corners=found["right"][key].corners[options[k % len(options)]]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from services.calibrator.board.board_views import board_view
 from services.calibrator.bundle.lens_model import lens_vector
 from services.calibrator.bundle.residuals import State
-from services.calibrator.bundle.views import view_of
-from services.calibrator.rig.held_out_error import board_error
+from services.calibrator.rig.held_out_error import held_out_error
 
 
 def views_and_state(bench, noise_px):
@@ -17,7 +17,7 @@ def views_and_state(bench, noise_px):
         key for key in bench.poses if all(key in found[camera.name] for camera in bench.cameras)
     )
     views = [
-        view_of(bench.board, found[camera.name][key], k, 0)
+        board_view(bench.board, found[camera.name][key], k, 0)
         for k, camera in enumerate(bench.cameras)
     ]
     state = State(
@@ -31,7 +31,7 @@ def views_and_state(bench, noise_px):
 def test_a_true_rig_has_no_error(make_bench):
     bench = make_bench()
     views, state, key = views_and_state(bench, 0.0)
-    error = board_error(views, state, bench.board)
+    error = held_out_error(views, state, bench.board)
     assert error is not None
     assert error.fit_squares < 1e-8
     assert error.square_ratio == pytest.approx(1.0, abs=1e-9)
@@ -46,7 +46,7 @@ def test_a_baseline_too_long_makes_squares_too_large(make_bench):
     views, state, _ = views_and_state(bench, 0.0)
     longer = state.T_camera_from_rig.copy()
     longer[1, :3, 3] *= 1.02
-    error = board_error(views, State(state.lenses, longer, state.T_rig_from_board), bench.board)
+    error = held_out_error(views, State(state.lenses, longer, state.T_rig_from_board), bench.board)
     assert error is not None
     assert error.square_ratio == pytest.approx(1.02, abs=2e-3)
 
@@ -54,6 +54,6 @@ def test_a_baseline_too_long_makes_squares_too_large(make_bench):
 def test_one_view_or_too_few_common_corners_have_no_error(make_bench):
     bench = make_bench()
     views, state, _ = views_and_state(bench, 0.0)
-    assert board_error(views[:1], state, bench.board) is None
+    assert held_out_error(views[:1], state, bench.board) is None
     apart = [views[0], type(views[1])(1, 0, np.arange(5), views[1].points[:5], views[1].pixels[:5])]
-    assert board_error(apart, state, bench.board) is None
+    assert held_out_error(apart, state, bench.board) is None

@@ -1,5 +1,6 @@
-"""`rhot calibrate stereo --live` against cameras on a real router that answer `frame` queries with
-rendered pictures.
+"""`rhot calibrate stereo --live` against cameras on a real router.
+
+The cameras answer `frame` queries with rendered pictures.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from rhot.bus.bus import open_bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig, load_rig
 from services.calibrator.board.board import Board
-from services.cli.calibrate import live_pictures as calibrate_live
+from services.cli.calibrate import live_pictures
 from services.cli.calibrate.live_pictures import collect, one_each
+from testing.synthetic_boards import BenchSetup
 
 
 @pytest.fixture
@@ -31,9 +33,11 @@ def rig(tmp_path, router) -> RigConfig:
 
 
 @pytest.fixture(scope="module")
-def shown(make_bench) -> dict[str, list[bytes]]:
+def shown() -> dict[str, list[bytes]]:
     """PNGs of each camera, position by position."""
-    bench = make_bench(positions=3, size_px=(320, 240), focal_px=263.0, distortion=(0.0,) * 5)
+    bench = BenchSetup(
+        positions=3, size_px=(320, 240), focal_px=263.0, distortion=(0.0,) * 5
+    ).bench()
     pictures = {
         camera.name: [bench.picture(camera, key) for key in bench.poses] for camera in bench.cameras
     }
@@ -87,7 +91,7 @@ async def test_a_camera_that_is_silent_is_named(rig, router, shown, tmp_path):
 
 
 async def test_nobody_showing_anything_new_ends_it(rig, router, shown, tmp_path, monkeypatch):
-    monkeypatch.setattr(calibrate_live, "_PATIENCE_S", 0.5)
+    monkeypatch.setattr(live_pictures, "_PATIENCE_S", 0.5)
     async with cameras(router, {name: pictures[:1] for name, pictures in shown.items()}):
         with pytest.raises(CalibrationError, match="nothing new was shown") as ended:
             await asyncio.to_thread(collect, rig, [], tmp_path, Board(9, 6, 0.025), 0.025, 3, None)

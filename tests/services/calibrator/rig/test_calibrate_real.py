@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.calibrator.board.find_boards import find_boards, the_board
+from services.calibrator.board.find_boards import determine_board, find_boards
 from services.calibrator.board.picture_folder import PictureSet, find_pictures
 from services.calibrator.rig.calibrate import calibrate_rig
 
@@ -21,7 +21,7 @@ def pictures(rhot_data) -> PictureSet:
 
 def test_the_real_pairs_are_calibrated_to_the_limit(pictures):
     assert pictures.cameras == ["left", "right"]
-    board = the_board(pictures, None, 1.0)
+    board = determine_board(pictures, None, 1.0)
     assert (board.cols, board.rows) == (9, 6)
     found, blind = find_boards(pictures, board)
     assert not blind
