@@ -20,7 +20,7 @@ from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import load_rig
 from rhot.messages import Session, SimFrame
 from rhot.process.service import Service
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.calibrate.pictures import recorded, spread
 from services.pi_tracker.service import serve
 from testing.synthetic_images import Tip, clean, frame_of, noisy
