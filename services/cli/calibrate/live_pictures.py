@@ -18,8 +18,8 @@ from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig
-from services.cli.router_session import reach
-from services.cli.terminal import Teller
+from services.cli.router_session import router_session
+from services.cli.terminal import Terminal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +58,7 @@ def collect(
     for name in names:
         rig.camera_named(name)
     folder.mkdir(parents=True, exist_ok=True)
-    teller = Teller()
+    teller = Terminal()
     teller.line(
         f"show the board to {' and '.join(names)} and hold it still; pictures go to {folder}; Ctrl-C ends early"
     )
@@ -87,7 +87,7 @@ def one_each(rig: RigConfig, names: list[str], folder: Path, connect: str | None
 
 async def _one_each(rig: RigConfig, names: list[str], endpoints: list[str]) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
-    async with reach(rig.rig.name, endpoints) as bus:
+    async with router_session(rig.rig.name, endpoints) as bus:
         for attempt in range(_ATTEMPTS):
             await asyncio.sleep(0.2 * attempt)
             pictures |= await _ask(bus, [name for name in names if name not in pictures])
@@ -118,7 +118,7 @@ class _Job:
         folder: Path,
         square_m: float,
         count: int,
-        teller: Teller,
+        teller: Terminal,
     ) -> None:
         self.board: Board | None = None
         self._rig, self._names, self._folder = rig, names, folder
@@ -130,7 +130,7 @@ class _Job:
         """Ask, judge, keep, until there are enough."""
         from services.calibrator.board.live_selection import Collector, Verdict
 
-        async with reach(self._rig.rig.name, endpoints) as bus:
+        async with router_session(self._rig.rig.name, endpoints) as bus:
             collector: Collector | None = None
             news_s = time.monotonic()
             while collector is None or not collector.done:

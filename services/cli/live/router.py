@@ -21,7 +21,7 @@ from rhot.files.config import load_rig
 from rhot.process import systemd
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 
-LOOPBACK = "tcp/127.0.0.1:7447"
+_LOOPBACK = "tcp/127.0.0.1:7447"
 
 
 @contextlib.asynccontextmanager
@@ -50,7 +50,7 @@ def router(
     ] = None,
 ) -> None:
     """Run a Zenoh router until Ctrl-C (loopback only, unless told otherwise)."""
-    endpoints = listen or (list(load_rig(config).bus.listen) if config else [LOOPBACK])
+    endpoints = listen or (list(load_rig(config).bus.listen) if config else [_LOOPBACK])
     uvloop.run(_route(endpoints))
 
 
