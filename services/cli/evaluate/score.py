@@ -1,8 +1,7 @@
-"""`rhot score CAPTURE RESULT`: how far the poses of a result are from the truth of the capture it
-was made from.
+"""`rhot score CAPTURE RESULT`: errors of a result's poses against the truth of its capture.
 
-A capture without truth.jsonl, an interrupted result, or one of another capture is an error that
-says so.
+A capture without truth.jsonl, an interrupted result, or a result of another capture is an error
+that says so.
 """
 
 from __future__ import annotations

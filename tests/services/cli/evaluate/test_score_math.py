@@ -10,13 +10,8 @@ from hypothesis import strategies as st
 from rhot.errors import CaptureError
 from rhot.hand import DIGIT_ANGLES, DIGITS
 from rhot.messages import ObjectPose
-from services.cli.evaluate.score_math import (
-    coverage,
-    delay_ms,
-    score_hand,
-    score_object,
-    turn_error,
-)
+from services.cli.evaluate.score_math import score_hand, score_object
+from services.cli.evaluate.score_statistics import coverage, delay_ms, orientation_error
 from services.cli.evaluate.truth_track import hand_track, object_track
 
 PERIOD_NS = 1e9 / 30.0
@@ -148,9 +143,9 @@ def test_coverage_is_consistent_for_any_stamps(stamps, expected):
 def test_turns_are_exact_where_the_dot_product_is_not():
     small = np.array([[1.0, 1e-6, 0.0, 0.0]])
     same = np.array([[1.0, 0.0, 0.0, 0.0]])
-    assert turn_error(small, same).mean_deg == pytest.approx(0.0, abs=1e-3)
-    assert turn_error(np.array([[0.0, 0.0, 1.0, 0.0]]), same).max_deg == pytest.approx(180.0)
-    assert turn_error(-same, same).max_deg == 0.0
+    assert orientation_error(small, same).mean_deg == pytest.approx(0.0, abs=1e-3)
+    assert orientation_error(np.array([[0.0, 0.0, 1.0, 0.0]]), same).max_deg == pytest.approx(180.0)
+    assert orientation_error(-same, same).max_deg == 0.0
 
 
 def test_a_delay_needs_enough_instants():

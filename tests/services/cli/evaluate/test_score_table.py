@@ -5,8 +5,9 @@ from __future__ import annotations
 import msgspec
 
 from services.cli.evaluate.score_math import score_hand
-from services.cli.evaluate.score_table import score_text, table
+from services.cli.evaluate.score_table import score_text
 from services.cli.evaluate.score_types import Coverage, ObjectScore, Score
+from services.cli.evaluate.text_table import table
 from services.cli.evaluate.truth_track import hand_track
 
 

@@ -14,7 +14,8 @@ from rhot.geometry.transforms import (
     rotation_from_quaternion,
     rotation_from_vector,
 )
-from services.cli.evaluate.truth_track import cubic, hand_track, inside, linear, object_track, slerp
+from services.cli.evaluate.interpolation import cubic, linear, slerp
+from services.cli.evaluate.truth_track import hand_track, inside, object_track
 
 STAMPS = 1_700_000_000_000_000_000 + np.arange(31, dtype=np.int64) * 33_333_333
 

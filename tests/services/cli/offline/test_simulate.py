@@ -11,7 +11,7 @@ from rhot.errors import ConfigError
 from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
 from rhot.messages import Truth
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.simulator.scene.catalog import SCENES
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.capture import read_lines
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS
 from services.cli.offline.run import run
