@@ -1,5 +1,6 @@
-"""The `rhot` command. Each command is a file in the room of what its user does; what several rooms
-share lies here beside them.
+"""The `rhot` command: each command is a file, in the room of what its user does.
+
+What several rooms share lies here beside them. The rooms:
 
 live      a running rig: demo, up, router, top, session, and warm before the first start
 record    a rig's messages into a file and out again: record, replay

@@ -14,13 +14,13 @@ PROGRAM = "rhot"
 def main() -> None:
     """Entry point of rhot."""
     logging.basicConfig(level="WARNING", format=f"{PROGRAM}: %(message)s")
-    # The same as the option of application.py, without typer: an installation of the core
-    # dependencies alone can tell its version too.
+    # The same as the option of application.py, but without typer, which an installation of the core
+    # dependencies alone does not have.
     if sys.argv[1:] == ["--version"]:
         print(rhot_version())
         return
     try:
-        # Not above: where typer is missing, this import fails and is told like any other error.
+        # Not above: where typer is missing, this import fails, and the user gets one line.
         from services.cli.application import application
 
         application()()

@@ -1,8 +1,8 @@
-"""Where the configuration that rhot ships is: config/ of the source tree, or the wheel's copy of it
-beside this file. Commands only read it; what writes works on a copy or in the current folder.
+"""Where the configuration that rhot ships is: config/ of the source tree, or the wheel's copy.
 
-pyproject.toml (hatch, force-include) puts the copy into the wheel, so the two cannot differ; a
-source tree has no copy.
+The wheel's copy lies beside this file: pyproject.toml (hatch, force-include) puts it there, so the
+two cannot differ; a source tree has no copy. Commands only read the shipped files. What is written
+goes into a copy or into the current folder.
 """
 
 from __future__ import annotations

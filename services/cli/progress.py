@@ -1,5 +1,6 @@
-"""One line of progress on standard error, and none where it is no terminal: pipes, logs and CI stay
-clean.
+"""One line of progress on standard error, on a terminal only.
+
+Pipes, logs and CI stay clean unless progress is asked for.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Messages of one topic out of a recording: a result folder of `rhot track`, one of its .jsonl
-files, or an MCAP file of `rhot record`.
+"""Reads the messages of one topic from a recording.
 
-A file that cannot be read, or a damaged message, raises CaptureError with the file's name.
+A recording is a result folder of `rhot track`, one of its .jsonl files, or an MCAP file of `rhot
+record`. A file that cannot be read, or a damaged message, raises CaptureError with the file's name.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""What long-running commands print on standard error: lines that stay, and below them one status
-line that is overwritten on a terminal.
+"""Output of long-running commands on standard error: lines that stay above one status line.
+
+The status line is overwritten on a terminal, and left out elsewhere.
 """
 
 from __future__ import annotations

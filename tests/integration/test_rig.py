@@ -1,6 +1,4 @@
-"""The main job: from simulated cameras to poses, in real processes over a real router, against the
-simulator's truth.
-"""
+"""From simulated cameras to poses: real processes on a real router, against the true hand."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ import pytest
 
 from rhot import clock, topics
 from rhot.geometry.transforms import angle_between, rotation_from_quaternion
-from rhot.hand import default_hand
+from rhot.hand import DIGITS, default_hand
 from services.cli.live.demo_metrics import DemoMetrics
 
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
@@ -64,13 +62,7 @@ async def test_poses_are_right(rig):
 async def test_every_pose_is_a_possible_hand(rig):
     limits = default_hand("right").limits_rad
     for pose in await some(rig.bus.every(topics.POSE, 64), 30):
-        assert [finger.name for finger in pose.fingers] == [
-            "thumb",
-            "index",
-            "middle",
-            "ring",
-            "little",
-        ]
+        assert tuple(finger.name for finger in pose.fingers) == DIGITS
         for row, finger in enumerate(pose.fingers):
             assert np.all(finger.model_angles_rad >= limits[row, :, 0] - 1e-5)
             assert np.all(finger.model_angles_rad <= limits[row, :, 1] + 1e-5)

@@ -1,5 +1,4 @@
-"""`rhot plot DIR`: the result of `rhot track` as PNG pictures, to see at a glance where a marker
-was lost or a joint jumped.
+"""`rhot plot DIR`: PNG pictures of a result, to see where a marker was lost or a joint jumped.
 
 What a result does not hold (no second camera, no hand) is not drawn; an empty or interrupted result
 is an error.

@@ -1,7 +1,7 @@
-"""The pictures of `rhot plot`: arrays in, matplotlib figures out. No pyplot, no global state, no
-window.
+"""The pictures of `rhot plot`: arrays in, matplotlib figures out.
 
-Lines break at NaN. A figure without any value is still a figure: callers leave it out.
+No pyplot, no global state, no window. Lines break at NaN. A figure without any value is still a
+figure: callers leave it out.
 """
 
 from __future__ import annotations

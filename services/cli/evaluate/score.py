@@ -21,13 +21,11 @@ def score(
     ],
     result: Annotated[Path, typer.Argument(help="folder written by `rhot track`")],
     stages: Annotated[
-        bool, typer.Option("--stages", help="also say how much error markers and 3D points have")
+        bool, typer.Option("--stages", help="also the errors of markers and 3D points")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of tables")] = False,
 ) -> None:
-    """Compare tracked poses with the simulator's truth: tips, angles, orientation, dropouts,
-    limits, delay.
-    """
+    """Compare tracked poses with the truth: tips, angles, orientation, dropouts, limits, delay."""
     # Not above: scipy takes longer to import than the other commands take to run.
     from services.cli.evaluate.score_result import score_result
     from services.cli.evaluate.score_table import score_text

@@ -105,7 +105,7 @@ def stages_text(hand: str, stages: Stages) -> str:
 def _overview(score: HandScore) -> list[tuple[str, str, str]]:
     """(what, value, remark) of what is one number for the whole hand."""
     turn, limits = score.orientation, score.violations
-    turn_text = f"RMS; mean {turn.mean_deg:.2f}, most {turn.max_deg:.2f}"
+    turn_text = f"RMS; mean {turn.mean_deg:.2f}, max {turn.max_deg:.2f}"
     worst = f"worst {limits.worst_deg:.2f} deg at {limits.worst_joint}" if limits.count else "none"
     missed = f"{100 * score.coverage.missed_share:.1f} %"
     delay = "-" if score.delay_ms is None else f"{score.delay_ms:.1f} ms"
@@ -116,7 +116,7 @@ def _overview(score: HandScore) -> list[tuple[str, str, str]]:
         ("wrist position, RMS", f"{score.wrist.total_rms_mm:.2f} mm", ""),
         ("dropouts", missed, _coverage_text(score.coverage)),
         ("limit violations", str(limits.count), worst),
-        ("delay", delay, "of the content; - where the motion does not tell"),
+        ("delay", delay, "of the content; - if the motion is too slow to measure it"),
     ]
 
 

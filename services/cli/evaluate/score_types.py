@@ -25,7 +25,7 @@ class PointError(msgspec.Struct, frozen=True, kw_only=True):
 class AngleError(msgspec.Struct, frozen=True, kw_only=True):
     """Error of one joint angle in deg: signed mean (bias), mean and maximum of its size.
 
-    A fixed joint cannot move (its limits are equal), so its error says nothing.
+    A fixed joint cannot move (its limits are equal), so its error is no error of the estimate.
     """
 
     bias_deg: float

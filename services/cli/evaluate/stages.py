@@ -1,5 +1,4 @@
-"""Errors of the stages before the hand is solved: markers against the projected truth, 3D points
-against the truth's landmarks.
+"""Errors of the stages before the pose: markers against the projected truth, points in 3D.
 
 Poses are the third stage (score_math.py). A landmark's truth is the point that stands for its paint
 (rhot.hand.landmark_point), not the joint: that is what fusion reports. Instants outside the truth

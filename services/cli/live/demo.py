@@ -1,5 +1,7 @@
-"""`rhot demo`: router, simulated rig, all services and the live view, on one machine, until Ctrl-C
-or for N seconds.
+"""`rhot demo`: the whole rig, simulated, on one machine, until Ctrl-C or for N seconds.
+
+Router, simulator, trackers, fusion, solver, object tracker and viewer are processes of their own,
+as in `rhot up`. They run on a copy of the configuration that rhot ships.
 """
 
 from __future__ import annotations

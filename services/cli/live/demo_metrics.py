@@ -1,7 +1,7 @@
-"""Measurements of a running rig for `rhot demo`: rate, glass-to-pose latency, and finger-tip error
-against the simulator's truth. Pure.
+"""Measures a running rig for `rhot demo`: pose rate, glass-to-pose latency, finger-tip error.
 
-A pose without truth before and after it counts in rate and latency only.
+The error is against the simulator's truth. A pose without truth before and after it counts in rate
+and latency only. Pure.
 """
 
 from __future__ import annotations

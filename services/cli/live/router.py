@@ -49,7 +49,7 @@ def router(
         list[str] | None, typer.Option(help="endpoint, e.g. tcp/0.0.0.0:7447 for the whole network")
     ] = None,
 ) -> None:
-    """Run a Zenoh router until Ctrl-C (loopback only, unless told otherwise)."""
+    """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
     endpoints = listen or (list(load_rig(config).bus.listen) if config else [_LOOPBACK])
     uvloop.run(_route(endpoints))
 

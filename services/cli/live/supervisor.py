@@ -1,5 +1,4 @@
-"""Child processes that are restarted when they end, and all ended together: what systemd does for
-an installed rig.
+"""Child processes that are restarted when they end: what systemd does for an installed rig.
 
 Each child leads a session of its own: Ctrl-C reaches only the supervisor, which ends the children.
 The kernel kills them should the supervisor be killed. What they write comes out line by line with
@@ -105,6 +104,7 @@ def _die_with_parent() -> None:
 
 async def _end(process: asyncio.subprocess.Process) -> None:
     """SIGTERM, and SIGKILL for a process that does not end."""
+    # Alike in services/object_tracker/sources/libsurvive.py: a service does not import the command.
     if process.returncode is not None:
         return
     with contextlib.suppress(ProcessLookupError):

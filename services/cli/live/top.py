@@ -1,5 +1,7 @@
-"""`rhot top`: every service's state, its rates against the topics table, drops, and latencies of
-each hop and from glass to pose.
+"""`rhot top`: the state, rates, losses and latencies of every service, live.
+
+Rates are compared with the topics table. Latencies are of each hop, and from glass to pose: from
+mid-exposure to the published pose.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from services.cli.live.top_text import table_text
 from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import rig_and_endpoints, router_session
 
-# A beat comes once a second: after two, every living service has been heard.
+# A beat comes once a second: within two, every running service has sent one.
 _LISTEN_S = 2.2
 
 

@@ -1,8 +1,7 @@
-"""The state of every service for `rhot top`, from health beats and liveliness tokens. Pure: time is
-an argument.
+"""The state of every service for `rhot top`, from health beats and liveliness tokens.
 
 A service whose beat is missing for three seconds is `silent`, one whose token is gone is `gone`,
-one that rig.toml expects and that never came is `absent`.
+one that rig.toml expects and that never came is `absent`. Pure: time is an argument.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""`rhot up CONFIG`: the master's processes of a real rig, supervised: router, fusion, solver,
-object tracker, viewer, recorder.
+"""`rhot up CONFIG`: the master's processes of a real rig, supervised.
 
-Cameras whose `host` is empty are tracked on this machine too; those of other hosts run
-`rhot-pi-tracker` there.
+These are router, fusion, solver, object tracker, viewer and recorder. Cameras whose `host` is empty
+are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""The whole rig without its processes: frames of all cameras in, markers, points and poses out, in
-the order of time.
+"""The whole rig without its processes: frames of all cameras in, markers, points and poses out.
 
-The step objects are the services' own; here their messages pass from one to the next without a bus.
-Pure: the same frames give the same messages. With one camera, without a hand or without geometry
-there are markers only (`Pipeline.hands` is then empty). A frame whose size is not its lens
-calibration's is a CalibrationError at once, as no point could be computed from it.
+Frames come in the order of time. The step objects are the services' own; their messages pass from
+one to the next without a bus. Pure: the same frames give the same messages. With one camera,
+without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame
+whose size is not its lens calibration's is a CalibrationError at once, as no point could be
+computed from it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""The folder `rhot track` writes: markers, points, poses and objects as .jsonl in wire format, and
-summary.json last of all.
+"""The folder `rhot track` writes: .jsonl files in wire format, and summary.json last of all.
 
 Each file is written as NAME.partial and gets its name when all are complete. A run that fails
 removes its .partial files and leaves what was there before; one that is interrupted leaves them,

@@ -1,5 +1,4 @@
-"""One run of `rhot track`: reads the recordings frame by frame, runs the pipeline, writes the
-result folder.
+"""One run of `rhot track`: recordings through the pipeline, frame by frame, into a result folder.
 
 An error leaves no result, an interruption .partial files (results.py).
 """
@@ -29,7 +28,7 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
     """
     names = [one.camera for one in job.inputs]
     cameras, markers_only = geometry(job.config, names)
-    trackers = {name: _tracker(job.config, name) for name in names}
+    trackers = {name: tracker_step(job.config, name) for name in names}
     clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
     with ResultWriter(out) as writer:
@@ -71,10 +70,14 @@ def _track_frames(
     return counters
 
 
-def _tracker(config: RigConfig, name: str) -> TrackerStep:
+def tracker_step(config: RigConfig, name: str) -> TrackerStep:
+    """The tracker of one camera with its calibration.
+
+    Raises CalibrationError naming the command that helps.
+    """
     colors = load_colors(config.calibration_dir, name)
     path = config.calibration_dir / f"{name}.colors.json"
-    # Without a hand rig.toml does not say which colours are needed: all are tracked.
+    # Without a hand in rig.toml no landmark chooses the colours: all are tracked.
     wanted = config.colors or sorted(colors.colors)
     if not wanted:
         raise CalibrationError(

@@ -1,4 +1,4 @@
-"""Progress shows where somebody watches, and nowhere else."""
+"""Progress shows on a terminal, and elsewhere only if asked for."""
 
 from __future__ import annotations
 

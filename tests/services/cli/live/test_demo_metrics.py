@@ -8,6 +8,7 @@ import pytest
 from rhot import hand as h
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, HandTruth, Truth, WristPose
 from services.cli.live.demo_metrics import DemoMetrics
+from services.cli.live.demo_summary import summary_text
 
 START_NS = 1_700_000_000_000_000_000
 FRAME_NS = 33_333_333
@@ -74,3 +75,11 @@ def test_without_truth_or_poses_nothing_is_claimed():
     assert metrics.summary({}).latency_p50_ms is None
     metrics.add_pose(pose(START_NS, 0.0), START_NS + 1)
     assert metrics.summary({}).tip_error_rms_mm is None
+
+
+def test_the_text_has_every_measurement_and_names_what_is_missing():
+    metrics = DemoMetrics()
+    metrics.add_pose(pose(START_NS, 0.0), START_NS + 20_000_000)
+    text = summary_text(metrics.summary({"fusion": 2}))
+    for part in ("1 in 0.0 s", "p50 20.0 ms", "RMS not measured", "fusion: 2"):
+        assert part in text
