@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import importlib
 import json
 import logging
 import os
@@ -26,6 +27,7 @@ from rhot.bus.bus import open_bus
 from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
+from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
 
 Serve = Callable[[Service], Awaitable[None]]
@@ -35,15 +37,16 @@ log = logging.getLogger("rhot.lifecycle")
 EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
 
 
-def command(name: str, serve: Serve, instance_option: str = "instance") -> None:
-    """The whole main() of a service: options, logging, loop, exit code.
+def command(name: str, module: str, about: str | None, instance_option: str = "instance") -> None:
+    """The whole main() of a service: options, imports, logging, loop, exit code.
 
-    instance_option names the option that says which one of several this is, e.g. "camera"; any
-    other than "instance" is required.
+    module holds the coroutine `serve`. It is imported once the options are read, so that --help and
+    --version need no extra of the package; about is what --help says. instance_option names the
+    option that says which one of several this is, e.g. "camera"; any other than "instance" is
+    required.
     """
-    parser = argparse.ArgumentParser(
-        prog=f"rhot-{name.replace('_', '-')}", description=serve.__doc__ or f"rhot's {name} service"
-    )
+    program = _program(name)
+    parser = argparse.ArgumentParser(prog=program, description=about)
     parser.add_argument("--config", type=Path, required=True, help="rig.toml")
     required = instance_option != "instance"
     parser.add_argument(
@@ -61,6 +64,13 @@ def command(name: str, serve: Serve, instance_option: str = "instance") -> None:
     )
     parser.add_argument("--version", action="version", version=rhot_version())
     options = parser.parse_args()
+    try:
+        serve: Serve = importlib.import_module(module).serve
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error, program)
+        if missing is None:
+            raise
+        parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
     log_json_lines(f"{name}/{options.name}")
     sys.exit(run(name, options.name, options.config, serve, options.connect))
 
@@ -77,20 +87,34 @@ def run(
             )
         uvloop.run(_live(name, instance, config, serve))
     except Exception as error:
-        return _explain(error, f"{name} {instance}")
+        return _explain(error, name, instance)
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
 
 
-def _explain(error: Exception, who: str) -> int:
+def user_errors(error: Exception, program: str) -> list[RhotError]:
+    """What the user can mend of an error or a group of them; empty if any of it is a bug.
+
+    program is the command's name. A missing extra is the user's to install, and says how.
+    """
+    found = [missing_extra(leaf, program) or leaf for leaf in leaves(error)]
+    errors = [leaf for leaf in found if isinstance(leaf, RhotError)]
+    return errors if len(errors) == len(found) else []
+
+
+def _program(name: str) -> str:
+    return f"rhot-{name.replace('_', '-')}"
+
+
+def _explain(error: Exception, name: str, instance: str) -> int:
     """Log what ended a service; its exit code."""
-    found = list(leaves(error))
-    if all(isinstance(leaf, RhotError) for leaf in found):
-        for leaf in found:
-            log.error("%s", leaf)
+    errors = user_errors(error, _program(name))
+    for one in errors:
+        log.error("%s", one)
+    if errors:
         return EXIT_USER
-    log.error("%s failed", who, exc_info=error)
+    log.error("%s %s failed", name, instance, exc_info=error)
     return EXIT_BUG
 
 

@@ -1,13 +1,14 @@
-"""The `rhot` command. Each command is a file in the room of what its user does; what several rooms
-share lies here beside them.
+"""The `rhot` command: each command is a file, in the room of what its user does.
+
+What several rooms share lies here beside them. The rooms:
 
 live      a running rig: demo, up, router, top, session, and warm before the first start
-record    what a running rig says, into a file and out again: record, replay
+record    a rig's messages into a file and out again: record, replay
 calibrate what a rig must know about itself: calibrate ..., and the board to print
 check     whether a rig.toml will do, before anything runs
 offline   recordings in, results out, without a rig: simulate, track, tune
-evaluate  results against the truth, as figures and as pictures: score, plot
+evaluate  results against the truth, as tables and as pictures: score, plot
 
 Only calibrate and evaluate use another room (offline); check, offline and evaluate import no bus,
-clock or thread themselves. tests/test_architecture.py sees to both.
+clock or thread themselves. tests/test_architecture.py checks both.
 """

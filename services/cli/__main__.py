@@ -1,88 +1,35 @@
-"""The `rhot` command.
-
-Every subcommand is one function in the file of its name, in a room of this folder; here they are
-only gathered.
-"""
+"""The program `rhot`: runs the command line; what a user can mend is one line and exit code 2."""
 
 from __future__ import annotations
 
 import logging
 import sys
 
-import typer
-
-from rhot.errors import RhotError, leaves
-from rhot.process.lifecycle import EXIT_USER
+from rhot.process.lifecycle import EXIT_USER, user_errors
 from rhot.process.service import rhot_version
-from services.cli.calibrate.board import board
-from services.cli.calibrate.calibrate import calibrate
-from services.cli.check.check import check
-from services.cli.evaluate.plot import plot
-from services.cli.evaluate.score import score
-from services.cli.live.demo import demo
-from services.cli.live.router import router
-from services.cli.live.session import session
-from services.cli.live.top import top
-from services.cli.live.up import up
-from services.cli.live.warm import warm
-from services.cli.offline.simulate import simulate
-from services.cli.offline.track import track
-from services.cli.offline.tune import tune
-from services.cli.options import menu
-from services.cli.record.record import record
-from services.cli.record.replay import replay
 
-COMMANDS = (
-    demo,
-    up,
-    router,
-    top,
-    session,
-    track,
-    score,
-    plot,
-    simulate,
-    record,
-    replay,
-    check,
-    board,
-    warm,
-)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(rhot_version())
-        raise typer.Exit
-
-
-def application() -> typer.Typer:
-    """The command with all its subcommands."""
-    app = menu("rhot", "Real-time hand and object tracking from low-cost parts.")
-
-    @app.callback()
-    def options(
-        version: bool = typer.Option(
-            False, "--version", callback=_version, is_eager=True, help="print the version"
-        ),
-    ) -> None:
-        pass
-
-    for function in COMMANDS:
-        app.command(name=function.__name__)(function)
-    app.add_typer(calibrate)
-    app.add_typer(tune, name="tune")
-    return app
+PROGRAM = "rhot"
 
 
 def main() -> None:
-    """Run `rhot`; what a user can mend is one line on standard error and exit code 2."""
-    logging.basicConfig(level="WARNING", format="rhot: %(message)s")
+    """Entry point of rhot."""
+    logging.basicConfig(level="WARNING", format=f"{PROGRAM}: %(message)s")
+    # The same as the option of application.py, but without typer, which an installation of the core
+    # dependencies alone does not have.
+    if sys.argv[1:] == ["--version"]:
+        print(rhot_version())
+        return
     try:
+        # Not above: where typer is missing, this import fails, and the user gets one line.
+        from services.cli.application import application
+
         application()()
-    except* RhotError as group:
-        for error in leaves(group):
-            typer.echo(f"rhot: error: {error}", err=True)
+    except Exception as error:
+        errors = user_errors(error, PROGRAM)
+        if not errors:
+            raise
+        for one in errors:
+            print(f"{PROGRAM}: error: {one}", file=sys.stderr)
         sys.exit(EXIT_USER)
 
 

@@ -1,8 +1,8 @@
-"""Where the ready-made configurations are: config/ of the source tree, or the copy that the wheel
-carries beside this file.
+"""Where the configuration that rhot ships is: config/ of the source tree, or the wheel's copy.
 
-pyproject.toml (hatch, force-include) puts the copy there, so the two cannot differ; a source tree
-has no copy.
+The wheel's copy lies beside this file: pyproject.toml (hatch, force-include) puts it there, so the
+two cannot differ; a source tree has no copy. Commands only read the shipped files. What is written
+goes into a copy or into the current folder.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ def config_dir() -> Path:
         if (folder / "sim.toml").is_file():
             return folder
     raise ConfigError(
-        f"{here / 'config'}: rhot's own sim.toml is missing; install rhot again, or name a file with --config"
+        f"{here / 'config'}: rhot's own sim.toml is missing; "
+        "install rhot again, or name a file with --config"
     )
 
 

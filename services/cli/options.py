@@ -1,6 +1,4 @@
-"""Options and menus that commands of several rooms share, so that one thing has one name and one
-help text everywhere.
-"""
+"""Options that several commands share, so that each has one name and one help text everywhere."""
 
 from __future__ import annotations
 
@@ -23,13 +21,13 @@ VerboseOption = Annotated[
 ]
 
 
-def menu(name: str, says: str) -> typer.Typer:
-    """A command that has commands; alone it shows them."""
+def menu(name: str, about: str) -> typer.Typer:
+    """A command that has subcommands; without one it lists them."""
     return typer.Typer(
         name=name,
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
-        help=says,
+        help=about,
     )

@@ -1,5 +1,6 @@
-"""One line of progress on standard error, and none where nobody watches: pipes, logs and CI stay
-clean.
+"""One line of progress on standard error, on a terminal only.
+
+Pipes, logs and CI stay clean unless progress is asked for.
 """
 
 from __future__ import annotations
@@ -8,45 +9,46 @@ import sys
 import time
 from typing import TextIO
 
-from services.cli.terminal import Teller
+from services.cli.terminal import Terminal
 
 # A reader cannot follow more than a few numbers a second; where every line stays, one each two
 # seconds is enough.
-_TERMINAL_S, _LINES_S = 0.2, 2.0
+_STATUS_PERIOD_S, _LINE_PERIOD_S = 0.2, 2.0
 
 
 class Progress:
     """Shows `what 120/600 (20 %), 85 frames/s`.
 
-    shown is None for "on a terminal only"; total, 0 if unknown, may be set when it becomes known.
+    shown None means "on a terminal only"; total, 0 if unknown, may be set when it becomes known.
     """
 
     def __init__(
         self, what: str, total: int, shown: bool | None, out: TextIO | None = None
     ) -> None:
         out = out or sys.stderr
-        terminal = out.isatty()
+        is_terminal = out.isatty()
         self.total = total
-        self.every_s = _TERMINAL_S if terminal else _LINES_S
+        self.period_s = _STATUS_PERIOD_S if is_terminal else _LINE_PERIOD_S
         self._what, self._count = what, 0
-        self._teller = Teller(out=out)
-        self._tell = self._teller.status if terminal else self._teller.line
-        self._shown = terminal if shown is None else shown
-        self._started = self._told = time.monotonic()
+        self._terminal = Terminal(out=out)
+        self._print = self._terminal.status if is_terminal else self._terminal.line
+        self._shown = is_terminal if shown is None else shown
+        self._started_s = self._printed_s = time.monotonic()
 
     def advance(self, count: int = 1) -> None:
         """So many more are done."""
         self._count += count
-        now = time.monotonic()
-        if self._shown and now - self._told >= self.every_s:
-            self._told = now
-            self._tell(self._text(now))
+        now_s = time.monotonic()
+        if self._shown and now_s - self._printed_s >= self.period_s:
+            self._printed_s = now_s
+            self._print(self._text(now_s))
 
     def end(self) -> None:
-        """Take the line away."""
+        """Remove the line."""
         if self._shown:
-            self._teller.end()
+            self._terminal.end()
 
-    def _text(self, now: float) -> str:
+    def _text(self, now_s: float) -> str:
         share = f"/{self.total} ({100 * self._count // self.total} %)" if self.total else ""
-        return f"{self._what} {self._count}{share}, {self._count / max(now - self._started, 1e-3):.0f} frames/s"
+        per_s = self._count / max(now_s - self._started_s, 1e-3)
+        return f"{self._what} {self._count}{share}, {per_s:.0f} frames/s"

@@ -1,7 +1,7 @@
-"""Messages of one stream out of a recording: a result folder of `rhot track`, one of its .jsonl
-files, or an MCAP of `rhot record`.
+"""Reads the messages of one topic from a recording.
 
-A recording that is none, or a damaged message, is a CaptureError that names the file.
+A recording is a result folder of `rhot track`, one of its .jsonl files, or an MCAP file of `rhot
+record`. A file that cannot be read, or a damaged message, raises CaptureError with the file's name.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ M = TypeVar("M", bound=msgspec.Struct)
 def messages(recording: Path, topic: topics.Topic[M], kind: type[M], stream: str) -> Iterator[M]:
     """All messages of a topic, in order.
 
-    Stream is the name of the .jsonl file that holds them in a result folder.
+    stream is the name of the .jsonl file that holds them in a result folder.
     """
     path = recording / f"{stream}.jsonl" if recording.is_dir() else recording
     if path.suffix != ".mcap":
         yield from read_lines(path, kind)
         return
+    # Only for MCAP files: the package mcap is not needed for the others.
     from services.recorder.reader import read
 
     for record in read(path):

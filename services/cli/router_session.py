@@ -1,5 +1,6 @@
-"""A bus for a command that a person waits for: with an error instead of endless patience where no
-router answers.
+"""A bus for a command that a person waits for: BusError after three seconds without a router.
+
+Services wait for the router instead, as long as it takes (rhot.bus.bus.open_bus).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
 
 # A router on the same network answers within milliseconds.
-_REACH_S = 3.0
+_TIMEOUT_S = 3.0
 
 
 def rig_and_endpoints(config: Path | None, connect: str | None) -> tuple[RigConfig, list[str]]:
@@ -25,14 +26,18 @@ def rig_and_endpoints(config: Path | None, connect: str | None) -> tuple[RigConf
 
 
 @contextlib.asynccontextmanager
-async def reach(rig: str, endpoints: list[str]) -> AsyncIterator[Bus]:
-    """open_bus, or BusError after three seconds without a router."""
+async def router_session(rig: str, endpoints: list[str]) -> AsyncIterator[Bus]:
+    """A bus of the rig named `rig`, connected to the router at one of the endpoints.
+
+    Raises BusError if none answers in time.
+    """
     async with contextlib.AsyncExitStack() as stack:
         try:
-            async with asyncio.timeout(_REACH_S):
+            async with asyncio.timeout(_TIMEOUT_S):
                 bus = await stack.enter_async_context(open_bus(rig, endpoints))
         except TimeoutError:
             raise BusError(
-                f"no router answers at {', '.join(endpoints)}; start the rig (`rhot demo`, `rhot up CONFIG`) or name another with --connect"
+                f"no router answers at {', '.join(endpoints)}; start the rig "
+                "(`rhot demo`, `rhot up CONFIG`) or name another with --connect"
             ) from None
         yield bus

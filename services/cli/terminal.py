@@ -1,5 +1,6 @@
-"""What long-running commands print: events on standard error, one status line that is overwritten
-on a terminal.
+"""Output of long-running commands on standard error: lines that stay above one status line.
+
+The status line is overwritten on a terminal, and left out elsewhere.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ from typing import TextIO
 _LEVELS = {"debug": 0, "info": 1, "warning": 2, "error": 3, "critical": 4}
 
 
-class Teller:
-    """Prints lines and a status; children's log below warning only if verbose."""
+class Terminal:
+    """Prints lines and a status; of the services' log only warnings and errors, unless verbose."""
 
     def __init__(self, *, verbose: bool = False, out: TextIO | None = None) -> None:
         self._out = out or sys.stderr
-        self._least = 0 if verbose else 2
+        self._min_level = _LEVELS["debug"] if verbose else _LEVELS["warning"]
         self._status = ""
 
-    def child(self, name: str, level: str, text: str) -> None:
-        """A child's log line."""
-        if _LEVELS.get(level, 1) >= self._least:
+    def log(self, name: str, level: str, text: str) -> None:
+        """A line of the log of the process `name`."""
+        if _LEVELS.get(level, _LEVELS["info"]) >= self._min_level:
             self.line(f"[{name}] {level}: {text}")
 
     def line(self, text: str) -> None:
@@ -32,7 +33,7 @@ class Teller:
         self._out.flush()
 
     def status(self, text: str) -> None:
-        """The status line; nothing where nobody watches."""
+        """Replace the status line; without effect where the output is no terminal."""
         if not self._out.isatty():
             return
         self._clear()
@@ -41,7 +42,7 @@ class Teller:
         self._out.flush()
 
     def end(self) -> None:
-        """Leave the terminal as it was."""
+        """Remove the status line."""
         self._clear()
         self._status = ""
         self._out.flush()

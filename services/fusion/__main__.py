@@ -1,14 +1,13 @@
-"""rhot-fusion: see services/fusion/service.py."""
+"""rhot-fusion: turns the cameras' markers into 3D landmarks; master of session and clock."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.fusion.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-fusion."""
-    command("fusion", serve)
+    command("fusion", "services.fusion.service", __doc__)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,13 @@
-"""rhot-object-tracker: see services/object_tracker/service.py."""
+"""rhot-object-tracker: tracks objects by SteamVR, libsurvive, a file or the bus."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.object_tracker.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-object-tracker."""
-    command("object_tracker", serve)
+    command("object_tracker", "services.object_tracker.service", __doc__)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,13 @@
-"""rhot-pi-tracker --config rig.toml --camera left"""
+"""rhot-pi-tracker: finds the coloured markers in one camera's images."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.pi_tracker.service import serve
 
 
 def main() -> None:
-    """The command rhot-pi-tracker."""
-    command("pi_tracker", serve, instance_option="camera")
+    """Entry point of rhot-pi-tracker."""
+    command("pi_tracker", "services.pi_tracker.service", __doc__, instance_option="camera")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,13 @@
-"""rhot-recorder: see services/recorder/service.py."""
+"""rhot-recorder: records every session (or always: [recorder] autostart) as MCAP."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.recorder.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-recorder."""
-    command("recorder", serve)
+    command("recorder", "services.recorder.service", __doc__)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,13 @@
-"""rhot-simulator: see services/simulator/service.py."""
+"""rhot-simulator: renders a virtual rig live: camera images, tracker poses and the truth."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.simulator.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-simulator."""
-    command("simulator", serve)
+    command("simulator", "services.simulator.service", __doc__)
 
 
 if __name__ == "__main__":

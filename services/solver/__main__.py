@@ -1,14 +1,13 @@
-"""rhot-solver: see services/solver/service.py."""
+"""rhot-solver: solves the pose of every hand from its painted landmarks."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.solver.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-solver."""
-    command("solver", serve)
+    command("solver", "services.solver.service", __doc__)
 
 
 if __name__ == "__main__":

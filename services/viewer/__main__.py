@@ -1,14 +1,13 @@
-"""rhot-viewer: see services/viewer/service.py."""
+"""rhot-viewer: shows the rig live at http://127.0.0.1:8080 (or [viewer] port)."""
 
 from __future__ import annotations
 
 from rhot.process.lifecycle import command
-from services.viewer.service import serve
 
 
 def main() -> None:
     """Entry point of rhot-viewer."""
-    command("viewer", serve)
+    command("viewer", "services.viewer.service", __doc__)
 
 
 if __name__ == "__main__":

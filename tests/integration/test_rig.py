@@ -1,6 +1,4 @@
-"""The main job: from simulated cameras to poses, in real processes over a real router, against the
-simulator's truth.
-"""
+"""From simulated cameras to poses: real processes on a real router, against the true hand."""
 
 from __future__ import annotations
 
@@ -16,8 +14,8 @@ import pytest
 
 from rhot import clock, topics
 from rhot.geometry.transforms import angle_between, rotation_from_quaternion
-from rhot.hand import default_hand
-from services.cli.live.demo_metrics import LiveFigures
+from rhot.hand import DIGITS, default_hand
+from services.cli.live.demo_metrics import DemoMetrics
 
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 
@@ -40,21 +38,21 @@ async def some(subscription, count):
 
 
 async def test_poses_are_right(rig):
-    figures = LiveFigures()
+    metrics = DemoMetrics()
 
     async def truths():
         async for truth in rig.bus.every(topics.TRUTH, 256):
-            figures.truth(truth)
+            metrics.add_truth(truth)
 
     async def poses():
         async for pose in rig.bus.every(topics.POSE, 256):
-            figures.pose(pose, clock.now_ns())
+            metrics.add_pose(pose, clock.now_ns())
 
     tasks = [asyncio.create_task(truths()), asyncio.create_task(poses())]
-    await rig.until(lambda: figures.poses >= 150, DEADLINE_S)
+    await rig.until(lambda: metrics.poses >= 150, DEADLINE_S)
     for task in tasks:
         task.cancel()
-    summary = figures.summary({})
+    summary = metrics.summary({})
     # Live, without lag and on a machine of any speed: a rig that works is within a centimetre, one
     # that does not is decimetres off.
     assert summary.tip_error_median_mm < 10.0
@@ -64,13 +62,7 @@ async def test_poses_are_right(rig):
 async def test_every_pose_is_a_possible_hand(rig):
     limits = default_hand("right").limits_rad
     for pose in await some(rig.bus.every(topics.POSE, 64), 30):
-        assert [finger.name for finger in pose.fingers] == [
-            "thumb",
-            "index",
-            "middle",
-            "ring",
-            "little",
-        ]
+        assert tuple(finger.name for finger in pose.fingers) == DIGITS
         for row, finger in enumerate(pose.fingers):
             assert np.all(finger.model_angles_rad >= limits[row, :, 0] - 1e-5)
             assert np.all(finger.model_angles_rad <= limits[row, :, 1] + 1e-5)
@@ -113,16 +105,16 @@ async def test_top_finds_everything_alive_at_its_rate(rig):
             )
             if code == 0:
                 break
-    board = json.loads(output)
-    assert {row["service"] for row in board["services"]} == {
+    table = json.loads(output)
+    assert {row["service"] for row in table["services"]} == {
         "simulator",
         "pi_tracker",
         "fusion",
         "solver",
         "object_tracker",
     }
-    assert all(row["state"] == "running" for row in board["services"])
-    assert 0.0 < board["glass_to_pose_ms"]["right"][0] < 1000.0
+    assert all(row["state"] == "running" for row in table["services"])
+    assert 0.0 < table["glass_to_pose_ms"]["right"][0] < 1000.0
 
 
 async def test_zenoh_tools_show_readable_json(rig):

@@ -1,6 +1,4 @@
-"""What the scenarios share: a synthetic hand through FusionStep, and how far what it tells is from
-the truth.
-"""
+"""What the scenarios share: a synthetic hand through FusionStep, and its points' errors."""
 
 from __future__ import annotations
 
@@ -19,8 +17,8 @@ from testing.synthetic_points import START_NS, Path, Setup, point_hands
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """Every point told, one row each, in order of time."""
+class Reported:
+    """Every point that fusion reported, one row each, in order of time."""
 
     instants_s: Array  # (n,) since the start
     errors_m: Array  # (n, 3)
@@ -33,30 +31,31 @@ class Told:
         return 1e3 * float(np.sqrt(np.mean(np.sum(self.errors_m[inside] ** 2, axis=1))))
 
     def share(self, begin_s: float, end_s: float, *, measured: bool = False) -> float:
-        """How many of the points that could be there are, six for each of 30 frames a second.
+        """Points reported over points possible: six for each of 30 frames a second.
 
-        Measured: these only.
+        measured: of the points only those with a measurement.
         """
         inside = (self.instants_s >= begin_s) & (self.instants_s < end_s)
         if measured:
             inside &= self.measured
         return float(inside.sum()) / (6 * 30 * (end_s - begin_s))
 
-    def lies(self) -> float:
-        """Share of points more than five sigmas off."""
+    def outlier_share(self) -> float:
+        """Share of points that are more than five sigmas off."""
         return float(np.mean(np.sqrt(np.mean((self.errors_m / self.sigmas_m) ** 2, axis=1)) > 5.0))
 
 
 @pytest.fixture
-def tell() -> Callable[..., tuple[FusionStep, Told]]:
-    """Frames -> FusionStep -> everything it told, against the truth."""
+def run_fusion() -> Callable[..., tuple[FusionStep, Reported]]:
+    """Frames -> FusionStep -> all points it reported, against the truth."""
 
     def run(
         setup: Setup, given: Iterable[MarkerFrame], path: Path, fusion: Fusion | None = None
-    ) -> tuple[FusionStep, Told]:
+    ) -> tuple[FusionStep, Reported]:
         step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
         messages = [message for frame in given for message in step.step(frame)] + step.flush()
         rows = []
+        # Alike in tests/services/fusion/conftest.py, where other columns are needed.
         for message in messages:
             at_s = (message.stamp_ns - START_NS) * 1e-9
             truth = path(np.array([at_s]))[0]
@@ -64,6 +63,6 @@ def tell() -> Callable[..., tuple[FusionStep, Told]]:
                 error = np.array(point.position_m) - truth[BASIC_LANDMARKS.index(point.name)]
                 rows.append([at_s, *error, *point.sigma_m, float(point.source == "measured")])
         table = np.array(rows).reshape(-1, 8)
-        return step, Told(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7] > 0.5)
+        return step, Reported(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7] > 0.5)
 
     return run

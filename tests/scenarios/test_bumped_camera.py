@@ -1,5 +1,6 @@
-"""A camera that was bumped after its calibration is reported, if it was turned so that heights show
-it; a sound rig never is.
+"""A camera that was moved after its calibration is reported, where the epipolar errors show it.
+
+A rig as it was calibrated never is.
 """
 
 from __future__ import annotations

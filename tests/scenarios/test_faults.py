@@ -1,4 +1,4 @@
-"""What can go wrong with a rig's cameras, clocks and network, each with what must come of it.
+"""Faults of a rig's cameras, clocks and network, each with the result it must have.
 
 Every fault begins at 2 s of a moving hand. In all of them nothing hangs, no more than one point in
 two hundred is further than five of its sigmas from the truth, and half a second after the fault
@@ -47,11 +47,11 @@ def mirrored(frame: MarkerFrame) -> MarkerFrame:
 
 
 class During(Enum):
-    """What is told while the fault lasts, once hold_s has passed."""
+    """What is reported while the fault lasts, once hold_s has passed."""
 
     NOTHING = "no point at all, rather than a wrong one"
     FEW = "hardly any point as measured"
-    ALL = "everything, as ever"
+    ALL = "all points, as without a fault"
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class Scenario(Enum):
     CAMERA_STOPS = Plan(
         "the right camera stops and returns", "right", 2.0, lost, Expected(During.NOTHING)
     )
-    PACEMAKER_STOPS = Plan(
-        "the left camera, which sets the pace, stops and returns",
+    REFERENCE_CAMERA_STOPS = Plan(
+        "the left camera, whose frames set the output schedule, stops and returns",
         "left",
         2.0,
         lost,
@@ -155,26 +155,26 @@ def edited(given: list[MarkerFrame], plan: Plan) -> list[MarkerFrame]:
 
 
 @pytest.mark.parametrize("scenario", Scenario, ids=lambda scenario: scenario.name.lower())
-def test_scenario(scenario, tell):
+def test_scenario(scenario, run_fusion):
     plan = scenario.value
     end_s = BEGIN_S + plan.lasts_s
-    step, told = tell(SETUP, edited(frames(SETUP, MOVING, end_s + AFTER_S), plan), MOVING)
-    assert told.share(end_s + RECOVERY_S, end_s + AFTER_S - 0.1) > 0.95
-    assert told.rms_mm(end_s + RECOVERY_S, end_s + AFTER_S) < 3.0
+    step, reported = run_fusion(SETUP, edited(frames(SETUP, MOVING, end_s + AFTER_S), plan), MOVING)
+    assert reported.share(end_s + RECOVERY_S, end_s + AFTER_S - 0.1) > 0.95
+    assert reported.rms_mm(end_s + RECOVERY_S, end_s + AFTER_S) < 3.0
     # hold_s is .15 s, and a track needs a moment to be dropped; a fault of one frame has no such
     # stretch.
     stretch = (BEGIN_S, end_s) if plan.expected.during is During.ALL else (BEGIN_S + 0.3, end_s)
     match plan.expected.during:
         case During.NOTHING:
-            assert told.share(*stretch) == 0.0
+            assert reported.share(*stretch) == 0.0
         case During.FEW:
             # A mirrored view can look sound for a moment: rays meet, sizes fit. Hardly ever, and
             # never as a whole hand.
-            assert told.share(*stretch, measured=True) < 0.1
+            assert reported.share(*stretch, measured=True) < 0.1
         case During.ALL:
-            assert told.share(BEGIN_S, BEGIN_S + 0.5) > 0.9
+            assert reported.share(BEGIN_S, BEGIN_S + 0.5) > 0.9
     if plan.expected.during is not During.FEW:
-        assert told.lies() < 0.005
+        assert reported.outlier_share() < 0.005
     assert not step.mirrors.mirrored
     if plan.expected.refusal:
         assert step.refusals[plan.expected.refusal] > 20
@@ -189,10 +189,10 @@ class Disorder(Enum):
 
 
 @pytest.mark.parametrize("disorder", Disorder, ids=lambda disorder: disorder.name.lower())
-def test_disorder(disorder, tell):
-    """Expected: the points that are told are right.
+def test_disorder(disorder, run_fusion):
+    """Expected: the points that are reported are right.
 
-    A late frame of the pacemaker has no instant of its own any more.
+    A late frame of the reference camera gives no output of its own any more.
     """
     places, twice = disorder.value
     given, random = frames(SETUP, MOVING, 5.0), np.random.default_rng(0)
@@ -200,8 +200,8 @@ def test_disorder(disorder, tell):
         np.arange(len(given)) + random.uniform(0.0, places, len(given)), kind="stable"
     )
     arriving = [given[k] for k in order for _ in range(2 if random.random() < twice else 1)]
-    step, told = tell(SETUP, arriving, MOVING)
-    assert told.share(1.0, 4.9) > (0.95 if places == 0.0 else 0.8)
-    assert told.rms_mm(1.0, 5.0) < (3.0 if places == 0.0 else 5.0)
-    assert told.lies() < 0.005
+    step, reported = run_fusion(SETUP, arriving, MOVING)
+    assert reported.share(1.0, 4.9) > (0.95 if places == 0.0 else 0.8)
+    assert reported.rms_mm(1.0, 5.0) < (3.0 if places == 0.0 else 5.0)
+    assert reported.outlier_share() < 0.005
     assert (step.refusals["twice"] > 30) == (twice > 0.0)

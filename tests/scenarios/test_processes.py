@@ -1,11 +1,10 @@
-"""The same faults on the real thing: `rhot-fusion` as a process, behind a real router, fed with a
-synthetic hand in real time.
-"""
+"""Faults of the real process: `rhot-fusion` behind a real router, fed with a synthetic hand."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import signal
 import sys
 from collections.abc import AsyncIterator
@@ -17,7 +16,8 @@ import pytest_asyncio
 
 from rhot import clock, topics
 from rhot.bus.bus import open_bus
-from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
+from rhot.files.calibration import save
+from testing.calibration_files import lens_of, save_calibration
 from testing.synthetic_points import START_NS, Path, Setup, frames
 
 pytestmark = pytest.mark.integration
@@ -27,34 +27,17 @@ SETUP = Setup(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, 
 FUSION = File(sys.executable).parent / "rhot-fusion"
 
 
-def rows(matrix):
-    return tuple(tuple(row) for row in matrix.tolist())
-
-
 @pytest.fixture
 def rig_toml(tmp_path, router) -> File:
     """The synthetic rig on disk, calibrated."""
-    for camera in SETUP.rig().values():
-        lens = Lens(
-            size_px=camera.size_px,
-            matrix=rows(camera.matrix),
-            distortion=tuple(camera.distortion.tolist()),
-        )
-        save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
-    places = {
-        camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera))
-        for camera in SETUP.rig().values()
-    }
-    save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
+    save_calibration(tmp_path / "calibration", SETUP.rig().values())
     markers = "\n".join(
         f'{name} = "{color}"' for name, color in SETUP.config().hand["right"].markers.items()
     )
     cameras = "\n".join(f'[[camera]]\nname = "{name}"\n' for name in SETUP.names)
     path = tmp_path / "rig.toml"
-    path.write_text(
-        f'[rig]\nname = "bench"\n[bus]\nconnect = ["{router}"]\n{cameras}\n[hand.right.markers]\n{markers}\n',
-        encoding="utf-8",
-    )
+    rig = f'[rig]\nname = "bench"\n[bus]\nconnect = ["{router}"]\n'
+    path.write_text(f"{rig}{cameras}\n[hand.right.markers]\n{markers}\n", encoding="utf-8")
     return path
 
 
@@ -159,14 +142,7 @@ async def test_a_missing_calibration_is_one_line_and_exit_code_2(rig_toml):
 async def test_a_calibration_of_another_resolution_is_reported_and_gives_no_points(rig_toml, feed):
     path = rig_toml.parent / "calibration" / "right.lens.json"
     camera = SETUP.rig()["right"]
-    save(
-        path,
-        Lens(
-            size_px=(1280, 960),
-            matrix=rows(camera.matrix),
-            distortion=tuple(camera.distortion.tolist()),
-        ),
-    )
+    save(path, msgspec.structs.replace(lens_of(camera), size_px=(1280, 960)))
     async with fusion(rig_toml) as process:
         await until(lambda: "another size" in feed.last_error, START_S)
         assert process.returncode is None
@@ -182,14 +158,7 @@ async def test_a_bumped_camera_reaches_health(rig_toml, feed):
     camera = SETUP.rig()["right"]
     matrix = camera.matrix.copy()
     matrix[1, 2] += 4.6
-    save(
-        path,
-        Lens(
-            size_px=camera.size_px,
-            matrix=rows(matrix),
-            distortion=tuple(camera.distortion.tolist()),
-        ),
-    )
+    save(path, lens_of(dataclasses.replace(camera, matrix=matrix)))
     async with fusion(rig_toml):
         await until(lambda: "rhot calibrate stereo" in feed.last_error, START_S)
     assert "left and right" in feed.last_error

@@ -20,7 +20,7 @@ from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
 from services.cli.calibrate import options
 from services.cli.options import ConnectOption
-from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.router_session import rig_and_endpoints, router_session
 
 Name = Annotated[str, typer.Argument(help="the camera's name in rig.toml")]
 # Ways of saying what is paint; all may be repeated.
@@ -86,7 +86,7 @@ async def _camera(
     from services.cli.calibrate.pictures import live
     from services.pi_tracker.colors.exposure_advice import advice, assess
 
-    async with reach(rig.rig.name, endpoints) as bus:
+    async with router_session(rig.rig.name, endpoints) as bus:
         client = RigClient(bus)
         state = await client.exposure(name)
         for one in wanted:

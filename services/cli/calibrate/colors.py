@@ -21,7 +21,7 @@ from rhot.files.config import RigConfig
 from services.cli.calibrate import options, pictures
 from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
 from services.cli.calibrate.pointing_options import at, everywhere, numbers_of
-from services.cli.router_session import reach
+from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.paint_patch import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
@@ -91,7 +91,7 @@ def _known(path: Path) -> dict[str, ColorRange]:
 
 async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], count: int) -> None:
     """Fit to the running camera's next pictures, and put the result in force there (or into --out)."""
-    async with reach(rig.rig.name, endpoints) as bus:
+    async with router_session(rig.rig.name, endpoints) as bus:
         client = RigClient(bus)
         in_force = await client.colors(request.camera)
         taken = await pictures.live(bus, request.camera, count)

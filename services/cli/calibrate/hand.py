@@ -29,8 +29,8 @@ from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES
 from rhot.messages import HandPoints
 from services.cli.calibrate import options
 from services.cli.options import ConnectOption
-from services.cli.router_session import reach, rig_and_endpoints
-from services.cli.terminal import Teller
+from services.cli.router_session import rig_and_endpoints, router_session
+from services.cli.terminal import Terminal
 
 _BONES = {"proximal": 0, "middle": 1, "distal": 2}
 _THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
@@ -175,8 +175,8 @@ async def _live(rig: RigConfig, endpoints: list[str], which: HandName) -> list[H
         raise CalibrationError(
             f"rig.toml has no [hand.{which}.markers]; it has {', '.join(h for h in HANDS if h in rig.hand) or 'no hand'}"
         )
-    teller, messages, shown = Teller(), [], -1
-    async with reach(rig.rig.name, endpoints) as bus:
+    teller, messages, shown = Terminal(), [], -1
+    async with router_session(rig.rig.name, endpoints) as bus:
         stream = RigClient(bus).hand_points(which, queue=256)
         teller.line(
             f"{CYCLE_S:.0f} s of exercises begin in {_READY_S:.0f} s: {EXERCISES[0].prompt}"

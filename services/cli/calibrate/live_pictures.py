@@ -18,15 +18,15 @@ from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig
-from services.cli.router_session import reach
-from services.cli.terminal import Teller
+from services.cli.router_session import router_session
+from services.cli.terminal import Terminal
 
 if TYPE_CHECKING:
     import numpy as np
 
     from services.calibrator.board.board import Board
     from services.calibrator.board.detect import Detection
-    from services.calibrator.board.live_selection import LiveSelection
+    from services.calibrator.board.live_selection import Collector
 
 # A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
 _ANSWER_S = 5.0
@@ -58,7 +58,7 @@ def collect(
     for name in names:
         rig.camera_named(name)
     folder.mkdir(parents=True, exist_ok=True)
-    teller = Teller()
+    teller = Terminal()
     teller.line(
         f"show the board to {' and '.join(names)} and hold it still; pictures go to {folder}; Ctrl-C ends early"
     )
@@ -87,7 +87,7 @@ def one_each(rig: RigConfig, names: list[str], folder: Path, connect: str | None
 
 async def _one_each(rig: RigConfig, names: list[str], endpoints: list[str]) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
-    async with reach(rig.rig.name, endpoints) as bus:
+    async with router_session(rig.rig.name, endpoints) as bus:
         for attempt in range(_ATTEMPTS):
             await asyncio.sleep(0.2 * attempt)
             pictures |= await _ask(bus, [name for name in names if name not in pictures])
@@ -118,7 +118,7 @@ class _Job:
         folder: Path,
         square_m: float,
         count: int,
-        teller: Teller,
+        teller: Terminal,
     ) -> None:
         self.board: Board | None = None
         self._rig, self._names, self._folder = rig, names, folder
@@ -130,7 +130,7 @@ class _Job:
         """Ask, judge, keep, until there are enough."""
         from services.calibrator.board.live_selection import LiveSelection, Verdict
 
-        async with reach(self._rig.rig.name, endpoints) as bus:
+        async with router_session(self._rig.rig.name, endpoints) as bus:
             collector: LiveSelection | None = None
             news_s = time.monotonic()
             while collector is None or not collector.done:
@@ -170,9 +170,9 @@ class _Job:
 
     def _counted(self, images: dict[str, np.ndarray]) -> Board | None:
         from services.calibrator.board.board import Board
-        from services.calibrator.board.board_size import find_board_size
+        from services.calibrator.board.board_size import guess_corners
 
-        before, self._size = self._size, find_board_size(images.values())
+        before, self._size = self._size, guess_corners(images.values())
         # A board that is just coming into the picture is counted too small: two takes must agree.
         if self._size is None or self._size != before:
             self._teller.status("looking for the board: show all of it, and hold it still")
@@ -190,7 +190,7 @@ class _Job:
         return f"nothing new was shown for {_PATIENCE_S:.0f} s ({state}); the pictures so far are in {self._folder}"
 
 
-def _seen(image: np.ndarray, collector: LiveSelection) -> Detection | None:
+def _seen(image: np.ndarray, collector: Collector) -> Detection | None:
     from services.calibrator.board.detect import detect
 
     return detect(image, collector.board, quick=True)

@@ -1,5 +1,4 @@
-"""`rhot plot DIR`: the result of `rhot track` as PNG pictures, to see at a glance where a marker
-was lost or a joint jumped.
+"""`rhot plot DIR`: PNG pictures of a result, to see where a marker was lost or a joint jumped.
 
 What a result does not hold (no second camera, no hand) is not drawn; an empty or interrupted result
 is an error.
@@ -7,13 +6,10 @@ is an error.
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from rhot.errors import ConfigError
 
 
 def plot(
@@ -27,11 +23,8 @@ def plot(
     ] = None,
 ) -> None:
     """Draw marker tracks, 3D points, joint angles, residuals and objects."""
-    if find_spec("matplotlib") is None:
-        raise ConfigError(
-            "`rhot plot` needs matplotlib, which is not installed; `pip install 'rhot[study]'`"
-        )
-    # Not above: matplotlib takes longer to import than other commands take to run.
+    # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
+    # take to run.
     from services.cli.evaluate.plot_result import plot_result
 
     for path in plot_result(result, out or result, truth):

@@ -1,23 +1,26 @@
-"""Which pictures a result gives, and what is on them; drawing itself is plots.py.
+"""Which pictures a result gives, and what is on them; plot_figures.py draws them.
 
-Times are seconds since the first frame. Where a marker, point or pose is missing the line breaks:
-nothing is bridged.
+Times are seconds since the first frame. Where a marker, point or pose is missing, the line breaks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rhot.errors import CaptureError
 from rhot.files.capture import Capture, read_lines
+from rhot.geometry.transforms import Array
 from rhot.hand import HANDS
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
 from rhot.simulator_messages import Truth
+from services.cli.evaluate.interpolation import Stamps
 from services.cli.evaluate.plot_figures import (
     Track,
     angles_figure,
@@ -27,8 +30,18 @@ from services.cli.evaluate.plot_figures import (
     residuals_figure,
 )
 from services.cli.evaluate.score_math import estimate_track
-from services.cli.evaluate.truth_track import hand_track, object_track
+from services.cli.evaluate.truth_track import HandTrack, hand_track, object_track
 from services.cli.offline.results import check_result
+
+Flags = npt.NDArray[np.bool_]
+
+
+class _Stamped(Protocol):
+    @property
+    def stamp_ns(self) -> int: ...
+
+
+M = TypeVar("M", bound=_Stamped)
 
 # A gap of more than this many usual steps breaks the line.
 _GAP_STEPS = 2.5
@@ -64,66 +77,55 @@ def _truth(capture: Capture) -> list[Truth]:
 
 
 def _figures(result: Path, truth: list[Truth]) -> Iterator[tuple[str, Figure]]:
+    """(name, figure) of everything the result holds."""
     frames = list(read_lines(result / "markers.jsonl", MarkerFrame))
     if not frames:
         return
     origin_ns = min(frame.stamp_ns for frame in frames)
     for camera in sorted({frame.camera for frame in frames}):
         own = [frame for frame in frames if frame.camera == camera]
-        yield (
-            f"markers_{camera}",
-            markers_figure(camera, own[0].size_px, *_marker_tracks(own, origin_ns)),
-        )
+        figure = markers_figure(camera, own[0].size_px, *_marker_tracks(own, origin_ns))
+        yield f"markers_{camera}", figure
     points = list(read_lines(result / "points.jsonl", HandPoints))
     poses = list(read_lines(result / "poses.jsonl", HandPose))
     for hand in HANDS:
         lines = [line for line in points if line.hand == hand]
         if any(line.points for line in lines):
             yield f"points_{hand}", points_figure(hand, _point_tracks(lines, origin_ns))
-        solved = sorted(
-            (pose for pose in poses if pose.hand == hand), key=lambda pose: pose.stamp_ns
-        )
+        solved = _by_stamp(pose for pose in poses if pose.hand == hand)
         if solved:
             yield from _pose_figures(hand, solved, truth, origin_ns)
     objects = _object_tracks(list(read_lines(result / "objects.jsonl", ObjectPose)), origin_ns)
     if objects:
-        names = [name for name in objects if any(name in line.objects for line in truth)]
-        real = {name: object_track(truth, name) for name in names}
-        yield (
-            "objects",
-            objects_figure(
-                objects,
-                {n: Track(_seconds(t.stamps_ns, origin_ns), t.position_m) for n, t in real.items()},
-            ),
-        )
+        yield "objects", objects_figure(objects, _object_truths(objects, truth, origin_ns))
 
 
 def _pose_figures(
     hand: str, poses: list[HandPose], truth: list[Truth], origin_ns: int
 ) -> Iterator[tuple[str, Figure]]:
     estimate = estimate_track(poses)
-    found = _broken(
-        Track(
-            _seconds(estimate.stamps_ns, origin_ns), np.rad2deg(estimate.angles_rad).reshape(-1, 20)
-        )
-    )
-    real = None
+    angles = _with_gaps(_angles_track(estimate, origin_ns))
+    true_angles = None
     if any(hand in line.hands for line in truth):
-        track = hand_track(truth, hand)
-        real = Track(
-            _seconds(track.stamps_ns, origin_ns), np.rad2deg(track.angles_rad).reshape(-1, 20)
-        )
-    yield f"angles_{hand}", angles_figure(hand, found, real)
-    residuals = 1e3 * np.array([[finger.residual_m for finger in pose.fingers] for pose in poses])
-    iterations = np.array([[float(finger.iterations) for finger in pose.fingers] for pose in poses])
-    unsure = np.array([[finger.status != "solved" for finger in pose.fingers] for pose in poses])
-    times_s = _seconds(estimate.stamps_ns, origin_ns)
-    yield f"residuals_{hand}", residuals_figure(hand, Track(times_s, residuals), iterations, unsure)
+        true_angles = _angles_track(hand_track(truth, hand), origin_ns)
+    yield f"angles_{hand}", angles_figure(hand, angles, true_angles)
+    fingers = [pose.fingers for pose in poses]
+    residuals_mm = 1e3 * np.array([[finger.residual_m for finger in row] for row in fingers])
+    iterations = np.array([[float(finger.iterations) for finger in row] for row in fingers])
+    unsolved = np.array([[finger.status != "solved" for finger in row] for row in fingers])
+    residuals = Track(_seconds(estimate.stamps_ns, origin_ns), residuals_mm)
+    yield f"residuals_{hand}", residuals_figure(hand, residuals, iterations, unsolved)
+
+
+def _angles_track(track: HandTrack, origin_ns: int) -> Track:
+    """All 20 angles in deg."""
+    angles_deg = np.rad2deg(track.angles_rad).reshape(-1, 20)
+    return Track(_seconds(track.stamps_ns, origin_ns), angles_deg)
 
 
 def _marker_tracks(frames: list[MarkerFrame], origin_ns: int) -> tuple[dict[str, Track], Track]:
-    """Per colour x, y in px with NaN where it was not seen; and how many markers each frame has."""
-    times_s = np.array([(frame.stamp_ns - origin_ns) * 1e-9 for frame in frames])
+    """Per colour x, y in px, NaN where it was not seen; and the number of markers per frame."""
+    times_s = _times(frames, origin_ns)
     tracks: dict[str, Track] = {}
     for row, frame in enumerate(frames):
         for marker in frame.markers:
@@ -135,11 +137,11 @@ def _marker_tracks(frames: list[MarkerFrame], origin_ns: int) -> tuple[dict[str,
     return dict(sorted(tracks.items())), Track(times_s, counts)
 
 
-def _point_tracks(lines: list[HandPoints], origin_ns: int) -> dict[str, tuple[Track, np.ndarray]]:
+def _point_tracks(lines: list[HandPoints], origin_ns: int) -> dict[str, tuple[Track, Flags]]:
     """Per landmark its position in m, NaN where absent, and which rows were only predicted."""
-    lines = sorted(lines, key=lambda line: line.stamp_ns)
-    times_s = np.array([(line.stamp_ns - origin_ns) * 1e-9 for line in lines])
-    tracks: dict[str, tuple[Track, np.ndarray]] = {}
+    lines = _by_stamp(lines)
+    times_s = _times(lines, origin_ns)
+    tracks: dict[str, tuple[Track, Flags]] = {}
     for row, line in enumerate(lines):
         for point in line.points:
             empty = (
@@ -153,31 +155,46 @@ def _point_tracks(lines: list[HandPoints], origin_ns: int) -> dict[str, tuple[Tr
 
 
 def _object_tracks(poses: list[ObjectPose], origin_ns: int) -> dict[str, Track]:
+    """Per object its position in m, without the poses in which it was lost."""
     tracks = {}
     for name in sorted({pose.object for pose in poses}):
-        own = sorted(
-            (pose for pose in poses if pose.object == name and pose.tracking != "lost"),
-            key=lambda pose: pose.stamp_ns,
-        )
+        own = _by_stamp(p for p in poses if p.object == name and p.tracking != "lost")
         if own:
-            stamps = np.array([pose.stamp_ns for pose in own], dtype=np.int64)
-            tracks[name] = _broken(
-                Track(_seconds(stamps, origin_ns), np.array([pose.position_m for pose in own]))
-            )
+            stamps_ns = np.array([pose.stamp_ns for pose in own], dtype=np.int64)
+            positions_m = np.array([pose.position_m for pose in own])
+            tracks[name] = _with_gaps(Track(_seconds(stamps_ns, origin_ns), positions_m))
     return tracks
 
 
-def _broken(track: Track) -> Track:
+def _object_truths(names: Iterable[str], truth: list[Truth], origin_ns: int) -> dict[str, Track]:
+    """Per object that the truth knows its true position in m."""
+    known = [name for name in names if any(name in line.objects for line in truth)]
+    tracks = {name: object_track(truth, name) for name in known}
+    return {
+        name: Track(_seconds(track.stamps_ns, origin_ns), track.position_m)
+        for name, track in tracks.items()
+    }
+
+
+def _by_stamp(messages: Iterable[M]) -> list[M]:
+    return sorted(messages, key=lambda message: message.stamp_ns)
+
+
+def _with_gaps(track: Track) -> Track:
     """The track with a NaN row in each gap, so that its line breaks there."""
-    steps = np.diff(track.times_s)
-    if not len(steps):
+    steps_s = np.diff(track.times_s)
+    if not len(steps_s):
         return track
-    gaps = np.flatnonzero(steps > _GAP_STEPS * max(float(np.median(steps)), 1e-9)) + 1
+    gaps = np.flatnonzero(steps_s > _GAP_STEPS * max(float(np.median(steps_s)), 1e-9)) + 1
     return Track(
         np.insert(track.times_s, gaps, track.times_s[gaps - 1]),
         np.insert(track.values, gaps, np.nan, axis=0),
     )
 
 
-def _seconds(stamps_ns: np.ndarray, origin_ns: int) -> np.ndarray:
-    return (stamps_ns - origin_ns) * 1e-9
+def _times(messages: Iterable[_Stamped], origin_ns: int) -> Array:
+    return np.array([(message.stamp_ns - origin_ns) * 1e-9 for message in messages])
+
+
+def _seconds(stamps_ns: Stamps, origin_ns: int) -> Array:
+    return np.asarray((stamps_ns - origin_ns) * 1e-9, dtype=np.float64)

@@ -1,8 +1,7 @@
-"""`rhot score CAPTURE RESULT`: how far the poses of a result are from the truth of the capture it
-was made from.
+"""`rhot score CAPTURE RESULT`: errors of a result's poses against the truth of its capture.
 
-A capture without truth.jsonl, an interrupted result, or one of another capture is an error that
-says so.
+A capture without truth.jsonl, an interrupted result, or a result of another capture is an error
+that says so.
 """
 
 from __future__ import annotations
@@ -22,13 +21,11 @@ def score(
     ],
     result: Annotated[Path, typer.Argument(help="folder written by `rhot track`")],
     stages: Annotated[
-        bool, typer.Option("--stages", help="also say how much error markers and 3D points have")
+        bool, typer.Option("--stages", help="also the errors of markers and 3D points")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of tables")] = False,
 ) -> None:
-    """Compare tracked poses with the simulator's truth: tips, angles, orientation, dropouts,
-    limits, delay.
-    """
+    """Compare tracked poses with the truth: tips, angles, orientation, dropouts, limits, delay."""
     # Not above: scipy takes longer to import than the other commands take to run.
     from services.cli.evaluate.score_result import score_result
     from services.cli.evaluate.score_table import score_text

@@ -1,8 +1,7 @@
-"""A result folder against the capture it was made from: reads both, and asks scoring.py and
-stages.py for the figures.
+"""A result folder against the capture it was made from: reads both and computes the score.
 
-Only simulated captures have a truth; any other one, an interrupted result, or a result of another
-capture is a CaptureError that says so.
+Only simulated captures have a truth. Any other capture, an interrupted result, or a result of
+another capture is a CaptureError that says so.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
 from rhot.simulator_messages import Truth
 from rhot.topics import Rate
 from services.cli.evaluate.score_math import score_hand, score_object
-from services.cli.evaluate.score_types import Score, Stages
+from services.cli.evaluate.score_types import ObjectScore, Score, Stages
 from services.cli.evaluate.stages import landmark_truth, marker_errors, point_errors
 from services.cli.evaluate.truth_track import HandTrack, hand_track, object_track
 from services.cli.offline.results import check_result
@@ -30,57 +29,47 @@ def score_result(capture: Capture, result: Path, *, stages: bool = False) -> Sco
     Raises CaptureError if the capture has no truth, the result no poses, or if they do not belong
     together.
     """
-    if not capture.folder.is_dir():
-        raise CaptureError(
-            f"{capture.folder}: no such folder; make a capture with `rhot simulate fist --out {capture.folder}`"
-        )
-    if not capture.truth.is_file():
-        raise CaptureError(
-            f"{capture.folder}: has no truth.jsonl; only captures of `rhot simulate` can be scored"
-        )
+    _check_capture(capture)
     check_result(result, "poses", "objects", *(("markers", "points") if stages else ()))
     config = load_rig(capture.rig_toml)
     truth = list(read_lines(capture.truth, Truth))
     poses = list(read_lines(result / "poses.jsonl", HandPose))
     period_ns = 1e9 / (config.rate_hz(Rate.HAND) or 30.0)
     models = _models(config, truth)
-    notes = (
-        [] if models else ["truth.jsonl knows no hand that rig.toml configures; no hand was scored"]
-    )
-    notes += [
-        f"no pose of the {hand} hand, which truth.jsonl knows"
-        for hand in models
-        if not any(p.hand == hand for p in poses)
-    ]
     tracks = {hand: hand_track(truth, hand) for hand in models}
-    seen = [hand for hand in models if any(pose.hand == hand for pose in poses)]
-    if models and not seen:
+    poses_of = {hand: [pose for pose in poses if pose.hand == hand] for hand in models}
+    if models and not any(poses_of.values()):
         raise CaptureError(
-            f"{result}: has no pose of the {' or '.join(models)} hand; see {result / 'summary.json'} for the reason"
+            f"{result}: has no pose of the {' or '.join(models)} hand; "
+            f"see {result / 'summary.json'} for the reason"
         )
     hands = {
-        hand: score_hand(
-            [p for p in poses if p.hand == hand], tracks[hand], models[hand], period_ns
-        )
-        for hand in seen
+        str(hand): score_hand(own, tracks[hand], models[hand], period_ns)
+        for hand, own in poses_of.items()
+        if own
     }
-    objects = list(read_lines(result / "objects.jsonl", ObjectPose))
-    names = sorted(
-        {name for line in truth for name in line.objects} & {table.name for table in config.object}
-    )
+    scored_stages = {
+        str(hand): _stages(config, hand, models[hand], tracks[hand], result)
+        for hand in (models if stages else ())
+    }
     return Score(
-        hands={str(hand): one for hand, one in hands.items()},
-        objects={
-            name: score_object(
-                [o for o in objects if o.object == name], object_track(truth, name), period_ns
-            )
-            for name in names
-        },
-        stages={hand: _stages(config, hand, models[hand], tracks[hand], result) for hand in models}
-        if stages
-        else {},
-        notes=notes,
+        hands=hands,
+        objects=_objects(config, truth, result, period_ns),
+        stages=scored_stages,
+        notes=_notes(poses_of),
     )
+
+
+def _check_capture(capture: Capture) -> None:
+    folder = capture.folder
+    if not folder.is_dir():
+        raise CaptureError(
+            f"{folder}: no such folder; make a capture with `rhot simulate fist --out {folder}`"
+        )
+    if not capture.truth.is_file():
+        raise CaptureError(
+            f"{folder}: has no truth.jsonl; only captures of `rhot simulate` can be scored"
+        )
 
 
 def _models(config: RigConfig, truth: list[Truth]) -> dict[HandName, HandModel]:
@@ -90,6 +79,29 @@ def _models(config: RigConfig, truth: list[Truth]) -> dict[HandName, HandModel]:
         hand: load_hand(config.calibration_dir, hand, config.hand[hand].scale)
         for hand in HANDS
         if hand in config.hand and hand in known
+    }
+
+
+def _notes(poses_of: dict[HandName, list[HandPose]]) -> list[str]:
+    if not poses_of:
+        return ["truth.jsonl knows no hand that rig.toml configures; no hand was scored"]
+    return [
+        f"no pose of the {hand} hand, which truth.jsonl knows"
+        for hand, own in poses_of.items()
+        if not own
+    ]
+
+
+def _objects(
+    config: RigConfig, truth: list[Truth], result: Path, period_ns: float
+) -> dict[str, ObjectScore]:
+    poses = list(read_lines(result / "objects.jsonl", ObjectPose))
+    known = {name for line in truth for name in line.objects}
+    return {
+        name: score_object(
+            [pose for pose in poses if pose.object == name], object_track(truth, name), period_ns
+        )
+        for name in sorted(known & {table.name for table in config.object})
     }
 
 

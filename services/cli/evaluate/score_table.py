@@ -1,11 +1,6 @@
-"""Scores as text: plain tables that line up in a terminal, a log or a mail.
-
-Numbers that were not measured show as `-`.
-"""
+"""Scores as text tables. Numbers that were not measured show as `-`."""
 
 from __future__ import annotations
-
-from collections.abc import Iterable, Sequence
 
 from services.cli.evaluate.score_types import (
     Coverage,
@@ -15,23 +10,11 @@ from services.cli.evaluate.score_types import (
     Score,
     Stages,
 )
+from services.cli.evaluate.text_table import number, plain, table
 
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Columns as wide as their widest cell: the first to the left, the others to the right."""
-    cells = [list(header), *(list(row) for row in rows)]
-    widths = [max(len(row[column]) for row in cells) for column in range(len(header))]
-    lines = [
-        "  ".join(
-            [
-                row[0].ljust(widths[0]),
-                *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True)),
-            ]
-        ).rstrip()
-        for row in cells
-    ]
-    lines.insert(1, "  ".join("-" * width for width in widths))
-    return "\n".join(lines)
+# Bias and RMS along each axis, RMS and maximum of the length, as in PointError; all in mm.
+_POINT_COLUMNS = ("bias x", "bias y", "bias z", "RMS x", "RMS y", "RMS z", "RMS mm", "max mm")
+_MARKER_COLUMNS = ("found %", "strays", "bias x", "bias y", "RMS x", "RMS y px")
 
 
 def score_text(score: Score) -> str:
@@ -46,57 +29,28 @@ def score_text(score: Score) -> str:
 
 def hand_text(hand: str, score: HandScore) -> str:
     """One hand: tips, angles, orientation, dropouts, limits, delay."""
-    tips = [(name, *_point(error)) for name, error in {**score.tips, "wrist": score.wrist}.items()]
+    count = f"{score.scored} of {score.poses} poses inside the truth"
+    if score.predicted:
+        count += f", {score.predicted} with a predicted finger"
+    points = [(name, *_point(error)) for name, error in score.tips.items()]
+    points.append(("wrist", *_point(score.wrist)))
     angles = [
         (
             f"{digit} {joint}",
-            _number(error.bias_deg, 1),
-            _number(error.mean_deg, 1),
-            _number(error.max_deg, 1),
+            number(error.bias_deg, 1),
+            number(error.mean_deg, 1),
+            number(error.max_deg, 1),
         )
         for digit, joints in score.angles.items()
         for joint, error in joints.items()
         if not error.fixed
     ]
-    lines = [
-        ("finger tips, RMS", f"{score.tips_rms_mm:.2f} mm", f"at {score.distance_m:.2f} m"),
-        ("joint angles, mean", f"{score.angles_mean_deg:.2f} deg", "fixed joints left out"),
-        (
-            "hand orientation",
-            f"{score.orientation.rms_deg:.2f} deg",
-            f"RMS; mean {score.orientation.mean_deg:.2f}, most {score.orientation.max_deg:.2f}",
-        ),
-        ("wrist position, RMS", f"{score.wrist.total_rms_mm:.2f} mm", ""),
-        ("dropouts", f"{100 * score.coverage.missed_share:.1f} %", coverage_text(score.coverage)),
-        ("limit violations", str(score.violations.count), _worst(score)),
-        (
-            "delay",
-            "-" if score.delay_ms is None else f"{score.delay_ms:.1f} ms",
-            "of the content; - where the motion does not tell",
-        ),
-    ]
-    count = f"{score.scored} of {score.poses} poses inside the truth"
-    if score.predicted:
-        count += f", {score.predicted} with a predicted finger"
     return "\n\n".join(
         [
             f"{hand} hand: {count}",
-            table(
-                (
-                    "point",
-                    "bias x",
-                    "bias y",
-                    "bias z",
-                    "RMS x",
-                    "RMS y",
-                    "RMS z",
-                    "RMS mm",
-                    "max mm",
-                ),
-                tips,
-            ),
+            table(("point", *_POINT_COLUMNS), points),
             table(("angle", "bias", "mean", "max deg"), angles),
-            plain(lines),
+            plain(_overview(score)),
         ]
     )
 
@@ -107,29 +61,14 @@ def objects_text(objects: dict[str, ObjectScore]) -> str:
         (
             name,
             f"{one.scored}/{one.poses}",
-            *(_point(one.position) if one.position else ["-"] * 8),
-            _number(one.orientation.rms_deg if one.orientation else None),
+            *(_point(one.position) if one.position else ["-"] * len(_POINT_COLUMNS)),
+            number(one.orientation.rms_deg if one.orientation else None),
             f"{100 * one.coverage.missed_share:.1f}",
-            _number(one.delay_ms, 1),
+            number(one.delay_ms, 1),
         )
         for name, one in objects.items()
     ]
-    header = (
-        "object",
-        "poses",
-        "bias x",
-        "bias y",
-        "bias z",
-        "RMS x",
-        "RMS y",
-        "RMS z",
-        "RMS mm",
-        "max mm",
-        "turn deg",
-        "lost %",
-        "delay ms",
-    )
-    return table(header, rows)
+    return table(("object", "poses", *_POINT_COLUMNS, "turn deg", "lost %", "delay ms"), rows)
 
 
 def stages_text(hand: str, stages: Stages) -> str:
@@ -139,7 +78,7 @@ def stages_text(hand: str, stages: Stages) -> str:
             f"{camera} {name}",
             f"{100 * one.found_share:.1f}",
             str(one.strays),
-            *(_number(v) for v in (*one.bias_px, *one.rms_px)),
+            *(number(value) for value in (*one.bias_px, *one.rms_px)),
         )
         for camera, rows in stages.markers.items()
         for name, one in rows.items()
@@ -156,54 +95,37 @@ def stages_text(hand: str, stages: Stages) -> str:
     return "\n\n".join(
         [
             f"{hand} hand, markers against the projected truth:",
-            table(
-                ("marker", "found %", "strays", "bias x", "bias y", "RMS x", "RMS y px"), markers
-            ),
+            table(("marker", *_MARKER_COLUMNS), markers),
             f"{hand} hand, points against the truth's landmarks:",
-            table(
-                (
-                    "point",
-                    "found %",
-                    "pred. %",
-                    "bias x",
-                    "bias y",
-                    "bias z",
-                    "RMS x",
-                    "RMS y",
-                    "RMS z",
-                    "RMS mm",
-                    "max mm",
-                ),
-                points,
-            ),
+            table(("point", "found %", "pred. %", *_POINT_COLUMNS), points),
         ]
     )
 
 
-def coverage_text(coverage: Coverage) -> str:
-    """The dropouts in words."""
-    text = f"{coverage.missed} of {coverage.expected} instants, longest gap {coverage.longest_gap_ms:.0f} ms"
+def _overview(score: HandScore) -> list[tuple[str, str, str]]:
+    """(what, value, remark) of what is one number for the whole hand."""
+    turn, limits = score.orientation, score.violations
+    turn_text = f"RMS; mean {turn.mean_deg:.2f}, max {turn.max_deg:.2f}"
+    worst = f"worst {limits.worst_deg:.2f} deg at {limits.worst_joint}" if limits.count else "none"
+    missed = f"{100 * score.coverage.missed_share:.1f} %"
+    delay = "-" if score.delay_ms is None else f"{score.delay_ms:.1f} ms"
+    return [
+        ("finger tips, RMS", f"{score.tips_rms_mm:.2f} mm", f"at {score.distance_m:.2f} m"),
+        ("joint angles, mean", f"{score.angles_mean_deg:.2f} deg", "fixed joints left out"),
+        ("hand orientation", f"{turn.rms_deg:.2f} deg", turn_text),
+        ("wrist position, RMS", f"{score.wrist.total_rms_mm:.2f} mm", ""),
+        ("dropouts", missed, _coverage_text(score.coverage)),
+        ("limit violations", str(limits.count), worst),
+        ("delay", delay, "of the content; - if the motion is too slow to measure it"),
+    ]
+
+
+def _coverage_text(coverage: Coverage) -> str:
+    gap = f"longest gap {coverage.longest_gap_ms:.0f} ms"
+    text = f"{coverage.missed} of {coverage.expected} instants, {gap}"
     return text + (f", {coverage.outside} poses outside the truth" if coverage.outside else "")
 
 
-def plain(rows: Sequence[Sequence[str]]) -> str:
-    """Rows without a header."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )
-
-
-def _worst(score: HandScore) -> str:
-    found = score.violations
-    return f"worst {found.worst_deg:.2f} deg at {found.worst_joint}" if found.count else "none"
-
-
 def _point(error: PointError) -> list[str]:
-    return [_number(v) for v in (*error.bias_mm, *error.rms_mm, error.total_rms_mm, error.max_mm)]
-
-
-def _number(value: float | None, digits: int = 2) -> str:
-    # Adding 0.0 turns the -0.0 of a rounded small number into 0.0.
-    return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
+    values = (*error.bias_mm, *error.rms_mm, error.total_rms_mm, error.max_mm)
+    return [number(value) for value in values]

@@ -1,7 +1,6 @@
-"""What `rhot score` finds: frozen results, in the units people read (mm, deg, ms), ready for JSON.
+"""What `rhot score` reports, in the units people read (mm, deg, ms), ready for JSON.
 
-A value that could not be measured is None, never zero: a delay of a hand that does not move, angles
-when no pose was scored.
+A value that could not be measured is None, never zero: the delay of a hand at rest, for example.
 """
 
 from __future__ import annotations
@@ -11,13 +10,10 @@ import msgspec
 Vec3 = tuple[float, float, float]
 
 
-class Result(msgspec.Struct, frozen=True, kw_only=True):
-    """Base of all scores."""
+class PointError(msgspec.Struct, frozen=True, kw_only=True):
+    """Error of one point in mm: mean (bias) and RMS along the rig's x, y, z.
 
-
-class PointError(Result, frozen=True, kw_only=True):
-    """Error of one point along the rig's x, y, z in mm: its mean (bias), its RMS, and the RMS and
-    maximum of its length.
+    total_rms_mm and max_mm are of the error's length.
     """
 
     bias_mm: Vec3
@@ -26,10 +22,10 @@ class PointError(Result, frozen=True, kw_only=True):
     max_mm: float
 
 
-class AngleError(Result, frozen=True, kw_only=True):
+class AngleError(msgspec.Struct, frozen=True, kw_only=True):
     """Error of one joint angle in deg: signed mean (bias), mean and maximum of its size.
 
-    A fixed joint has no freedom to err.
+    A fixed joint cannot move (its limits are equal), so its error is no error of the estimate.
     """
 
     bias_deg: float
@@ -38,7 +34,7 @@ class AngleError(Result, frozen=True, kw_only=True):
     fixed: bool
 
 
-class TurnError(Result, frozen=True, kw_only=True):
+class OrientationError(msgspec.Struct, frozen=True, kw_only=True):
     """Angle between two orientations in deg."""
 
     mean_deg: float
@@ -46,12 +42,12 @@ class TurnError(Result, frozen=True, kw_only=True):
     max_deg: float
 
 
-class Coverage(Result, frozen=True, kw_only=True):
-    """How much of the truth was answered.
+class Coverage(msgspec.Struct, frozen=True, kw_only=True):
+    """How much of the truth has a pose.
 
     expected: instants of truth; missed: those without a pose within half a frame; longest_gap_ms:
-    longest time between two poses (or from the first or to the last truth); outside: poses before
-    or after the truth, which are not scored.
+    longest time between two poses, or between the truth's ends and a pose; outside: poses before or
+    after the truth, which are not scored.
     """
 
     expected: int
@@ -61,9 +57,10 @@ class Coverage(Result, frozen=True, kw_only=True):
     outside: int
 
 
-class Violations(Result, frozen=True, kw_only=True):
-    """Joint angles beyond the limits of the hand: how many (poses times joints), the worst excess
-    and where it is.
+class Violations(msgspec.Struct, frozen=True, kw_only=True):
+    """Joint angles beyond the limits of the hand: how many, the largest excess and its joint.
+
+    Each joint of each pose counts.
     """
 
     count: int
@@ -71,7 +68,7 @@ class Violations(Result, frozen=True, kw_only=True):
     worst_joint: str
 
 
-class HandScore(Result, frozen=True, kw_only=True):
+class HandScore(msgspec.Struct, frozen=True, kw_only=True):
     """One hand against its truth."""
 
     poses: int
@@ -83,13 +80,13 @@ class HandScore(Result, frozen=True, kw_only=True):
     angles: dict[str, dict[str, AngleError]]
     angles_mean_deg: float
     wrist: PointError
-    orientation: TurnError
+    orientation: OrientationError
     coverage: Coverage
     violations: Violations
     delay_ms: float | None
 
 
-class ObjectScore(Result, frozen=True, kw_only=True):
+class ObjectScore(msgspec.Struct, frozen=True, kw_only=True):
     """One object against its truth.
 
     Unregistered poses (lighthouse frame) are counted and not scored.
@@ -99,15 +96,16 @@ class ObjectScore(Result, frozen=True, kw_only=True):
     scored: int
     unregistered: int
     position: PointError | None
-    orientation: TurnError | None
+    orientation: OrientationError | None
     coverage: Coverage
     delay_ms: float | None
 
 
-class MarkerError(Result, frozen=True, kw_only=True):
+class MarkerError(msgspec.Struct, frozen=True, kw_only=True):
     """Blobs of one colour in one camera against the projected landmark.
 
-    found_share of the frames; strays are blobs elsewhere; bias and RMS of the rest.
+    found_share: of the frames; strays: blobs too far away, which are false detections; bias and RMS
+    are of the others.
     """
 
     found_share: float
@@ -116,9 +114,10 @@ class MarkerError(Result, frozen=True, kw_only=True):
     rms_px: tuple[float, float]
 
 
-class PointStage(Result, frozen=True, kw_only=True):
-    """3D points of one landmark against its truth: share of instants that hold it, and of those the
-    share only predicted.
+class PointStage(msgspec.Struct, frozen=True, kw_only=True):
+    """3D points of one landmark against its truth.
+
+    found_share: of the instants; predicted_share: of the points found, those without a measurement.
     """
 
     found_share: float
@@ -126,14 +125,14 @@ class PointStage(Result, frozen=True, kw_only=True):
     error: PointError
 
 
-class Stages(Result, frozen=True, kw_only=True):
+class Stages(msgspec.Struct, frozen=True, kw_only=True):
     """Errors before the hand is solved: markers per camera and landmark, points per landmark."""
 
     markers: dict[str, dict[str, MarkerError]]
     points: dict[str, PointStage]
 
 
-class Score(Result, frozen=True, kw_only=True):
+class Score(msgspec.Struct, frozen=True, kw_only=True):
     """All of a result against the capture it was made from; stages only where asked for."""
 
     hands: dict[str, HandScore]

@@ -1,10 +1,9 @@
-"""The simulator's truth as functions of time: what hand and objects did at the instant a pose
-speaks of.
+"""The simulator's truth as functions of time: the state of hand and objects at a pose's own stamp.
 
 Truth comes as one line per instant; poses have stamps of their own. Positions are interpolated by a
 cubic spline, angles linearly, orientations along the shortest arc. Nothing is extrapolated: an
-instant before the first or after the last line is `outside`, and the scores say how many those
-were. A capture with fewer than two lines of truth cannot be scored.
+instant before the first or after the last line is `outside`, and the scores count those. A capture
+with fewer than two lines of truth cannot be scored.
 """
 
 from __future__ import annotations
@@ -14,22 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from rhot.errors import CaptureError
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS, TIPS
 from rhot.messages import FingerAngles
 from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
-
-Stamps = npt.NDArray[np.int64]
+from services.cli.evaluate.interpolation import Stamps, cubic, linear, slerp
 
 
 @dataclass(frozen=True, eq=False)
 class HandTrack:
-    """One hand's truth: stamps_ns (n,), wrist and tips in metres, orientation wxyz, angles (n, 5,
-    4) in rad.
-    """
+    """One hand's truth or estimate at n instants, in the rig frame; metres and radians."""
 
     stamps_ns: Stamps  # (n,)
     wrist_m: Array  # (n, 3)
@@ -50,13 +45,11 @@ class HandTrack:
 
 @dataclass(frozen=True, eq=False)
 class ObjectTrack:
-    """One object's truth or estimate: stamps_ns (n,), position (n, 3) in metres, orientation (n, 4)
-    wxyz.
-    """
+    """One object's truth or estimate at n instants, in the rig frame."""
 
-    stamps_ns: Stamps
-    position_m: Array
-    orientation_wxyz: Array
+    stamps_ns: Stamps  # (n,)
+    position_m: Array  # (n, 3)
+    orientation_wxyz: Array  # (n, 4)
 
     def at(self, stamps_ns: Stamps) -> ObjectTrack:
         """The object at other instants (m,), all of them inside the span of the truth."""
@@ -115,46 +108,12 @@ def inside(track: HandTrack | ObjectTrack, stamps_ns: Stamps) -> npt.NDArray[np.
     return (stamps_ns >= track.stamps_ns[0]) & (stamps_ns <= track.stamps_ns[-1])
 
 
-def cubic(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
-    """Cubic spline through (n, ...) at (m,) -> (m, ...)."""
-    return np.asarray(
-        CubicSpline(_seconds(stamps_ns, stamps_ns), values, axis=0)(_seconds(at_ns, stamps_ns))
-    )
-
-
-def linear(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
-    """Straight lines through (n, ...) at (m,) -> (m, ...)."""
-    index, share = _segments(stamps_ns, at_ns)
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return values[index] * (1.0 - share) + values[index + 1] * share
-
-
-def slerp(stamps_ns: Stamps, wxyz: Array, at_ns: Stamps) -> Array:
-    """Shortest arcs through quaternions (n, 4) at (m,) -> (m, 4). Shoemake, SIGGRAPH 1985."""
-    index, share = _segments(stamps_ns, at_ns)
-    a, b = wxyz[index], wxyz[index + 1]
-    dot = np.sum(a * b, axis=1, keepdims=True)
-    b, dot = np.where(dot < 0.0, -b, b), np.minimum(np.abs(dot), 1.0)
-    angle = np.arccos(dot)
-    sine = np.sin(angle)
-    share = share[:, None]
-    # Below 1e-6 rad the arc is its chord.
-    small = sine < 1e-6
-    safe = np.where(small, 1.0, sine)
-    q = np.where(
-        small,
-        a * (1 - share) + b * share,
-        (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / safe,
-    )
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    return np.where(q[:, :1] < 0.0, -q, q)
-
-
 def _tips(truth: HandTruth) -> Array:
     missing = [tip for tip in TIPS if tip not in truth.points_m]
     if missing:
         raise CaptureError(
-            f"truth.jsonl: points_m lacks {missing}; simulate the capture again with `rhot simulate`"
+            f"truth.jsonl: points_m lacks {missing}; "
+            "simulate the capture again with `rhot simulate`"
         )
     return np.array([truth.points_m[tip] for tip in TIPS])
 
@@ -162,7 +121,8 @@ def _tips(truth: HandTruth) -> Array:
 def _increasing(stamps: list[int], what: str) -> Stamps:
     if len(stamps) < 2:
         raise CaptureError(
-            f"{what}: {len(stamps)} line(s) in truth.jsonl; at least 2 are needed to score against it"
+            f"{what}: {len(stamps)} line(s) in truth.jsonl; "
+            "at least 2 are needed to score against it"
         )
     array = np.array(stamps, dtype=np.int64)
     if np.any(np.diff(array) <= 0):
@@ -170,13 +130,3 @@ def _increasing(stamps: list[int], what: str) -> Stamps:
             f"{what}: two lines of truth.jsonl have the same stamp_ns; simulate the capture again"
         )
     return array
-
-
-def _seconds(stamps_ns: Stamps, origin_ns: Stamps) -> Array:
-    return (stamps_ns - origin_ns[0]) * 1e-9
-
-
-def _segments(stamps_ns: Stamps, at_ns: Stamps) -> tuple[npt.NDArray[np.intp], Array]:
-    """Segment number and share 0..1 within it of each instant; (m,), (m,)."""
-    index = np.clip(np.searchsorted(stamps_ns, at_ns, side="right") - 1, 0, len(stamps_ns) - 2)
-    return index, (at_ns - stamps_ns[index]) / (stamps_ns[index + 1] - stamps_ns[index])

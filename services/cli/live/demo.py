@@ -1,13 +1,17 @@
-"""`rhot demo`: router, simulated rig, all services and the live view, on one machine, until Ctrl-C
-or for N seconds.
+"""`rhot demo`: the whole rig, simulated, on one machine, until Ctrl-C or for N seconds.
+
+Router, simulator, trackers, fusion, solver, object tracker and viewer are processes of their own,
+as in `rhot up`. They run on a copy of the configuration that rhot ships.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
+from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import typer
@@ -15,24 +19,36 @@ import uvloop
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.files.config import RigConfig, load_rig
+from rhot.errors import ConfigError
+from rhot.files.config import load_rig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
-from services.cli.defaults import sim_toml
-from services.cli.live.demo_metrics import LiveFigures, Summary
+from services.cli.live.demo_metrics import DemoMetrics
+from services.cli.live.demo_summary import Summary, summary_text
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
+from services.cli.live.working_copy import working_copy
 from services.cli.options import VerboseOption
-from services.cli.terminal import Teller
+from services.cli.terminal import Terminal
 
 # Without a pose by then something is wrong: numba's first compilation takes most of a minute on a
 # slow machine.
 _FIRST_POSE_S = 120.0
+_POLL_S = 0.25
 
 
 def demo(
     config: Annotated[
         Path | None,
-        typer.Option(help="rig.toml of a simulated rig; default: the one rhot brings along"),
+        typer.Option(
+            help="rig.toml of a simulated rig, run where it is; default: a copy of rhot's own"
+        ),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(
+            help="keep the copy of rhot's own rig here, and continue with it the next time; "
+            "default: a temporary folder, removed at the end"
+        ),
     ] = None,
     seconds: Annotated[
         float | None,
@@ -43,103 +59,117 @@ def demo(
     verbose: VerboseOption = False,
 ) -> None:
     """Run the whole rig, simulated: a moving hand and an object, live in the browser."""
-    path = config or sim_toml()
-    summary = uvloop.run(_demo(load_rig(path), path, seconds, viewer, Teller(verbose=verbose)))
+    if config is not None and folder is not None:
+        raise ConfigError(
+            "--folder is for rhot's own rig, --config for another one, which runs where it is: "
+            "give one of them"
+        )
+    with working_copy(folder) if config is None else contextlib.nullcontext(config) as path:
+        terminal = Terminal(verbose=verbose)
+        if config is None:
+            kept = "" if folder else "; removed at the end, --folder DIR keeps it"
+            terminal.line(f"working folder {path.parent}{kept}")
+        summary = uvloop.run(_demo(path, seconds, viewer, terminal))
     if as_json:
         typer.echo(msgspec.json.encode(summary).decode())
     elif seconds is not None or summary.poses:
-        typer.echo(_text(summary))
+        typer.echo(summary_text(summary))
     if not summary.poses:
         typer.echo(
-            "rhot demo: no pose came; `rhot demo --verbose` shows what the services say", err=True
+            "rhot demo: no pose came; `rhot demo --verbose` shows what the services log", err=True
         )
         raise typer.Exit(1)
 
 
-async def _demo(
-    config: RigConfig, path: Path, seconds: float | None, viewer: bool, teller: Teller
-) -> Summary:
+async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Terminal) -> Summary:
     stopping = stop_on_signals()
-    supervisor, figures = Supervisor(teller.child), LiveFigures()
+    config = load_rig(path)
+    supervisor, metrics = Supervisor(terminal.log), DemoMetrics()
     endpoint = _free_endpoint(config.bus.listen[0])
     with cancelled_by(stopping):
         async with asyncio.TaskGroup() as tasks:
             keepers = [
-                tasks.create_task(supervisor.keep(child))
+                tasks.create_task(supervisor.keep_running(child))
                 for child in children_of(config, path, viewer=viewer, endpoint=[endpoint])
             ]
-            teller.line(
-                f"rig {config.rig.name!r}, scene {config.simulator.scene!r}, router at {endpoint}; Ctrl-C ends everything"
+            terminal.line(
+                f"rig {config.rig.name!r}, scene {config.simulator.scene!r}, "
+                f"router at {endpoint}; Ctrl-C ends everything"
             )
             try:
-                async with (
-                    open_bus(config.rig.name, [endpoint]) as bus,
-                    asyncio.TaskGroup() as watchers,
-                ):
-                    watching = [
-                        watchers.create_task(watch) for watch in _watch(bus, figures, teller)
-                    ]
-                    await _until_done(figures, seconds, teller)
-                    for task in watching:
-                        task.cancel()
+                async with open_bus(config.rig.name, [endpoint]) as bus:
+                    await _measure(bus, metrics, seconds, terminal)
             finally:
                 for keeper in keepers:
                     keeper.cancel()
-    teller.end()
-    return figures.summary(dict(supervisor.restarts))
+    terminal.end()
+    return metrics.summary(dict(supervisor.restarts))
 
 
-def _watch(bus: Bus, figures: LiveFigures, teller: Teller) -> list:
+async def _measure(
+    bus: Bus, metrics: DemoMetrics, seconds: float | None, terminal: Terminal
+) -> None:
+    """Feed the metrics from the bus until the time is over."""
+    async with asyncio.TaskGroup() as tasks:
+        subscribed = [tasks.create_task(one) for one in _subscribers(bus, metrics, terminal)]
+        await _until_done(metrics, seconds, terminal)
+        for task in subscribed:
+            task.cancel()
+
+
+def _subscribers(
+    bus: Bus, metrics: DemoMetrics, terminal: Terminal
+) -> list[Coroutine[Any, Any, None]]:
     async def poses() -> None:
         async for pose in bus.every(topics.POSE, 256):
-            figures.pose(pose, clock.now_ns())
+            metrics.add_pose(pose, clock.now_ns())
 
     async def truths() -> None:
         async for truth in bus.every(topics.TRUTH, 256):
-            figures.truth(truth)
+            metrics.add_truth(truth)
 
     async def objects() -> None:
         async for _ in bus.every(topics.OBJECT, 256):
-            figures.objects += 1
+            metrics.objects += 1
 
-    async def health() -> None:
+    async def viewer_port() -> None:
         port = 0
         async for beat in bus.every(topics.HEALTH, 64):
             if beat.service == "viewer" and beat.values.get("port", port) != port:
                 port = int(beat.values["port"])
-                teller.line(f"live view: http://127.0.0.1:{port}")
+                terminal.line(f"live view: http://127.0.0.1:{port}")
 
-    return [poses(), truths(), objects(), health()]
+    return [poses(), truths(), objects(), viewer_port()]
 
 
-async def _until_done(figures: LiveFigures, seconds: float | None, teller: Teller) -> None:
+async def _until_done(metrics: DemoMetrics, seconds: float | None, terminal: Terminal) -> None:
     """Return when the time is over, or when no first pose came in time."""
-    waited_s, last, step_s = 0.0, 0, 0.25
+    waited_s, poses_before = 0.0, 0
     while True:
-        await asyncio.sleep(step_s)
-        waited_s += step_s
-        if not figures.poses and waited_s >= _FIRST_POSE_S and seconds is not None:
-            return
-        if (
-            seconds is not None
-            and figures.poses
-            and clock.now_ns() - figures.first_ns >= seconds * 1e9
-        ):
-            return
+        await asyncio.sleep(_POLL_S)
+        waited_s += _POLL_S
+        if seconds is not None:
+            if not metrics.poses and waited_s >= _FIRST_POSE_S:
+                return
+            if metrics.poses and clock.now_ns() - metrics.first_ns >= seconds * 1e9:
+                return
         if waited_s % 1.0 == 0.0:
-            error_mm = figures.tip_error_mm(last=30)
-            error = "" if error_mm is None else f", tips {error_mm:.1f} mm from truth"
-            teller.status(
-                f"{figures.poses - last} poses/s{error}"
-                if figures.poses
-                else "waiting for the first pose ..."
-            )
-            last = figures.poses
+            terminal.status(_status(metrics, poses_before))
+            poses_before = metrics.poses
+
+
+def _status(metrics: DemoMetrics, poses_before: int) -> str:
+    if not metrics.poses:
+        return "waiting for the first pose ..."
+    error_mm = metrics.tip_error_mm(last=30)
+    error = "" if error_mm is None else f", tips {error_mm:.1f} mm from truth"
+    return f"{metrics.poses - poses_before} poses/s{error}"
 
 
 def _free_endpoint(wanted: str) -> str:
-    """The wanted loopback endpoint, or one on a free port if another router has it: a demo should
-    not fail for that.
+    """The wanted loopback endpoint, or one on a free port if another router has it.
+
+    A demo should not fail because a second one runs.
     """
     protocol, _, address = wanted.partition("/")
     host, _, port = address.rpartition(":")
@@ -150,17 +180,3 @@ def _free_endpoint(wanted: str) -> str:
         except OSError:
             probe.bind((host, 0))
         return f"{protocol}/{host}:{probe.getsockname()[1]}"
-
-
-def _text(summary: Summary) -> str:
-    def show(value: float | None, unit: str) -> str:
-        return "not measured" if value is None else f"{value:.1f} {unit}"
-
-    lines = [
-        f"poses        {summary.poses} in {summary.seconds:.1f} s = {summary.poses_per_s:.1f} per second",
-        f"latency      p50 {show(summary.latency_p50_ms, 'ms')}, p99 {show(summary.latency_p99_ms, 'ms')} (mid-exposure to pose received)",
-        f"tip error    RMS {show(summary.tip_error_rms_mm, 'mm')}, median {show(summary.tip_error_median_mm, 'mm')} against the truth",
-        f"object poses {summary.object_poses}",
-    ]
-    lines += [f"restarts     {name}: {count}" for name, count in sorted(summary.restarts.items())]
-    return "\n".join(lines)

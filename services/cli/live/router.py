@@ -21,7 +21,7 @@ from rhot.files.config import load_rig
 from rhot.process import systemd
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 
-LOOPBACK = "tcp/127.0.0.1:7447"
+_LOOPBACK = "tcp/127.0.0.1:7447"
 
 
 @contextlib.asynccontextmanager
@@ -49,8 +49,8 @@ def router(
         list[str] | None, typer.Option(help="endpoint, e.g. tcp/0.0.0.0:7447 for the whole network")
     ] = None,
 ) -> None:
-    """Run a Zenoh router until Ctrl-C (loopback only, unless told otherwise)."""
-    endpoints = listen or (list(load_rig(config).bus.listen) if config else [LOOPBACK])
+    """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
+    endpoints = listen or (list(load_rig(config).bus.listen) if config else [_LOOPBACK])
     uvloop.run(_route(endpoints))
 
 

@@ -12,7 +12,7 @@ from rhot.client import RigClient
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.router_session import rig_and_endpoints, router_session
 
 
 class Action(StrEnum):
@@ -35,7 +35,7 @@ def session(
 
 
 async def _session(action: Action, rig: RigConfig, endpoints: list[str]) -> str:
-    async with reach(rig.rig.name, endpoints) as bus:
+    async with router_session(rig.rig.name, endpoints) as bus:
         client = RigClient(bus)
         if action is Action.START:
             client.start()

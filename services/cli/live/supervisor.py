@@ -1,9 +1,8 @@
-"""Child processes that are restarted when they end, and all ended together: what systemd does for
-an installed rig.
+"""Child processes that are restarted when they end: what systemd does for an installed rig.
 
-Each child leads its own session (Ctrl-C reaches only the supervisor, which ends them in order) and
-is killed by the kernel should the supervisor die without a word. Their JSON log lines come out as
-one line of text each, warnings only unless asked for more.
+Each child leads a session of its own: Ctrl-C reaches only the supervisor, which ends the children.
+The kernel kills them should the supervisor be killed. What they write comes out line by line with
+its level.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ import asyncio
 import contextlib
 import ctypes
 import json
+import re
 import signal
 import sys
 import time
@@ -22,13 +22,15 @@ from rhot.process.lifecycle import EXIT_USER
 
 # As systemd's RestartSec of the installed units: poses are back within a second of a crash.
 _RESTART_S = 0.5
-# A service that stops with a message for the user will say the same at once; asking again every
-# five seconds is enough.
+# A service that ended with a message for the user would end with the same one at once; a new try
+# every five seconds is enough.
 _RESTART_AFTER_USER_ERROR_S = 5.0
 # A service ends within a second of SIGTERM; five are for a loaded machine.
 _STOP_S = 5.0
 _PR_SET_PDEATHSIG = 1
 _LINE_LIMIT = 1 << 20
+# How our programs refuse to start before they log: wrong options, a missing extra.
+_REFUSAL = re.compile(r"rhot[a-z-]*: error: (.*)")
 
 
 @dataclass(frozen=True)
@@ -45,26 +47,23 @@ def service_argv(package: str, *options: str) -> list[str]:
 
 
 class Supervisor:
-    """Runs children until cancelled. say(name, level, text) gets what they log."""
+    """Runs children until cancelled; log(name, level, text) gets each line they write."""
 
-    def __init__(self, say: Callable[[str, str, str], None]) -> None:
+    def __init__(self, log: Callable[[str, str, str], None]) -> None:
         self.restarts: dict[str, int] = {}
         self.pids: dict[str, int] = {}
-        self._say = say
+        self._log = log
 
-    async def keep(self, child: Child) -> None:
-        """Keep one child running; ends it when cancelled."""
+    async def keep_running(self, child: Child) -> None:
+        """Start one child again whenever it ends; ends it when cancelled."""
         while True:
             started_s = time.monotonic()
             code = await self._run_once(child)
             pause_s = _RESTART_AFTER_USER_ERROR_S if code == EXIT_USER else _RESTART_S
             self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
-            lived_s = time.monotonic() - started_s
-            self._say(
-                child.name,
-                "warning",
-                f"ended with {_describe(code)} after {lived_s:.1f} s, starting again in {pause_s:g} s",
-            )
+            ran_s = time.monotonic() - started_s
+            text = f"ended with {_describe(code)} after {ran_s:.1f} s, starting again in"
+            self._log(child.name, "warning", f"{text} {pause_s:g} s")
             await asyncio.sleep(pause_s)
 
     async def _run_once(self, child: Child) -> int:
@@ -79,12 +78,12 @@ class Supervisor:
         )
         self.pids[child.name] = process.pid
         try:
-            await self._listen(child.name, process)
+            await self._read_lines(child.name, process)
             return await process.wait()
         finally:
             await asyncio.shield(_end(process))
 
-    async def _listen(self, name: str, process: asyncio.subprocess.Process) -> None:
+    async def _read_lines(self, name: str, process: asyncio.subprocess.Process) -> None:
         if process.stdout is None:
             return
         while True:
@@ -96,7 +95,7 @@ class Supervisor:
                 return
             level, text = _parse(line.decode(errors="replace").rstrip())
             if text:
-                self._say(name, level, text)
+                self._log(name, level, text)
 
 
 def _die_with_parent() -> None:
@@ -104,7 +103,8 @@ def _die_with_parent() -> None:
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:
-    """SIGTERM, and SIGKILL for what does not listen."""
+    """SIGTERM, and SIGKILL for a process that does not end."""
+    # Alike in services/object_tracker/sources/libsurvive.py: a service does not import the command.
     if process.returncode is not None:
         return
     with contextlib.suppress(ProcessLookupError):
@@ -117,7 +117,9 @@ async def _end(process: asyncio.subprocess.Process) -> None:
 
 
 def _parse(line: str) -> tuple[str, str]:
-    """(level, text) of a JSON log line; anything else is information as it stands."""
+    """(level, text) of a JSON log line; a refusal to start is an error, any other line info."""
+    if refusal := _REFUSAL.fullmatch(line):
+        return "error", refusal[1]
     try:
         record = json.loads(line)
         text = str(record["text"]) + ("\n" + record["trace"] if "trace" in record else "")

@@ -1,5 +1,7 @@
-"""`rhot top`: services alive, rates against the topics table, drops, and latencies of each hop and
-from glass to pose.
+"""`rhot top`: the state, rates, losses and latencies of every service, live.
+
+Rates are compared with the topics table. Latencies are of each hop, and from glass to pose: from
+mid-exposure to the published pose.
 """
 
 from __future__ import annotations
@@ -16,11 +18,12 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
-from services.cli.live.top_table import Board, Watcher, expected_services, text
+from services.cli.live.top_table import ServiceMonitor, TopTable, expected_services
+from services.cli.live.top_text import table_text
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.router_session import reach, rig_and_endpoints
+from services.cli.router_session import rig_and_endpoints, router_session
 
-# A beat comes once a second: after two, every living service has been heard.
+# A beat comes once a second: within two, every running service has sent one.
 _LISTEN_S = 2.2
 
 
@@ -36,50 +39,50 @@ def top(
 ) -> None:
     """Show every service, its rates and latencies, live."""
     rig, endpoints = rig_and_endpoints(config, connect)
-    board = uvloop.run(_top(rig, endpoints, once, seconds, as_json))
-    if once and (board is None or not board.healthy):
+    table = uvloop.run(_top(rig, endpoints, once, seconds, as_json))
+    if once and (table is None or not table.healthy):
         raise typer.Exit(1)
 
 
 async def _top(
     rig: RigConfig, endpoints: list[str], once: bool, seconds: float | None, as_json: bool
-) -> Board | None:
+) -> TopTable | None:
     stopping = stop_on_signals()
-    watcher, board = Watcher(rig.rig.name, expected_services(rig)), None
+    monitor, table = ServiceMonitor(rig.rig.name, expected_services(rig)), None
     with cancelled_by(stopping):
-        async with reach(rig.rig.name, endpoints) as bus, asyncio.TaskGroup() as tasks:
+        async with router_session(rig.rig.name, endpoints) as bus, asyncio.TaskGroup() as tasks:
             listeners = [
-                tasks.create_task(_beats(bus, watcher)),
-                tasks.create_task(_tokens(bus, watcher)),
+                tasks.create_task(_beats(bus, monitor)),
+                tasks.create_task(_tokens(bus, monitor)),
             ]
             left_s = _LISTEN_S if once else seconds
             await asyncio.sleep(_LISTEN_S)
             while True:
-                board = watcher.board(clock.now_ns())
-                _show(board, as_json)
+                table = monitor.table(clock.now_ns())
+                _show(table, as_json)
                 left_s = None if left_s is None else left_s - (_LISTEN_S if once else 1.0)
                 if left_s is not None and left_s <= 0.0:
                     break
                 await asyncio.sleep(1.0)
             for task in listeners:
                 task.cancel()
-    return board
+    return table
 
 
-async def _beats(bus: Bus, watcher: Watcher) -> None:
+async def _beats(bus: Bus, monitor: ServiceMonitor) -> None:
     async for health in bus.every(topics.HEALTH, 1024):
-        watcher.beat(health, clock.now_ns())
+        monitor.beat(health, clock.now_ns())
 
 
-async def _tokens(bus: Bus, watcher: Watcher) -> None:
+async def _tokens(bus: Bus, monitor: ServiceMonitor) -> None:
     async for change in bus.watch_alive():
-        watcher.token(change.service, change.instance, change.alive)
+        monitor.token(change.service, change.instance, change.alive)
 
 
-def _show(board: Board, as_json: bool) -> None:
+def _show(table: TopTable, as_json: bool) -> None:
     if as_json:
-        typer.echo(msgspec.json.encode(board).decode())
+        typer.echo(msgspec.json.encode(table).decode())
         return
     if sys.stdout.isatty():
         typer.echo("\033[H\033[2J", nl=False)
-    typer.echo(text(board))
+    typer.echo(table_text(table))

@@ -1,8 +1,7 @@
-"""`rhot up CONFIG`: the master's processes of a real rig, supervised: router, fusion, solver,
-objects, viewer, recorder.
+"""`rhot up CONFIG`: the master's processes of a real rig, supervised.
 
-Cameras whose `host` is empty are tracked on this machine too; those of other hosts run
-`rhot-pi-tracker` there.
+These are router, fusion, solver, object tracker, viewer and recorder. Cameras whose `host` is empty
+are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.options import VerboseOption
-from services.cli.terminal import Teller
+from services.cli.terminal import Terminal
 
 
 def children_of(
@@ -55,19 +54,20 @@ def up(
     verbose: VerboseOption = False,
 ) -> None:
     """Run the master's services of a real rig until Ctrl-C."""
-    uvloop.run(_up(load_rig(config), config, viewer, Teller(verbose=verbose)))
+    uvloop.run(_up(load_rig(config), config, viewer, Terminal(verbose=verbose)))
 
 
-async def _up(config: RigConfig, path: Path, viewer: bool, teller: Teller) -> None:
+async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -> None:
     stopping = stop_on_signals()
-    supervisor = Supervisor(teller.child)
+    supervisor = Supervisor(terminal.log)
     with cancelled_by(stopping):
         async with asyncio.TaskGroup() as tasks:
             for child in children_of(config, path, viewer=viewer):
-                tasks.create_task(supervisor.keep(child))
+                tasks.create_task(supervisor.keep_running(child))
             remote = sorted({camera.host for camera in config.camera if camera.host})
-            teller.line(
-                f"rig {config.rig.name!r} is up at {', '.join(config.bus.listen)}; Ctrl-C ends it, `rhot top --config {path}` shows it"
+            terminal.line(
+                f"rig {config.rig.name!r} is up at {', '.join(config.bus.listen)}; "
+                f"Ctrl-C ends it, `rhot top --config {path}` shows it"
             )
             if remote:
-                teller.line(f"cameras expected from {', '.join(remote)}")
+                terminal.line(f"cameras expected from {', '.join(remote)}")

@@ -1,5 +1,4 @@
-"""`rhot warm`: compile every numba kernel into its cache, so that the first service starts as fast
-as all later ones.
+"""`rhot warm`: compile every numba kernel into its cache, before the first start of a service.
 
 Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or
 ~/.cache/rhot (rhot.process.numba_cache); running it again costs a second.

@@ -1,10 +1,10 @@
-"""The whole rig without its processes: frames of all cameras in, markers, points and poses out, in
-the order of time.
+"""The whole rig without its processes: frames of all cameras in, markers, points and poses out.
 
-The step objects are the services' own; here they only meet without a bus. Pure: the same frames
-give the same messages. With one camera, without a hand or without geometry there are markers only
-(`Pipeline.hands` is then empty). A frame whose size is not its lens calibration's is a
-CalibrationError at once, as nothing could be made of it.
+Frames come in the order of time. The step objects are the services' own; their messages pass from
+one to the next without a bus. Pure: the same frames give the same messages. With one camera,
+without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame
+whose size is not its lens calibration's is a CalibrationError at once, as no point could be
+computed from it.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Pipeline:
         clock_sigma_ns: dict[str, int],
         cameras: dict[str, Camera] | None,
     ) -> None:
-        """trackers and the uncertainty of their stamps (-1: unknown) by camera.
+        """trackers and clock_sigma_ns, the uncertainty of their stamps (-1: unknown), by camera.
 
-        Cameras as `geometry` returns them.
+        cameras as `geometry` returns them.
         """
         self._trackers = trackers
         self._clock_sigma_ns = clock_sigma_ns
@@ -73,8 +73,9 @@ class Pipeline:
         camera = self._cameras.get(frame.camera)
         if camera is not None and camera.size_px != frame.size_px:
             raise CalibrationError(
-                f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, its lens was calibrated at "
-                f"{camera.size_px[0]} x {camera.size_px[1]}; use images of that size, or run `rhot calibrate lens {frame.camera}`"
+                f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, "
+                f"its lens was calibrated at {camera.size_px[0]} x {camera.size_px[1]}; "
+                f"use images of that size, or run `rhot calibrate lens {frame.camera}`"
             )
         markers = self._trackers[frame.camera].step(
             frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera]
@@ -103,10 +104,8 @@ def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | N
     there and one is uncalibrated.
     """
     if not config.hand:
-        return (
-            None,
-            "markers only: rig.toml has no [hand.right.markers] table that says which colour is which landmark",
-        )
+        note = "rig.toml has no [hand.right.markers] table that says which colour is which landmark"
+        return None, f"markers only: {note}"
     if len(names) < 2:
         return None, f"markers only: 3D needs two cameras, this is {names[0]!r} alone"
     return load_rig_cameras(config, names), ""

@@ -1,10 +1,9 @@
-"""The folder `rhot track` writes: markers, points, poses and objects as .jsonl in wire format, and
-summary.json last of all.
+"""The folder `rhot track` writes: .jsonl files in wire format, and summary.json last of all.
 
-Each file is written as NAME.partial and gets its name when all are complete. A run that fails takes
-its .partial files away and leaves what was there before; one that is interrupted leaves them, and
-readers recognise that. A folder that holds anything else is refused, so that nobody's files are
-lost.
+Each file is written as NAME.partial and gets its name when all are complete. A run that fails
+removes its .partial files and leaves what was there before; one that is interrupted leaves them,
+and readers refuse such a folder. A folder that holds anything else is refused too, so that nobody's
+files are lost.
 """
 
 from __future__ import annotations
@@ -18,42 +17,14 @@ from typing import BinaryIO, Self
 import msgspec
 
 from rhot.errors import CaptureError, RhotError
+from services.cli.offline.track_summary import Summary
 
 STREAMS = ("markers", "points", "poses", "objects")
 SUMMARY = "summary.json"
 PARTIAL = ".partial"
-# What `rhot plot` leaves beside them; a second run may overwrite the folder although it holds
-# pictures of the first.
+# What `rhot plot` writes beside them: a second run may overwrite a folder that holds pictures of
+# the first.
 PICTURES = ".png"
-
-
-class CameraSummary(msgspec.Struct, frozen=True, kw_only=True):
-    """One camera's share: frames read, frames with a marker, and markers found, all and per colour."""
-
-    frames: int
-    frames_with_markers: int
-    detections: int
-    colors: dict[str, int]
-
-
-class Summary(msgspec.Struct, frozen=True, kw_only=True):
-    """What a run of `rhot track` did. No times of day and no durations: the same input writes the
-    same bytes.
-
-    refusals counts what fusion could not use, by reason; complete is false if a recording could not
-    be read to its end, and warnings say which; notes say what was left out or looks odd.
-    """
-
-    rig: str
-    cameras: dict[str, CameraSummary]
-    markers: int
-    points: int
-    poses: int
-    objects: int
-    refusals: dict[str, int]
-    complete: bool
-    warnings: list[str]
-    notes: list[str]
 
 
 class ResultWriter:
@@ -107,23 +78,21 @@ class ResultWriter:
 
 def check_result(folder: Path, *streams: str) -> None:
     """Raises CaptureError unless the folder holds a complete result with these streams."""
+    make_it = f"`rhot track CAPTURE --out {folder}`"
     if not folder.is_dir():
-        raise CaptureError(
-            f"{folder}: no such folder; make it with `rhot track CAPTURE --out {folder}`"
-        )
+        raise CaptureError(f"{folder}: no such folder; make it with {make_it}")
     if any(folder.glob(f"*{PARTIAL}")):
         raise CaptureError(
-            f"{folder}: holds {PARTIAL} files of a run that was interrupted; run `rhot track` into it again"
+            f"{folder}: holds {PARTIAL} files of a run that was interrupted; "
+            "run `rhot track` into it again"
         )
     if not (folder / SUMMARY).is_file():
         raise CaptureError(
-            f"{folder}: has no {SUMMARY}, so it is no complete result; make one with `rhot track CAPTURE --out {folder}`"
+            f"{folder}: has no {SUMMARY}, so it is no complete result; make one with {make_it}"
         )
     for stream in streams:
         if not (folder / f"{stream}.jsonl").is_file():
-            raise CaptureError(
-                f"{folder}: has no {stream}.jsonl; make it with `rhot track CAPTURE --out {folder}`"
-            )
+            raise CaptureError(f"{folder}: has no {stream}.jsonl; make it with {make_it}")
 
 
 def _prepare(folder: Path) -> None:
@@ -138,7 +107,8 @@ def _prepare(folder: Path) -> None:
         ]
         if foreign:
             raise CaptureError(
-                f"{folder}: holds files that are not a result of `rhot track` ({', '.join(foreign[:3])}); give --out another folder"
+                f"{folder}: holds files that are not a result of `rhot track` "
+                f"({', '.join(foreign[:3])}); give --out another folder"
             )
     except OSError as error:
         raise CaptureError(f"{folder}: cannot be written: {error}") from None

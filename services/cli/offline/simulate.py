@@ -1,5 +1,4 @@
-"""`rhot simulate SCENE --seconds 10 --seed 1 --out DIR`: a virtual rig's recording, with the truth
-beside it.
+"""`rhot simulate SCENE --seconds 10 --seed 1 --out DIR`: a virtual rig's recording and its truth.
 
 The same scene, seed and rig give the same bytes. A folder that is not empty is an error, and an
 unknown scene lists the valid ones.
@@ -7,6 +6,7 @@ unknown scene lists the valid ones.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -29,6 +29,16 @@ class Simulated(msgspec.Struct, frozen=True, kw_only=True):
     seed: int
     seconds: float
     pictures: int
+
+
+@dataclass(frozen=True)
+class _Recording:
+    """What is simulated: see simulate's options of the same names."""
+
+    scene: str
+    seconds: float
+    seed: int | None
+    speed: float | None
 
 
 def simulate(
@@ -65,11 +75,18 @@ def simulate(
         return
     if scene is None or out is None:
         raise ConfigError(
-            f"`rhot simulate SCENE --out DIR` needs a scene and a folder; scenes: {', '.join(SCENES)}"
+            "`rhot simulate SCENE --out DIR` needs a scene and a folder; "
+            f"scenes: {', '.join(SCENES)}"
         )
-    made = _write(_rig(config, fps), scene, seconds, seed, speed, out, progress)
-    text = f"{out}: {seconds:g} s of {scene!r}, {made.pictures} pictures; next: rhot track {out} --out result"
-    typer.echo(msgspec.json.encode(made).decode() if as_json else text)
+    recording = _Recording(scene, seconds, seed, speed)
+    made = _write(_rig(config, fps), recording, out, progress)
+    if as_json:
+        typer.echo(msgspec.json.encode(made).decode())
+        return
+    typer.echo(
+        f"{out}: {seconds:g} s of {scene!r}, {made.pictures} pictures; "
+        f"next: rhot track {out} --out result"
+    )
 
 
 def _rig(path: Path | None, fps: float | None) -> RigConfig:
@@ -81,21 +98,13 @@ def _rig(path: Path | None, fps: float | None) -> RigConfig:
     )
 
 
-def _write(
-    config: RigConfig,
-    name: str,
-    seconds: float,
-    seed: int | None,
-    speed: float | None,
-    out: Path,
-    progress: bool | None,
-) -> Simulated:
+def _write(config: RigConfig, recording: _Recording, out: Path, progress: bool | None) -> Simulated:
     # Not above: the renderer's numba takes longer to import than other commands take to run.
     from services.simulator.files.capture_writer import write_capture
     from services.simulator.scene.scene import load_scene
 
-    scene = load_scene(config, name, seed, speed)
-    shown, done_before = Progress(f"rhot simulate {name}:", 0, progress), 0
+    scene = load_scene(config, recording.scene, recording.seed, recording.speed)
+    shown, done_before = Progress(f"rhot simulate {recording.scene}:", 0, progress), 0
 
     def advance(done: int, total: int) -> None:
         nonlocal done_before
@@ -104,11 +113,15 @@ def _write(
         done_before = done
 
     try:
-        pictures = write_capture(scene, seconds, out, advance)
+        pictures = write_capture(scene, recording.seconds, out, advance)
     finally:
         shown.end()
     return Simulated(
-        capture=str(out), scene=name, seed=scene.seed, seconds=seconds, pictures=pictures
+        capture=str(out),
+        scene=recording.scene,
+        seed=scene.seed,
+        seconds=recording.seconds,
+        pictures=pictures,
     )
 
 

@@ -1,5 +1,4 @@
-"""`rhot track CAPTURE --out DIR` or `rhot track left=l.mp4 right=r.mp4 --config rig.toml --out
-DIR`: the whole rig, offline.
+"""`rhot track CAPTURE --out DIR`, or CAM=VIDEO pairs instead of CAPTURE: the whole rig, offline.
 
 As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off
 is tracked up to there, and the summary says so; if no frame at all can be read, the command fails.
@@ -36,7 +35,8 @@ def track(
     """Track recordings offline: markers, 3D points, hand poses and objects."""
     # Not above: OpenCV and numba take longer to import than other commands take to run.
     from services.cli.offline.inputs import job_of
-    from services.cli.offline.run import run, summary_text
+    from services.cli.offline.run import run
+    from services.cli.offline.track_summary import summary_text
 
     summary = run(job_of(sources, config), out, progress)
     if as_json:

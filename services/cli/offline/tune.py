@@ -1,4 +1,4 @@
-"""`rhot tune filter RECORDING`: a 1-Euro filter that suits one's own hand and cameras.
+"""`rhot tune filter RECORDING`: parameters of the 1-Euro filter for one's own hand and cameras.
 
 Record the hand held still for some seconds, then moving as fast as it will, with `method =
 "triangulate"` and `filter = "none"`; the RECORDING is the folder that `rhot track` wrote, its
@@ -28,7 +28,7 @@ tune = menu("tune", "Propose settings from recordings.")
 
 @tune.callback()
 def _group() -> None:
-    """Keeps `filter` a subcommand although it is the only one yet."""
+    """Makes typer keep `filter` as a subcommand, although it is the only one."""
 
 
 @tune.command(name="filter")
@@ -48,7 +48,8 @@ def tune_filter(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> None:
     """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
-    # Not above: numba and scipy take longer to import than other commands take to run.
+    # Not above: importing the package fusion prepares numba's cache, which other commands do not
+    # need.
     from services.fusion.paired import one_euro_tuning
 
     proposal = one_euro_tuning.propose(
@@ -68,8 +69,8 @@ def _text(proposal: Proposal) -> str:
     for row in proposal.rows:
         mark = "  <- proposed" if row == proposal.best else ""
         lines.append(
-            f"{row.jitter_mm:8.2f} mm {100 * row.jitter_share:3.0f} % {row.mincutoff_hz:11.2f} {row.beta:8.1f} {row.error_mm:12.2f} mm "
-            f"{row.lag_ms:8.0f} ms{mark}"
+            f"{row.jitter_mm:8.2f} mm {100 * row.jitter_share:3.0f} % {row.mincutoff_hz:11.2f} "
+            f"{row.beta:8.1f} {row.error_mm:12.2f} mm {row.lag_ms:8.0f} ms{mark}"
         )
     best = proposal.best
     lines += [

@@ -1,4 +1,4 @@
-"""`rhot record`: everything a rig says into one MCAP file, until Ctrl-C or for some seconds."""
+"""`rhot record`: all messages of a running rig in one MCAP file, until Ctrl-C or for N seconds."""
 
 from __future__ import annotations
 
@@ -17,29 +17,32 @@ from rhot.files.config import RigConfig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from rhot.process.service import rhot_version
 from services.cli.options import ConnectOption, RunningRigOption
-from services.cli.router_session import reach, rig_and_endpoints
-from services.cli.terminal import Teller
+from services.cli.router_session import rig_and_endpoints, router_session
+from services.cli.terminal import Terminal
 from services.recorder.recorder import Recorder
 from services.recorder.service import keep, subscribe
 
-_TELL_S = 1.0
+_STATUS_PERIOD_S = 1.0
 
 
 def record(
     config: RunningRigOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="file (*.mcap) or folder; default: [recorder] folder of rig.toml"),
+        typer.Option(
+            help="file (*.mcap) or folder; default: [recorder] folder beside rig.toml, "
+            "without --config in the current folder"
+        ),
     ] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="end after so long")] = None,
     connect: ConnectOption = None,
 ) -> None:
     """Record a running rig; the recording plays back with `rhot replay FILE`."""
     rig, endpoints = rig_and_endpoints(config, connect)
-    folder = (
-        out if out is not None and out.suffix != ".mcap" else Path(rig.folder) / rig.recorder.folder
-    )
     path = out if out is not None and out.suffix == ".mcap" else None
+    # The simulated rig's own folder is part of the installed package: nothing is written there.
+    rig_folder = Path(rig.folder) if config is not None else Path()
+    folder = out if out is not None and path is None else rig_folder / rig.recorder.folder
     if path is not None and path.exists():
         raise CaptureError(
             f"{path}: exists already; recordings are never overwritten, choose another --out"
@@ -63,25 +66,25 @@ async def _record(
     seconds: float | None,
 ) -> None:
     stopping = stop_on_signals()
-    teller = Teller()
+    terminal = Terminal()
     with cancelled_by(stopping):
-        async with reach(rig.rig.name, endpoints) as bus:
-            teller.line(f"recording into {recorder.start(clock.now_ns(), path)}; Ctrl-C ends it")
+        async with router_session(rig.rig.name, endpoints) as bus:
+            terminal.line(f"recording into {recorder.start(clock.now_ns(), path)}; Ctrl-C ends it")
             try:
                 # The time the user asked for is no error.
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(seconds):
-                        await _keep_all(bus, rig, recorder, teller)
+                        await _record_all(bus, rig, recorder, terminal)
             finally:
                 recorder.stop()
-                teller.end()
+                terminal.end()
 
 
-async def _keep_all(bus: Bus, rig: RigConfig, recorder: Recorder, teller: Teller) -> None:
+async def _record_all(bus: Bus, rig: RigConfig, recorder: Recorder, terminal: Terminal) -> None:
     async with asyncio.TaskGroup() as tasks:
         for topic, samples in subscribe(bus, rig):
             tasks.create_task(keep(recorder, topic, samples))
         while True:
-            await asyncio.sleep(_TELL_S)
+            await asyncio.sleep(_STATUS_PERIOD_S)
             recorder.flush()
-            teller.status(f"{recorder.messages} messages, {recorder.bytes / 1e6:.2f} MB")
+            terminal.status(f"{recorder.messages} messages, {recorder.bytes / 1e6:.2f} MB")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,15 +11,24 @@ import uvloop
 
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.options import ConnectOption
-from services.cli.router_session import reach, rig_and_endpoints
-from services.cli.terminal import Teller
+from services.cli.router_session import rig_and_endpoints, router_session
+from services.cli.terminal import Terminal
 from services.recorder.reader import Record, Summary, summarize
 from services.recorder.recover import recover as recover_file
 from services.recorder.sources.replay import check_names
 from services.recorder.sources.replay import replay as replay_file
 
-# Records between two updates of the status line.
-_TELL = 100
+# Messages between two updates of the status line.
+_STATUS_EVERY = 100
+
+
+@dataclass(frozen=True)
+class _Playback:
+    """How a file is replayed: see replay's options of the same names."""
+
+    rate: float
+    loop: bool
+    only: list[str]
 
 
 def replay(
@@ -54,7 +64,8 @@ def replay(
     if recover:
         done = recover_file(file)
         typer.echo(
-            f"{done.target}: {done.messages} messages restored, {done.damaged_chunks} damaged pieces left out"
+            f"{done.target}: {done.messages} messages restored, "
+            f"{done.damaged_chunks} damaged pieces left out"
         )
         return
     summary = summarize(file)
@@ -62,43 +73,36 @@ def replay(
         typer.echo(_text(file, summary))
         return
     check_names(only or ())
-    typer.echo(
-        f"replayed {uvloop.run(_replay(file, summary, config, connect, rate, loop, only or []))} messages"
-    )
+    playback = _Playback(rate, loop, only or [])
+    count = uvloop.run(_replay(file, summary, playback, config, connect))
+    typer.echo(f"replayed {count} messages")
 
 
 async def _replay(
-    file: Path,
-    summary: Summary,
-    config: Path | None,
-    connect: str | None,
-    rate: float,
-    loop: bool,
-    only: list[str],
+    file: Path, summary: Summary, playback: _Playback, config: Path | None, connect: str | None
 ) -> int:
     stopping = stop_on_signals()
     rig, endpoints = rig_and_endpoints(config, connect)
-    teller, sent = Teller(), 0
+    terminal, sent = Terminal(), 0
 
-    def tell(record: Record) -> None:
+    def report(record: Record) -> None:
         nonlocal sent
         sent += 1
-        if sent % _TELL == 0:
-            teller.status(
-                f"{(record.log_time_ns - summary.start_ns) * 1e-9:.1f} of {summary.duration_s:.1f} s, {sent} messages"
-            )
+        if sent % _STATUS_EVERY == 0:
+            at_s = (record.log_time_ns - summary.start_ns) * 1e-9
+            terminal.status(f"{at_s:.1f} of {summary.duration_s:.1f} s, {sent} messages")
 
     with cancelled_by(stopping):
-        async with reach(rig.rig.name, endpoints) as bus:
-            await replay_file(bus, file, rate, loop=loop, only=only, report=tell)
-    teller.end()
+        async with router_session(rig.rig.name, endpoints) as bus:
+            await replay_file(
+                bus, file, playback.rate, loop=playback.loop, only=playback.only, report=report
+            )
+    terminal.end()
     return sent
 
 
 def _text(file: Path, summary: Summary) -> str:
-    lines = [
-        f"{file}: rig {summary.rig!r}, {summary.messages} messages in {summary.duration_s:.1f} s"
-    ]
-    return "\n".join(
-        lines + [f"  {count:8d}  {key}" for key, count in sorted(summary.keys.items())]
-    )
+    counts = f"{summary.messages} messages in {summary.duration_s:.1f} s"
+    lines = [f"{file}: rig {summary.rig!r}, {counts}"]
+    lines += [f"  {count:8d}  {key}" for key, count in sorted(summary.keys.items())]
+    return "\n".join(lines)

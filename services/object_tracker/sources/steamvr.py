@@ -181,6 +181,6 @@ def _import_openvr() -> Any:
         return importlib.import_module("openvr")
     except (ImportError, OSError) as error:
         raise SourceError(
-            f"the Python package openvr cannot be loaded ({error}); install it with `pip install 'rhot[bridges]'` on the"
+            f"the Python package openvr cannot be loaded ({error}); install it with `pip install 'rhot[openvr]'` on the"
             " (x86) machine that runs SteamVR, or choose another [objects] source"
         ) from None

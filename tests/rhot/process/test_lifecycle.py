@@ -48,7 +48,7 @@ def start(tmp_path, endpoint):
                 service.ready()
                 service.error("a small thing")
                 {ENDINGS[ending]}
-            command("probe", serve)
+            command("probe", "__main__", "a service that ends as it is told")
         """)
         environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), **environment}
         argv = [sys.executable, "-c", script, "--config", str(tmp_path / "rig.toml")]

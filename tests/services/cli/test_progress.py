@@ -1,4 +1,4 @@
-"""Progress shows where somebody watches, and nowhere else."""
+"""Progress shows on a terminal, and elsewhere only if asked for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Terminal(io.StringIO):
 def test_a_terminal_gets_one_line_that_is_overwritten_and_taken_away():
     out = Terminal()
     progress = Progress("work:", 10, True, out)
-    progress.every_s = 0.0
+    progress.period_s = 0.0
     progress.advance(3)
     progress.advance(2)
     progress.end()
@@ -29,7 +29,7 @@ def test_a_pipe_gets_nothing_unless_asked():
     for shown, count in ((None, 0), (False, 0), (True, 1)):
         out = io.StringIO()
         progress = Progress("work:", 0, shown, out)
-        progress.every_s = 0.0
+        progress.period_s = 0.0
         progress.advance()
         progress.end()
         assert out.getvalue().count("work: 1,") == count

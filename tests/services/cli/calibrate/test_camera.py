@@ -21,7 +21,7 @@ from rhot.files.config import load_rig
 from rhot.messages import Session
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.calibrate.pictures import recorded, spread
 from services.pi_tracker.service import serve
 from testing.synthetic_images import Tip, clean, frame_of, noisy

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from rhot.files.calibration import load_colors
 from rhot.files.config import Tracker
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep

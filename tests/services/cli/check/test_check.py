@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rhot.files.calibration import ColorRange, Lens, load_geometry, load_lens, save
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.check.calibration import overlap
 from services.cli.check.check import check_config
 from services.cli.defaults import config_dir, sim_toml

@@ -1,4 +1,7 @@
-"""`rhot plot` draws what a result holds, and says what is missing."""
+"""`rhot plot` draws what a result holds, and says what is missing.
+
+Without matplotlib: tests/services/test_entry_points.py.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rhot.errors import CaptureError, ConfigError
-from services.cli.__main__ import application
-from services.cli.evaluate import plot as plot_module
+from rhot.errors import CaptureError
+from services.cli.application import application
 from services.cli.evaluate.plot_result import plot_result
 
 pytest.importorskip("matplotlib", reason="matplotlib is of the extra `study`")
@@ -72,9 +74,3 @@ def test_an_empty_or_missing_result_or_truth(result, tmp_path):
     (tmp_path / "result" / "markers.jsonl").write_text("")
     with pytest.raises(CaptureError, match="nothing to draw"):
         plot_result(tmp_path / "result", tmp_path, None)
-
-
-def test_without_matplotlib_the_error_names_the_extra(result, monkeypatch):
-    monkeypatch.setattr(plot_module, "find_spec", lambda _: None)
-    with pytest.raises(ConfigError, match=r"pip install 'rhot\[study\]'"):
-        plot_module.plot(result)

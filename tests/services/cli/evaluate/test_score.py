@@ -13,7 +13,7 @@ from rhot.errors import CaptureError
 from rhot.files.capture import Capture, read_lines, write_lines
 from rhot.hand import DIGIT_ANGLES, DIGITS
 from rhot.messages import HandPose
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.evaluate.score_result import score_result
 
 

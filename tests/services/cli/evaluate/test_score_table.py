@@ -1,20 +1,13 @@
-"""Tables line up, and what was not measured is a dash."""
+"""The text of a score has all its parts, and a dash for what was not measured."""
 
 from __future__ import annotations
 
 import msgspec
 
 from services.cli.evaluate.score_math import score_hand
-from services.cli.evaluate.score_table import score_text, table
+from services.cli.evaluate.score_table import score_text
 from services.cli.evaluate.score_types import Coverage, ObjectScore, Score
 from services.cli.evaluate.truth_track import hand_track
-
-
-def test_columns_line_up():
-    lines = table(("name", "a", "b"), [("x", "1.00", "20"), ("longer", "-3.50", "")]).splitlines()
-    assert lines[0] == "name        a   b"
-    assert lines[2] == "x        1.00  20"
-    assert lines[3] == "longer  -3.50"
 
 
 def test_a_score_has_all_its_parts(made_up):

@@ -1,10 +1,15 @@
+"""Poses made from the truth have the error, latency and rate that was put into them."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
 from rhot import hand as h
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from rhot.simulator_messages import HandTruth, Truth
-from services.cli.live.demo_metrics import LiveFigures
+from services.cli.live.demo_metrics import DemoMetrics
+from services.cli.live.demo_summary import summary_text
 
 START_NS = 1_700_000_000_000_000_000
 FRAME_NS = 33_333_333
@@ -54,12 +59,12 @@ def pose(stamp_ns, x_m):
 
 
 def test_error_is_measured_against_truth_at_the_poses_own_instant():
-    figures = LiveFigures()
+    metrics = DemoMetrics()
     for index in range(10):
-        figures.truth(truth(index, 0.001 * index))
+        metrics.add_truth(truth(index, 0.001 * index))
         between_ns = START_NS + index * FRAME_NS + FRAME_NS // 2
-        figures.pose(pose(between_ns, 0.001 * (index + 0.5) + 0.003), between_ns + 20_000_000)
-    summary = figures.summary({"fusion": 1})
+        metrics.add_pose(pose(between_ns, 0.001 * (index + 0.5) + 0.003), between_ns + 20_000_000)
+    summary = metrics.summary({"fusion": 1})
     assert summary.tip_error_rms_mm == pytest.approx(3.0, abs=0.01)
     assert summary.latency_p50_ms == pytest.approx(20.0)
     assert summary.poses_per_s == pytest.approx(30.0, abs=0.1)
@@ -67,7 +72,15 @@ def test_error_is_measured_against_truth_at_the_poses_own_instant():
 
 
 def test_without_truth_or_poses_nothing_is_claimed():
-    figures = LiveFigures()
-    assert figures.summary({}).latency_p50_ms is None
-    figures.pose(pose(START_NS, 0.0), START_NS + 1)
-    assert figures.summary({}).tip_error_rms_mm is None
+    metrics = DemoMetrics()
+    assert metrics.summary({}).latency_p50_ms is None
+    metrics.add_pose(pose(START_NS, 0.0), START_NS + 1)
+    assert metrics.summary({}).tip_error_rms_mm is None
+
+
+def test_the_text_has_every_measurement_and_names_what_is_missing():
+    metrics = DemoMetrics()
+    metrics.add_pose(pose(START_NS, 0.0), START_NS + 20_000_000)
+    text = summary_text(metrics.summary({"fusion": 2}))
+    for part in ("1 in 0.0 s", "p50 20.0 ms", "RMS not measured", "fusion: 2"):
+        assert part in text

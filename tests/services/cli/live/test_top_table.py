@@ -1,8 +1,13 @@
+"""The states of `rhot top`, and how it marks what is slow."""
+
+from __future__ import annotations
+
 import msgspec
 import pytest
 
 from rhot.messages import Health, StreamHealth
-from services.cli.live.top_table import Watcher, text
+from services.cli.live.top_table import ServiceMonitor
+from services.cli.live.top_text import table_text
 
 NOW_NS = 1_700_000_000_000_000_000
 
@@ -42,42 +47,42 @@ def health():
 
 
 @pytest.fixture
-def watcher():
-    return Watcher("sim", [("solver", "main")])
+def monitor():
+    return ServiceMonitor("sim", [("solver", "main")])
 
 
-def test_a_service_that_never_came_is_absent(watcher):
-    board = watcher.board(NOW_NS)
-    assert [row.state for row in board.services] == ["absent"]
-    assert not board.healthy
+def test_a_service_that_never_came_is_absent(monitor):
+    table = monitor.table(NOW_NS)
+    assert [row.state for row in table.services] == ["absent"]
+    assert not table.healthy
 
 
-def test_running_silent_and_gone(watcher, health):
-    watcher.token("solver", "main", True)
-    watcher.beat(health, NOW_NS)
-    board = watcher.board(NOW_NS + 1_000_000_000)
-    assert board.healthy
-    assert board.glass_to_pose_ms == {"right": (21.0, 35.0)}
-    assert watcher.board(NOW_NS + 4_000_000_000).services[0].state == "silent"
-    watcher.token("solver", "main", False)
-    assert watcher.board(NOW_NS + 1_000_000_000).services[0].state == "gone"
+def test_running_silent_and_gone(monitor, health):
+    monitor.token("solver", "main", True)
+    monitor.beat(health, NOW_NS)
+    table = monitor.table(NOW_NS + 1_000_000_000)
+    assert table.healthy
+    assert table.glass_to_pose_ms == {"right": (21.0, 35.0)}
+    assert monitor.table(NOW_NS + 4_000_000_000).services[0].state == "silent"
+    monitor.token("solver", "main", False)
+    assert monitor.table(NOW_NS + 1_000_000_000).services[0].state == "gone"
 
 
-def test_a_slow_stream_is_marked(watcher, health):
-    watcher.token("solver", "main", True)
-    watcher.beat(
+def test_a_slow_stream_is_marked(monitor, health):
+    monitor.token("solver", "main", True)
+    monitor.beat(
         msgspec.structs.replace(health, streams=[stream(ok=False, rate_hz=3.0, rejected=5)]), NOW_NS
     )
-    board = watcher.board(NOW_NS)
-    assert not board.healthy
-    line = next(line for line in text(board).splitlines() if "hand/right/pose" in line)
+    table = monitor.table(NOW_NS)
+    assert not table.healthy
+    line = next(line for line in table_text(table).splitlines() if "hand/right/pose" in line)
     assert line.lstrip().startswith("! out")
     assert "rejected 5" in line
 
 
-def test_uninvited_services_are_listed_too(watcher, health):
-    watcher.token("bridge", "vmc", True)
-    assert [(row.service, row.state) for row in watcher.board(NOW_NS).services] == [
+def test_unexpected_services_are_listed_too(monitor, health):
+    monitor.token("bridge", "vmc", True)
+    assert [(row.service, row.state) for row in monitor.table(NOW_NS).services] == [
         ("solver", "absent"),
         ("bridge", "silent"),
     ]

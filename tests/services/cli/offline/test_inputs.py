@@ -1,4 +1,4 @@
-"""What `rhot track` takes, and what it says of everything else."""
+"""What `rhot track` reads, and its errors for everything else."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_csv_beside_the_video_has_its_stamps(tmp_path, rig):
     assert one.clock_sigma_ns > 0
 
 
-def test_a_csv_of_something_else_is_told_and_not_used(tmp_path, rig):
+def test_a_csv_of_something_else_gives_a_note_and_is_not_used(tmp_path, rig):
     v = video(tmp_path / "v.mkv")
     (tmp_path / "v.csv").write_text("name,age\nx,3\n")
     (one,) = job_of([f"left={v}"], rig).inputs

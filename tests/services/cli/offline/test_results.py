@@ -6,7 +6,8 @@ import pytest
 
 from rhot.errors import CaptureError
 from rhot.messages import Session
-from services.cli.offline.results import STREAMS, ResultWriter, Summary, check_result
+from services.cli.offline.results import STREAMS, ResultWriter, check_result
+from services.cli.offline.track_summary import Summary
 
 LINE = Session(running=True, start_ns=1)
 

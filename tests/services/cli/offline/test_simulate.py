@@ -11,7 +11,7 @@ from rhot.errors import ConfigError
 from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
 from rhot.simulator_messages import Truth
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.simulator.scene.catalog import SCENES
 
 
@@ -35,14 +35,14 @@ def test_a_capture_is_written_at_the_wanted_rate(tmp_path):
         "--json",
     )
     assert ran.exit_code == 0
-    told = json.loads(ran.stdout)
+    printed = json.loads(ran.stdout)
     capture = Capture(tmp_path / "c")
     assert load_rig(capture.rig_toml).camera[0].fps == 60
     count = sum(len(read_stamps(capture.stamps(name))) for name in ("left", "right"))
-    assert told["pictures"] == count
+    assert printed["pictures"] == count
     assert 30 <= count <= 36
-    assert told["scene"] == "wave"
-    assert told["seed"] == 4
+    assert printed["scene"] == "wave"
+    assert printed["seed"] == 4
     assert next(read_lines(capture.truth, Truth)).hands["right"].points_m["index_tip"]
     assert ran.stderr == ""
 

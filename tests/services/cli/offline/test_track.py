@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.capture import read_lines
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
-from services.cli.__main__ import application
+from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS
 from services.cli.offline.run import run
@@ -86,7 +86,7 @@ def test_without_a_hand_all_calibrated_colours_are_tracked(copy, tmp_path):
     assert "no [hand.right.markers]" in summary.notes[0]
 
 
-def test_a_truncated_video_is_tracked_up_to_there_and_told(copy, tmp_path):
+def test_a_truncated_video_is_tracked_up_to_there_with_a_warning(copy, tmp_path):
     data = (copy / "right.mkv").read_bytes()
     (copy / "right.mkv").write_bytes(data[: len(data) // 2])
     summary = track([copy], tmp_path / "out")
@@ -139,7 +139,7 @@ def test_a_marker_colour_that_is_not_calibrated(copy, tmp_path):
         track([copy], tmp_path / "out")
 
 
-def test_objects_without_registration_stay_where_they_are_and_it_is_told(copy, tmp_path):
+def test_objects_without_registration_stay_in_the_lighthouse_frame_with_a_note(copy, tmp_path):
     (copy / "calibration" / "objects.json").unlink()
     summary = track([copy], tmp_path / "out")
     assert any("lighthouse frame" in note for note in summary.notes)

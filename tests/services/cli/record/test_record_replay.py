@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from rhot import topics
 from rhot.bus.bus import client_config
 from rhot.errors import BusError, CaptureError
+from services.cli.defaults import config_dir
 from services.cli.record.record import record
 from services.cli.record.replay import replay
 from services.recorder.reader import read
@@ -129,10 +130,20 @@ def test_record_nothing(router: str, rig_toml: Path, tmp_path: Path, invoke: Inv
     assert len(list((tmp_path / "recordings").iterdir())) == 1
 
 
+def test_without_a_rig_toml_it_records_into_the_current_folder(
+    router: str, tmp_path: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Never beside the configuration that rhot ships, which is part of the installed package."""
+    monkeypatch.chdir(tmp_path)
+    invoke("record", "--connect", router, "--seconds", 0.1, code=1)
+    assert len(list((tmp_path / "recordings").glob("rhot-sim-*.mcap"))) == 1
+    assert not (config_dir() / "recordings").exists()
+
+
 def test_no_router(
     endpoint: str, rig_toml: Path, recording: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.cli.router_session._REACH_S", 0.3)
+    monkeypatch.setattr("services.cli.router_session._TIMEOUT_S", 0.3)
     for arguments in (["record"], ["replay", recording]):
         with pytest.raises(BusError, match="no router answers"):
             invoke(*arguments, "--config", rig_toml, "--connect", endpoint)
