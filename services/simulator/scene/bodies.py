@@ -89,7 +89,7 @@ class ShapeBuilder:
 
     def arrays(self) -> ShapeArrays:
         """What was added so far."""
-        kind = [self.surface, self.end_surface, np.array(self.dabbed, dtype=np.int64)]
+        kind = [np.array(values) for values in (self.surface, self.end_surface, self.dabbed)]
         return ShapeArrays(
             frame=np.array(self.frame, dtype=np.int64).reshape(-1, 2),
             offset=np.array(self.offset).reshape(-1, 2, 3),
