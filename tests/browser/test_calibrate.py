@@ -153,7 +153,7 @@ def until(page: Any, condition: Any) -> Any:
     return found
 
 
-def test_from_the_first_click_to_new_ranges_in_force(
+def test_from_the_first_click_to_applied_ranges(
     chromium: Any, page_url: str, camera: list[MarkerFrame], tmp_path: Path
 ) -> None:
     page = chromium.new_page(viewport={"width": 1200, "height": 800})
@@ -170,7 +170,7 @@ def test_from_the_first_click_to_new_ranges_in_force(
     switch.click()
     page.get_by_text("click the middle of the blue marker").wait_for(**wait)
     page.get_by_text("still missing: blue, green").wait_for(**wait)
-    assert page.get_by_role("button", name="put in force").is_disabled()
+    assert page.get_by_role("button", name="apply").is_disabled()
 
     # Grey is no paint, and says so.
     green = until(page, lambda: where(page, "green"))
@@ -178,15 +178,15 @@ def test_from_the_first_click_to_new_ranges_in_force(
     page.get_by_text("is on something grey").wait_for(**wait)
 
     page.mouse.click(*until(page, lambda: where(page, "blue")))
-    page.get_by_text("1 of 2 colours pointed at").wait_for(**wait)
+    page.get_by_text("1 of 2 colours clicked").wait_for(**wait)
     page.get_by_text("click the middle of the green marker").wait_for(**wait)
     page.mouse.click(*green)
-    page.get_by_text("2 of 2 colours pointed at").wait_for(**wait)
+    page.get_by_text("2 of 2 colours clicked").wait_for(**wait)
     assert page.locator("table tr", has_text="green").last.inner_text().count("d'") == 2
 
     assert not any(frame.markers for frame in camera)
-    page.get_by_role("button", name="put in force").click()
-    page.get_by_text("in force on camera left, and written on its machine").wait_for(**wait)
+    page.get_by_role("button", name="apply").click()
+    page.get_by_text("applied on camera left and saved on its machine").wait_for(**wait)
     assert set(load_colors(tmp_path / "calibration", "left").colors) == {"green", "blue"}
     until(page, lambda: {marker.color for marker in camera[-1].markers} == {"green", "blue"})
     page.get_by_text("This camera is done.").wait_for(**wait)
@@ -210,8 +210,8 @@ def test_from_the_first_click_to_new_ranges_in_force(
         box.fill(value)
         box.press("Enter")
     page.get_by_text("set by hand: green").wait_for(**wait)
-    page.get_by_text("not in force yet").wait_for(**wait)
-    page.get_by_role("button", name="put in force").click()
+    page.get_by_text("not applied yet").wait_for(**wait)
+    page.get_by_role("button", name="apply").click()
     until(page, lambda: [marker.color for marker in camera[-1].markers] == ["blue"])
     by_hand = load_colors(tmp_path / "calibration", "left")
     assert (by_hand.colors["green"].hsv_low[0], by_hand.colors["green"].hsv_high[0]) == (0, 9)
