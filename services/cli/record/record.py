@@ -20,7 +20,7 @@ from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import reach, rig_and_endpoints
 from services.cli.terminal import Teller
 from services.recorder.recorder import Recorder
-from services.recorder.service import keep, subscribe
+from services.recorder.service import record_topic, subscribe
 
 _TELL_S = 1.0
 
@@ -80,7 +80,7 @@ async def _record(
 async def _keep_all(bus: Bus, rig: RigConfig, recorder: Recorder, teller: Teller) -> None:
     async with asyncio.TaskGroup() as tasks:
         for topic, samples in subscribe(bus, rig):
-            tasks.create_task(keep(recorder, topic, samples))
+            tasks.create_task(record_topic(recorder, topic, samples))
         while True:
             await asyncio.sleep(_TELL_S)
             recorder.flush()
