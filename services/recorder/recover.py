@@ -102,7 +102,7 @@ class _ReadableRecords:
         self.header = first if isinstance(first, Header) else None
 
     def head(self) -> list[Metadata | Attachment]:
-        """What stands before the first chunk."""
+        """Metadata and attachments before the first chunk."""
         head: list[Metadata | Attachment] = []
         for record in self._records:
             if isinstance(record, Chunk):
@@ -125,7 +125,7 @@ class _ReadableRecords:
             if chunk.uncompressed_size > RECORD_LIMIT:
                 raise ValueError("absurd size")
             records = breakup_chunk(chunk, validate_crc=True)
-        except Exception:  # decompressors and parsers raise whatever they like on damaged bytes
+        except Exception:  # decoders of damaged bytes may raise anything
             self.damaged_chunks += 1
             return
         for record in records:
@@ -140,7 +140,7 @@ def _until_damaged(file: IO[bytes]) -> Iterator[McapRecord]:
         yield from StreamReader(file, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
     except OSError:
         raise
-    except Exception:  # the end of what can be read, in whatever way the library says so
+    except Exception:  # the end of what can be read; decoders may raise anything
         return
 
 

@@ -36,7 +36,7 @@ async def serve(service: Service) -> None:
     config = service.config
     loop = asyncio.get_running_loop()
     setup = read_setup(config)
-    # viser's websocket library tells of every browser that comes and goes.
+    # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
         connected = asyncio.Event()

@@ -38,7 +38,7 @@ def read_setup(config: RigConfig) -> Setup:
         try:
             colors.append(load_colors(config.calibration_dir, table.name))
         except CalibrationError:
-            # Paints have names; pi_tracker tells of colours that are not calibrated.
+            # Paints have names; pi_tracker reports colours that are not calibrated.
             continue
     paints: dict[tuple[HandName, str], Rgb] = {
         (hand, landmark): paint_rgb(color, colors)

@@ -42,7 +42,7 @@ _HFOV_RAD = np.deg2rad(62.5)
 _BASELINE_M = 0.075
 # Barrel distortion of a Raspberry Pi camera's lens after the usual calibration.
 _K1, _K2 = -0.055, 0.020
-# The base station stands 2 m behind and above the rig, its universe turned against it.
+# Origin of the lighthouse frame in the rig frame.
 _LIGHTHOUSE_M = (0.6, 0.9, 1.4)
 
 # Scenes and frames that show every paint from many sides, in light and shade.
@@ -88,7 +88,7 @@ def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:
 
 
 def objects(config: RigConfig, date: str) -> Objects:
-    """Where the lighthouse stands, and how the trackers sit on their objects."""
+    """The pose of the lighthouse frame, and how the trackers are fixed to their objects."""
     T = transform(rotation_x(np.pi) @ rotation_y(0.6) @ rotation_x(0.15), _LIGHTHOUSE_M)
     # A tracker sits at the lower end of its object, 75 mm from the middle.
     places = {

@@ -60,7 +60,7 @@ class SceneSpec:
     # Standard deviation of lens blur and defocus at the hand, px.
     blur_px: float = 0.6
     light: Light = Light()
-    # Saturated things in the background and beside the hand.
+    # Objects in saturated colours in the background.
     clutter: bool = False
     # Hands beside the configured ones, unpainted.
     extra_hands: tuple[HandName, ...] = ()
@@ -79,7 +79,7 @@ SCENES: dict[str, SceneSpec] = {
     "random": SceneSpec("random", "all joints wander through their ranges", tilt_deg=42.0),
     "still": SceneSpec("still", "an open hand held still", tilt_deg=20.0),
     "guided": SceneSpec(
-        "guided", "the exercises of `rhot calibrate hand`, at its pace (48 s)", tilt_deg=42.0
+        "guided", "the exercises of `rhot calibrate hand`, with its timing (48 s)", tilt_deg=42.0
     ),
     "hard": SceneSpec(
         "random",

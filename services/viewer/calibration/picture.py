@@ -30,7 +30,7 @@ def decoded(picture: bytes) -> Image | None:
     try:
         return cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error:
-        # Nothing at all, or a picture of a size that no memory holds.
+        # No bytes, or a picture larger than memory.
         return None
 
 

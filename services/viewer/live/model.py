@@ -81,7 +81,7 @@ class View:
     objects: dict[str, ObjectView]
     trails: dict[HandName, Array]
     health: list[Health]
-    # Glass to pose arriving here, ms, of the newest pose; None where its stamp says nothing.
+    # From exposure to the newest pose's arrival here, ms; None where its stamp is no guide.
     latency_ms: dict[HandName, float | None]
 
 

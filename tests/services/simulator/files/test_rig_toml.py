@@ -36,74 +36,92 @@ def unique(values: st.SearchStrategy, most: int) -> st.SearchStrategy:
     return st.lists(values, max_size=most, unique=True)
 
 
-@st.composite
-def rigs(draw: st.DrawFn) -> RigConfig:
-    """Any valid rig.toml: names, strings and numbers of every table, at their bounds too."""
-
-    def some(strategy: st.SearchStrategy):
-        return draw(strategy)
-
+def rig_tables() -> st.SearchStrategy[tables.RigTable]:
     row = st.tuples(*[numbers(-1e300, 1e300)] * 4)
-    world = some(st.none() | st.builds(World, T_rig_from_camera=st.tuples(row, row, row, row)))
-    cameras = [
-        tables.CameraTable(
-            name=name,
-            source=some(TEXTS),
-            fps=some(numbers(TINY, 240.0)),
-            size_px=(some(numbers(16, 8192, whole=True)), some(numbers(16, 8192, whole=True))),
-            sync=some(st.sampled_from(["off", "server", "client"])),
-            host=some(TEXTS),
-        )
-        for name in some(unique(NAMES, 3))
-    ]
-    landmarks = some(unique(st.sampled_from(LANDMARKS), 6))
-    colors = some(st.lists(NAMES, min_size=6, max_size=6, unique=True))
+    worlds = st.builds(World, T_rig_from_camera=st.tuples(row, row, row, row))
+    return st.builds(tables.RigTable, name=NAMES, calibration=TEXTS, world=st.none() | worlds)
+
+
+def camera_tables(name: str) -> st.SearchStrategy[tables.CameraTable]:
+    pixels = numbers(16, 8192, whole=True)
+    return st.builds(
+        tables.CameraTable,
+        name=st.just(name),
+        source=TEXTS,
+        fps=numbers(TINY, 240.0),
+        size_px=st.tuples(pixels, pixels),
+        sync=st.sampled_from(["off", "server", "client"]),
+        host=TEXTS,
+    )
+
+
+@st.composite
+def hand_tables(draw: st.DrawFn) -> dict[str, HandTable]:
+    """One hand, two or none, no colour twice."""
+    landmarks = draw(unique(st.sampled_from(LANDMARKS), 6))
+    colors = draw(st.lists(NAMES, min_size=6, max_size=6, unique=True))
     hands = {}
     for hand, part in (("left", slice(0, 3)), ("right", slice(3, 6))):
         markers = dict(zip(landmarks[part], colors[part], strict=False))
         if markers:
-            hands[hand] = HandTable(markers=markers, scale=some(numbers(0.4, 1.6)))
-    serials = some(st.lists(NAMES, min_size=3, max_size=3, unique=True))
-    names = some(unique(NAMES, 3))
+            hands[hand] = HandTable(markers=markers, scale=draw(numbers(0.4, 1.6)))
+    return hands
+
+
+@st.composite
+def object_tables(draw: st.DrawFn) -> list[ObjectTable]:
+    serials = draw(st.lists(NAMES, min_size=3, max_size=3, unique=True))
+    names = draw(unique(NAMES, 3))
+    pairs = zip(names, serials, strict=False)
+    return [ObjectTable(name=name, serial=serial) for name, serial in pairs]
+
+
+# Every bounded number and every free text of the other tables.
+OTHER_TABLES = {
+    "tracker": st.builds(
+        tables.Tracker,
+        roi_margin_px=numbers(0, 500, whole=True),
+        rectify=st.booleans(),
+        gaussian_px=numbers(0, 31, whole=True),
+        min_area_px=numbers(0.0),
+        max_area_px=numbers(TINY),
+    ),
+    "fusion": st.builds(
+        tables.Fusion,
+        hold_s=numbers(0.0, 2.0),
+        one_euro=st.builds(tables.OneEuro, mincutoff_hz=numbers(TINY), beta=numbers(0.0)),
+        disparity=st.builds(
+            tables.Disparity, k=numbers(TINY), z=numbers(-3.0, -0.1), phi_rad=numbers(-0.5, 0.5)
+        ),
+    ),
+    "solver": st.builds(
+        tables.Solver, max_iterations=numbers(1, 1000, whole=True), tolerance_m=numbers(TINY)
+    ),
+    "objects": st.builds(tables.Objects, source=TEXTS, rate_hz=numbers(TINY, 1000.0)),
+    "simulator": st.builds(
+        tables.Simulator,
+        scene=TEXTS,
+        seed=numbers(0, 2**63 - 1, whole=True),
+        speed=numbers(TINY, 10.0),
+    ),
+    "viewer": st.builds(
+        tables.Viewer, port=numbers(0, 65535, whole=True), rate_hz=numbers(TINY, 60.0)
+    ),
+    "recorder": st.builds(tables.Recorder, folder=TEXTS, autostart=st.booleans()),
+}
+
+
+@st.composite
+def rigs(draw: st.DrawFn) -> RigConfig:
+    """Any valid rig.toml."""
+    endpoints = st.lists(TEXTS, max_size=3).map(tuple)
     return RigConfig(
-        rig=tables.RigTable(name=some(NAMES), calibration=some(TEXTS), world=world),
-        bus=tables.Bus(
-            connect=tuple(some(st.lists(TEXTS, max_size=3))),
-            listen=tuple(some(st.lists(TEXTS, max_size=3))),
-        ),
-        camera=cameras,
-        tracker=tables.Tracker(
-            roi_margin_px=some(numbers(0, 500, whole=True)),
-            rectify=some(st.booleans()),
-            gaussian_px=some(numbers(0, 31, whole=True)),
-            min_area_px=some(numbers(0.0)),
-            max_area_px=some(numbers(TINY)),
-        ),
-        hand=hands,
-        fusion=tables.Fusion(
-            hold_s=some(numbers(0.0, 2.0)),
-            one_euro=tables.OneEuro(mincutoff_hz=some(numbers(TINY)), beta=some(numbers(0.0))),
-            disparity=tables.Disparity(
-                k=some(numbers(TINY)), z=some(numbers(-3.0, -0.1)), phi_rad=some(numbers(-0.5, 0.5))
-            ),
-        ),
-        solver=tables.Solver(
-            max_iterations=some(numbers(1, 1000, whole=True)), tolerance_m=some(numbers(TINY))
-        ),
-        objects=tables.Objects(source=some(TEXTS), rate_hz=some(numbers(TINY, 1000.0))),
-        object=[
-            ObjectTable(name=name, serial=serial)
-            for name, serial in zip(names, serials, strict=False)
-        ],
-        simulator=tables.Simulator(
-            scene=some(TEXTS),
-            seed=some(numbers(0, 2**63 - 1, whole=True)),
-            speed=some(numbers(TINY, 10.0)),
-        ),
-        viewer=tables.Viewer(
-            port=some(numbers(0, 65535, whole=True)), rate_hz=some(numbers(TINY, 60.0))
-        ),
-        recorder=tables.Recorder(folder=some(TEXTS), autostart=some(st.booleans())),
+        rig=draw(rig_tables()),
+        bus=draw(st.builds(tables.Bus, connect=endpoints, listen=endpoints)),
+        camera=[draw(camera_tables(name)) for name in draw(unique(NAMES, 3))],
+        hand=draw(hand_tables()),
+        object=draw(object_tables()),
+        **{name: draw(strategy) for name, strategy in OTHER_TABLES.items()},
     )
 
 
