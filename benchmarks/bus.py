@@ -1,5 +1,4 @@
-"""What the bus costs: latency of one message through a router, bare Zenoh beside rhot's typed
-streams, in one process.
+"""Latency of one message through a router: bare Zenoh and rhot's typed streams, in one process.
 
     python benchmarks/bus.py [--json FILE]
 
@@ -22,7 +21,8 @@ import uvloop
 import zenoh
 
 from rhot import topics
-from rhot.bus.bus import client_config, open_bus, router_config
+from rhot.bus.bus import open_bus
+from rhot.bus.zenoh_config import client_config, router_config
 from rhot.messages import Marker, MarkerFrame
 
 MESSAGES, WARM_UP = 1000, 100
@@ -49,14 +49,15 @@ def frame() -> MarkerFrame:
 
 
 def bare(endpoint: str) -> list[float]:
-    """Zenoh alone: put in one session, callback in another; us."""
-    key, arrived, latencies = "bench/bare", threading.Event(), []
+    """Latencies of Zenoh alone, us: put in one session, callback in another."""
+    key, arrived = "bench/bare", threading.Event()
+    received: list[int] = []
     with (
         zenoh.open(client_config([endpoint])) as sender,
         zenoh.open(client_config([endpoint])) as receiver,
     ):
         receiver.declare_subscriber(
-            key, lambda _: (latencies.append(time.perf_counter_ns()), arrived.set())
+            key, lambda _: (received.append(time.perf_counter_ns()), arrived.set())
         )
         publisher = sender.declare_publisher(key, express=True)
         while not publisher.matching_status.matching:
@@ -67,11 +68,11 @@ def bare(endpoint: str) -> list[float]:
             started.append(time.perf_counter_ns())
             publisher.put(payload)
             arrived.wait(5.0)
-    return [(b - a) / 1e3 for a, b in zip(started, latencies, strict=True)][WARM_UP:]
+    return [(end - start) / 1e3 for start, end in zip(started, received, strict=True)][WARM_UP:]
 
 
 async def typed(endpoint: str, receive: str) -> list[float]:
-    """rhot's bus: encode, put, wake the loop, decode; us."""
+    """Latencies of rhot's bus, us: encode, put, wake the event loop, decode."""
     latencies = []
     async with open_bus("bench", [endpoint]) as sender, open_bus("bench", [endpoint]) as receiver:
         subscription = {
@@ -92,7 +93,7 @@ async def typed(endpoint: str, receive: str) -> list[float]:
 
 
 def main() -> None:
-    """Run all ways and print the table."""
+    """Measure every way to receive and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()

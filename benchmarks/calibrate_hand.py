@@ -31,7 +31,8 @@ from rhot.messages import HandPoint, HandPoints, HandPose
 from services.calibrator.hand.fit import fit_person
 from services.calibrator.hand.recording import recording_of
 from services.simulator.scene.calibration_exercises import guided
-from services.simulator.scene.gestures import MOTIONS, Motion, Unrest
+from services.simulator.scene.gestures import MOTIONS, Motion
+from services.simulator.scene.involuntary_motion import InvoluntaryMotion
 from services.solver.step import SolverStep
 
 _NOISE_M, _FPS = 1e-3, 30.0
@@ -99,7 +100,7 @@ def messages(
     model: HandModel, motion: Motion, seed: int, seconds: float
 ) -> tuple[list[HandPoints], list[tuple[Array, Array]]]:
     """A motion as fusion would tell it, and the truth: wrist rotation and angles of every frame."""
-    rng, unrest = np.random.default_rng([seed, 17]), Unrest(seed)
+    rng, unrest = np.random.default_rng([seed, 17]), InvoluntaryMotion(seed)
     told, truth = [], []
     for frame in range(int(seconds * _FPS)):
         gesture, (turn, shift) = motion(frame / _FPS), unrest(frame / _FPS)

@@ -1,18 +1,19 @@
-"""What the tracker needs of a Raspberry Pi: `python benchmarks/footprint.py [--runs N] [--seconds
-S] [--json FILE]`.
+"""What the tracker needs of a Raspberry Pi: start-up time, memory, processor time, imports.
 
-rhot-pi-tracker is started as systemd starts it, as a process of its own, against a router on the
-loopback, with six colours; this process plays the camera (640 x 480 YUV420 at 30 frames a second,
+    python benchmarks/footprint.py [--runs N] [--seconds S] [--json FILE]
+
+rhot-pi-tracker is started as systemd starts it: a process of its own with six colours, connected to
+a router on the loopback. This process plays the camera (640 x 480 YUV420 at 30 frames a second,
 over the bus) and the master that has started the session. Measured:
     start_s         from exec to the liveliness token: the median of the runs (start_worst_s: the
                     slowest)
-    start_cpu_s     processor time that took: what start_s would be on an idle core
+    start_cpu_s     processor time for that: what start_s would be on an idle core
     first_marker_s  from exec to the first MarkerFrame
-    peak_mb         peak resident memory after so many seconds of tracking while somebody watches
-                    the preview (VmHWM); 1 MB is 10^6 bytes
+    peak_mb         peak resident memory after --seconds of tracking while the preview is watched
+                    (VmHWM); 1 MB is 10^6 bytes
     cpu_percent     of one core at 30 frames a second, preview included
-    forbidden       modules of scipy, numba and viser that it imported, of all that it imported
-                    (`modules`) from start to end
+    modules         number of modules it imported from start to end
+    forbidden       those of scipy, numba and viser among them
 Linux only: memory is read from /proc.
 """
 
@@ -68,7 +69,8 @@ def write_rig(folder: Path) -> Path:
     )
     path = folder / "rig.toml"
     path.write_text(
-        f'[rig]\nname = "{RIG}"\n[[camera]]\nname = "{CAMERA}"\nsource = "simulator"\n[hand.right.markers]\n{markers}\n'
+        f'[rig]\nname = "{RIG}"\n[[camera]]\nname = "{CAMERA}"\nsource = "simulator"\n'
+        f"[hand.right.markers]\n{markers}\n"
     )
     (folder / "calibration").mkdir()
     save(folder / "calibration" / f"{CAMERA}.colors.json", synthetic_images.ranges())
@@ -76,27 +78,24 @@ def write_rig(folder: Path) -> Path:
 
 
 def pictures() -> list[bytes]:
-    """A hand's worth of painted tips that move a little."""
+    """Pictures of six painted tips that move a little, as I420 bytes."""
     images = []
     for n in range(8):
         tips = [
             synthetic_images.Tip(color, 200.0 + 45 * i + 2 * n, 200.0 + 30 * (i % 3) + n)
             for i, color in enumerate(synthetic_images.PAINTS)
         ]
-        images.append(
-            synthetic_images.i420(
-                synthetic_images.noisy(synthetic_images.clean(tips, SIZE)[0], 5.0, n)
-            ).tobytes()
-        )
+        noisy = synthetic_images.noisy(synthetic_images.clean(tips, SIZE)[0], 5.0, n)
+        images.append(synthetic_images.i420(noisy).tobytes())
     return images
 
 
 async def play(bus: Bus, images: list[bytes]) -> None:
-    """The camera, for ever."""
+    """Publish the pictures as the camera does, for ever."""
     camera, seq = bus.publisher(topics.SIM_FRAME, camera=CAMERA), 0
     while True:
         if camera.wanted:
-            told = SimFrame(
+            header = SimFrame(
                 camera=CAMERA,
                 seq=seq,
                 stamp_ns=time.time_ns(),
@@ -104,14 +103,14 @@ async def play(bus: Bus, images: list[bytes]) -> None:
                 size_px=SIZE,
                 clock_skew_ns=0,
             )
-            camera.put_bytes(images[seq % len(images)], told)
+            camera.put_bytes(images[seq % len(images)], header)
             seq += 1
         await asyncio.sleep(1.0 / FPS)
 
 
 @contextlib.asynccontextmanager
 async def tracker(rig: Path, endpoint: str, *, imports: bool) -> AsyncIterator[Process]:
-    """The service's process; imports: it tells on stderr what it imports."""
+    """The service's process; with imports it lists on stderr what it imports."""
     program = Path(sys.executable).with_name("rhot-pi-tracker")
     environment = os.environ | ({"PYTHONPROFILEIMPORTTIME": "1"} if imports else {})
     process = await asyncio.create_subprocess_exec(
@@ -137,12 +136,12 @@ async def tracker(rig: Path, endpoint: str, *, imports: bool) -> AsyncIterator[P
 async def one_run(
     bus: Bus, rig: Path, endpoint: str, seconds: float, *, imports: bool = False
 ) -> Run:
-    """Start it, let it work, read its memory, end it."""
+    """Start the tracker, let it work, read its memory, end it."""
     markers, alive = bus.every(topics.MARKERS, 64, camera=CAMERA), bus.watch_alive()
     previews = bus.raw(topics.PREVIEW, 4, camera=CAMERA)
     begun_s = time.monotonic()
     async with tracker(rig, endpoint, imports=imports) as process:
-        told = asyncio.ensure_future(process.stderr.read()) if process.stderr else None
+        imported = asyncio.ensure_future(process.stderr.read()) if process.stderr else None
         async for one in alive:
             if one.alive and one.service == "pi_tracker":
                 break
@@ -150,16 +149,13 @@ async def one_run(
         async for frame in markers:
             if len(frame.markers) == len(synthetic_images.PAINTS):
                 break
-        first_s, cpu_s, since_s = (
-            time.monotonic() - begun_s,
-            cpu_seconds(process.pid),
-            time.monotonic(),
-        )
+        first_s = time.monotonic() - begun_s
+        cpu_s, since_s = cpu_seconds(process.pid), time.monotonic()
         await asyncio.sleep(seconds)
         busy = (cpu_seconds(process.pid) - cpu_s) / (time.monotonic() - since_s)
         peak_mb = peak_memory_mb(process.pid)
         process.terminate()
-        lines = (await told).decode().splitlines() if told else []
+        lines = (await imported).decode().splitlines() if imported else []
     # "import time:       123 |        456 |   numpy.linalg"
     modules = {line.rpartition("|")[2].strip() for line in lines if line.startswith("import time:")}
     for subscription in (markers, previews):
@@ -170,15 +166,13 @@ async def one_run(
 
 def peak_memory_mb(pid: int) -> float:
     """Peak resident memory of a process."""
-    text = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    return (
-        next(int(line.split()[1]) for line in text.splitlines() if line.startswith("VmHWM"))
-        * 1024e-6
-    )
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    peak_kib = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+    return peak_kib * 1024e-6
 
 
 def cpu_seconds(pid: int) -> float:
-    """Processor time that a process has had."""
+    """Processor time of a process so far."""
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -194,14 +188,12 @@ async def measure(runs: int, seconds: float) -> dict[str, Any]:
             async with open_bus(RIG, [endpoint]) as bus:
                 bus.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
                 camera = asyncio.ensure_future(play(bus, pictures()))
-                deadline_s = DEADLINE_S + seconds
-                with_imports = await asyncio.wait_for(
-                    one_run(bus, rig, endpoint, 2.0, imports=True), deadline_s
-                )
-                lives = [
-                    await asyncio.wait_for(one_run(bus, rig, endpoint, seconds), deadline_s)
-                    for _ in range(runs)
-                ]
+                async with asyncio.timeout(DEADLINE_S + seconds):
+                    with_imports = await one_run(bus, rig, endpoint, 2.0, imports=True)
+                lives = []
+                for _ in range(runs):
+                    async with asyncio.timeout(DEADLINE_S + seconds):
+                        lives.append(await one_run(bus, rig, endpoint, seconds))
                 camera.cancel()
     starts = [life.start_s for life in lives]
     return {

@@ -34,7 +34,7 @@ from rhot.messages import Marker
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
-from services.simulator.camera.visibility import Sight, sights
+from services.simulator.camera.visibility import PatchVisibility, patch_visibility
 from services.simulator.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
@@ -58,7 +58,9 @@ class Tally:
     # cannot be lost.
     known: bool | None = None
 
-    def add(self, sight: Sight, marker: Marker | None, shows: npt.NDArray[np.bool_]) -> None:
+    def add(
+        self, sight: PatchVisibility, marker: Marker | None, shows: npt.NDArray[np.bool_]
+    ) -> None:
         """Take in one frame; shows (h, w) is where the paint is seen."""
         right = marker is not None and on_paint(marker, shows)
         visible = sight.share >= VISIBLE
@@ -114,11 +116,12 @@ def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str
         markers = {marker.color: marker for marker in step.step(frame_of(taken)).markers}
         seen = {
             landmark: sight
-            for (_, landmark), sight in sights(source.renderer, taken.time_s).items()
+            for (_, landmark), sight in patch_visibility(source.renderer, taken.time_s).items()
         }
         labels = source.renderer.labels(taken.time_s)
         surfaces = {
-            landmark: surface for (_, landmark), surface in source.renderer.cast.marks.items()
+            landmark: surface
+            for (_, landmark), surface in source.renderer.shapes.paint_surfaces.items()
         }
         for color, landmark in landmarks.items():
             tallies[color].add(seen[landmark], markers.get(color), labels == 1 + surfaces[landmark])

@@ -20,7 +20,7 @@ from solver_hands import FRAMES, RATE_HZ, Motion, moving
 
 from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
-from services.simulator.scene.gestures import CURVED, FIST, OPEN, Fitted, bump
+from services.simulator.scene.gestures import CURVED, FIST, OPEN, LimitScaling, bump
 
 _JOINTS = ("proximal", "intermediate")
 CANDIDATES = (
@@ -63,7 +63,7 @@ def gesture(model: HandModel, name: str, rng: np.random.Generator) -> Motion:
     """Five seconds of a gesture or a swing of GESTURES and SWINGS, at any orientation."""
     start, fit, t = (
         moving(model, rng, "fist").rotations[0],
-        Fitted(model),
+        LimitScaling(model),
         np.arange(FRAMES) / RATE_HZ,
     )
     turns = np.outer(

@@ -1,7 +1,7 @@
-"""Where the lighthouses and the objects stand: calibration/objects.json turned into transforms.
+"""Registration of the lighthouses and the objects: calibration/objects.json as transforms.
 
-Pure. Without the file every object keeps its tracker's own pose in the lighthouse frame
-(Registration.registered is false); a file whose matrix is not a rigid transform is a
+Pure. Without the file every object has its tracker's own pose in the lighthouse frame
+(Registration.registered is false). A file whose matrix is not a rigid transform is a
 CalibrationError, never repaired.
 """
 
@@ -23,18 +23,17 @@ _RIGID_TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """One configured object: its name, its origin in its tracker's frame, and how late its
-    tracker's stamps are.
-    """
+    """One configured object, and how it is fixed to its tracker."""
 
     name: str
     T_tracker_from_object: Array  # (4, 4)
+    # How late the tracker's stamps are.
     time_offset_ns: int
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """All that turns a tracker's pose into an object's; placements are keyed by serial."""
+    """What turns a tracker's pose into an object's; placements are keyed by serial."""
 
     registered: bool
     T_rig_from_lighthouse: Array  # (4, 4), identity while registered is false
@@ -42,11 +41,11 @@ class Registration:
 
 
 def register(config: RigConfig, objects: Objects | None) -> Registration:
-    """The registration of the objects that rig.toml names; objects is None where none was
-    calibrated.
+    """The registration of the objects in rig.toml; objects is None if none was calibrated.
 
-    An object without an entry in objects.json is its tracker: no offset. Raises CalibrationError if
-    objects.json holds a matrix that is not a rigid transform or a quaternion without a direction.
+    An object without an entry in objects.json has the pose of its tracker, without an offset.
+    Raises CalibrationError if objects.json has a matrix that is not a rigid transform, or a
+    quaternion that is not a unit quaternion.
     """
     places = objects.objects if objects else {}
     placements = {
@@ -60,17 +59,15 @@ def register(config: RigConfig, objects: Objects | None) -> Registration:
 
 
 def load_registration(config: RigConfig) -> Objects | None:
-    """calibration/objects.json of a rig, or None where nobody has calibrated objects yet."""
+    """calibration/objects.json of a rig, or None if objects were not calibrated yet."""
     if not Path(config.calibration_dir / "objects.json").exists():
         return None
     return load_objects(config.calibration_dir)
 
 
 def is_rotation(R: Array, tolerance: float) -> bool:
-    """Whether (3, 3) is a right-handed rotation with every entry of R R^T within `tolerance` of the
-    identity's.
-    """
-    # Large entries are sorted out first, so that the products below cannot overflow.
+    """Whether R (3, 3) is a right-handed rotation: R R^T within `tolerance` of the identity."""
+    # Large entries are refused first, so that the products below cannot overflow.
     if not np.all(np.abs(R) <= 1.0 + tolerance):
         return False
     return bool(np.abs(R @ R.T - np.eye(3)).max() <= tolerance and np.linalg.det(R) > 0.0)
@@ -82,7 +79,8 @@ def _placement(name: str, place: ObjectPlace) -> Placement:
     # 1e-3: the length of a quaternion typed with four digits; a zero one has no direction at all.
     if not np.all(np.isfinite(offset_m)) or not abs(float(np.hypot.reduce(q)) - 1.0) < 1e-3:
         raise CalibrationError(
-            f"objects.json: {name!r} needs a finite offset_m and a unit quaternion wxyz; run `rhot calibrate objects` again"
+            f"objects.json: {name!r} needs a finite offset_m and a unit quaternion wxyz;"
+            " run `rhot calibrate objects` again"
         )
     return Placement(name, transform(rotation_from_quaternion(q), offset_m), place.time_offset_ns)
 
@@ -95,6 +93,7 @@ def _rigid(T: Array) -> Array:
         or np.abs(T[3] - bottom).max() > _RIGID_TOLERANCE
     ):
         raise CalibrationError(
-            "objects.json: T_rig_from_lighthouse is not a rigid transform (rotation and metres); run `rhot calibrate objects` again"
+            "objects.json: T_rig_from_lighthouse is not a rigid transform (rotation and metres);"
+            " run `rhot calibrate objects` again"
         )
     return T

@@ -1,9 +1,9 @@
-"""The object tracker: OpenVR-shaped poses in, object poses in the rig frame out.
+"""The object tracker: tracker poses as OpenVR reports them in, object poses in the rig frame out.
 
 Poses come from a source of its own (steamvr, libsurvive, replay) or from elsewhere on the bus
-(simulator, network); either way they travel on the openvr topic, so that everybody can see and
-record them. Late: each pose keeps its own stamp. Missing: nothing is published. Uncalibrated: poses
-stay in the lighthouse frame with registered = false, and health says so.
+(simulator, network). Either way they are published on the openvr topic, so that they can be seen
+and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. Uncalibrated:
+poses stay in the lighthouse frame with registered = false, and health says so.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ async def serve(service: Service) -> None:
     step = ObjectStep(service.config, load_registration(service.config))
     if not step.registered and service.config.object:
         service.error(
-            "no calibration/objects.json: poses stay in the lighthouse frame; run `rhot calibrate objects`"
+            "no calibration/objects.json: poses stay in the lighthouse frame;"
+            " run `rhot calibrate objects`"
         )
     source = open_source(service.config, service.error)
     publishers = {
@@ -35,7 +36,7 @@ async def serve(service: Service) -> None:
     }
     poses = service.bus.every(topics.OPENVR, 64)
     if source is not None:
-        service.tasks.create_task(_feed(service, source))
+        service.tasks.create_task(_publish_source(service, source))
     service.ready()
     async for pose in poses:
         result = step.step(pose)
@@ -43,15 +44,16 @@ async def serve(service: Service) -> None:
             publishers[result.object].put(result)
         elif step.unknown == 1:
             service.error(
-                f"device {pose.device.serial} is none of rig.toml's [[object]] tables; its poses are ignored (and counted)"
+                f"device {pose.device.serial} is none of rig.toml's [[object]] tables;"
+                " its poses are ignored (and counted)"
             )
         service.values.update(
             registered=float(step.registered), lost=step.lost, unknown=step.unknown
         )
 
 
-async def _feed(service: Service, source: PoseSource) -> None:
-    """Publish what the source says, one stream a device."""
+async def _publish_source(service: Service, source: PoseSource) -> None:
+    """Publish the poses of a source, one stream for each device."""
     publishers: dict[str, Publisher[OpenVrPose]] = {}
     async with contextlib.aclosing(source.poses()) as poses:
         async for pose in poses:

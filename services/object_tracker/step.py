@@ -1,10 +1,10 @@
-"""One OpenVR-shaped pose in, one object pose in the rig frame out.
+"""One tracker pose as OpenVR reports it in, one object pose in the rig frame out.
 
-Pure. A pose that cannot be trusted (not valid, disconnected, not finite, not a rotation, absurdly
-far away) gives an ObjectPose with tracking "lost" and neutral numbers: the last good pose is not
-held, nothing is guessed. A device that rig.toml does not name gives None and is counted. Without
+Pure. A pose that cannot be right (not valid, disconnected, not finite, not a rotation, beyond
+100 m) gives an ObjectPose with tracking "lost" and neutral numbers: the last good pose is not held,
+nothing is extrapolated. A device that rig.toml does not name gives None and is counted. Without
 calibration/objects.json poses stay in the lighthouse frame with registered = false. Late poses are
-not reordered: each stands for itself, at its own stamp.
+not reordered: each keeps its own stamp.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _TRACKING: dict[int, ObjectTracking] = {
 # 20 minutes of SteamVR poses (vive/marvin) stay within 2e-7 of a rotation (float32); 1e-3 still
 # excludes any real scale or shear.
 _ROTATION_TOLERANCE = 1e-3
-# Lighthouses reach 10 m; SteamVR was seen to jump some metres when it resolves them anew. Beyond
-# 100 m it is no pose.
+# Lighthouses reach 10 m; SteamVR was seen to jump some metres when it locates them again. What is
+# beyond 100 m is no pose.
 _MAX_DISTANCE_M = 100.0
 # A thrown tracker stays under 30 m/s and a spun one under 60 rad/s; ten times that is no velocity.
 _MAX_SPEED = 600.0
-# Serials kept to tell people what to write into rig.toml; OpenVR has 64 slots.
+# Serials kept so that people can see what to write into rig.toml; OpenVR has 64 slots.
 _MAX_UNKNOWN = 64
 _LATEST_STAMP_NS = 2**63 - 1
 
@@ -46,9 +46,9 @@ _LATEST_STAMP_NS = 2**63 - 1
 class ObjectStep:
     """Turns trackers' poses into objects' poses.
 
-    unknown counts poses of devices that rig.toml does not name, unknown_serials names them (the
-    first 64); lost counts poses that were turned into tracking "lost". Raises CalibrationError at
-    construction if objects.json cannot be right.
+    unknown counts poses of devices that rig.toml does not name, unknown_serials holds the first 64
+    of them; lost counts poses with tracking "lost". Raises CalibrationError at construction if
+    objects.json cannot be right.
     """
 
     def __init__(self, config: RigConfig, objects: Objects | None) -> None:
@@ -63,12 +63,11 @@ class ObjectStep:
         return self._registration.registered
 
     def step(self, pose: OpenVrPose) -> ObjectPose | None:
-        """The object's pose at the same instant (less the tracker's own delay), or None for a
-        device rig.toml does not name.
+        """The object's pose at the same instant, less the tracker's own delay.
 
-        T_rig_from_object = T_rig_from_lighthouse T_lighthouse_from_tracker T_tracker_from_object;
-        the velocity is that of the object's origin, v + w x r with r from the tracker to it (rigid
-        body), and both are turned into the rig frame.
+        None for a device that rig.toml does not name. T_rig_from_object = T_rig_from_lighthouse @
+        T_lighthouse_from_tracker @ T_tracker_from_object. The velocity is that of the object's
+        origin, v + w x r with r from the tracker to it (rigid body); v and w are in the rig frame.
         """
         placement = self._registration.placements.get(pose.device.serial)
         if placement is None:
@@ -77,7 +76,7 @@ class ObjectStep:
                 self.unknown_serials.add(pose.device.serial)
             return None
         tracking = _TRACKING.get(pose.eTrackingResult)
-        T_lighthouse_from_tracker = _rigid_or_none(pose)
+        T_lighthouse_from_tracker = _valid_transform(pose)
         if tracking is None or T_lighthouse_from_tracker is None:
             self.lost += 1
             return self._message(pose, placement, "lost", np.eye(4), np.zeros(3), np.zeros(3))
@@ -123,8 +122,8 @@ class ObjectStep:
         )
 
 
-def _rigid_or_none(pose: OpenVrPose) -> Array | None:
-    """T_lighthouse_from_tracker (4, 4) of a pose that can be trusted, made exactly rigid."""
+def _valid_transform(pose: OpenVrPose) -> Array | None:
+    """T_lighthouse_from_tracker (4, 4), made exactly rigid; None if the pose cannot be right."""
     if not pose.bPoseIsValid or not pose.bDeviceIsConnected:
         return None
     rows = np.array(pose.mDeviceToAbsoluteTracking, dtype=np.float64)  # (3, 4)

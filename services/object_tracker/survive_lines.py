@@ -1,12 +1,12 @@
-"""The text that libsurvive's `survive-cli --record-stdout` prints, line by line, turned into
-OpenVR-shaped poses.
+"""Parses the text that libsurvive's `survive-cli --record-stdout` prints, and converts its poses to
+those of OpenVR.
 
 Pure. Lines of interest (metres, seconds, wxyz, z up):
-    t object CONFIG {json}                       the device's own configuration, with its serial number
+    t object CONFIG {json}                 the device's own configuration, with its serial number
     t object POSE x y z qw qx qy qz
-    t object VELOCITY vx vy vz wx wy wz          follows the POSE of the same instant, usually
+    t object VELOCITY vx vy vz wx wy wz    follows the POSE of the same instant, usually
 Everything else (raw light, IMU, logs) and every malformed line is skipped; malformed POSE lines are
-counted. libsurvive goes silent when it loses a device: no line, no pose.
+counted. When libsurvive loses a device it prints no more lines for it.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{
 # libsurvive's z-up world to the `lighthouse` frame of docs/reference/frames.md (x right, y up, -z
 # forward): -90 deg about x.
 R_LIGHTHOUSE_FROM_SURVIVE: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-# Devices libsurvive can name at once are a handful; more names are garbage.
+# libsurvive names a few devices at most; more names are damaged lines.
 _MAX_DEVICES = 64
-# libsurvive rounds to 1e-6; further off is no rotation.
+# libsurvive rounds to 1e-6; a quaternion whose length is off by more than this is no rotation.
 _UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class SurvivePose:
-    """One POSE line with its VELOCITY (zero where libsurvive said none), in libsurvive's z-up
-    world.
+    """One POSE line with its VELOCITY (zero if there was none), in libsurvive's z-up frame.
 
-    time_s counts from the start of survive-cli; serial is the device's own where its CONFIG was
-    seen, else its code name.
+    time_s counts from the start of survive-cli; serial is the device's own if its CONFIG line came
+    before, else its code name.
     """
 
     time_s: float
@@ -49,8 +48,8 @@ class SurvivePose:
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
 
 
-class SurviveLines:
-    """Feed it lines; it gives poses. A pose waits for the next line, which may be its velocity."""
+class SurviveParser:
+    """Takes lines, gives poses. A pose waits for the next line, which may be its velocity."""
 
     def __init__(self) -> None:
         self._serials: dict[str, str] = {}
@@ -79,7 +78,7 @@ class SurviveLines:
         return done
 
     def flush(self) -> SurvivePose | None:
-        """The pose still waiting when the lines end."""
+        """The pose that is still waiting when the lines end."""
         done, self._pending = self._pending, None
         return done
 
@@ -115,17 +114,17 @@ def _numbers(text: str, count: int) -> list[float] | None:
 
 
 class RunClock:
-    """libsurvive's run time as wall-clock nanoseconds.
+    """Converts libsurvive's run time to wall-clock nanoseconds.
 
-    The least (arrival - run time) seen is the offset with the least delay in it; it is taken over
-    the current and the previous window, so that a clock that drifts (50 ppm: 0.5 ms in 10 s) or is
-    set is followed.
+    The smallest (arrival - run time) seen is the offset with the least delay in it. It is taken
+    over the current and the previous window, so that it follows a clock that drifts (50 ppm: 0.5 ms
+    in 10 s) or is set.
     """
 
-    # Long enough to meet an undelayed line, short enough for the drift above.
+    # Long enough to contain a line without delay, short enough for the drift above.
     WINDOW_NS = 10_000_000_000
-    # Arrivals scatter by milliseconds; one this much earlier than its window means that the wall
-    # clock was set back.
+    # Arrivals scatter by milliseconds; if one is earlier than its window by more than this, the
+    # wall clock was set back.
     BACKWARDS_NS = 1_000_000_000
 
     def __init__(self) -> None:
@@ -144,20 +143,15 @@ class RunClock:
         if self._window_start_ns is None or not -self.BACKWARDS_NS < age_ns < 2 * self.WINDOW_NS:
             self._window_start_ns, self._least_ns, self._previous_ns = arrival_ns, offset_ns, None
         elif age_ns >= self.WINDOW_NS:
-            self._window_start_ns, self._least_ns, self._previous_ns = (
-                arrival_ns,
-                offset_ns,
-                self._least_ns,
-            )
+            self._previous_ns = self._least_ns
+            self._window_start_ns, self._least_ns = arrival_ns, offset_ns
         self._least_ns = min(self._least_ns, offset_ns)
-        least_ns = (
-            self._least_ns if self._previous_ns is None else min(self._least_ns, self._previous_ns)
-        )
-        return max(0, time_ns + least_ns)
+        previous_ns = self._least_ns if self._previous_ns is None else self._previous_ns
+        return max(0, time_ns + min(self._least_ns, previous_ns))
 
 
 def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
-    """The same pose as SteamVR would tell it: y up, Valve's field names, Running_OK."""
+    """The same pose as SteamVR would report it: y up, OpenVR's field names, Running_OK."""
     R = R_LIGHTHOUSE_FROM_SURVIVE
     rotation = (R @ rotation_from_quaternion(pose.orientation_wxyz)).tolist()
     position = (R @ np.array(pose.position_m)).tolist()

@@ -1,7 +1,7 @@
-"""Recordings read back: what arrived, when, on which key.
+"""Reads recordings (MCAP): what arrived, when, on which key.
 
-Files that are no recording of rhot, or were cut off, raise CaptureError; `recover` makes a whole
-file of a cut one. Payloads are given as they were recorded: they may not decode.
+Files that are not recordings of rhot, or are truncated, raise CaptureError; recover.py restores
+truncated ones. Payloads are given as they were recorded: they may not decode.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from rhot.errors import CaptureError
 from services.recorder.writer import PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
-# Ours are at most 65 KiB and the largest message; a longer record is damage, and must not be
-# allocated.
+# Records of rhot are at most 65 KiB and the largest message; a longer one is damage, and no memory
+# must be allocated for it.
 RECORD_LIMIT = 16 * 1024 * 1024
 
 
@@ -35,7 +35,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a recording holds."""
+    """Rig, time and numbers of messages of a recording."""
 
     rig: str
     messages: int
@@ -51,7 +51,7 @@ class Summary:
 
 
 def is_finished(path: Path) -> bool:
-    """Whether a file ends as a whole MCAP file does. Raises OSError if it cannot be read."""
+    """Whether a file ends as a complete MCAP file does. Raises OSError if it cannot be read."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - len(MAGIC)))
@@ -75,7 +75,7 @@ def read(path: Path) -> Iterator[Record]:
                 )
         except CaptureError:
             raise
-        except Exception as error:  # the decoders of damaged bytes raise whatever they like
+        except Exception as error:  # decoders of damaged bytes may raise anything
             raise _damaged(path, error) from None
 
 
@@ -84,27 +84,26 @@ def summarize(path: Path) -> Summary:
     with _open(path) as file:
         reader = _reader(path, file)
         try:
-            summary = reader.get_summary()
-            rig = next(
-                (m.metadata.get("rig", "") for m in reader.iter_metadata() if m.name == "rhot"), ""
-            )
-            if summary is None or summary.statistics is None:
-                raise CaptureError(f"{path}: has no summary; it was not written by rhot's recorder")
-            statistics = summary.statistics
-            keys = {
-                c.topic: statistics.channel_message_counts.get(c.id, 0)
-                for c in summary.channels.values()
-            }
+            return _summary(path, reader)
         except CaptureError:
             raise
         except Exception as error:  # likewise
             raise _damaged(path, error) from None
+
+
+def _summary(path: Path, reader: SeekingReader) -> Summary:
+    summary = reader.get_summary()
+    if summary is None or summary.statistics is None:
+        raise CaptureError(f"{path}: has no summary; it was not written by rhot's recorder")
+    rigs = [m.metadata.get("rig", "") for m in reader.iter_metadata() if m.name == "rhot"]
+    statistics = summary.statistics
+    counts = statistics.channel_message_counts
     return Summary(
-        rig,
-        statistics.message_count,
-        statistics.message_start_time,
-        statistics.message_end_time,
-        keys,
+        rig=rigs[0] if rigs else "",
+        messages=statistics.message_count,
+        start_ns=statistics.message_start_time,
+        end_ns=statistics.message_end_time,
+        keys={c.topic: counts.get(c.id, 0) for c in summary.channels.values()},
     )
 
 
@@ -132,7 +131,8 @@ def _reader(path: Path, file: IO[bytes]) -> SeekingReader:
     file.seek(0)
     if not is_finished(path):
         raise CaptureError(
-            f"{path}: was cut off before it was finished; restore it with `rhot replay --recover {path}`"
+            f"{path}: was cut off before it was finished;"
+            f" restore it with `rhot replay --recover {path}`"
         )
     try:
         reader = SeekingReader(file, validate_crcs=True, record_size_limit=RECORD_LIMIT)

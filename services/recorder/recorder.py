@@ -1,10 +1,10 @@
-"""What is recorded when: a file for each session, named after its start. Pure but for the files it
-writes.
+"""Decides what is recorded when: one file for each session, named after its start. Pure but for the
+files it writes.
 
 With [recorder] autostart everything is recorded from the beginning, and a session that starts opens
-a file of its own; without, only sessions are recorded. Messages that come between are not kept.
-Late or undecodable payloads are kept as they came; a session message that does not decode starts
-and stops nothing.
+a file of its own. Without, only sessions are recorded: messages between them are not kept. Late or
+undecodable payloads are kept as they came; a session message that does not decode starts and stops
+nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rhot.messages import Session
 from rhot.topics import Topic
 from services.recorder.writer import RecordingWriter
 
-# A calibration file is some kB; what is larger is not one.
+# A calibration file is some kB; a file larger than this is none.
 _MAX_ATTACHMENT_BYTES = 1_000_000
 
 
@@ -39,13 +39,9 @@ def recorded_topics(config: RigConfig) -> list[Topic]:
 
 
 def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
-    """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3, ...
-
-    where that name is taken.
-    """
-    day, _, clock = (
-        str(np.datetime64(start_ns // 10**9, "s")).replace("-", "").replace(":", "").partition("T")
-    )
+    """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3 ... if that name is taken."""
+    iso = str(np.datetime64(start_ns // 10**9, "s"))
+    day, _, clock = iso.replace("-", "").replace(":", "").partition("T")
     stem = f"rhot-{rig}-{day}-{clock}"
     path, number = folder / f"{stem}.mcap", 1
     while path.exists():
@@ -55,8 +51,9 @@ def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
 
 
 def attachments(config: RigConfig) -> dict[str, bytes]:
-    """What a recording needs to be understood later: the rig's configuration as JSON and its
-    calibration files.
+    """The rig's configuration as JSON and its calibration files, by name.
+
+    A recording cannot be understood later without them.
     """
     files = {"config.json": msgspec.json.encode(config)}
     for path in sorted(config.calibration_dir.glob("*.json")):
@@ -64,17 +61,17 @@ def attachments(config: RigConfig) -> dict[str, bytes]:
             if path.stat().st_size <= _MAX_ATTACHMENT_BYTES:
                 files[f"calibration/{path.name}"] = path.read_bytes()
         except OSError:
-            # A calibration that cannot be read is missing from the recording, as it is from the
-            # rig.
+            # A calibration that cannot be read is missing in the rig, too.
             continue
     return files
 
 
 class Recorder:
-    """Takes every sample and keeps those that belong into a file.
+    """Takes every sample and keeps those that belong to a session.
 
-    messages and bytes count over all files; path is the file being written, None between sessions.
-    Without follow_sessions only start() and stop() open and close files.
+    messages, bytes and refused (messages on too many keys) count over all files; path is the file
+    being written, None between sessions. Without follow_sessions only start() and stop() open and
+    close files.
     """
 
     def __init__(
@@ -114,7 +111,7 @@ class Recorder:
     def follow(self, session: Session) -> None:
         """Open and close files as sessions start and stop.
 
-        The same session told again changes nothing.
+        The same session announced again changes nothing.
         """
         if session.running and session.start_ns != self._session_ns:
             self._session_ns = session.start_ns
@@ -125,10 +122,9 @@ class Recorder:
                 self.stop()
 
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
-        """One sample; kept if a file is open. Raises CaptureError."""
-        session = (
-            self._session(payload) if topic is topics.SESSION and self._follow_sessions else None
-        )
+        """Take one sample; it is kept if a file is open. Raises CaptureError."""
+        follows = self._follow_sessions and topic is topics.SESSION
+        session = self._session(payload) if follows else None
         if session is not None and session.running:
             self.follow(session)
         if self._writer is not None:
@@ -144,7 +140,7 @@ class Recorder:
             self.follow(session)
 
     def flush(self) -> None:
-        """Hand what is whole to the system; raises CaptureError when the disk is nearly full."""
+        """Hand whole chunks to the system; raises CaptureError when the disk is nearly full."""
         if self._writer is not None:
             self._writer.flush()
 

@@ -1,9 +1,9 @@
-"""Whole recordings out of cut or damaged ones: every chunk that can still be read goes to
+"""Restores truncated or damaged recordings: every chunk that can still be read goes to
 *.recovered.mcap.
 
 A killed recorder leaves a file without its index and with half a chunk at its end; damage in the
-middle costs the chunks it hits. The broken file is left as it is. A file another process is
-recording into is left alone; one with nothing whole gives no file.
+middle costs the chunks it hits. The broken file is left as it is. A file that another process is
+recording into is left alone; one without any readable message gives no file.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SUFFIX = ".recovered.mcap"
 
 @dataclass(frozen=True)
 class Recovered:
-    """What one recovery brought; damaged_chunks counts those that were skipped."""
+    """The result of one recovery; damaged_chunks counts those that were skipped."""
 
     source: Path
     target: Path
@@ -35,7 +35,7 @@ class Recovered:
     damaged_chunks: int
 
 
-def unfinished(folder: Path) -> list[Path]:
+def truncated_recordings(folder: Path) -> list[Path]:
     """Recordings in a folder that were cut off and not yet recovered, oldest name first."""
     return [
         path
@@ -53,10 +53,10 @@ def target_of(path: Path) -> Path:
 
 
 def recover(path: Path) -> Recovered:
-    """Write what is whole in `path` to *.recovered.mcap beside it.
+    """Write what can be read of `path` to *.recovered.mcap beside it.
 
     Raises CaptureError if the file cannot be read, is no recording of rhot, is being recorded into,
-    or holds nothing whole.
+    or has no readable message.
     """
     target = target_of(path)
     try:
@@ -64,23 +64,22 @@ def recover(path: Path) -> Recovered:
             raise CaptureError(f"{path}: is being recorded into; stop that recorder first")
         target.unlink(missing_ok=True)
         with path.open("rb") as file:
-            return _copy(path, target, _Whole(file))
+            return _copy(path, target, _ReadableRecords(file))
     except OSError as error:
         raise CaptureError(f"{path}: cannot be recovered: {error.strerror or error}") from None
 
 
-def _copy(path: Path, target: Path, whole: _Whole) -> Recovered:
-    header, head = whole.header, whole.head()
+def _copy(path: Path, target: Path, records: _ReadableRecords) -> Recovered:
+    header, head = records.header, records.head()
     if header is None or header.profile != PROFILE:
         raise CaptureError(f"{path}: is no recording of rhot, or not even its beginning is whole")
     rig = next((m.metadata.get("rig", "") for m in head if isinstance(m, Metadata)), "")
     attachments = {a.name: a.data for a in head if isinstance(a, Attachment)}
-    # Written under a hidden name: a recovery that is killed in turn must not look like one that was
-    # finished.
+    # Written under a hidden name: a recovery that is itself killed must not look finished.
     partial = target.with_name(f".{target.name}.part")
     partial.unlink(missing_ok=True)
     with RecordingWriter(partial, rig, header.library.removeprefix("rhot "), attachments) as writer:
-        for key, message in whole.messages():
+        for key, message in records.messages():
             topic = topics.find(key)
             if topic is not None:
                 writer.add(topic, key, message.data, message.log_time)
@@ -88,22 +87,22 @@ def _copy(path: Path, target: Path, whole: _Whole) -> Recovered:
         partial.unlink()
         raise CaptureError(f"{path}: holds no whole message; nothing to recover")
     partial.rename(target)
-    return Recovered(path, target, writer.messages, whole.damaged_chunks)
+    return Recovered(path, target, writer.messages, records.damaged_chunks)
 
 
-class _Whole:
+class _ReadableRecords:
     """The records of a damaged file that can still be read; header is None if not even that can."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self.damaged_chunks = 0
         self._channels: dict[int, str] = {}
-        self._records = _until_broken(file)
+        self._records = _until_damaged(file)
         self._first_chunk: Chunk | None = None
         first = next(self._records, None)
         self.header = first if isinstance(first, Header) else None
 
     def head(self) -> list[Metadata | Attachment]:
-        """What stands before the first chunk."""
+        """Metadata and attachments before the first chunk."""
         head: list[Metadata | Attachment] = []
         for record in self._records:
             if isinstance(record, Chunk):
@@ -126,7 +125,7 @@ class _Whole:
             if chunk.uncompressed_size > RECORD_LIMIT:
                 raise ValueError("absurd size")
             records = breakup_chunk(chunk, validate_crc=True)
-        except Exception:  # decompressors and parsers raise whatever they like on damaged bytes
+        except Exception:  # decoders of damaged bytes may raise anything
             self.damaged_chunks += 1
             return
         for record in records:
@@ -136,12 +135,12 @@ class _Whole:
                 yield self._channels[record.channel_id], record
 
 
-def _until_broken(file: IO[bytes]) -> Iterator[McapRecord]:
+def _until_damaged(file: IO[bytes]) -> Iterator[McapRecord]:
     try:
         yield from StreamReader(file, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
     except OSError:
         raise
-    except Exception:  # the end of what can be read, in whatever way the library says so
+    except Exception:  # the end of what can be read; decoders may raise anything
         return
 
 

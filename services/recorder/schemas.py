@@ -1,4 +1,4 @@
-"""JSON Schemas of the messages, as MCAP readers such as Foxglove want them. Pure."""
+"""JSON Schemas of the messages, in the form that MCAP readers such as Foxglove need. Pure."""
 
 from __future__ import annotations
 

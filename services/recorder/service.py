@@ -1,8 +1,8 @@
 """The recorder: everything the topics table marks as recorded, into one MCAP file a session.
 
 Late or missing streams are recorded late or not at all. A full disk, or a folder that cannot be
-written, ends the service with a clear error. At its start it restores recordings that were cut off
-by a crash.
+written, ends the service with a clear error. When it starts it restores recordings that were cut
+off by a crash.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rhot.files.config import RigConfig
 from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
 from services.recorder.recorder import Recorder, recorded_topics
-from services.recorder.recover import recover, unfinished
+from services.recorder.recover import recover, truncated_recordings
 
 # Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a
 # camera, and no memory to speak of.
@@ -42,8 +42,8 @@ async def serve(service: Service) -> None:
         service.ready()
         async with asyncio.TaskGroup() as tasks:
             for topic, samples in subscriptions:
-                tasks.create_task(keep(recorder, topic, samples))
-            tasks.create_task(_tend(service, recorder))
+                tasks.create_task(record_topic(recorder, topic, samples))
+            tasks.create_task(_flush_and_report(service, recorder))
     finally:
         recorder.stop()
 
@@ -53,31 +53,32 @@ def subscribe(bus: Bus, config: RigConfig) -> list[tuple[Topic, RawSubscription]
     return [(topic, bus.raw(topic, QUEUE)) for topic in recorded_topics(config)]
 
 
-async def keep(recorder: Recorder, topic: Topic, samples: RawSubscription) -> None:
-    """Give every sample to the recorder, for ever; raises CaptureError when it cannot be kept."""
+async def record_topic(recorder: Recorder, topic: Topic, samples: RawSubscription) -> None:
+    """Record every sample of a topic, for ever; raises CaptureError when one cannot be kept."""
     async for sample in samples:
         recorder.add(topic, sample.key, sample.payload, sample.received_ns)
 
 
 def recover_all(folder: Path) -> list[str]:
-    """Restore the cut recordings of a folder; what to tell of it.
+    """Restore the truncated recordings of a folder; returns a note for each.
 
-    Files with nothing in them are told too, and left.
+    Files without any readable message are noted too, and left.
     """
     notes = []
-    for path in unfinished(folder):
+    for path in truncated_recordings(folder):
         try:
             done = recover(path)
             notes.append(
-                f"{path.name} had been cut off: {done.messages} messages restored to {done.target.name}"
+                f"{path.name} had been cut off:"
+                f" {done.messages} messages restored to {done.target.name}"
             )
         except CaptureError as error:
             notes.append(str(error))
     return notes
 
 
-async def _tend(service: Service, recorder: Recorder) -> None:
-    """Keep file and health up to date."""
+async def _flush_and_report(service: Service, recorder: Recorder) -> None:
+    """Keep the file and the service's health up to date, for ever."""
     while True:
         await asyncio.sleep(_FLUSH_S)
         recorder.flush()

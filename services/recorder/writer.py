@@ -1,7 +1,7 @@
-"""One recording being written: an MCAP file of raw payloads, with schemas, the rig's configuration
-and calibration.
+"""Writes one recording: an MCAP file of raw payloads, with schemas, the rig's configuration and
+calibration.
 
-Payloads are kept as they came, also when they do not decode. Chunks are small, so that a killed
+Payloads are kept as they came, even if they do not decode. Chunks are small, so that a killed
 recorder loses less than a second of a busy rig; `flush` hands whole chunks to the system. A full
 disk or an unwritable folder raises CaptureError. The file is locked while it is open, so that
 recovery leaves it alone.
@@ -21,7 +21,7 @@ from rhot.errors import CaptureError
 from rhot.topics import Topic
 from services.recorder.schemas import SCHEMA_ENCODING, json_schema, schema_name
 
-# How readers know one of ours.
+# The MCAP profile by which readers know a recording of rhot.
 PROFILE = "rhot"
 # Measured: loses at most 0.8 s at 200 messages/s, and still compresses to 2 MB/min.
 CHUNK_BYTES = 65_536
@@ -73,7 +73,7 @@ class RecordingWriter:
             raise _failed(self.path, error) from None
 
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
-        """Keep one payload as it is; log_time_ns is when it arrived, on this machine's clock."""
+        """Write one payload as it is; log_time_ns is when it arrived, on this machine's clock."""
         channel = self._channels.get(key)
         if channel is None and len(self._channels) >= MAX_CHANNELS:
             self.refused += 1
@@ -91,10 +91,9 @@ class RecordingWriter:
 
     def _channel(self, topic: Topic, key: str) -> int:
         name = schema_name(topic)
-        if name and name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(
-                name, SCHEMA_ENCODING, json_schema(topic.message)
-            )  # type: ignore[arg-type]
+        if topic.message is not None and name not in self._schemas:
+            schema = json_schema(topic.message)
+            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, schema)
         encoding = "json" if name else topic.media_type
         self._channels[key] = self._writer.register_channel(
             key, encoding, self._schemas.get(name, 0), {"encoding": topic.encoding}
@@ -136,12 +135,13 @@ def check_space(folder: Path) -> None:
     free = shutil.disk_usage(folder).free
     if free < MIN_FREE_BYTES:
         raise CaptureError(
-            f"{folder}: only {free / 1e6:.0f} MB free, recordings need {MIN_FREE_BYTES / 1e6:.0f}; delete old ones or set [recorder] folder"
+            f"{folder}: only {free / 1e6:.0f} MB free, recordings need"
+            f" {MIN_FREE_BYTES / 1e6:.0f}; delete old ones or set [recorder] folder"
         )
 
 
 def _writer(file: object) -> Writer:
-    """zstd, or lz4 where zstandard is not installed, or plain."""
+    """Compresses with zstd, or lz4 where zstandard is not installed, or not at all."""
     for compression in (CompressionType.ZSTD, CompressionType.LZ4):
         try:
             return Writer(file, CHUNK_BYTES, compression)  # type: ignore[arg-type]
@@ -154,11 +154,12 @@ def _close(file: object) -> None:
     try:
         file.close()  # type: ignore[attr-defined]
     except OSError:
-        # A full disk refuses the last bytes once more; the first refusal is the one that is told.
+        # A full disk refuses the last bytes once more; the first refusal is the one reported.
         return
 
 
 def _failed(path: Path, error: OSError) -> CaptureError:
     return CaptureError(
-        f"{path}: cannot be recorded: {error.strerror or error}; free the disk, or set [recorder] folder to one that can be written"
+        f"{path}: cannot be recorded: {error.strerror or error};"
+        " free the disk, or set [recorder] folder to one that can be written"
     )

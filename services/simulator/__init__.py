@@ -1,4 +1,4 @@
-"""Simulator: a rig of virtual cameras with its truth."""
+"""Simulator: a rig of virtual cameras, with ground truth."""
 
 from pathlib import Path
 

@@ -1,11 +1,11 @@
 """The simulator live: pictures of every simulated camera, poses of every simulated tracker, and the
-truth, in real time.
+ground truth, in real time.
 
 Each camera runs at its own phase, in a thread of its own; a picture is published when a real one
-would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; a
-simulated camera computer's clock is off by what SimFrame.clock_skew_ns says. Late: a camera that
-cannot keep up skips frames and counts them in health. Uncalibrated: the service ends with the error
-that names the command. Nobody listens: it runs on.
+would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; the
+clock of a simulated camera computer is off by SimFrame.clock_skew_ns. Late: a camera that cannot
+keep up skips frames and counts them in health. Uncalibrated: the service ends with the error that
+names the command. Nobody listens: it runs on.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame
-from services.simulator.camera.frame_source import FrameSource
+from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.scene.scene import Scene, load_scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
@@ -31,7 +31,7 @@ _PROCESSING_S = 3e-3
 _SMOOTHING = 0.05
 
 
-class StageClock:
+class SceneClock:
     """Seconds since the scene began, and that beginning on the master's clock, which may be slewed
     or set meanwhile.
     """
@@ -67,47 +67,43 @@ class StageClock:
 
 
 async def serve(service: Service) -> None:
-    """Renders a virtual rig live: camera pictures, tracker poses and the truth."""
+    """Renders a virtual rig live: camera pictures, tracker poses and the ground truth."""
     cv2.setNumThreads(1)
     config = service.config
     scene = load_scene(config)
     names = [c.name for c in config.camera if c.source == "simulator"]
     with ThreadPoolExecutor(max(1, len(names)), "camera") as threads:
         sources = [
-            await asyncio.get_running_loop().run_in_executor(threads, _warm, scene, name)
+            await asyncio.get_running_loop().run_in_executor(threads, _compiled, scene, name)
             for name in names
         ]
-        clock = StageClock()
+        clock = SceneClock()
         async with asyncio.TaskGroup() as tasks:
             for source in sources:
-                tasks.create_task(_film(service, source, clock, threads))
-            tasks.create_task(_tell_truth(service, scene, clock))
+                tasks.create_task(_run_camera(service, source, clock, threads))
+            tasks.create_task(_publish_truth(service, scene, clock))
             if config.objects.source == "simulator":
-                tasks.create_task(_track_things(service, scene, clock, config))
+                tasks.create_task(_publish_tracker_poses(service, scene, clock, config))
             service.ready()
 
 
-def _warm(scene: Scene, camera: str) -> FrameSource:
-    """A camera whose kernels are compiled: the first compilation takes most of a minute on a slow
-    machine.
-    """
+def _compiled(scene: Scene, camera: str) -> FrameSource:
+    """A camera whose kernels are compiled: most of a minute on a slow machine, the first time."""
     source = FrameSource(scene, camera)
     source.renderer.picture(0)
     return source
 
 
-async def _film(
-    service: Service, source: FrameSource, clock: StageClock, threads: ThreadPoolExecutor
+async def _run_camera(
+    service: Service, source: FrameSource, clock: SceneClock, threads: ThreadPoolExecutor
 ) -> None:
-    """One camera for ever."""
-    loop, name, timing = asyncio.get_running_loop(), source.camera.name, source.clock
+    """Render and publish the frames of one camera, for ever."""
+    loop = asyncio.get_running_loop()
+    name, timing = source.camera.name, source.clock
     publisher = service.bus.publisher(topics.SIM_FRAME, camera=name)
     # From mid-exposure of row 0 to the picture in memory.
-    delay_s = (
-        0.5 * timing.exposure_s
-        + source.camera.size_px[1] * timing.row_time_ns * 1e-9
-        + _PROCESSING_S
-    )
+    readout_s = source.camera.size_px[1] * timing.row_time_ns * 1e-9
+    delay_s = 0.5 * timing.exposure_s + readout_s + _PROCESSING_S
     values = service.values
     values.update({f"{name}_skipped": 0.0, f"{name}_lost": 0.0, f"{name}_render_ms": 0.0})
     seq = timing.first_frame(clock.now_s())
@@ -118,44 +114,47 @@ async def _film(
             values[f"{name}_skipped"] += skipped
             seq += skipped
         began_s = clock.now_s()
-        taken = await loop.run_in_executor(threads, source.take, seq, clock.start_ns())
-        if taken.image is None:
+        frame = await loop.run_in_executor(threads, source.take, seq, clock.start_ns())
+        if frame.image is None:
             values[f"{name}_lost"] += 1
         else:
-            values[f"{name}_render_ms"] += _SMOOTHING * (
-                1e3 * (clock.now_s() - began_s) - values[f"{name}_render_ms"]
-            )
-            await asyncio.sleep(max(0.0, taken.time_s + delay_s - clock.now_s()))
-            about = SimFrame(
-                camera=name,
-                seq=seq,
-                stamp_ns=taken.stamp_ns,
-                row_time_ns=taken.row_time_ns,
-                size_px=taken.size_px,
-                clock_skew_ns=taken.skew_ns,
-            )
-            publisher.put_bytes(taken.image.tobytes(), attachment=about)
+            render_ms = 1e3 * (clock.now_s() - began_s)
+            values[f"{name}_render_ms"] += _SMOOTHING * (render_ms - values[f"{name}_render_ms"])
+            await asyncio.sleep(max(0.0, frame.time_s + delay_s - clock.now_s()))
+            publisher.put_bytes(frame.image.tobytes(), attachment=_header(frame))
         seq += 1
 
 
-async def _tell_truth(service: Service, scene: Scene, clock: StageClock) -> None:
-    """The truth at every instant of the first camera."""
+def _header(frame: TakenFrame) -> SimFrame:
+    """What travels with a picture."""
+    return SimFrame(
+        camera=frame.camera,
+        seq=frame.seq,
+        stamp_ns=frame.stamp_ns,
+        row_time_ns=frame.row_time_ns,
+        size_px=frame.size_px,
+        clock_skew_ns=frame.skew_ns,
+    )
+
+
+async def _publish_truth(service: Service, scene: Scene, clock: SceneClock) -> None:
+    """The ground truth at every instant of the first camera."""
     publisher = service.bus.publisher(topics.TRUTH)
     first = next(iter(scene.clocks.values()))
     async for _, t_s in clock.ticks(first.period_s, first.phase_s):
         publisher.put(scene.truth(t_s, clock.start_ns() + round(t_s * 1e9)))
 
 
-async def _track_things(
-    service: Service, scene: Scene, clock: StageClock, config: RigConfig
+async def _publish_tracker_poses(
+    service: Service, scene: Scene, clock: SceneClock, config: RigConfig
 ) -> None:
-    """Every object's Vive tracker at the rate of rig.toml."""
+    """The pose of every object's Vive tracker, at the rate of rig.toml."""
     publishers = [
-        service.bus.publisher(topics.OPENVR, serial=thing.serial) for thing in scene.things
+        service.bus.publisher(topics.OPENVR, serial=item.serial) for item in scene.objects
     ]
     async for seq, t_s in clock.ticks(1.0 / config.objects.rate_hz):
         stamp_ns = clock.start_ns() + round(t_s * 1e9)
-        for index, (thing, publisher) in enumerate(
-            zip(scene.things, publishers, strict=True), start=1
+        for index, (item, publisher) in enumerate(
+            zip(scene.objects, publishers, strict=True), start=1
         ):
-            publisher.put(tracker_pose(scene, thing, index, t_s, seq, stamp_ns))
+            publisher.put(tracker_pose(scene, item, index, t_s, seq, stamp_ns))

@@ -1,9 +1,9 @@
-"""A viser server for this machine's own browsers and nobody else's.
+"""A viser server for the browsers of this machine only.
 
 viser listens on all interfaces by default, offers a button that opens a public tunnel, and lets any
-web page open in the same browser connect. Here it listens on the loopback, has no tunnel, not even
-for a client that asks for one, and refuses other pages. A port that is taken is replaced by the
-next free one. Other machines look through an SSH tunnel.
+web page that is open in the same browser connect. Here it listens on the loopback, has no tunnel,
+not even for a client that asks for one, and refuses other pages. If its port is taken it uses the
+next free one. Other machines can use an SSH tunnel.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ import websockets.asyncio.server
 from rhot.errors import BusError
 
 _LOOPBACK = ("127.0.0.1", "localhost")
-# Where a browser's own page comes from, directly or through an SSH tunnel's port; None: programs,
-# which send no origin.
+# Origins of the server's own page, directly or through an SSH tunnel's port; None: programs, which
+# send no origin.
 _ORIGINS = [re.compile(r"http://(127\.0\.0\.1|localhost)(:\d+)?"), None]
 
 
 class LoopbackServer(viser.ViserServer):
-    """viser without a way out."""
+    """A viser server without a public tunnel."""
 
     def request_share_url(self, verbose: bool = True) -> None:  # noqa: ARG002 - viser's signature
-        """No public tunnel, whoever asks."""
+        """Do nothing, whoever asks."""
         return
 
 
@@ -41,7 +41,8 @@ def open_server(host: str, port: int) -> Iterator[LoopbackServer]:
     """
     if host not in _LOOPBACK:
         raise BusError(
-            f"the viewer listens on {_LOOPBACK[0]} only, not on {host!r}; look from elsewhere through `ssh -L {port}:127.0.0.1:{port}`"
+            f"the viewer listens on {_LOOPBACK[0]} only, not on {host!r};"
+            f" from another machine use `ssh -L {port}:127.0.0.1:{port}`"
         )
     # viser prints a banner and notes with rich; the services' standard output is for log lines.
     with contextlib.redirect_stdout(io.StringIO()), _own_pages_only():
@@ -61,9 +62,9 @@ def open_server(host: str, port: int) -> Iterator[LoopbackServer]:
 
 @contextlib.contextmanager
 def _own_pages_only() -> Iterator[None]:
-    """viser passes no `origins` to websockets' serve().
+    """Refuse other pages: viser passes no `origins` to websockets' serve().
 
-    While its server starts, serve() has them anyway.
+    While its server starts, serve() is replaced by one that has them.
     """
     serve = websockets.asyncio.server.serve
     websockets.asyncio.server.serve = functools.partial(serve, origins=_ORIGINS)  # type: ignore[assignment, misc]
@@ -73,22 +74,22 @@ def _own_pages_only() -> Iterator[None]:
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
 
 
-class Audience:
-    """Counts browsers; changed(count) is called from viser's thread."""
+class BrowserCount:
+    """Counts connected browsers; changed(count) is called from viser's thread."""
 
     def __init__(self, server: viser.ViserServer, changed: Callable[[int], object]) -> None:
         self._ids: set[int] = set()
         self._changed = changed
-        server.on_client_connect(self._came)
-        server.on_client_disconnect(self._went)
+        server.on_client_connect(self._connected)
+        server.on_client_disconnect(self._disconnected)
 
     # Coroutines, so that viser runs them one after the other on its own loop instead of in a pool
     # of threads.
 
-    async def _came(self, client: viser.ClientHandle) -> None:
+    async def _connected(self, client: viser.ClientHandle) -> None:
         self._ids.add(client.client_id)
         self._changed(len(self._ids))
 
-    async def _went(self, client: viser.ClientHandle) -> None:
+    async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._ids.discard(client.client_id)
         self._changed(len(self._ids))

@@ -1,8 +1,8 @@
 """The live view in a browser on this machine: hands, markers, objects, cameras, joint angles,
 rates.
 
-Nothing is subscribed to, and nothing is computed, while no browser looks. Late streams are drawn
-when they come and hidden when they are a second old; missing ones are said to be missing.
+Nothing is subscribed to, and nothing is computed, while no browser is connected. Late streams are
+drawn when they come and hidden when they are a second old; missing ones are said to be missing.
 Uncalibrated cameras are left out, with a note.
 """
 
@@ -18,11 +18,11 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.process.service import Service
 from rhot.topics import Topic
-from services.viewer.calibration.page import Calibrate
-from services.viewer.live.gui import Gui
+from services.viewer.calibration.page import CalibrationPage
+from services.viewer.live.gui import LivePanel
 from services.viewer.live.model import ViewModel
-from services.viewer.live.scene import Scene
-from services.viewer.server import Audience, open_server
+from services.viewer.live.scene import LiveScene
+from services.viewer.server import BrowserCount, open_server
 from services.viewer.setup import read_setup
 
 log = logging.getLogger("rhot.viewer")
@@ -36,64 +36,61 @@ async def serve(service: Service) -> None:
     config = service.config
     loop = asyncio.get_running_loop()
     setup = read_setup(config)
-    # viser's websocket library tells of every browser that comes and goes.
+    # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
-        present = asyncio.Event()
-        Audience(
-            server, lambda count: loop.call_soon_threadsafe(present.set if count else present.clear)
+        connected = asyncio.Event()
+        BrowserCount(
+            server,
+            lambda count: loop.call_soon_threadsafe(connected.set if count else connected.clear),
         )
-        gui, scene = (
-            Gui(server, config, setup.notes),
-            Scene(server, config, setup.cameras, setup.paints),
-        )
-        calibrating = service.tasks.create_task(Calibrate(service, server).run())
+        panel = LivePanel(server, config, setup.notes)
+        scene = LiveScene(server, config, setup.cameras, setup.paints)
+        calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
         service.values["port"] = server.get_port()
         log.info("live view at http://127.0.0.1:%d", server.get_port())
         service.ready()
         try:
             while True:
-                await present.wait()
-                await _live(service, present, gui, scene)
+                await connected.wait()
+                await _show_live(service, connected, panel, scene)
         finally:
             calibrating.cancel()
 
 
-async def _live(service: Service, present: asyncio.Event, gui: Gui, scene: Scene) -> None:
-    """Follow the rig for as long as somebody looks."""
+async def _show_live(
+    service: Service, connected: asyncio.Event, panel: LivePanel, scene: LiveScene
+) -> None:
+    """Subscribe and draw for as long as a browser is connected."""
     model = ViewModel()
     async with asyncio.TaskGroup() as tasks:
         followers = [
-            tasks.create_task(
-                _follow(
-                    service.bus,
-                    topics.POSE,
-                    lambda m: model.pose(m, time.monotonic(), clock.now_ns()),
-                )
-            ),
-            tasks.create_task(
-                _follow(service.bus, topics.POINTS, lambda m: model.points(m, time.monotonic()))
-            ),
-            tasks.create_task(
-                _follow(service.bus, topics.OBJECT, lambda m: model.object(m, time.monotonic()))
-            ),
-            tasks.create_task(
-                _follow(service.bus, topics.HEALTH, lambda m: model.health(m, time.monotonic()))
-            ),
+            tasks.create_task(_follow(service.bus, topic, take)) for topic, take in _handlers(model)
         ]
         pictures: asyncio.Task[None] | None = None
         text_due_s = 0.0
-        while present.is_set():
+        while connected.is_set():
             now_s = time.monotonic()
             view = model.view(now_s)
-            scene.show(view, trails=gui.trails)
+            scene.show(view, trails=panel.trails)
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
-                gui.show(view)
-                pictures = _switch(tasks, pictures, service, gui)
+                panel.show(view)
+                pictures = _switch_pictures(tasks, pictures, service, panel)
             await asyncio.sleep(1.0 / service.config.viewer.rate_hz)
         for follower in [*followers, *([pictures] if pictures else [])]:
             follower.cancel()
+
+
+def _handlers(model: ViewModel) -> list[tuple[Topic[Any], Callable[[Any], None]]]:
+    """What is subscribed to, and who takes it."""
+    now_s = time.monotonic
+    return [
+        (topics.POSE, lambda message: model.pose(message, now_s(), clock.now_ns())),
+        (topics.POINTS, lambda message: model.points(message, now_s())),
+        (topics.OBJECT, lambda message: model.object(message, now_s())),
+        (topics.HEALTH, lambda message: model.health(message, now_s())),
+    ]
 
 
 async def _follow(bus: Bus, topic: Topic[Any], take: Callable[[Any], None]) -> None:
@@ -105,26 +102,29 @@ async def _follow(bus: Bus, topic: Topic[Any], take: Callable[[Any], None]) -> N
         bus.close(subscription)
 
 
-def _switch(
-    tasks: asyncio.TaskGroup, pictures: asyncio.Task[None] | None, service: Service, gui: Gui
+def _switch_pictures(
+    tasks: asyncio.TaskGroup,
+    pictures: asyncio.Task[None] | None,
+    service: Service,
+    panel: LivePanel,
 ) -> asyncio.Task[None] | None:
     """Subscribe to previews only while the switch is on: cameras send none otherwise."""
-    if gui.pictures == (pictures is not None):
+    if panel.pictures == (pictures is not None):
         return pictures
-    gui.show_pictures(gui.pictures)
+    panel.show_pictures(panel.pictures)
     if pictures is None:
-        return tasks.create_task(_follow_pictures(service, gui))
+        return tasks.create_task(_follow_pictures(service, panel))
     pictures.cancel()
     return None
 
 
-async def _follow_pictures(service: Service, gui: Gui) -> None:
+async def _follow_pictures(service: Service, panel: LivePanel) -> None:
     # One being shown and the next of each of two cameras; more would only be older.
     samples = service.bus.raw(topics.PREVIEW, 4)
     try:
         async for sample in samples:
             camera = (topics.PREVIEW.names(sample.key) or {}).get("camera", "")
-            if not gui.picture(camera, sample.payload):
+            if not panel.set_picture(camera, sample.payload):
                 service.error(f"{sample.key} carries no JPEG of a camera of this rig")
     finally:
         service.bus.close(samples)

@@ -1,7 +1,7 @@
 """What the viewer reads before it starts: cameras and paints, with a note for whatever is missing.
 
-A rig that is not calibrated is shown without frusta, a broken calibration file likewise: the note
-says which and what to run.
+A camera that is not calibrated, or whose calibration file is broken, is shown without a frustum:
+the note says which and what to run.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def read_setup(config: RigConfig) -> Setup:
         try:
             colors.append(load_colors(config.calibration_dir, table.name))
         except CalibrationError:
-            # Paints have names; pi_tracker tells of colours that are not calibrated.
+            # Paints have names; pi_tracker reports colours that are not calibrated.
             continue
     paints: dict[tuple[HandName, str], Rgb] = {
         (hand, landmark): paint_rgb(color, colors)

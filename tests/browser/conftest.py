@@ -1,10 +1,11 @@
-"""A headless Chromium, where there is one."""
+"""A headless Chromium, where there is one, and publishers that run beside it."""
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -39,3 +40,24 @@ def chromium() -> Iterator[Any]:
         browser = driver.chromium.launch(executable_path=path, args=list(FLAGS))
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def in_background() -> Iterator[Callable[[Callable[[threading.Event], None]], threading.Event]]:
+    """Run functions in threads; each ends when the event it was given is set.
+
+    The event is returned, and set at the end of the test.
+    """
+    running: list[tuple[threading.Thread, threading.Event]] = []
+
+    def start(function: Callable[[threading.Event], None]) -> threading.Event:
+        stop = threading.Event()
+        thread = threading.Thread(target=function, args=(stop,))
+        thread.start()
+        running.append((thread, stop))
+        return stop
+
+    yield start
+    for thread, stop in running:
+        stop.set()
+        thread.join()

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
@@ -31,6 +31,8 @@ from testing.synthetic_images import PAINTS, Tip, clean, frame_of, noisy
 pytestmark = pytest.mark.browser
 DEADLINE_S = 30.0
 SIZE = (320, 240)
+WAIT = {"timeout": DEADLINE_S * 1e3}
+InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
 RIG = """
 [rig]
 name = "desk"
@@ -57,29 +59,26 @@ def shot() -> np.ndarray:
 
 
 @pytest.fixture
-def camera(router: str, shot: np.ndarray) -> Iterator[list[MarkerFrame]]:
+def camera(router: str, shot: np.ndarray, in_background: InBackground) -> list[MarkerFrame]:
     """The camera, the master that started the session, and what the tracker sends."""
-    stop, seen = threading.Event(), list[MarkerFrame]()
+    seen = list[MarkerFrame]()
 
-    def film() -> None:
-        image = frame_of(noisy(shot, 4.0, 1), 0, "i420").image
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            session = Session(running=True, start_ns=1)
+            query.reply(topics.SESSION.key("desk"), msgspec.json.encode(session))
+
+    def take(sample: zenoh.Sample) -> None:
+        seen.append(msgspec.json.decode(sample.payload.to_bytes(), type=MarkerFrame))
+
+    def film(stop: threading.Event) -> None:
+        image = frame_of(noisy(shot, 4.0, 1), 0, "i420").image.tobytes()
+        key = topics.SIM_FRAME.key("desk", camera="left")
         with zenoh.open(client_config([router])) as session:
-
-            def answer(query: zenoh.Query) -> None:
-                with query:
-                    query.reply(
-                        topics.SESSION.key("desk"),
-                        msgspec.json.encode(Session(running=True, start_ns=1)),
-                    )
-
             session.declare_queryable(topics.SESSION.key("desk"), answer)
-            key = topics.MARKERS.key("desk", camera="left")
-            session.declare_subscriber(
-                key,
-                lambda s: seen.append(msgspec.json.decode(s.payload.to_bytes(), type=MarkerFrame)),
-            )
+            session.declare_subscriber(topics.MARKERS.key("desk", camera="left"), take)
             for seq in itertools.count():
-                told = SimFrame(
+                header = SimFrame(
                     camera="left",
                     seq=seq,
                     stamp_ns=time.time_ns(),
@@ -87,19 +86,12 @@ def camera(router: str, shot: np.ndarray) -> Iterator[list[MarkerFrame]]:
                     size_px=SIZE,
                     clock_skew_ns=0,
                 )
-                session.put(
-                    topics.SIM_FRAME.key("desk", camera="left"),
-                    image.tobytes(),
-                    attachment=msgspec.json.encode(told),
-                )
+                session.put(key, image, attachment=msgspec.json.encode(header))
                 if stop.wait(1 / 15):
                     return
 
-    thread = threading.Thread(target=film)
-    thread.start()
-    yield seen
-    stop.set()
-    thread.join()
+    in_background(film)
+    return seen
 
 
 @pytest.fixture
@@ -154,43 +146,67 @@ def until(page: Any, condition: Any) -> Any:
     return found
 
 
-def test_from_the_first_click_to_new_ranges_in_force(
+def open_calibration(page: Any, url: str) -> Any:
+    """Show the picture to click; returns its switch."""
+    page.goto(url)
+    page.get_by_text("calibrate colours").wait_for(**WAIT)
+    switch = page.get_by_label("show picture")
+    # Folders are drawn open before they are closed.
+    until(page, lambda: not switch.is_visible())
+    page.get_by_text("calibrate colours").click()
+    switch.wait_for(**WAIT)
+    switch.click()
+    return switch
+
+
+def click_markers(page: Any) -> tuple[float, float]:
+    """Click beside the green marker, then on both; returns where the green one is."""
+    # Grey is no paint, and says so.
+    green = until(page, lambda: where(page, "green"))
+    page.mouse.click(green[0], green[1] - 180)
+    page.get_by_text("is on something grey").wait_for(**WAIT)
+
+    page.mouse.click(*until(page, lambda: where(page, "blue")))
+    page.get_by_text("1 of 2 colours clicked").wait_for(**WAIT)
+    page.get_by_text("click the middle of the green marker").wait_for(**WAIT)
+    page.mouse.click(*green)
+    page.get_by_text("2 of 2 colours clicked").wait_for(**WAIT)
+    return green
+
+
+def set_green_hue(page: Any, low: int, high: int, expected_low: int) -> None:
+    """Set the hue of the green range with the sliders, which show expected_low before."""
+    hue_from, hue_to = page.locator("input[type=text]").all()[-2:]
+    assert int(hue_from.input_value()) == expected_low
+    for box, value in ((hue_from, str(low)), (hue_to, str(high))):
+        box.fill(value)
+        box.press("Enter")
+    page.get_by_text("set by hand: green").wait_for(**WAIT)
+    page.get_by_text("not applied yet").wait_for(**WAIT)
+
+
+def test_from_the_first_click_to_applied_ranges(
     chromium: Any, page_url: str, camera: list[MarkerFrame], tmp_path: Path
 ) -> None:
     page = chromium.new_page(viewport={"width": 1200, "height": 800})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(page_url)
-    wait = {"timeout": DEADLINE_S * 1e3}
-    page.get_by_text("calibrate colours").wait_for(**wait)
-    switch = page.get_by_label("show picture")
-    # Folders are drawn open before they are closed.
-    until(page, lambda: not switch.is_visible())
-    page.get_by_text("calibrate colours").click()
-    switch.wait_for(**wait)
-    switch.click()
-    page.get_by_text("click the middle of the blue marker").wait_for(**wait)
-    page.get_by_text("still missing: blue, green").wait_for(**wait)
-    assert page.get_by_role("button", name="put in force").is_disabled()
+    switch = open_calibration(page, page_url)
+    page.get_by_text("click the middle of the blue marker").wait_for(**WAIT)
+    page.get_by_text("still missing: blue, green").wait_for(**WAIT)
+    apply = page.get_by_role("button", name="apply")
+    assert apply.is_disabled()
 
-    # Grey is no paint, and says so.
-    green = until(page, lambda: where(page, "green"))
-    page.mouse.click(green[0], green[1] - 180)
-    page.get_by_text("is on something grey").wait_for(**wait)
-
-    page.mouse.click(*until(page, lambda: where(page, "blue")))
-    page.get_by_text("1 of 2 colours pointed at").wait_for(**wait)
-    page.get_by_text("click the middle of the green marker").wait_for(**wait)
-    page.mouse.click(*green)
-    page.get_by_text("2 of 2 colours pointed at").wait_for(**wait)
+    green = click_markers(page)
     assert page.locator("table tr", has_text="green").last.inner_text().count("d'") == 2
 
     assert not any(frame.markers for frame in camera)
-    page.get_by_role("button", name="put in force").click()
-    page.get_by_text("in force on camera left, and written on its machine").wait_for(**wait)
-    assert set(load_colors(tmp_path / "calibration", "left").colors) == {"green", "blue"}
+    apply.click()
+    page.get_by_text("applied on camera left and saved on its machine").wait_for(**WAIT)
+    calibrated = load_colors(tmp_path / "calibration", "left")
+    assert set(calibrated.colors) == {"green", "blue"}
     until(page, lambda: {marker.color for marker in camera[-1].markers} == {"green", "blue"})
-    page.get_by_text("This camera is done.").wait_for(**wait)
+    page.get_by_text("This camera is done.").wait_for(**WAIT)
     found = {marker.color: marker for marker in camera[-1].markers}
     assert abs(found["green"].x_px - 120.0) < 6.0
     assert abs(found["blue"].x_px - 200.0) < 6.0
@@ -202,17 +218,8 @@ def test_from_the_first_click_to_new_ranges_in_force(
     assert (about.max(axis=2) < 40).sum() + (about.min(axis=2) > 225).sum() > 60
 
     # By hand: a range that takes nothing green, and the tracker no longer does.
-    hue_from, hue_to = page.locator("input[type=text]").all()[-2:]
-    assert (
-        int(hue_from.input_value())
-        == load_colors(tmp_path / "calibration", "left").colors["green"].hsv_low[0]
-    )
-    for box, value in ((hue_from, "0"), (hue_to, "9")):
-        box.fill(value)
-        box.press("Enter")
-    page.get_by_text("set by hand: green").wait_for(**wait)
-    page.get_by_text("not in force yet").wait_for(**wait)
-    page.get_by_role("button", name="put in force").click()
+    set_green_hue(page, 0, 9, expected_low=calibrated.colors["green"].hsv_low[0])
+    apply.click()
     until(page, lambda: [marker.color for marker in camera[-1].markers] == ["blue"])
     by_hand = load_colors(tmp_path / "calibration", "left")
     assert (by_hand.colors["green"].hsv_low[0], by_hand.colors["green"].hsv_high[0]) == (0, 9)

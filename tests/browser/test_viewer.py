@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, ObjectP
 pytestmark = pytest.mark.browser
 DEADLINE_S = 30.0
 OBJECT_AT = (0.17, 0.05, 0.55)
+InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
 
 
 @pytest.fixture
@@ -128,28 +129,20 @@ def cup_pose(seq: int) -> ObjectPose:
 
 
 @pytest.fixture
-def moving_hand(router: str, rig: RigConfig) -> Iterator[threading.Event]:
+def moving_hand(router: str, rig: RigConfig, in_background: InBackground) -> threading.Event:
     """Publishes a hand and a cup at 30 Hz until the event is set."""
-    stop = threading.Event()
+    hand_key = topics.POSE.key(rig.rig.name, hand="right")
+    cup_key = topics.OBJECT.key(rig.rig.name, object="cup")
 
-    def publish() -> None:
+    def publish(stop: threading.Event) -> None:
         with zenoh.open(client_config([router])) as session:
             for seq in itertools.count():
-                session.put(
-                    topics.POSE.key(rig.rig.name, hand="right"), msgspec.json.encode(hand_pose(seq))
-                )
-                session.put(
-                    topics.OBJECT.key(rig.rig.name, object="cup"),
-                    msgspec.json.encode(cup_pose(seq)),
-                )
+                session.put(hand_key, msgspec.json.encode(hand_pose(seq)))
+                session.put(cup_key, msgspec.json.encode(cup_pose(seq)))
                 if stop.wait(1 / 30):
                     return
 
-    thread = threading.Thread(target=publish)
-    thread.start()
-    yield stop
-    stop.set()
-    thread.join()
+    return in_background(publish)
 
 
 def picture(page: Any) -> np.ndarray:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from services.calibrator.board.board import Board
     from services.calibrator.board.detect import Detection
-    from services.calibrator.board.live_selection import Collector
+    from services.calibrator.board.live_selection import LiveSelection
 
 # A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
 _ANSWER_S = 5.0
@@ -190,7 +190,7 @@ class _Job:
         return f"nothing new was shown for {_PATIENCE_S:.0f} s ({state}); the pictures so far are in {self._folder}"
 
 
-def _seen(image: np.ndarray, collector: Collector) -> Detection | None:
+def _seen(image: np.ndarray, collector: LiveSelection) -> Detection | None:
     from services.calibrator.board.detect import detect
 
     return detect(image, collector.board, quick=True)

@@ -20,7 +20,7 @@ from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import rig_and_endpoints, router_session
 from services.cli.terminal import Terminal
 from services.recorder.recorder import Recorder
-from services.recorder.service import keep, subscribe
+from services.recorder.service import record_topic, subscribe
 
 _STATUS_PERIOD_S = 1.0
 
@@ -83,7 +83,7 @@ async def _record(
 async def _record_all(bus: Bus, rig: RigConfig, recorder: Recorder, terminal: Terminal) -> None:
     async with asyncio.TaskGroup() as tasks:
         for topic, samples in subscribe(bus, rig):
-            tasks.create_task(keep(recorder, topic, samples))
+            tasks.create_task(record_topic(recorder, topic, samples))
         while True:
             await asyncio.sleep(_STATUS_PERIOD_S)
             recorder.flush()

@@ -1,9 +1,8 @@
-"""Where tracked devices' poses come from: siblings behind one interface, chosen by `[objects]
-source` in rig.toml.
+"""Sources of tracked devices' poses behind one interface; `[objects] source` of rig.toml chooses.
 
-steamvr and libsurvive read real lighthouses, replay reads an objects.jsonl; with simulator and
-network the poses arrive on the bus already. A source that cannot be opened, or fails for good,
-raises SourceError; systemd (or `rhot up`) tries again.
+steamvr and libsurvive read real lighthouses, replay reads an objects.jsonl. With simulator and
+network the poses are on the bus already. A source that cannot be opened, or fails for good, raises
+SourceError; systemd (or `rhot up`) tries again.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ Report = Callable[[str], None]
 
 
 class PoseSource(Protocol):
-    """One provider of poses."""
+    """A source of poses."""
 
     def poses(self) -> AsyncGenerator[OpenVrPose]:
         """Poses as they come; ends with the source, raises SourceError when it fails."""
@@ -31,10 +30,10 @@ class PoseSource(Protocol):
 
 
 def open_source(config: RigConfig, report: Report) -> PoseSource | None:
-    """The source rig.toml names, or None where poses arrive on the bus already.
+    """The source that rig.toml names, or None if poses are on the bus already.
 
-    report takes what a user should hear of without the source failing. Raises SourceError for an
-    unknown name.
+    report takes warnings: what a user should know although the source goes on. Raises SourceError
+    for an unknown name.
     """
     kind, _, detail = config.objects.source.partition(":")
     match kind:

@@ -13,7 +13,7 @@ from pathlib import Path
 from rhot.files.capture import read_lines
 from rhot.messages import OpenVrPose
 
-# A longer gap is a pause of the recording, or a broken stamp: nobody wants to sit through it.
+# A longer gap is a pause of the recording, or a broken stamp: it is shortened to this.
 _LONGEST_GAP_NS = 5_000_000_000
 
 
@@ -24,7 +24,7 @@ class Replay:
         self._path = path
 
     async def poses(self) -> AsyncGenerator[OpenVrPose]:
-        """Every line of the file, when its stamp says."""
+        """Every line of the file, at the time of its stamp."""
         loop = asyncio.get_running_loop()
         due_s = loop.time()
         last_ns: int | None = None

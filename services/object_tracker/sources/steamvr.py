@@ -1,8 +1,8 @@
 """Poses from a running SteamVR, through the PyPI package openvr (x86 only, imported when needed).
 
-SteamVR missing or quit raises SourceError with what to do (openvr's own message is empty). A device
-that sleeps or is hidden keeps reporting, with bPoseIsValid or bDeviceIsConnected false. When
-SteamVR moves its origin the registration no longer holds: reported.
+If SteamVR is missing or quits, SourceError says what to do (openvr's own message is empty). A
+device that sleeps or is occluded keeps reporting, with bPoseIsValid or bDeviceIsConnected false.
+When SteamVR moves its origin the registration is no longer valid: a warning is reported.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from rhot.errors import SourceError
 from rhot.messages import OpenVrDevice, OpenVrPose
 
 _CLASSES = {1: "HMD", 2: "Controller", 3: "GenericTracker"}
-# ETrackingUniverseOrigin: raw does not follow the user's recentring. EVRApplicationType: background
-# does not start SteamVR.
+# ETrackingUniverseOrigin: raw does not follow when the user recentres. EVRApplicationType:
+# background does not start SteamVR.
 _RAW, _BACKGROUND = 2, 3
 _QUIT = 700
 # Events after which the origin may be elsewhere.
@@ -40,7 +40,7 @@ _DIGITS = 7
 class SteamVr:
     """Polls every tracked device at rate_hz in a thread of its own.
 
-    Report hears of a moved origin.
+    report takes the warning about a moved origin.
     """
 
     def __init__(self, rate_hz: float, report: Callable[[str], None]) -> None:
@@ -52,8 +52,8 @@ class SteamVr:
         universe.
         """
         loop = asyncio.get_running_loop()
-        # One thread for all of openvr: init() takes seconds, and nothing promises that it may be
-        # called from several.
+        # One thread for all of openvr: init() takes seconds, and its documentation does not say
+        # that several threads may call it.
         with ThreadPoolExecutor(1, "steamvr") as thread:
             poller = await loop.run_in_executor(
                 thread, _Poller, lambda text: loop.call_soon_threadsafe(self._report, text)
@@ -80,8 +80,8 @@ class _Poller:
             self._system = self._vr.init(_BACKGROUND)
         except self._vr.OpenVRError as error:
             raise SourceError(
-                f"SteamVR cannot be reached ({type(error).__name__}); install and start SteamVR on this machine, or choose"
-                " another [objects] source"
+                f"SteamVR cannot be reached ({type(error).__name__}); install and start SteamVR on"
+                " this machine, or choose another [objects] source"
             ) from None
         self._array = (self._vr.TrackedDevicePose_t * self._vr.k_unMaxTrackedDeviceCount)()
         self._event = self._vr.VREvent_t()
@@ -94,7 +94,7 @@ class _Poller:
 
     def poll(self, now_s: float) -> list[OpenVrPose]:
         """Every device's pose at this instant."""
-        self._events()
+        self._handle_events()
         if now_s - self._refreshed_s >= _DEVICE_REFRESH_S:
             self._refreshed_s = now_s
             self._devices = self._read_devices()
@@ -107,37 +107,37 @@ class _Poller:
         self._seq += 1
         return poses
 
-    def _events(self) -> None:
+    def _handle_events(self) -> None:
         while self._system.pollNextEvent(self._event):
             kind = int(self._event.eventType)
             if kind == _QUIT:
                 raise SourceError("SteamVR quit; start it again")
             if kind in _MOVED:
                 self._report(
-                    f"SteamVR moved its origin ({_MOVED[kind]}): registration is stale; run `rhot calibrate objects` again"
+                    f"SteamVR moved its origin ({_MOVED[kind]}): registration is stale;"
+                    " run `rhot calibrate objects` again"
                 )
 
     def _read_devices(self) -> dict[int, OpenVrDevice]:
         devices = {}
         for index in range(self._vr.k_unMaxTrackedDeviceCount):
-            name = _CLASSES.get(int(self._system.getTrackedDeviceClass(index)))
-            if name is not None:
-                devices[index] = OpenVrDevice(
-                    index=index,
-                    serial=_key_name(
-                        self._property("String", index, self._vr.Prop_SerialNumber_String, ""),
-                        index,
-                    ),
-                    device_class=name,
-                    model=self._property("String", index, self._vr.Prop_ModelNumber_String, ""),
-                    battery=self._property(
-                        "Float", index, self._vr.Prop_DeviceBatteryPercentage_Float, -1.0
-                    ),
-                    charging=bool(
-                        self._property("Bool", index, self._vr.Prop_DeviceIsCharging_Bool, False)
-                    ),
-                )
+            device_class = _CLASSES.get(int(self._system.getTrackedDeviceClass(index)))
+            if device_class is not None:
+                devices[index] = self._read_device(index, device_class)
         return devices
+
+    def _read_device(self, index: int, device_class: str) -> OpenVrDevice:
+        vr = self._vr
+        serial = self._property("String", index, vr.Prop_SerialNumber_String, "")
+        charging = self._property("Bool", index, vr.Prop_DeviceIsCharging_Bool, False)
+        return OpenVrDevice(
+            index=index,
+            serial=_key_name(serial, index),
+            device_class=device_class,
+            model=self._property("String", index, vr.Prop_ModelNumber_String, ""),
+            battery=self._property("Float", index, vr.Prop_DeviceBatteryPercentage_Float, -1.0),
+            charging=bool(charging),
+        )
 
     def _property(self, kind: str, index: int, prop: int, missing: Any) -> Any:
         try:
@@ -171,7 +171,7 @@ def openvr_pose(tracked: Any, device: OpenVrDevice, seq: int, stamp_ns: int) -> 
 
 
 def _key_name(serial: str, index: int) -> str:
-    """A serial fit to be part of a key."""
+    """A serial as part of a key: other characters become underscores."""
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", serial)[:64]
     return name if re.match(r"[A-Za-z0-9]", name) else f"device{index}"
 
@@ -181,6 +181,7 @@ def _import_openvr() -> Any:
         return importlib.import_module("openvr")
     except (ImportError, OSError) as error:
         raise SourceError(
-            f"the Python package openvr cannot be loaded ({error}); install it with `pip install 'rhot[openvr]'` on the"
-            " (x86) machine that runs SteamVR, or choose another [objects] source"
+            f"the Python package openvr cannot be loaded ({error}); install it with"
+            " `pip install 'rhot[openvr]'` on the (x86) machine that runs SteamVR,"
+            " or choose another [objects] source"
         ) from None

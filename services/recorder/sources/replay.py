@@ -1,8 +1,8 @@
-"""A recording as a source of messages: every payload on its key again, in its own time.
+"""Replays a recording: publishes every payload on its key again, at the recorded times.
 
-Keys are rewritten to the rig of the bus; payloads and their stamps stay as they were, so that what
-listens computes the same again. Messages on keys that are not in the topics table, or cannot be
-published on, are skipped. Files that are no whole recordings raise CaptureError.
+Keys are rewritten to the rig of the bus; payloads and their stamps stay as they were, so that
+subscribers compute the same again. Messages on keys that are not in the topics table, or cannot be
+published on, are skipped. Files that are not complete recordings raise CaptureError.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from rhot.bus.bus import Bus
 from rhot.errors import BusError, CaptureError
 from services.recorder.reader import Record, read
 
-# Longer silence is a pause of the recording, or a damaged time: nobody wants to sit through it.
+# A longer gap is a pause of the recording, or a damaged time: it is shortened to this.
 _LONGEST_GAP_NS = 10_000_000_000
-# Flat out, messages sent before the loop and Zenoh's sender get their turn; larger bursts overflow
-# Zenoh's queues.
+# At rate 0, messages sent before the event loop and Zenoh's sender get their turn; larger bursts
+# overflow Zenoh's queues.
 _BURST = 16
 
 
@@ -34,21 +34,21 @@ async def replay(
     only: Collection[str] = (),
     report: Callable[[Record], None] | None = None,
 ) -> int:
-    """Publish a recording; how many messages were sent.
+    """Publish a recording; returns how many messages were sent.
 
-    rate 1 is real time, 2 twice as fast, 0 flat out. loop begins again at the end, for ever. only
-    keeps the named topics (`camera/markers`; empty: all). report is called with each record as it
-    is sent.
+    rate 1 is real time, 2 twice as fast, 0 as fast as possible. loop begins again at the end, for
+    ever. only keeps the named topics (`camera/markers`; empty: all). report is called with each
+    record as it is sent.
     """
     if not (math.isfinite(rate) and rate >= 0.0):
         raise CaptureError(
-            f"cannot replay at rate {rate}; 1 is real time, 2 twice as fast, 0 flat out"
+            f"cannot replay at rate {rate}; 1 is real time, 2 twice as fast, 0 as fast as possible"
         )
     check_names(only)
     sent = 0
     while True:
         before = sent
-        sent += await _once(bus, path, rate, only, report)
+        sent += await _replay_once(bus, path, rate, only, report)
         if not loop:
             return sent
         if sent == before:
@@ -56,14 +56,14 @@ async def replay(
 
 
 def check_names(only: Collection[str]) -> None:
-    """Raises CaptureError for names that are no recorded topic's."""
+    """Raises CaptureError for names that are not those of recorded topics."""
     valid = sorted(topic.name for topic in topics.TOPICS if topic.recorded)
     unknown = sorted(set(only) - set(valid))
     if unknown:
         raise CaptureError(f"no recorded topic is called {unknown[0]!r}; valid: {', '.join(valid)}")
 
 
-async def _once(
+async def _replay_once(
     bus: Bus,
     path: Path,
     rate: float,
@@ -107,6 +107,6 @@ def _route(recorded_key: str, rig: str, only: Collection[str]) -> Route | None:
     try:
         return Route(topic.key(rig, **(topic.names(recorded_key) or {})), topic.encoding)
     except BusError:
-        # A key with a wildcard or worse in it: somebody published it, and it was recorded; it
-        # cannot be published again.
+        # A key that is not valid, e.g. with a wildcard: it was recorded as it came, but cannot be
+        # published again.
         return None

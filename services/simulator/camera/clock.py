@@ -1,8 +1,8 @@
-"""When each simulated camera takes its pictures, and what its computer's clock says about it. Pure.
+"""When each simulated camera exposes its frames, and the errors of its computer's clock. Pure.
 
-Cameras run free: each has its own phase, its own crystal, its own clock. Times are seconds on the
-master's clock since the scene began; a stamp is nanoseconds. Everything follows from (seed, number
-of the camera, number of the frame).
+Cameras are not synchronised: each has a phase, a crystal and a clock of its own. Times are seconds
+on the master's clock since the scene began; a stamp is nanoseconds. Everything follows from the
+random seed, the camera's name and number, and the number of the frame.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhot.files.config import CameraTable
+
 # The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647
 # (18.9 and 33.7 us).
 _READOUT_S = 14.4e-3
@@ -22,7 +24,7 @@ _MAX_READOUT = 0.85
 
 @dataclass(frozen=True)
 class CameraClock:
-    """One camera's timing; see `camera_clock` for what is usual."""
+    """One camera's timing; `camera_clock` has the usual values."""
 
     period_s: float
     # Mid-exposure of row 0 of frame 0.
@@ -32,7 +34,7 @@ class CameraClock:
     # The camera computer's clock reads offset + drift * t more than the master's.
     offset_ns: float
     drift_ppm: float
-    # What synchronisation leaves over of these two in a recording made with synchronised clocks.
+    # What is left of these two in a recording, after synchronisation of the clocks.
     residual_ns: float
     residual_ppm: float
     # Standard deviation of the stamps, and the share of frames that get lost.
@@ -53,7 +55,7 @@ class CameraClock:
         return round(self.offset_ns + self.drift_ppm * 1e3 * time_s)
 
     def stamp_error_ns(self, frame: int) -> int:
-        """Jitter of one frame's stamp: what the driver adds."""
+        """Jitter of one frame's stamp, which the driver adds."""
         return round(float(self._rng(frame, 1).standard_normal()) * self.jitter_ns)
 
     def residual_at_ns(self, time_s: float) -> int:
@@ -69,16 +71,16 @@ class CameraClock:
 
 
 def camera_clock(
-    name: str, number: int, cameras: int, fps: float, rows: int, exposure_s: float, seed: int
+    table: CameraTable, number: int, cameras: int, exposure_s: float, seed: int
 ) -> CameraClock:
-    """The clock of camera `number` of `cameras`, as free-running cameras on unsynchronised
-    computers have it.
+    """The clock of camera `number` of `cameras`, neither cameras nor computers synchronised.
 
-    Phases are spread over the period (two cameras at 30 fps: 16.7 ms apart), clocks up to 20 ms off
-    and drifting up to 50 ppm, sensor crystals within 20 ppm, 1.5 % of the frames lost.
+    Phases are spread over the period (two cameras at 30 fps: 16.7 ms apart). Clocks are up to 20 ms
+    off and drift up to 50 ppm, sensor crystals are within 20 ppm, 1.5 % of the frames are lost.
     """
+    name, rows = table.name, table.size_px[1]
     rng = np.random.default_rng([seed, zlib.crc32(name.encode()), 3])
-    period_s = (1.0 + rng.uniform(-20e-6, 20e-6)) / fps
+    period_s = (1.0 + rng.uniform(-20e-6, 20e-6)) / table.fps
     readout_s = min(_READOUT_S, _MAX_READOUT * period_s)
     return CameraClock(
         period_s=period_s,

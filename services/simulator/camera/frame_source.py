@@ -1,8 +1,7 @@
-"""The pictures of one simulated camera as its tracker would get them: number, stamp on its own
-clock, bytes. Pure.
+"""The frames of one simulated camera as its tracker would get them: number, stamp on the camera
+computer's clock, picture. Pure.
 
-Lost frames are said to be lost and are not rendered; their numbers are skipped as a driver skips
-them.
+A lost frame keeps its number and has no picture; it is not rendered.
 """
 
 from __future__ import annotations
@@ -14,8 +13,8 @@ from services.simulator.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Shot:
-    """When one frame is taken, before anybody renders it."""
+class FrameTime:
+    """When one frame is exposed, known without rendering it."""
 
     camera: str
     seq: int
@@ -49,9 +48,9 @@ class TakenFrame:
 class FrameSource:
     """One camera of a scene.
 
-    recorded=False: the camera computer's clock is as wrong as CameraClock says (live; the tracker
-    measures it by echo). recorded=True: only what synchronisation leaves over is wrong (captures;
-    offline nobody can ask the time).
+    recorded=False: stamps have the full clock error of CameraClock (live; the tracker measures it
+    against the master). recorded=True: stamps have the residual error only (captures: offline there
+    is no master to ask).
     """
 
     def __init__(self, scene: Scene, camera: str, *, recorded: bool = False) -> None:
@@ -60,27 +59,27 @@ class FrameSource:
         self.renderer = Renderer(scene, camera)
         self._recorded = recorded
 
-    def shot(self, seq: int) -> Shot:
-        """When frame `seq` is taken, and whether it gets lost."""
-        return Shot(self.camera.name, seq, self.clock.time_s(seq), self.clock.dropped(seq))
+    def frame_time(self, seq: int) -> FrameTime:
+        """When frame `seq` is exposed, and whether it is lost."""
+        return FrameTime(self.camera.name, seq, self.clock.time_s(seq), self.clock.dropped(seq))
 
     def take(self, seq: int, start_ns: int = 0) -> TakenFrame:
-        """Frame number `seq` since the scene's beginning, which is start_ns on the master's clock."""
-        shot = self.shot(seq)
-        skew_ns = self.skew_ns(shot.time_s)
+        """Frame `seq` of a scene that begins at start_ns on the master's clock."""
+        frame = self.frame_time(seq)
+        skew_ns = self.skew_ns(frame.time_s)
         return TakenFrame(
             camera=self.camera.name,
             seq=seq,
-            time_s=shot.time_s,
+            time_s=frame.time_s,
             stamp_ns=max(
-                0, start_ns + round(shot.time_s * 1e9) + skew_ns + self.clock.stamp_error_ns(seq)
+                0, start_ns + round(frame.time_s * 1e9) + skew_ns + self.clock.stamp_error_ns(seq)
             ),
             skew_ns=skew_ns,
             row_time_ns=self.clock.row_time_ns,
             size_px=self.camera.size_px,
-            image=None if shot.dropped else self.renderer.picture(seq),
+            image=None if frame.dropped else self.renderer.picture(seq),
         )
 
     def skew_ns(self, time_s: float) -> int:
-        """How far the clock that stamps is ahead of the master's."""
+        """How far the stamping clock is ahead of the master's."""
         return self.clock.residual_at_ns(time_s) if self._recorded else self.clock.skew_ns(time_s)

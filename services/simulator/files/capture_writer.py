@@ -1,5 +1,5 @@
-"""Writes a scene as a capture folder: pictures, stamps, object poses and the truth, as a recording
-of a synchronised rig has them.
+"""Writes a scene as a capture folder: pictures, stamps, object poses and the ground truth, as a
+recording of a rig with synchronised clocks has them.
 
 The same scene and duration give the same bytes. A folder that is not empty is a CaptureError, and
 nothing is written.
@@ -43,7 +43,7 @@ def write_capture(
     """
     if not seconds > 0.0:
         raise CaptureError(f"cannot write a capture of {seconds} s; give a duration above 0")
-    capture = _new(folder)
+    capture = _make_folder(folder)
     try:
         _copy_rig(scene.config, capture)
         write_lines(capture.objects, _object_lines(scene, seconds))
@@ -53,7 +53,7 @@ def write_capture(
         raise CaptureError(f"{folder}: cannot be written: {error}") from None
 
 
-def _new(folder: Path) -> Capture:
+def _make_folder(folder: Path) -> Capture:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise CaptureError(
             f"{folder}: exists and is not an empty folder; name a new one or empty it"
@@ -85,8 +85,8 @@ def _object_lines(scene: Scene, seconds: float) -> Iterator[OpenVrPose]:
     rate_hz = scene.config.objects.rate_hz
     for seq in range(int(seconds * rate_hz)):
         t_s = seq / rate_hz
-        for index, thing in enumerate(scene.things, start=1):
-            yield tracker_pose(scene, thing, index, t_s, seq, START_NS + round(t_s * 1e9))
+        for index, item in enumerate(scene.objects, start=1):
+            yield tracker_pose(scene, item, index, t_s, seq, START_NS + round(t_s * 1e9))
 
 
 def _truth_lines(scene: Scene, seconds: float) -> Iterator[Truth]:
@@ -101,13 +101,13 @@ def _write_pictures(
     scene: Scene, seconds: float, capture: Capture, progress: Progress | None
 ) -> int:
     counts = {name: clock.first_frame(seconds) for name, clock in scene.clocks.items()}
-    total, done, written = sum(counts.values()), 0, 0
+    total = sum(counts.values())
+    done, written = 0, 0
     for name, count in counts.items():
         source = FrameSource(scene, name, recorded=True)
         stamps: list[FrameStamp] = []
-        video = _open(
-            capture.video(name), scene.config.camera_named(name).fps, source.camera.size_px
-        )
+        fps = scene.config.camera_named(name).fps
+        video = _open_video(capture.video(name), fps, source.camera.size_px)
         try:
             for seq in range(count):
                 taken = source.take(seq, START_NS)
@@ -128,12 +128,12 @@ def _write_pictures(
     return written
 
 
-def _open(path: Path, fps: float, size_px: tuple[int, int]) -> cv2.VideoWriter:
-    video = cv2.VideoWriter(
-        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), fps, size_px
-    )  # type: ignore[attr-defined]
+def _open_video(path: Path, fps: float, size_px: tuple[int, int]) -> cv2.VideoWriter:
+    codec = cv2.VideoWriter_fourcc(*"FFV1")  # type: ignore[attr-defined]
+    video = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, codec, fps, size_px)
     if not video.isOpened():
         raise CaptureError(
-            f"{path}: OpenCV cannot write FFV1 here; install opencv-python-headless, whose wheels bring FFmpeg along"
+            f"{path}: OpenCV cannot write FFV1 here; install opencv-python-headless, whose wheels"
+            " bring FFmpeg along"
         )
     return video

@@ -1,10 +1,10 @@
 """Makes the calibration of a simulated rig: `python -m services.simulator.files.make_calibration
 config/sim.toml`.
 
-Lens, place, exposure and objects are what a calibration of good cheap cameras would give; colours
-are fitted to rendered samples (services/simulator/files/fit_colors.py). Existing files are
-replaced: a simulated rig has nothing to lose. The values follow from the cameras' names and order
-alone.
+Intrinsics, extrinsics, exposure and objects are what a calibration of good cheap cameras would
+give; colours are fitted to rendered samples (services/simulator/files/fit_colors.py). Existing
+files are replaced: a simulated rig has nothing to lose. The values follow from the cameras' names
+and order alone.
 """
 
 from __future__ import annotations
@@ -30,64 +30,65 @@ from rhot.files.calibration import (
 from rhot.files.config import CameraTable, RigConfig, load_rig
 from rhot.geometry.camera import pinhole
 from rhot.geometry.transforms import Array, rotation_from_vector, rotation_x, rotation_y, transform
-from services.simulator.files.fit_colors import Samples, fit, samples
+from services.simulator.files.fit_colors import Samples, fit_ranges, sample_pixels
 from services.simulator.render.renderer import Renderer
 from services.simulator.scene.scene import load_scene
 
+# A label that is stored in every calibration file, not a path: it keeps its value, so that files
+# made again are the same bytes.
 TOOL = "services.simulator.rig"
 # RHOT: 62.5 deg over 640 px, cameras 75 mm apart.
 _HFOV_RAD = np.deg2rad(62.5)
 _BASELINE_M = 0.075
 # Barrel distortion of a Raspberry Pi camera's lens after the usual calibration.
 _K1, _K2 = -0.055, 0.020
-# The base station stands 2 m behind and above the rig, its universe turned against it.
+# Origin of the lighthouse frame in the rig frame.
 _LIGHTHOUSE_M = (0.6, 0.9, 1.4)
 
 # Scenes and frames that show every paint from many sides, in light and shade.
-_SAMPLED, _FRAMES = ("fist", "piano", "random", "wave"), tuple(range(5, 200, 13))
+_SCENES, _FRAMES = ("fist", "piano", "random", "wave"), tuple(range(5, 200, 13))
 
 
 def lens(camera: CameraTable, date: str) -> Lens:
-    """A lens like the others of its kind, yet its own: focal length, middle and distortion differ a
-    little.
-    """
+    """Intrinsics and distortion of one camera, which differ a little from camera to camera."""
     rng = _rng(camera.name, 1)
     matrix = pinhole(camera.size_px, float(_HFOV_RAD))
     matrix[:2, :2] *= 1.0 + 0.002 * rng.standard_normal()
     matrix[:2, 2] += rng.uniform(-4.0, 4.0, 2) * camera.size_px[0] / 640.0
-    k1, k2 = _K1 * rng.uniform(0.9, 1.1), _K2 * rng.uniform(0.9, 1.1)
+    k1 = _K1 * rng.uniform(0.9, 1.1)
+    k2 = _K2 * rng.uniform(0.9, 1.1)
     p1, p2 = rng.uniform(-5e-4, 5e-4, 2)
     rows = np.round(matrix, 4).tolist()
-    distortion = tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0))
     return Lens(
         date=date,
         tool=TOOL,
         size_px=camera.size_px,
-        matrix=tuple(tuple(r) for r in rows),
-        distortion=distortion,
-    )  # type: ignore[arg-type]
+        matrix=tuple(tuple(row) for row in rows),  # type: ignore[arg-type]
+        distortion=tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0)),  # type: ignore[arg-type]
+    )
 
 
 def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:
-    """Cameras in a row, 75 mm apart, each but the first turned by up to half a degree about each
-    axis, and displaced by millimetres.
+    """Cameras in a row, 75 mm apart.
+
+    Each but the first is turned by up to half a degree about each axis and displaced by up to 1 mm.
     """
     places = {}
     for number, camera in enumerate(cameras):
         rng = _rng(camera.name, 2)
         T = np.eye(4)
         if number:
-            wrong = rng.uniform(-1.0, 1.0, 6)
+            error = rng.uniform(-1.0, 1.0, 6)
             T = transform(
-                rotation_from_vector(np.deg2rad(0.5) * wrong[:3]),
-                np.array([number * _BASELINE_M, 0.0, 0.0]) + 1e-3 * wrong[3:],
+                rotation_from_vector(np.deg2rad(0.5) * error[:3]),
+                np.array([number * _BASELINE_M, 0.0, 0.0]) + 1e-3 * error[3:],
             )
-        places[camera.name] = CameraPlace(T_rig_from_camera=_rows(T))
+        places[camera.name] = CameraPlace(T_rig_from_camera=_matrix_rows(T))
     return RigGeometry(date=date, tool=TOOL, cameras=places)
 
 
 def objects(config: RigConfig, date: str) -> Objects:
-    """Where the lighthouse stands, and how the trackers sit on their objects."""
+    """The pose of the lighthouse frame, and how the trackers are fixed to their objects."""
     T = transform(rotation_x(np.pi) @ rotation_y(0.6) @ rotation_x(0.15), _LIGHTHOUSE_M)
     # A tracker sits at the lower end of its object, 75 mm from the middle.
     places = {
@@ -96,7 +97,7 @@ def objects(config: RigConfig, date: str) -> Objects:
         )
         for o in config.object
     }
-    return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=_rows(T), objects=places)
+    return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=_matrix_rows(T), objects=places)
 
 
 def write_all(config: RigConfig, date: str = "") -> list[Path]:
@@ -129,21 +130,18 @@ def colors(config: RigConfig, camera: str, date: str) -> Colors:
     """
     painted: dict[str, list[Samples]] = {}
     others = []
-    for name in _SAMPLED:
+    for name in _SCENES:
         renderer = Renderer(load_scene(config, name), camera)
-        surfaces, rest = samples(renderer, _FRAMES)
+        surfaces, rest = sample_pixels(renderer, _FRAMES)
         others.append(rest)
-        for (hand, landmark), surface in renderer.cast.marks.items():
-            painted.setdefault(config.hand[hand].markers[landmark], []).append(surfaces[surface])  # type: ignore[index]
-    return fit(
-        {name: np.concatenate(rows) for name, rows in painted.items()},
-        np.concatenate(others),
-        date,
-        TOOL,
-    )
+        for (hand, landmark), surface in renderer.shapes.paint_surfaces.items():
+            color = config.hand[hand].markers[landmark]  # type: ignore[index]
+            painted.setdefault(color, []).append(surfaces[surface])
+    by_color = {name: np.concatenate(rows) for name, rows in painted.items()}
+    return fit_ranges(by_color, np.concatenate(others), date, TOOL)
 
 
-def _rows(T: Array) -> tuple:
+def _matrix_rows(T: Array) -> tuple:
     return tuple(tuple(round(float(v), 8) for v in row) for row in T)
 
 
@@ -161,7 +159,7 @@ def main() -> None:
         for path in write_all(load_rig(options.config), options.date):
             print(path)
     except RhotError as error:
-        sys.exit(f"rig: {error}")
+        sys.exit(f"make_calibration: {error}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Gives a Matroska file fixed identifiers, so that the same pictures make the same bytes.
 
-FFmpeg writes a random SegmentUID and TrackUID into every file and OpenCV cannot stop it. They sit
-in the Info, Tracks and Tags elements at the head of the file, each guarded by a CRC-32. A file
+FFmpeg writes a random SegmentUID and TrackUID into every file, and OpenCV cannot stop it. They are
+in the Info, Tracks and Tags elements at the head of the file, each protected by a CRC-32. A file
 built in another way is left as it is: it plays all the same. RFC 9559 (Matroska) and RFC 8794
 (EBML).
 """
@@ -12,31 +12,21 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-_SEGMENT, _INFO, _TRACKS, _TAGS, _TAG, _TARGETS, _ENTRY = (
-    0x18538067,
-    0x1549A966,
-    0x1654AE6B,
-    0x1254C367,
-    0x7373,
-    0x63C0,
-    0xAE,
-)
 _CRC32, _CLUSTER = 0xBF, 0x1F43B675
 # SegmentUID, TrackUID, TagTrackUID.
 _IDENTIFIERS = (0x73A4, 0x73C5, 0x63C5)
-_MASTERS = (_SEGMENT, _INFO, _TRACKS, _TAGS, _TAG, _TARGETS, _ENTRY)
+# Elements that hold these: Segment, Info, Tracks, Tags, Tag, Targets, TrackEntry.
+_MASTERS = (0x18538067, 0x1549A966, 0x1654AE6B, 0x1254C367, 0x7373, 0x63C0, 0xAE)
 # The header of a file with one video track has under 1 kB.
 _HEAD = 65536
 
 
 def fix_identifiers(path: Path, number: int) -> None:
-    """Replace the random identifiers of a finished file by `number` and mend the checksums, in
-    place.
-    """
+    """Replace the random identifiers of a finished file by `number`, checksums included."""
     with path.open("r+b") as file:
         head = bytearray(file.read(_HEAD))
         try:
-            _fix(head, 0, len(head), number)
+            _fix_elements(head, 0, len(head), number)
         except IndexError:
             # Not the layout that is known here.
             return
@@ -47,14 +37,14 @@ def fix_identifiers(path: Path, number: int) -> None:
 def _elements(data: bytearray, start: int, end: int) -> Iterator[tuple[int, int, int]]:
     """(id, first byte, end) of the content of each element in data[start:end]."""
     while start < end:
-        identifier, start = _number(data, start, keep_marker=True)
-        size, start = _number(data, start, keep_marker=False)
+        identifier, start = _read_number(data, start, keep_marker=True)
+        size, start = _read_number(data, start, keep_marker=False)
         yield identifier, start, min(start + size, len(data))
         start += size
 
 
-def _number(data: bytearray, at: int, *, keep_marker: bool) -> tuple[int, int]:
-    """A number of variable length, and where it ends."""
+def _read_number(data: bytearray, at: int, *, keep_marker: bool) -> tuple[int, int]:
+    """An EBML number of variable length, and where it ends."""
     first = data[at]
     length = 9 - first.bit_length()
     if length > 8:
@@ -65,7 +55,8 @@ def _number(data: bytearray, at: int, *, keep_marker: bool) -> tuple[int, int]:
     return value, at + length
 
 
-def _fix(data: bytearray, start: int, end: int, number: int) -> None:
+def _fix_elements(data: bytearray, start: int, end: int, number: int) -> None:
+    """Replace identifiers and checksums in data[start:end], and in the elements inside it."""
     checksum = -1
     for identifier, first, last in _elements(data, start, end):
         if identifier == _CLUSTER:
@@ -75,7 +66,7 @@ def _fix(data: bytearray, start: int, end: int, number: int) -> None:
         elif identifier in _IDENTIFIERS:
             data[first:last] = number.to_bytes(last - first, "big")
         elif identifier in _MASTERS:
-            _fix(data, first, last, number)
+            _fix_elements(data, first, last, number)
     if checksum >= 0 and end <= len(data):
         # The checksum covers everything after itself.
         data[checksum : checksum + 4] = zlib.crc32(data[checksum + 4 : end]).to_bytes(4, "little")

@@ -1,12 +1,14 @@
 """Writes a RigConfig as rig.toml, for captures that must stand alone. Pure.
 
-Values that rig.toml does not know (None) are left out; what load_rig reads back equals what was
-written, but for `folder`.
+What load_rig reads back equals what was written, except for `folder`. Values that are None are left
+out: TOML has no word for them. tomli-w would write [[object]] as one inline array of tables and
+every array over several lines: people read and edit this file, and its bytes would change.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import msgspec
@@ -44,15 +46,34 @@ def _dotted(path: list[str]) -> str:
 
 
 def _key(name: str) -> str:
-    return (
-        name
-        if name.replace("_", "").replace("-", "").isalnum() and name.isascii()
-        else json.dumps(name)
-    )
+    bare = name.replace("_", "").replace("-", "").isalnum() and name.isascii()
+    return name if bare else _string(name)
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    # JSON's numbers, booleans and basic strings are TOML's.
-    return json.dumps(value, ensure_ascii=True)
+    match value:
+        case list() | tuple():
+            return "[" + ", ".join(_value(item) for item in value) + "]"
+        case str():
+            return _string(value)
+        case float() if not math.isfinite(value):
+            # inf, -inf or nan.
+            return str(value)
+        case _:
+            # JSON's other numbers and booleans are TOML's.
+            return json.dumps(value)
+
+
+def _string(text: str) -> str:
+    """A basic string in ASCII.
+
+    As JSON writes it, but for two kinds of characters: JSON leaves DEL as it is, and writes those
+    beyond 16 bits as two surrogates; TOML allows neither.
+    """
+    return '"' + "".join(_character(c) for c in text) + '"'
+
+
+def _character(c: str) -> str:
+    if c == "\x7f":
+        return "\\u007f"
+    return f"\\U{ord(c):08x}" if ord(c) > 0xFFFF else json.dumps(c)[1:-1]

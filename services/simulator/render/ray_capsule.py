@@ -1,144 +1,133 @@
-"""Rays and tapered capsules as compiled kernels, in one camera's frame. Pure.
+"""Intersection of rays with tapered capsules, in the frame of one camera. Compiled kernels. Pure.
 
-A capsule is the hull of two balls. While a frame is exposed it moves along a parabola in u = -1..1
-(render_paths). Capsules must lie before the camera; one that does not is drawn nowhere.
+A capsule is the convex hull of two balls (a rounded cone). While a frame is exposed its ends move
+along parabolas in u = -1..1 (motion_paths.py). A capsule must lie in front of the camera; one that
+does not is not drawn.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from services.simulator.render.projection import Array32
+from services.simulator.scene.bodies import Ints
 
-Array32 = npt.NDArray[np.float32]
-
-# Fields of a placed capsule: 0 a, 3 b - a, 6 b (xyz each), 9 radii and products of these that `hit`
-# needs; from LOOK on what `shade` needs, written once by `dress`: palmar direction (xyz), surface,
-# end surface, end length, dabbed, instant.
-LOOK = 20
-PLACED = LOOK + 8
+# Fields of a placed capsule (PLACED,). First what depends on the instant, written by
+# `place_capsule`: the balls' centres a and b and the axis b - a (xyz each), the radii ...
+END_A, AXIS, END_B = 0, 3, 6
+RADIUS_A, RADIUS_B, TAPER = 9, 10, 11
+# ... and products of these that the intersection needs: -axis . a; the power |centre|^2 - radius^2
+# of each ball; the squared slant length of the cone (0: no cone) and the constant of its quadratic
+# equation; the length of the axis.
+AXIS_SQUARED, AXIS_DOT_A, POWER_A, POWER_B = 12, 13, 14, 15
+SLANT_SQUARED, CONE_CONSTANT, LENGTH, INVERSE_LENGTH = 16, 17, 18, 19
+# Then what shading needs, written once a frame by `write_attributes`: palmar direction (xyz),
+# surface, surface and length of the painted end, whether dabs stick to it, number of the instant.
+PALMAR, SURFACE, END_SURFACE, END_LENGTH, DABBED, INSTANT = 20, 23, 24, 25, 26, 27
+PLACED = 28
+# Distance of what a ray does not meet.
 FAR = 1e9
 
 
-def rays_of(camera: Camera) -> Array32:
-    """Unit direction of every pixel's ray in the camera frame.
+class NearestHits(NamedTuple):
+    """The nearest capsule along each pixel's ray of one row of w pixels."""
 
-    (h, 3, w) float32, so that rows are contiguous.
-    """
-    w, h = camera.size_px
-    x, y = np.meshgrid(np.arange(w, dtype=np.float64), np.arange(h, dtype=np.float64))
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1)
-    xy = camera.rays_from_pixels(pixels)
-    # A lens model that folds over has no ray for its outermost pixels; real ones show a dim rim
-    # there, which a plain pinhole stands for.
-    plain = Camera(
-        camera.name, camera.size_px, camera.matrix, np.zeros(5), camera.T_rig_from_camera
-    )
-    xy = np.where(np.isnan(xy), plain.rays_from_pixels(pixels), xy)
-    rays = np.concatenate([xy, np.ones((h * w, 1))], axis=1)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    return np.ascontiguousarray(rays.reshape(h, w, 3).transpose(0, 2, 1).astype(np.float32))
-
-
-def lens_of(camera: Camera) -> Array:
-    """(9,): fx, fy, cx, cy, k1, k2, p1, p2, k3."""
-    m = camera.matrix
-    return np.concatenate([[m[0, 0], m[1, 1], m[0, 2], m[1, 2]], camera.distortion])
+    distance: Array  # (w,) m, FAR where there is none
+    along: Array  # (w,) as `intersect` gives it
+    capsule: Ints  # (w,)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def project(lens, x, y, z):  # type: ignore[no-untyped-def]
-    """Pixel of a point before the camera; rhot.geometry.camera.Camera.project_camera."""
-    x, y = x / z, y / z
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (lens[4] + r2 * (lens[5] + r2 * lens[8]))
-    xd = x * radial + 2.0 * lens[6] * x * y + lens[7] * (r2 + 2.0 * x * x)
-    yd = y * radial + lens[6] * (r2 + 2.0 * y * y) + 2.0 * lens[7] * x * y
-    return lens[0] * xd + lens[2], lens[1] * yd + lens[3]
+def place_capsule(ends: Array, radius: Array, u: float, g: Array) -> None:
+    """Everything about a capsule at instant u that does not depend on the ray; g (PLACED,).
 
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def place(ends, ra, rb, u, g):  # type: ignore[no-untyped-def]
-    """One capsule at instant u: everything about it that does not depend on the ray.
-
-    G (PLACED,).
+    ends (2, 3, 3) are the parabolas of both centres, radius (2,).
     """
-    ba2, m1, m5, m7 = 0.0, 0.0, 0.0, 0.0
+    ra, rb = radius[0], radius[1]
+    axis_squared, axis_dot_a, a_squared, b_squared = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         a = ends[0, 0, i] + u * (ends[0, 1, i] + u * ends[0, 2, i])
         b = ends[1, 0, i] + u * (ends[1, 1, i] + u * ends[1, 2, i])
-        g[i], g[3 + i], g[6 + i] = a, b - a, b
-        ba2 += (b - a) * (b - a)
-        m1 -= (b - a) * a
-        m5 += a * a
-        m7 += b * b
-    rr = ra - rb
-    d2 = ba2 - rr * rr
-    g[9], g[10], g[11] = ra, rb, rr
-    g[12], g[13] = ba2, m1
-    g[14], g[15] = m5 - ra * ra, m7 - rb * rb
+        g[END_A + i], g[AXIS + i], g[END_B + i] = a, b - a, b
+        axis_squared += (b - a) * (b - a)
+        axis_dot_a -= (b - a) * a
+        a_squared += a * a
+        b_squared += b * b
+    taper = ra - rb
+    slant_squared = axis_squared - taper * taper
+    g[RADIUS_A], g[RADIUS_B], g[TAPER] = ra, rb, taper
+    g[AXIS_SQUARED], g[AXIS_DOT_A] = axis_squared, axis_dot_a
+    g[POWER_A], g[POWER_B] = a_squared - ra * ra, b_squared - rb * rb
     # One ball inside the other leaves no cone between them.
-    g[16] = d2 if d2 > 1e-12 else 0.0
-    g[17] = d2 * m5 - m1 * m1 + 2.0 * m1 * rr * ra - ba2 * ra * ra
-    g[18] = math.sqrt(ba2)
-    g[19] = 1.0 / max(g[18], 1e-9)
+    g[SLANT_SQUARED] = slant_squared if slant_squared > 1e-12 else 0.0
+    g[CONE_CONSTANT] = (
+        slant_squared * a_squared
+        - axis_dot_a * axis_dot_a
+        + 2.0 * axis_dot_a * taper * ra
+        - axis_squared * ra * ra
+    )
+    g[LENGTH] = math.sqrt(axis_squared)
+    g[INVERSE_LENGTH] = 1.0 / max(g[LENGTH], 1e-9)
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
-def hit(g, x, y, z):  # type: ignore[no-untyped-def]
-    """(distance, along) of the first point where a ray (unit, from the origin) meets a capsule;
-    distance FAR if nowhere.
+def intersect(g: Array, x: float, y: float, z: float) -> tuple[float, float]:
+    """(distance, along) of the first point where a unit ray from the origin meets a capsule.
 
-    along is 0 on ball a, the squared slant length g[16] on ball b, and between on the cone. Closed
-    form after I. Quilez, "Ray-surface intersection functions", rounded cone; the balls lie inside
-    the hull, so the nearest candidate is right.
+    distance is FAR if there is none. along is 0 on ball a, SLANT_SQUARED on ball b and between
+    the two on the cone. Closed form after I. Quilez, "Ray-surface intersection functions", rounded
+    cone; the balls lie inside the hull, so the nearest candidate is right.
     """
-    d2 = g[16]
-    m2 = g[3] * x + g[4] * y + g[5] * z
-    m3 = -(x * g[0] + y * g[1] + z * g[2])
-    best, reach = FAR, 0.0
+    d2 = g[SLANT_SQUARED]
+    m2 = g[AXIS] * x + g[AXIS + 1] * y + g[AXIS + 2] * z
+    m3 = -(x * g[END_A] + y * g[END_A + 1] + z * g[END_A + 2])
+    nearest, nearest_along = FAR, 0.0
     if d2 > 0.0:
         k2 = d2 - m2 * m2
-        k1 = d2 * m3 + m2 * (g[11] * g[9] - g[13])
-        h = k1 * k1 - g[17] * k2
+        k1 = d2 * m3 + m2 * (g[TAPER] * g[RADIUS_A] - g[AXIS_DOT_A])
+        h = k1 * k1 - g[CONE_CONSTANT] * k2
         if h < 0.0:
             return FAR, 0.0
         t = -(math.sqrt(h) + k1) / k2
-        along = g[13] - g[9] * g[11] + t * m2
+        along = g[AXIS_DOT_A] - g[RADIUS_A] * g[TAPER] + t * m2
         if along > 0.0 and along < d2:
             if k2 > 0.0:
                 return t, along
-            best, reach = t, along
-    h = m3 * m3 - g[14]
+            nearest, nearest_along = t, along
+    h = m3 * m3 - g[POWER_A]
     if h > 0.0:
         t = -m3 - math.sqrt(h)
-        if t < best:
-            best, reach = t, 0.0
-    m6 = -(x * g[6] + y * g[7] + z * g[8])
-    h = m6 * m6 - g[15]
+        if t < nearest:
+            nearest, nearest_along = t, 0.0
+    m6 = -(x * g[END_B] + y * g[END_B + 1] + z * g[END_B + 2])
+    h = m6 * m6 - g[POWER_B]
     if h > 0.0:
         t = -m6 - math.sqrt(h)
-        if t < best:
-            best, reach = t, d2
-    return best, reach
+        if t < nearest:
+            nearest, nearest_along = t, d2
+    return nearest, nearest_along
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def hit_row(g, rays, first, last, capsule, depth, owner, reach):  # type: ignore[no-untyped-def]
-    """`hit` for the pixels first..last of one row (3, w), keeping the nearest.
+def intersect_row(
+    g: Array, rays: Array32, first: int, last: int, capsule: int, nearest: NearestHits
+) -> None:
+    """`intersect` for the pixels first..last of a row's rays (3, w), keeping the nearest hit.
 
     Free of branches, so that it compiles to SIMD.
     """
-    ax, ay, az, bx, by, bz = g[0], g[1], g[2], g[6], g[7], g[8]
-    ux, uy, uz = g[3], g[4], g[5]
-    d2, k0, ca, cb = g[16], g[17], g[14], g[15]
-    q, y0 = g[11] * g[9] - g[13], g[13] - g[9] * g[11]
+    ax, ay, az = g[END_A], g[END_A + 1], g[END_A + 2]
+    bx, by, bz = g[END_B], g[END_B + 1], g[END_B + 2]
+    ux, uy, uz = g[AXIS], g[AXIS + 1], g[AXIS + 2]
+    d2, k0, ca, cb = g[SLANT_SQUARED], g[CONE_CONSTANT], g[POWER_A], g[POWER_B]
+    q = g[TAPER] * g[RADIUS_A] - g[AXIS_DOT_A]
+    y0 = g[AXIS_DOT_A] - g[RADIUS_A] * g[TAPER]
     rx, ry, rz = rays[0], rays[1], rays[2]
+    depth, reach, owner = nearest.distance, nearest.along, nearest.capsule
     for i in range(first, last + 1):
         x, y, z = float(rx[i]), float(ry[i]), float(rz[i])
         m2 = ux * x + uy * y + uz * z
@@ -167,15 +156,17 @@ def hit_row(g, rays, first, last, capsule, depth, owner, reach):  # type: ignore
 
 
 @njit(cache=True, nogil=True)
-def dress(palms, kind, end_m, g):  # type: ignore[no-untyped-def]
-    """Write what does not move into the table g (instants, c, PLACED)."""
+def write_attributes(palms: Array, kind: Ints, end_m: Array, g: Array) -> None:
+    """Write what does not move into a table of placed capsules g (instants, c, PLACED).
+
+    palms (c, 3, 3), of which the value at u = 0 counts; kind (c, 3); end_m (c,).
+    """
     for k in range(g.shape[0]):
         for c in range(g.shape[1]):
             for i in range(3):
-                g[k, c, LOOK + i] = palms[c, 0, i]
-            g[k, c, LOOK + 3], g[k, c, LOOK + 4], g[k, c, LOOK + 5] = (
-                kind[c, 0],
-                kind[c, 1],
-                end_m[c],
-            )
-            g[k, c, LOOK + 6], g[k, c, LOOK + 7] = kind[c, 2], k
+                g[k, c, PALMAR + i] = palms[c, 0, i]
+            g[k, c, SURFACE] = kind[c, 0]
+            g[k, c, END_SURFACE] = kind[c, 1]
+            g[k, c, END_LENGTH] = end_m[c]
+            g[k, c, DABBED] = kind[c, 2]
+            g[k, c, INSTANT] = k

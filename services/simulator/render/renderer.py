@@ -8,265 +8,208 @@ on disk).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.simulator.render import develop
-from services.simulator.render.antialias import outlines, patterns, retrace, widen
-from services.simulator.render.motion_paths import motions, points, rows_of
-from services.simulator.render.ray_capsule import FAR, lens_of, rays_of
-from services.simulator.render.shade import lights_of, surfaces_of, texture
-from services.simulator.render.trace import Film, World, trace
-from services.simulator.scene.backdrop import backdrop, vignette, wall
-from services.simulator.scene.bodies import HAND_FRAMES, ShapeArrays, Shapes, add_hand, arrays
-from services.simulator.scene.paints import CUP, SKIN, TRACKER, Surface, paint
+from services.simulator.render.antialias import supersample
+from services.simulator.render.buffers import (
+    FrameBuffers,
+    FrameTiming,
+    SceneArrays,
+    camera_view,
+    capsule_paths,
+    dab_paths,
+    frame_buffers,
+)
+from services.simulator.render.edges import flag_edges, widen_columns
+from services.simulator.render.materials import surfaces_in_light
+from services.simulator.render.motion_paths import (
+    BodyPoses,
+    find_rows,
+    trace_capsules,
+    trace_dabs,
+)
+from services.simulator.render.noise import NoiseDraw, add_noise, draw_noise, noise_bank
+from services.simulator.render.projection import Array32, pixel_rays
+from services.simulator.render.ray_capsule import FAR
+from services.simulator.render.trace import trace
+from services.simulator.scene.backdrop import backdrop, vignette, wall_texture
+from services.simulator.scene.bodies import Ints
 from services.simulator.scene.scene import Scene
+from services.simulator.scene.scene_shapes import scene_shapes
 
 Bytes = npt.NDArray[np.uint8]
+Labels = npt.NDArray[np.int16]
+Capsules = npt.NDArray[np.bool_]
 # Cameras differ in their white balance by a few per cent.
 _GAIN_SIGMA = 0.015
-
-
-@dataclass(frozen=True, eq=False)
-class Cast:
-    """Every body of a scene and how it looks.
-
-    marks: (hand, landmark) -> surface number of its paint.
-    """
-
-    shapes: ShapeArrays
-    surfaces: list[Surface]
-    marks: dict[tuple[str, str], int]
-
-
-def cast_of(scene: Scene) -> Cast:
-    """Bodies and surfaces of a scene; surface 0 is skin.
-
-    Raises ConfigError for a colour no paint has.
-    """
-    shapes, surfaces = Shapes(), [SKIN, CUP, TRACKER]
-    marks: dict[tuple[str, str], int] = {}
-    for number, hand in enumerate(scene.hands.values()):
-        paints: dict[str, int] = {}
-        for landmark, color in hand.landmarks.items():
-            paints[landmark] = marks[hand.name, landmark] = len(surfaces)
-            surfaces.append(paint(color))
-        add_hand(shapes, hand.model, number * HAND_FRAMES, 0, paints)
-    first = HAND_FRAMES * len(scene.hands)
-    for number, thing in enumerate(scene.things):
-        frame = first + number
-        shapes.capsule((frame, (0.0, -0.055, 0.0), 0.018), (frame, (0.0, 0.055, 0.0), 0.018), 1)
-        x, y, z = thing.T_object_from_tracker[:3, 3].tolist()
-        shapes.capsule((frame, (x - 0.012, y, z), 0.024), (frame, (x + 0.012, y, z), 0.024), 2)
-    return Cast(arrays(shapes), surfaces, marks)
+# How far lens blur and the widened edges reach beyond what moves, px.
+_MARGIN_PX = 5
 
 
 class Renderer:
-    """Takes the pictures of one camera of a scene."""
+    """Takes the pictures of one camera of a scene.
+
+    shapes is every body of the scene; clock says when each frame is exposed.
+    """
 
     def __init__(self, scene: Scene, camera: str) -> None:
         self.scene = scene
         self.camera: Camera = scene.cameras[camera]
         self.clock = scene.clocks[camera]
-        self.cast = cast_of(scene)
+        self.shapes = scene_shapes(scene)
         number = list(scene.cameras).index(camera)
         first = next(iter(scene.cameras.values()))
         rng = np.random.default_rng([scene.seed, 23, number])
         gains = 1.0 + _GAIN_SIGMA * rng.standard_normal(3)
         self._seed = scene.seed * 64 + number
-        self._prepare_light(first, gains)
+        self._view = camera_view(self.camera)
+        self._buffers = self._make_buffers(first, gains)
+        self._arrays = self._make_scene_arrays(first, gains)
         self._develop_backdrop()
 
-    def _prepare_light(self, first: Camera, gains: Array) -> None:
-        scene, camera = self.scene, self.camera
-        width, height = camera.size_px
-        rays = rays_of(camera)
-        self._lens = lens_of(camera)
-        T = camera.T_camera_from_rig
-        self._R, self._p = np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
+    def _make_buffers(self, first: Camera, gains: Array) -> FrameBuffers:
+        """Buffers that show the backdrop as this camera sees it."""
+        rays = pixel_rays(self.camera)
         shade = vignette(rays)
-        sharp = (
-            backdrop(camera, first, wall(scene.seed, scene.spec.clutter), rays, gains)
-            * shade[..., None]
-        )
-        self._film = Film(
-            rays=rays,
-            vignette=shade,
-            backdrop=sharp,
-            depth=np.full((height, width), FAR, np.float32),
-            owner=np.zeros((height, width), np.int16),
-            label=np.zeros((height, width), np.int16),
-            flags=np.zeros((height, width), np.uint8),
-            ranges=np.zeros((height, 2), np.int64),
-            picture=sharp.copy(),
-            pattern=patterns(),
-        )
-        self._world = self._make_world(
-            lights_of(scene.spec.light, T[:3, :3] @ first.T_rig_from_camera[:3, :3]), gains
-        )
-        self._curve, self._weights = develop.tone_curve(), develop.blur_weights(scene.spec.blur_px)
-        self._bank = develop.noise_bank(height, width, self._seed)
+        wall = wall_texture(self.scene.seed, self.scene.spec.clutter)
+        sharp = backdrop(self.camera, first, wall, rays, gains) * shade[..., None]
+        return frame_buffers(rays, shade, sharp)
 
-    def _make_world(self, lights: Array, gains: Array) -> World:
-        s = self.cast.shapes
-        count, dabs = len(s.frame), len(s.dab_frame)
-        return World(
-            ends=np.empty((count, 2, 3, 3)),
-            palms=np.empty((count, 3, 3)),
-            tracks=np.empty((count, 2, 3, 3)),
-            spans=np.empty((count, 2), np.int64),
-            radius=s.radius,
-            kind=s.kind,
-            end_m=s.end_m,
-            dabs=np.empty((dabs, 3, 3)),
-            dab_r2=s.dab_radius**2,
-            dab_surface=s.dab_surface,
-            looks=surfaces_of(self.cast.surfaces, gains),
-            lights=lights,
-            blotches=texture(self.scene.seed),
+    def _make_scene_arrays(self, first: Camera, gains: Array) -> SceneArrays:
+        """Bodies, surfaces and light, in this camera's frame."""
+        R_camera_from_rig = self.camera.T_camera_from_rig[:3, :3]
+        R_camera_from_first = R_camera_from_rig @ first.T_rig_from_camera[:3, :3]
+        return SceneArrays(
+            capsules=capsule_paths(self.shapes.arrays),
+            dabs=dab_paths(self.shapes.arrays),
+            surfaces=surfaces_in_light(
+                self.shapes.surfaces,
+                gains,
+                self.scene.spec.light,
+                R_camera_from_first,
+                self.scene.seed,
+            ),
         )
 
     def _develop_backdrop(self) -> None:
+        """Make the planes of the picture, and fill them with the backdrop."""
         width, height = self.camera.size_px
-        film = self._film
-        self._scratch, self._soft = np.empty_like(film.backdrop), np.empty_like(film.backdrop)
-        everything = np.tile([0, width - 1], (height, 1))
-        self._reach = everything.copy()
-        self._luma, self._chroma = (
-            np.empty((height, width), np.float32),
-            np.empty((2, height // 2, width // 2), np.float32),
-        )
-        develop.blur(everything, self._weights, film.backdrop, self._scratch, self._soft)
-        develop.develop(everything, self._curve, self._soft, self._luma, self._chroma)
-        self._bare = self._luma.copy(), self._chroma.copy()
-        self._drawn: Array | None = None
+        self._weights = develop.blur_weights(self.scene.spec.blur_px)
+        self._curve = develop.tone_curve()
+        self._noise_bank = noise_bank(height, width, self._seed)
+        backdrop_light = self._buffers.backdrop
+        self._scratch, self._blurred = np.empty_like(backdrop_light), np.empty_like(backdrop_light)
+        self._planes = develop.empty_planes(width, height)
+        # Columns of each row that are drawn anew.
+        self._wide: Ints = np.tile([0, width - 1], (height, 1))
+        self._develop(backdrop_light)
+        self._backdrop_planes = develop.copy_planes(self._planes)
+        # First and last row and column that differ from the backdrop, None if none does.
+        self._changed: Ints | None = None
 
     def picture(self, frame: int) -> Bytes:
         """Frame number `frame` as I420 (h * 3 / 2, w), with everything a camera adds."""
         self._draw(self.clock.time_s(frame))
-        return self._expose(frame, self.scene.spec.noise)
+        return self._finish(draw_noise(self._seed, frame, self.scene.spec.noise))
 
     def clean(self, time_s: float) -> Bytes:
         """The picture whose row 0 is exposed about time_s, without noise; I420."""
         self._draw(time_s)
-        return self._expose(0, 0.0)
+        return self._finish(draw_noise(self._seed, 0, 0.0))
 
     @property
-    def light(self) -> npt.NDArray[np.float32]:
+    def light(self) -> Array32:
         """Linear light of the last picture before the lens blurs it; (h, w, 3).
 
         Overwritten by the next picture.
         """
-        return self._film.picture
+        return self._buffers.light
 
-    def labels(
-        self, time_s: float, only: npt.NDArray[np.bool_] | None = None
-    ) -> npt.NDArray[np.int16]:
-        """Which surface each pixel's middle sees, each row at mid-exposure: 0 background, 1 skin, 1
-        + Cast.marks[...] paint; (h, w).
+    def labels(self, time_s: float, only: Capsules | None = None) -> Labels:
+        """Which surface the middle of each pixel sees, each row at mid-exposure; (h, w).
 
-        only (c,) says which capsules are there; default all.
+        0 is the backdrop, 1 skin, 1 + SceneShapes.paint_surfaces[...] paint. only (c,) says which
+        capsules are there; default all.
         """
-        self._wipe()
+        self._restore_backdrop()
         self._trace(time_s, only)
-        return self._film.label.copy()
+        return self._buffers.label.copy()
 
-    def _expose(self, frame: int, noise: float) -> Bytes:
+    def _finish(self, draw: NoiseDraw) -> Bytes:
         width, height = self.camera.size_px
         out = np.empty((height * 3 // 2, width), np.uint8)
-        row, column = develop.noise_offsets(self._seed, frame)
-        sign = 1.0 if (frame ^ (row >> 1)) & 1 else -1.0
-        develop.expose(
-            self._luma,
-            self._chroma,
-            *self._bank,
-            row,
-            column,
-            sign,
-            noise / develop.NOISE_UNIT,
-            out,
-        )
+        add_noise(self._planes, self._noise_bank, draw, out)
         return out
 
     def _draw(self, time_s: float) -> None:
         """Everything up to the unrounded planes."""
-        self._wipe()
-        timing, shutter = self._trace(time_s)
-        longest = outlines(self._world, self._film, shutter)
-        # What moves reaches beyond where it was in the middle of the exposure, and the lens spreads
-        # it further.
-        widen(self._film.ranges, int(0.5 * longest) + 5, self._reach)
-        np.minimum(self._reach[:, 1], self.camera.size_px[0] - 1, out=self._reach[:, 1])
-        self._drawn = self._bounds(self._reach)
-        retrace(self._world, self._film, timing, shutter, longest, self._reach)
-        develop.blur(self._reach, self._weights, self._film.picture, self._scratch, self._soft)
-        develop.develop(self._reach, self._curve, self._soft, self._luma, self._chroma)
+        self._restore_backdrop()
+        timing = self._trace(time_s)
+        tracks = self._arrays.capsules.tracks
+        longest = flag_edges(tracks, self._buffers, timing.exposure)
+        # What moves reaches beyond where it was in the middle of the exposure.
+        widen_columns(self._buffers.columns, int(0.5 * longest) + _MARGIN_PX, self._wide)
+        np.minimum(self._wide[:, 1], self.camera.size_px[0] - 1, out=self._wide[:, 1])
+        self._changed = _bounds(self._wide)
+        supersample(self._arrays, self._buffers, timing, longest, self._wide)
+        self._develop(self._buffers.light)
 
-    def _wipe(self) -> None:
-        """Bring the background back where the last picture covered it."""
-        if self._drawn is None:
+    def _develop(self, light: Array32) -> None:
+        """From light to planes, in the columns that are drawn anew."""
+        develop.blur(self._wide, self._weights, light, self._scratch, self._blurred)
+        develop.to_yuv420(self._wide, self._curve, self._blurred, self._planes)
+
+    def _restore_backdrop(self) -> None:
+        """Undo the last picture."""
+        if self._changed is None:
             return
-        y0, y1, x0, x1 = self._drawn[0], self._drawn[1] + 1, self._drawn[2], self._drawn[3] + 1
-        film = self._film
-        film.picture[y0:y1, x0:x1] = film.backdrop[y0:y1, x0:x1]
-        film.depth[y0:y1, x0:x1] = FAR
-        film.label[y0:y1, x0:x1] = 0
-        film.flags[y0:y1, x0:x1] = 0
-        self._luma[y0:y1, x0:x1] = self._bare[0][y0:y1, x0:x1]
-        self._chroma[:, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2] = self._bare[1][
-            :, y0 // 2 : y1 // 2, x0 // 2 : x1 // 2
-        ]
-        self._drawn = None
+        first_row, last_row, first_column, last_column = self._changed.tolist()
+        rows, columns = slice(first_row, last_row + 1), slice(first_column, last_column + 1)
+        buffers = self._buffers
+        buffers.light[rows, columns] = buffers.backdrop[rows, columns]
+        buffers.depth[rows, columns] = FAR
+        buffers.label[rows, columns] = 0
+        buffers.flags[rows, columns] = 0
+        develop.copy_part(self._backdrop_planes, self._planes, rows, columns)
+        self._changed = None
 
-    def _trace(
-        self, time_s: float, only: npt.NDArray[np.bool_] | None = None
-    ) -> tuple[Array, float]:
-        """One ray a pixel; returns (u of row 0 and step a row), and the exposure in units of u."""
+    def _trace(self, time_s: float, only: Capsules | None = None) -> FrameTiming:
+        """One ray a pixel of the frame whose row 0 is exposed about time_s."""
         height = self.camera.size_px[1]
         row_s, exposure_s = self.clock.row_time_ns * 1e-9, self.clock.exposure_s
         half_s = 0.5 * ((height - 1) * row_s + exposure_s)
         middle_s = time_s + 0.5 * (height - 1) * row_s
-        bodies = [self.scene.bodies(middle_s + k * half_s) for k in (-1, 0, 1)]
-        positions, rotations = (
-            np.stack([b.positions for b in bodies]),
-            np.stack([b.rotations for b in bodies]),
+        frames = [self.scene.body_frames(middle_s + k * half_s) for k in (-1, 0, 1)]
+        poses = BodyPoses(
+            np.stack([f.positions for f in frames]), np.stack([f.rotations for f in frames])
         )
-        s, w = self.cast.shapes, self._world
-        motions(
-            positions,
-            rotations,
-            self._R,
-            self._p,
-            self._lens,
-            s.frame,
-            s.offset,
-            s.radius,
-            w.ends,
-            w.palms,
-            w.tracks,
-        )
-        points(positions, rotations, self._R, self._p, s.dab_frame, s.dab_offset, w.dabs)
-        rows_of(w.tracks, height, w.spans)
+        capsules = self._arrays.capsules
+        trace_capsules(poses, self._view, capsules)
+        trace_dabs(poses, self._view, self._arrays.dabs)
+        find_rows(capsules.tracks, height, capsules.rows)
         if only is not None:
-            w.spans[~only] = (height, -1)
-        timing = np.array([(time_s - middle_s) / half_s, row_s / half_s])
-        trace(w, self._film, timing)
-        self._drawn = self._bounds(self._film.ranges)
-        return timing, exposure_s / half_s
-
-    def _bounds(self, ranges: npt.NDArray[np.int64]) -> Array | None:
-        """First and last row and column of all ranges (h, 2), on even boundaries.
-
-        None if they are empty.
-        """
-        rows = np.flatnonzero(ranges[:, 1] >= ranges[:, 0])
-        if not len(rows):
-            return None
-        first, last = int(ranges[rows, 0].min()), int(ranges[rows, 1].max())
-        return np.array(
-            [rows[0] // 2 * 2, rows[-1] // 2 * 2 + 1, first // 2 * 2, last // 2 * 2 + 1]
+            capsules.rows[~only] = (height, -1)
+        timing = FrameTiming(
+            first_row=(time_s - middle_s) / half_s,
+            row_step=row_s / half_s,
+            exposure=exposure_s / half_s,
         )
+        trace(self._arrays, self._buffers, timing)
+        self._changed = _bounds(self._buffers.columns)
+        return timing
+
+
+def _bounds(columns: Ints) -> Ints | None:
+    """First and last row and column of the touched columns (h, 2) of all rows, on even boundaries.
+
+    None if there are none.
+    """
+    rows = np.flatnonzero(columns[:, 1] >= columns[:, 0])
+    if not len(rows):
+        return None
+    first, last = int(columns[rows, 0].min()), int(columns[rows, 1].max())
+    return np.array([rows[0] // 2 * 2, rows[-1] // 2 * 2 + 1, first // 2 * 2, last // 2 * 2 + 1])

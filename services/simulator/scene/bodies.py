@@ -1,8 +1,9 @@
-"""The bodies of the simulated world: tapered capsules that hang on moving frames, and dabs of paint
-on them. Pure data.
+"""The bodies of the simulated world: tapered capsules fixed to moving body frames, and dabs of
+paint on them. Pure data.
 
-A frame is an OpenXR joint of a hand, its forearm, or an object. All lengths in metres, offsets in
-the axes of the frame they belong to. A left hand is the mirror image of a right one.
+A body frame is an OpenXR joint of a hand, its forearm, or an object. All lengths are in metres, all
+offsets in the axes of the body frame they belong to. A left hand is the mirror image of a right
+one.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from rhot.hand import JOINT_INDEX, TIPS, HandModel
 
 Ints = npt.NDArray[np.int64]
 
-# Frames of one hand: its 26 joints, and the forearm, which does not follow the wrist's motion.
+# Body frames of one hand: its 26 joints, and the forearm, which does not follow the wrist's motion.
 HAND_FRAMES = 27
 ARM = 26
 
@@ -25,9 +26,24 @@ Vec3 = tuple[float, float, float]
 _O: Vec3 = (0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True, eq=False)
+class ShapeArrays:
+    """c capsules and d dabs as arrays."""
+
+    frame: Ints  # (c, 2) which body frame either end is fixed to
+    offset: Array  # (c, 2, 3) m
+    radius: Array  # (c, 2) m
+    kind: Ints  # (c, 3) surface, surface of the painted end or -1, whether dabs stick to it
+    end_m: Array  # (c,) painted length
+    dab_frame: Ints  # (d,)
+    dab_offset: Array  # (d, 3) m
+    dab_radius: Array  # (d,) m
+    dab_surface: Ints  # (d,)
+
+
 @dataclass
-class Shapes:
-    """Grows one capsule and one dab at a time; `arrays` is what the renderer works on."""
+class ShapeBuilder:
+    """Collects capsules and dabs one at a time; `arrays` is what the renderer works on."""
 
     frame: list[tuple[int, int]] = field(default_factory=list)
     offset: list[tuple[Vec3, Vec3]] = field(default_factory=list)
@@ -52,9 +68,9 @@ class Shapes:
         *,
         dabbed: bool = False,
     ) -> None:
-        """A tapered capsule between two balls (frame, offset, radius).
+        """Add a tapered capsule between two balls (body frame, offset, radius).
 
-        The last `end` = (surface, metres) before b's end is painted.
+        end = (surface, metres) paints the last part of it, before the far end of ball b.
         """
         self.frame.append((a[0], b[0]))
         self.offset.append((a[1], b[1]))
@@ -65,21 +81,37 @@ class Shapes:
         self.dabbed.append(dabbed)
 
     def dab(self, frame: int, offset_m: Vec3, diameter_m: float, surface: int) -> None:
-        """Paint on all skin nearer than half the diameter to a point."""
+        """Add paint on all skin within half the diameter of a point."""
         self.dab_frame.append(frame)
         self.dab_offset.append(offset_m)
         self.dab_radius.append(0.5 * diameter_m)
         self.dab_surface.append(surface)
 
+    def arrays(self) -> ShapeArrays:
+        """What was added so far."""
+        kind = [np.array(values) for values in (self.surface, self.end_surface, self.dabbed)]
+        return ShapeArrays(
+            frame=np.array(self.frame, dtype=np.int64).reshape(-1, 2),
+            offset=np.array(self.offset).reshape(-1, 2, 3),
+            radius=np.array(self.radius).reshape(-1, 2),
+            kind=np.stack(kind, axis=1).astype(np.int64),
+            end_m=np.array(self.end_m, dtype=np.float64),
+            dab_frame=np.array(self.dab_frame, dtype=np.int64),
+            dab_offset=np.array(self.dab_offset).reshape(-1, 3),
+            dab_radius=np.array(self.dab_radius, dtype=np.float64),
+            dab_surface=np.array(self.dab_surface, dtype=np.int64),
+        )
+
 
 def add_hand(
-    shapes: Shapes, model: HandModel, first: int, skin: int, paints: dict[str, int]
+    shapes: ShapeBuilder, model: HandModel, first: int, skin: int, paints: dict[str, int]
 ) -> None:
-    """A hand whose frames start at `first`; paints maps painted landmarks to surface numbers.
+    """Add a hand whose body frames start at `first`.
 
-    Each finger's skin ends exactly at its OpenXR tip joint. The palm is a bundle of fat capsules
-    along the metacarpals, with thenar, hypothenar and webs; the wrist's palm side is where Paint
-    says, wrist_radius_m from the joint.
+    paints maps painted landmarks to surface numbers, skin is the surface of the rest. Each finger's
+    skin ends exactly at its OpenXR tip joint. The palm is a bundle of thick capsules along the
+    metacarpals, with thenar, hypothenar and webs. The palm side of the wrist is where
+    rhot.hand.Paint says, wrist_radius_m from the joint.
     """
     for digit in model.digits:
         _add_digit(shapes, model, digit.name, first, skin, paints)
@@ -92,7 +124,7 @@ def add_hand(
 
 
 def _add_digit(
-    shapes: Shapes, model: HandModel, name: str, first: int, skin: int, paints: dict[str, int]
+    shapes: ShapeBuilder, model: HandModel, name: str, first: int, skin: int, paints: dict[str, int]
 ) -> None:
     digit = next(d for d in model.digits if d.name == name)
     tip = JOINT_INDEX[f"{name}_tip"]
@@ -107,12 +139,12 @@ def _add_digit(
     shapes.capsule((joints[2], _O, r2), (joints[3], (0.0, 0.0, back), r3), skin, end, dabbed=True)
 
 
-def _add_palm(shapes: Shapes, model: HandModel, first: int, skin: int) -> None:
+def _add_palm(shapes: ShapeBuilder, model: HandModel, first: int, skin: int) -> None:
     scale, side = model.palm_radius_m / 0.018, model.side
     radius = {digit.name: digit.radii_m[0] for digit in model.digits}
 
     def ball(joint: str, x: float, y: float, z: float, r: float) -> tuple[int, Vec3, float]:
-        # Millimetres of an average right hand.
+        # The numbers below are millimetres of an average right hand.
         return (
             first + JOINT_INDEX[joint],
             (side * x * 1e-3 * scale, y * 1e-3 * scale, z * 1e-3 * scale),
@@ -123,8 +155,8 @@ def _add_palm(shapes: Shapes, model: HandModel, first: int, skin: int) -> None:
         knuckle = (first + JOINT_INDEX[f"{finger}_proximal"], _O, radius[finger])
         shapes.capsule(ball(f"{finger}_metacarpal", 0, 0, 0, 14), knuckle, skin, dabbed=True)
     for a, b in (
-        # thenar eminence, web between thumb and index finger, hypothenar, the pads below the
-        # fingers, the hollow of the hand, its heel
+        # Thenar eminence, web between thumb and index finger, hypothenar eminence, the pads below
+        # the fingers (two), the hollow of the hand, its heel (two).
         (ball("wrist", -13, -9, -14, 15), ball("thumb_proximal", 0, 0, 3, 12)),
         (ball("index_metacarpal", 0, -4, -38, 10), ball("thumb_proximal", 0, 0, 6, 10)),
         (ball("wrist", 18, -8, -18, 14.5), ball("little_proximal", 3, -3, 14, 10)),
@@ -137,7 +169,7 @@ def _add_palm(shapes: Shapes, model: HandModel, first: int, skin: int) -> None:
         shapes.capsule(a, b, skin, dabbed=True)
 
 
-def _add_forearm(shapes: Shapes, model: HandModel, first: int, skin: int) -> None:
+def _add_forearm(shapes: ShapeBuilder, model: HandModel, first: int, skin: int) -> None:
     r = model.wrist_radius_m
     wrist = first + JOINT_INDEX["wrist"]
     for x, end_x in ((0.0, 0.0), (-0.45, -0.7), (0.45, 0.7)):
@@ -146,35 +178,3 @@ def _add_forearm(shapes: Shapes, model: HandModel, first: int, skin: int) -> Non
         near = r if x == 0.0 else 0.92 * r
         a, b = (model.side * x * r, 0.0, 0.0), (model.side * end_x * r, 0.0, 12.0 * r)
         shapes.capsule((wrist, a, near), (first + ARM, b, 1.45 * r), skin, dabbed=True)
-
-
-@dataclass(frozen=True, eq=False)
-class ShapeArrays:
-    """The same as arrays: c capsules, d dabs."""
-
-    frame: Ints  # (c, 2)
-    offset: Array  # (c, 2, 3)
-    radius: Array  # (c, 2)
-    kind: Ints  # (c, 3): surface, end surface or -1, dabbed
-    end_m: Array  # (c,)
-    dab_frame: Ints  # (d,)
-    dab_offset: Array  # (d, 3)
-    dab_radius: Array  # (d,)
-    dab_surface: Ints  # (d,)
-
-
-def arrays(shapes: Shapes) -> ShapeArrays:
-    """What the renderer works on."""
-    return ShapeArrays(
-        np.array(shapes.frame, dtype=np.int64).reshape(-1, 2),
-        np.array(shapes.offset).reshape(-1, 2, 3),
-        np.array(shapes.radius).reshape(-1, 2),
-        np.stack(
-            [shapes.surface, shapes.end_surface, np.array(shapes.dabbed, dtype=np.int64)], axis=1
-        ).astype(np.int64),
-        np.array(shapes.end_m, dtype=np.float64),
-        np.array(shapes.dab_frame, dtype=np.int64),
-        np.array(shapes.dab_offset).reshape(-1, 3),
-        np.array(shapes.dab_radius, dtype=np.float64),
-        np.array(shapes.dab_surface, dtype=np.int64),
-    )

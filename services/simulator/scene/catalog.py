@@ -1,4 +1,4 @@
-"""The named scenes: who moves how, where, in which light. Pure data.
+"""The named scenes: which motion, where, in which light. Pure data.
 
 A new scene is a row of SCENES. An unknown name is a ConfigError with the valid ones.
 """
@@ -49,7 +49,7 @@ class SceneSpec:
     tilt_deg: float = 38.0
     yaw_deg: float = 8.0
     roll_deg: float = -6.0
-    # The hand's journey: amplitudes and frequency.
+    # How the hand moves about as a whole: amplitudes and frequency.
     travel_m: Vec3 = (0.0, 0.0, 0.0)
     travel_hz: float = 0.3
     speed: float = 1.0
@@ -60,7 +60,7 @@ class SceneSpec:
     # Standard deviation of lens blur and defocus at the hand, px.
     blur_px: float = 0.6
     light: Light = Light()
-    # Saturated things in the background and beside the hand.
+    # Objects in saturated colours in the background.
     clutter: bool = False
     # Hands beside the configured ones, unpainted.
     extra_hands: tuple[HandName, ...] = ()
@@ -79,7 +79,7 @@ SCENES: dict[str, SceneSpec] = {
     "random": SceneSpec("random", "all joints wander through their ranges", tilt_deg=42.0),
     "still": SceneSpec("still", "an open hand held still", tilt_deg=20.0),
     "guided": SceneSpec(
-        "guided", "the exercises of `rhot calibrate hand`, at its pace (48 s)", tilt_deg=42.0
+        "guided", "the exercises of `rhot calibrate hand`, with its timing (48 s)", tilt_deg=42.0
     ),
     "hard": SceneSpec(
         "random",
@@ -112,6 +112,7 @@ def scene_spec(name: str) -> SceneSpec:
         near = difflib.get_close_matches(name, SCENES, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ConfigError(
-            f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}. Set it in [simulator] of rig.toml or on the command line"
+            f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}."
+            " Set it in [simulator] of rig.toml or on the command line"
         )
     return SCENES[name]

@@ -1,10 +1,10 @@
-"""Hand motions as pure functions of time, twice continuously differentiable, inside the limits of
-any hand.
+"""Hand motions as pure functions of time: twice continuously differentiable, inside the joint
+limits of any hand.
 
-A motion gives the joint angles and how the wrist moves relative to where the scene puts it. Poses
-are written in degrees for the limits of the tables and are mapped affinely to the limits of the
-hand at hand, so that no limit can be passed, and without the kinks of clipping. DIP = ratio * PIP
-is the hand model's own coupling, RHOT eq. (4). Time may be any real number.
+A motion gives the joint angles, and how the wrist moves relative to its place in the scene. Poses
+are written in degrees for the limits of the tables in rhot/hand.py, and are mapped affinely to the
+limits of one person's hand. So no limit can be passed, and there are no kinks as clipping would
+make. DIP = ratio * PIP is the hand model's own coupling, RHOT eq. (4). Time may be any real number.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ TAU = 2.0 * np.pi
 
 
 class Gesture(NamedTuple):
-    """One instant: angles_rad (5, 4), and the hand's turn (rotation vector, rad) and shift (m) in
-    the frame of the resting wrist.
+    """One instant of a motion.
 
-    grip is 0 while the hand is empty and 1 while it holds an object.
+    turn_rad and shift_m move the hand in the frame of the resting wrist; grip is 0 while the hand
+    is empty and 1 while it holds an object.
     """
 
-    angles_rad: Array
-    turn_rad: Array
-    shift_m: Array
+    angles_rad: Array  # (5, 4)
+    turn_rad: Array  # (3,) rotation vector
+    shift_m: Array  # (3,)
     grip: float = 0.0
 
 
 Motion = Callable[[float], Gesture]
-_NO = np.zeros(3)
+_ZERO = np.zeros(3)
 
 # Poses in degrees, rows thumb (abduction, cmc, mcp, dip) and fingers (abduction, mcp, pip, dip);
 # the last column is set by the coupling.
@@ -60,28 +60,28 @@ GRIP = np.array(
 )
 
 
-def smooth(u: float) -> float:
-    """0 below 0, 1 above 1, between them the quintic whose first and second derivatives vanish at
-    both ends.
+def smootherstep(u: float) -> float:
+    """0 below 0, 1 above 1, and between them the quintic whose first and second derivatives vanish
+    at both ends (Perlin's smootherstep).
     """
     u = min(1.0, max(0.0, u))
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
 
 def bump(u: float) -> float:
-    """0 at 0, 1 at 1/2, 0 at 1, flat beyond: one stroke."""
-    return smooth(2.0 * u) * smooth(2.0 - 2.0 * u)
+    """0 at 0, 1 at 1/2, 0 at 1, constant beyond: one stroke."""
+    return smootherstep(2.0 * u) * smootherstep(2.0 - 2.0 * u)
 
 
-class Fitted:
-    """Turns degrees written for the table limits into angles inside one hand's own limits."""
+class LimitScaling:
+    """Maps degrees written for the table limits to angles inside one hand's own limits."""
 
     def __init__(self, model: HandModel) -> None:
         table = default_hand(model.hand).limits_rad  # (5, 4, 2)
         own = model.limits_rad
         span = table[..., 1] - table[..., 0]
-        # A joint that cannot move (abduction of the middle finger) stays in the middle of its
-        # range.
+        # A joint that cannot move in the tables (abduction of the middle finger) stays in the
+        # middle of its own range.
         self._scale = np.where(
             span > 0.0, (own[..., 1] - own[..., 0]) / np.where(span > 0.0, span, 1.0), 0.0
         )
@@ -98,7 +98,7 @@ class Fitted:
         )
 
     def __call__(self, degrees: Array) -> Array:
-        """(5, 4) rad of (5, 4) deg; the last column is replaced by the coupling."""
+        """Angles (5, 4) rad of degrees (5, 4); the last column is replaced by the coupling."""
         angles = self._offset + self._scale * np.deg2rad(degrees)
         angles[:, 3] = np.clip(self._ratio * angles[:, 2], self._low, self._high)
         return angles
@@ -106,8 +106,8 @@ class Fitted:
 
 def still(model: HandModel, _seed: int) -> Motion:
     """A hand held open."""
-    angles = Fitted(model)(OPEN)
-    return lambda _t: Gesture(angles, _NO, _NO)
+    angles = LimitScaling(model)(OPEN)
+    return lambda _t: Gesture(angles, _ZERO, _ZERO)
 
 
 def fist(model: HandModel, _seed: int) -> Motion:
@@ -115,7 +115,7 @@ def fist(model: HandModel, _seed: int) -> Motion:
 
     PIP leads, MCP follows after a third of the closing.
     """
-    fit = Fitted(model)
+    scale = LimitScaling(model)
     # The fingers do not close as one: the little finger leads by a few frames.
     lead_s = np.array([-0.10, 0.0, 0.02, 0.05, 0.09])
 
@@ -124,31 +124,32 @@ def fist(model: HandModel, _seed: int) -> Motion:
         for row in range(5):
             phase = (t_s - 0.25 + lead_s[row]) % 4.0
             closed = phase / 2.0 if phase < 2.0 else (4.0 - phase) / 2.0
-            lead, late = smooth(closed / 0.95), smooth((closed - 1.0 / 3.0) / 0.6)
+            lead = smootherstep(closed / 0.95)
+            late = smootherstep((closed - 1.0 / 3.0) / 0.6)
             # The thumb follows the fingers over them; of a finger only the MCP joint lags (study,
             # section 5).
             share[row] = (late, late, late, late) if row == 0 else (late, late, lead, lead)
-        return Gesture(fit(OPEN + share * (FIST - OPEN)), _NO, _NO)
+        return Gesture(scale(OPEN + share * (FIST - OPEN)), _ZERO, _ZERO)
 
     return at
 
 
 def pinch(model: HandModel, _seed: int) -> Motion:
     """Thumb and index finger meet and part every 2.4 s."""
-    fit = Fitted(model)
-    return lambda t_s: Gesture(fit(OPEN + bump(t_s / 2.4 % 1.0) * (PINCH - OPEN)), _NO, _NO)
+    scale = LimitScaling(model)
+    return lambda t_s: Gesture(scale(OPEN + bump(t_s / 2.4 % 1.0) * (PINCH - OPEN)), _ZERO, _ZERO)
 
 
 def wave(model: HandModel, _seed: int) -> Motion:
     """The open hand turns about the wrist, 22 deg to either side, once a second."""
-    fit = Fitted(model)
+    scale = LimitScaling(model)
 
     def at(t_s: float) -> Gesture:
         swing = np.sin(TAU * t_s)
         flex = np.zeros((5, 4))
         flex[1:, 1] = 5.0 * np.sin(TAU * t_s - 0.7)
         return Gesture(
-            fit(OPEN + flex),
+            scale(OPEN + flex),
             np.array([0.0, np.deg2rad(22.0) * swing, 0.0]),
             np.array([0.02 * swing, 0.0, 0.0]),
         )
@@ -163,7 +164,7 @@ _BAR_S = 2.4
 
 def piano(model: HandModel, _seed: int) -> Motion:
     """Digits strike one after the other, up and down, a note each 0.3 s."""
-    fit = Fitted(model)
+    scale = LimitScaling(model)
     stroke = np.array(
         [[-4, 8, 12, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0], [0, 24, 18, 0]],
         dtype=float,
@@ -175,21 +176,21 @@ def piano(model: HandModel, _seed: int) -> Motion:
             # A stroke takes twice the time of a note: one finger rises while the next one falls.
             press[digit] += bump((t_s - note * _BAR_S / 8) % _BAR_S / (_BAR_S / 4))
         sway = 0.012 * np.sin(TAU * t_s / _BAR_S)
-        return Gesture(fit(CURVED + press[:, None] * stroke), _NO, np.array([sway, 0.0, 0.0]))
+        return Gesture(scale(CURVED + press[:, None] * stroke), _ZERO, np.array([sway, 0.0, 0.0]))
 
     return at
 
 
 def grab(model: HandModel, _seed: int) -> Motion:
     """Every 8 s the hand closes around the object, carries it about, brings it back and opens."""
-    fit = Fitted(model)
+    scale = LimitScaling(model)
 
     def at(t_s: float) -> Gesture:
         phase = t_s % 8.0
         # Open until 0.6 s, closed from 1.8 to 6.2 s; carried between 1.9 and 6.1 s, when the grip
         # no longer changes.
-        grip = smooth((phase - 0.6) / 1.2) * smooth((7.4 - phase) / 1.2)
-        carry = smooth((phase - 1.9) / 0.9) * smooth((6.1 - phase) / 0.9)
+        grip = smootherstep((phase - 0.6) / 1.2) * smootherstep((7.4 - phase) / 1.2)
+        carry = smootherstep((phase - 1.9) / 0.9) * smootherstep((6.1 - phase) / 0.9)
         angle = TAU * (phase - 1.9) / 4.2
         shift = carry * np.array(
             [0.035 * np.sin(angle), 0.03 * np.sin(2.0 * angle), -0.04 * (1.0 - np.cos(angle)) / 2.0]
@@ -197,37 +198,38 @@ def grab(model: HandModel, _seed: int) -> Motion:
         turn = carry * np.array(
             [0.15 * np.sin(angle), 0.25 * np.sin(angle), 0.2 * np.sin(2.0 * angle)]
         )
-        held = smooth((phase - 1.7) / 0.2) * smooth((6.3 - phase) / 0.2)
-        return Gesture(fit(OPEN + grip * (GRIP - OPEN)), turn, shift, held)
+        held = smootherstep((phase - 1.7) / 0.2) * smootherstep((6.3 - phase) / 0.2)
+        return Gesture(scale(OPEN + grip * (GRIP - OPEN)), turn, shift, held)
 
     return at
 
 
 def random(model: HandModel, seed: int) -> Motion:
-    """Every joint wanders independently through 80 % of its range, band-limited to 0.8 Hz.
+    """Every joint moves independently through 80 % of its range, band-limited to 0.8 Hz.
 
-    So does the hand.
+    The hand as a whole turns and shifts below 0.4 Hz.
     """
-    fit = Fitted(model)
+    scale = LimitScaling(model)
     rng = np.random.default_rng([seed, 7])
     limits = np.rad2deg(default_hand(model.hand).limits_rad)
     middle, half = limits.mean(axis=2), 0.4 * (limits[..., 1] - limits[..., 0])
-    # Independent fingers far apart in flexion would pass through each other; abduction keeps to a
+    # Independent fingers far apart in flexion would pass through each other: abduction keeps to a
     # third of its range.
     half[1:, 0] /= 3.0
-    waves = _Waves(rng, (5, 4), 0.8)
-    turns, shifts = _Waves(rng, (3,), 0.4), _Waves(rng, (3,), 0.4)
+    joints = _SumOfSines(rng, (5, 4), 0.8)
+    turns = _SumOfSines(rng, (3,), 0.4)
+    shifts = _SumOfSines(rng, (3,), 0.4)
 
     def at(t_s: float) -> Gesture:
         return Gesture(
-            fit(middle + half * waves(t_s)), np.deg2rad(14.0) * turns(t_s), 0.03 * shifts(t_s)
+            scale(middle + half * joints(t_s)), np.deg2rad(14.0) * turns(t_s), 0.03 * shifts(t_s)
         )
 
     return at
 
 
-class _Waves:
-    """Sums of four sines below a limiting frequency, each sum within -1..1."""
+class _SumOfSines:
+    """Random sums of four sines below a limiting frequency, each sum within -1..1."""
 
     def __init__(self, rng: np.random.Generator, shape: tuple[int, ...], limit_hz: float) -> None:
         self._omega = TAU * limit_hz * rng.uniform(0.15, 1.0, (*shape, 4))
@@ -237,56 +239,6 @@ class _Waves:
 
     def __call__(self, t_s: float) -> Array:
         return np.sum(self._weight * np.sin(self._omega * t_s + self._phase), axis=-1)
-
-
-class Unrest:
-    """What no hand can help: a slow sway of millimetres, fingers that wander by tenths of one, and
-    the physiological tremor.
-
-    Tremor: 8-12 Hz, about 0.1 mm at the outstretched hand (Elble & Randall, Electroenceph. clin.
-    Neurophysiol. 44, 1978).
-    """
-
-    def __init__(self, seed: int) -> None:
-        rng = np.random.default_rng([seed, 11])
-        slow = rng.uniform(0.1, 0.7, (2, 3, 3))
-        fast = rng.uniform(8.0, 12.0, (2, 3, 1))
-        self._omega = TAU * np.concatenate([slow, fast], axis=2)  # (turn / shift, axis, wave)
-        self._phase = rng.uniform(0.0, TAU, (2, 3, 4))
-        # Sway of 0.4 deg and 1.2 mm a wave, tremor of 0.05 deg and 0.1 mm.
-        self._weight = np.array([[0.007, 0.007, 0.007, 0.0009], [1.2e-3, 1.2e-3, 1.2e-3, 1e-4]])[
-            :, None, :
-        ]
-        slow, fast = rng.uniform(0.1, 0.7, (5, 4, 3)), rng.uniform(8.0, 12.0, (5, 4, 1))
-        self._finger_omega = TAU * np.concatenate([slow, fast], axis=2)  # (digit, joint, wave)
-        self._finger_phase = rng.uniform(0.0, TAU, (5, 4, 4))
-
-    def __call__(self, t_s: float) -> tuple[Array, Array]:
-        """(rotation vector (3,) rad, shift (3,) m) at t_s."""
-        turn, shift = np.sum(self._weight * np.sin(self._omega * t_s + self._phase), axis=2)
-        return turn, shift
-
-    def fingers(self, t_s: float, angles_rad: Array, model: HandModel) -> Array:
-        """Joint angles (5, 4) that are meant, as they come out at t_s: inside the limits, DIP
-        coupled to PIP as it was.
-        """
-        waves = np.sum(
-            _FINGER_WEIGHT * np.sin(self._finger_omega * t_s + self._finger_phase), axis=2
-        )
-        low, high = model.limits_rad[..., 0], model.limits_rad[..., 1]
-        room = np.maximum(np.minimum(angles_rad - low, high - angles_rad), 0.0)
-        # Smoothly less towards a limit, and never beyond: waves stay below the constant.
-        angles = angles_rad + waves * room / (room + 0.02)
-        coupling = np.array([digit.coupling for digit in model.digits])
-        angles[:, 3] = np.clip(
-            angles_rad[:, 3] + coupling * (angles[:, 2] - angles_rad[:, 2]), low[:, 3], high[:, 3]
-        )
-        return np.asarray(angles)
-
-
-# Each joint wanders by .11 deg a wave and trembles by .02 deg: .3 and .03 mm at the tip of a
-# stretched finger, a fifth of what sway does.
-_FINGER_WEIGHT = np.array([0.002, 0.002, 0.002, 0.0004])
 
 
 MOTIONS: dict[str, Callable[[HandModel, int], Motion]] = {

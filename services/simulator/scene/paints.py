@@ -1,8 +1,7 @@
-"""Colours of the simulated world: acrylic paints, skin, and what stands in the background. Pure
-data.
+"""Surfaces of the simulated world: acrylic paints, skin, objects. Pure data.
 
-A colour is what a surface reflects of white light: linear RGB, 0..1. A colour name that no paint
-has is a ConfigError with the valid names.
+A colour is an albedo, the share of white light that a surface reflects: linear RGB, 0..1. A colour
+name that no paint has is a ConfigError with the valid names.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""A scene: everything that moves, everything that watches, as pure functions of time.
+"""A scene: hands, objects and cameras as pure functions of time.
 
-`load_scene` builds one from rig.toml; frozen and seeded: the same configuration, name, seed and
-speed give the same scene for ever. Times are seconds on the master's clock since the scene began.
-The hands have the bones of calibration/hand.<hand>.json, or of the tables; cameras without
-calibration are a CalibrationError that names the command, an unknown scene or paint a ConfigError
-that lists the valid ones.
+`load_scene` builds one from rig.toml. The same configuration, name, random seed and speed always
+give the same scene. Times are seconds on the master's clock since the scene began. The hands have
+the bones of calibration/hand.<hand>.json, or of the tables. Cameras without calibration are a
+CalibrationError that names the command, an unknown scene or paint is a ConfigError that lists the
+valid ones.
 """
 
 from __future__ import annotations
@@ -23,74 +23,88 @@ from rhot.geometry.transforms import Array, rotation_x, rotation_z, transform
 from rhot.hand import HANDS, HandName
 from rhot.simulator_messages import Truth
 from services.simulator.camera.clock import CameraClock, camera_clock
-from services.simulator.scene.actors import GRIP_M, Hand, HandState, Stage, Thing, beside, stage_of
+from services.simulator.scene.actors import (
+    GRIP_M,
+    Hand,
+    HandPlacement,
+    HandState,
+    PalmView,
+    SceneObject,
+    Travel,
+    lateral_offset_m,
+    place_hand,
+)
 from services.simulator.scene.calibration_exercises import guided
 from services.simulator.scene.catalog import SceneSpec, scene_spec
-from services.simulator.scene.gestures import MOTIONS, Unrest
+from services.simulator.scene.gestures import MOTIONS
 from services.simulator.scene.hand_kinematics import Skeleton
-from services.simulator.scene.truth import truth_of
+from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.scene.truth import truth_message
 
 # Without objects.json the lighthouse frame is taken to lie half a metre below and behind the
 # cameras, y up.
 _LIGHTHOUSE = transform(np.diag([1.0, -1.0, -1.0]), (0.0, 0.5, -0.5))
 
 
-class Bodies(NamedTuple):
-    """All frames of the scene at one instant, in the rig frame: per hand 26 joints and the forearm,
-    then the objects.
+class BodyFrames(NamedTuple):
+    """All f body frames at one instant, in the rig frame.
+
+    Of each hand 26 joints and the forearm, then the objects.
     """
 
-    positions: Array  # (f, 3)
+    positions: Array  # (f, 3) m
     rotations: Array  # (f, 3, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """See the module. cameras and clocks are keyed by camera name, in the order of rig.toml."""
+    """Everything that moves, and the cameras that see it.
+
+    cameras and clocks are keyed by camera name, in the order of rig.toml.
+    """
 
     config: RigConfig
     name: str
     seed: int
     spec: SceneSpec
     hands: dict[HandName, Hand]
-    things: list[Thing]
+    objects: list[SceneObject]
     cameras: dict[str, Camera]
     clocks: dict[str, CameraClock]
     T_rig_from_lighthouse: Array  # (4, 4)
 
     def hand_states(self, t_s: float) -> dict[HandName, HandState]:
         """Every hand at one instant."""
-        return {name: hand.at(t_s) for name, hand in self.hands.items()}
+        return {name: hand.state_at(t_s) for name, hand in self.hands.items()}
 
-    def thing_poses(self, t_s: float) -> dict[str, Array]:
+    def object_poses(self, t_s: float) -> dict[str, Array]:
         """T_rig_from_object (4, 4) of every object."""
         states = self.hand_states(t_s)
-        return {thing.name: thing.at(states) for thing in self.things}
+        return {item.name: item.pose_given(states) for item in self.objects}
 
-    def bodies(self, t_s: float) -> Bodies:
-        """All frames at one instant, for the renderer."""
+    def body_frames(self, t_s: float) -> BodyFrames:
+        """All body frames at one instant, for the renderer."""
         states = self.hand_states(t_s)
         positions, rotations = [], []
         for name, state in states.items():
             p, R = self.hands[name].joints(state)
             positions += [p, state.wrist_m[None]]
             rotations += [R, state.arm_rotation[None]]
-        for thing in self.things:
-            T = thing.at(states)
+        for item in self.objects:
+            T = item.pose_given(states)
             positions.append(T[None, :3, 3])
             rotations.append(T[None, :3, :3])
-        return Bodies(np.concatenate(positions), np.concatenate(rotations))
+        return BodyFrames(np.concatenate(positions), np.concatenate(rotations))
 
     def truth(self, t_s: float, stamp_ns: int | None = None) -> Truth:
-        """The truth at one instant.
+        """The ground truth at one instant.
 
         stamp_ns is that instant on the master's clock (default: the scene began at 0).
         """
         states = self.hand_states(t_s)
-        things = {thing.name: thing.at(states) for thing in self.things}
-        return truth_of(
-            self.hands, states, things, round(t_s * 1e9) if stamp_ns is None else stamp_ns
-        )
+        objects = {item.name: item.pose_given(states) for item in self.objects}
+        stamp_ns = round(t_s * 1e9) if stamp_ns is None else stamp_ns
+        return truth_message(self.hands, states, objects, stamp_ns)
 
 
 def load_scene(
@@ -115,7 +129,7 @@ def load_scene(
 def build_scene(
     config: RigConfig, spec: SceneSpec, name: str, seed: int, speed: float = 1.0
 ) -> Scene:
-    """A scene of one's own making, e.g. dataclasses.replace(SCENES["wave"], distance_m=1.0).
+    """A scene that is in no catalogue, e.g. dataclasses.replace(SCENES["wave"], distance_m=1.0).
 
     Errors as load_scene.
     """
@@ -129,13 +143,20 @@ def build_scene(
     )
     count = len(config.camera)
     clocks = {
-        c.name: camera_clock(
-            c.name, number, count, c.fps, cameras[c.name].size_px[1], spec.exposure_s, seed
-        )
-        for number, c in enumerate(config.camera)
+        table.name: camera_clock(table, number, count, spec.exposure_s, seed)
+        for number, table in enumerate(config.camera)
     }
-    things = _things(config, spec, hands, objects, next(iter(cameras.values())))
-    return Scene(config, name, seed, spec, hands, things, cameras, clocks, T_rig_from_lighthouse)
+    return Scene(
+        config=config,
+        name=name,
+        seed=seed,
+        spec=spec,
+        hands=hands,
+        objects=_scene_objects(config, spec, hands, objects, next(iter(cameras.values()))),
+        cameras=cameras,
+        clocks=clocks,
+        T_rig_from_lighthouse=T_rig_from_lighthouse,
+    )
 
 
 def rig_cameras(config: RigConfig) -> dict[str, Camera]:
@@ -148,12 +169,14 @@ def rig_cameras(config: RigConfig) -> dict[str, Camera]:
         size = cameras[table.name].size_px
         if size != table.size_px:
             raise CalibrationError(
-                f"camera {table.name!r}: rig.toml says size_px = {list(table.size_px)}, its lens was calibrated at {list(size)}; "
-                f"set the same size, or run `python -m services.simulator.files.make_calibration` for a simulated rig"
+                f"camera {table.name!r}: rig.toml says size_px = {list(table.size_px)}, its lens"
+                f" was calibrated at {list(size)}; set the same size, or run `python -m"
+                " services.simulator.files.make_calibration` for a simulated rig"
             )
         if table.size_px[0] % 2 or table.size_px[1] % 2:
             raise ConfigError(
-                f"camera {table.name!r}: size_px = {list(table.size_px)}; YUV420 pictures need even sizes"
+                f"camera {table.name!r}: size_px = {list(table.size_px)};"
+                " YUV420 pictures need even sizes"
             )
     return cameras
 
@@ -164,86 +187,86 @@ def _hands(
     names = [name for name in HANDS if name in config.hand or name in spec.extra_hands]
     if not names:
         raise ConfigError(
-            'the simulator needs a hand; add a [hand.right.markers] table to rig.toml, e.g. index_tip = "blue"'
+            "the simulator needs a hand; add a [hand.right.markers] table to rig.toml,"
+            ' e.g. index_tip = "blue"'
         )
     hands: dict[HandName, Hand] = {}
     for name in names:
         table = config.hand.get(name)
         model = load_hand(config.calibration_dir, name, table.scale if table else 1.0)
-        own = seed * len(HANDS) + HANDS.index(name)
-        motion = (guided if spec.motion == "guided" else MOTIONS[spec.motion])(model, own)
-        stage = _stage(spec, name, len(names), own, cameras)
-        landmarks = dict(table.markers) if table else {}
+        hand_seed = seed * len(HANDS) + HANDS.index(name)
+        make_motion = guided if spec.motion == "guided" else MOTIONS[spec.motion]
         hands[name] = Hand(
-            name, model, Skeleton(model), landmarks, motion, Unrest(own), stage, spec.speed * speed
+            name=name,
+            model=model,
+            skeleton=Skeleton(model),
+            landmarks=dict(table.markers) if table else {},
+            motion=make_motion(model, hand_seed),
+            involuntary=InvoluntaryMotion(hand_seed),
+            placement=_placement(spec, name, len(names), hand_seed, cameras),
+            speed=spec.speed * speed,
         )
     return hands
 
 
-def _stage(spec: SceneSpec, name: HandName, hands: int, seed: int, cameras: list[Camera]) -> Stage:
-    """A hand before the middle of the rig, nobody twice at quite the same place."""
+def _placement(
+    spec: SceneSpec, name: HandName, hands: int, seed: int, cameras: list[Camera]
+) -> HandPlacement:
+    """A hand in front of the middle of the rig; every seed gives a slightly different place."""
     T_view = cameras[0].T_rig_from_camera
     middle_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
     middle_view = T_view[:3, :3].T @ (middle_rig - T_view[:3, 3])
     rng = np.random.default_rng([seed, 5])
-    off_m, off_deg = rng.uniform(-0.008, 0.008, 3), rng.uniform(-3.0, 3.0, 3)
-    middle = (
-        middle_view
-        + np.array([spec.shift_m[0] + beside(name, hands), spec.shift_m[1], spec.distance_m])
-        + off_m
-    )
+    off_m = rng.uniform(-0.008, 0.008, 3)
+    off_deg = rng.uniform(-3.0, 3.0, 3)
+    aside_m = spec.shift_m[0] + lateral_offset_m(name, hands)
+    middle = middle_view + np.array([aside_m, spec.shift_m[1], spec.distance_m]) + off_m
     mirror = 1.0 if name == "right" else -1.0
-    yaw, roll = mirror * (spec.yaw_deg + off_deg[1]), mirror * (spec.roll_deg + off_deg[2])
-    return stage_of(
-        T_view, middle, spec.tilt_deg + off_deg[0], yaw, roll, spec.travel_m, spec.travel_hz
+    view = PalmView(
+        tilt_deg=spec.tilt_deg + off_deg[0],
+        yaw_deg=mirror * (spec.yaw_deg + off_deg[1]),
+        roll_deg=mirror * (spec.roll_deg + off_deg[2]),
     )
+    return place_hand(T_view, middle, view, Travel(spec.travel_m, spec.travel_hz))
 
 
 def _objects(config: RigConfig) -> Objects | None:
-    return (
-        load_objects(config.calibration_dir)
-        if Path(config.calibration_dir, "objects.json").exists()
-        else None
-    )
+    path = Path(config.calibration_dir, "objects.json")
+    return load_objects(config.calibration_dir) if path.exists() else None
 
 
-def _things(
+def _scene_objects(
     config: RigConfig,
     spec: SceneSpec,
     hands: dict[HandName, Hand],
     objects: Objects | None,
     first: Camera,
-) -> list[Thing]:
-    """The configured objects: the first is for grabbing if the scene grabs, the others stand in a
-    row.
-    """
+) -> list[SceneObject]:
+    """The configured objects: the first is grabbed if the scene grabs, others stand in a row."""
     holder = next(iter(hands)) if spec.motion == "grab" else None
-    # Along the x axis of the hand: the axis of an object is its y.
+    # The y axis of the object lies along the x axis of the hand.
     T_wrist_from_held = transform(rotation_z(-0.5 * np.pi), GRIP_M)
-    things = []
+    scene_objects = []
     for number, table in enumerate(config.object):
-        place = objects.objects.get(table.name, ObjectPlace()) if objects else ObjectPlace()
-        if holder is not None and number == 0:
-            stage = hands[holder].stage
-            T_rest = transform(stage.rotation, stage.wrist_m) @ T_wrist_from_held
+        held_by = holder if number == 0 else None
+        if held_by is not None:
+            placement = hands[held_by].placement
+            T_wrist = transform(placement.rotation, placement.wrist_m)
+            T_rest = T_wrist @ T_wrist_from_held
         else:
             # Beside one hand or between two, a little behind, upright and turned a little.
-            place_m = (
-                (0.17 if len(hands) < 2 else 0.05) - 0.11 * number,
-                0.10,
-                spec.distance_m + 0.12,
-            )
-            T_rest = first.T_rig_from_camera @ transform(
-                rotation_x(np.pi) @ rotation_z(0.1), place_m
-            )
-        things.append(
-            Thing(
-                table.name,
-                table.serial,
-                T_rest,
-                place,
-                holder if number == 0 else None,
-                T_wrist_from_held,
+            x_m = (0.17 if len(hands) < 2 else 0.05) - 0.11 * number
+            place_m = (x_m, 0.10, spec.distance_m + 0.12)
+            upright = rotation_x(np.pi) @ rotation_z(0.1)
+            T_rest = first.T_rig_from_camera @ transform(upright, place_m)
+        scene_objects.append(
+            SceneObject(
+                name=table.name,
+                serial=table.serial,
+                T_rig_from_rest=T_rest,
+                place=objects.objects.get(table.name, ObjectPlace()) if objects else ObjectPlace(),
+                holder=held_by,
+                T_wrist_from_held=T_wrist_from_held,
             )
         )
-    return things
+    return scene_objects

@@ -1,4 +1,4 @@
-"""What is true at one instant, as a message. Pure."""
+"""The ground truth of a scene at one instant, as a message. Pure."""
 
 from __future__ import annotations
 
@@ -9,53 +9,53 @@ from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
 from services.simulator.scene.actors import Hand, HandState
 
 
-def truth_of(
+def truth_message(
     hands: dict[HandName, Hand],
     states: dict[HandName, HandState],
-    things: dict[str, Array],
+    objects: dict[str, Array],
     stamp_ns: int,
 ) -> Truth:
-    """The truth about hands in these states and objects at these poses T_rig_from_object.
+    """The truth about hands in these states and objects at these poses T_rig_from_object (4, 4).
 
     points_m has all 26 joints.
     """
     return Truth(
         stamp_ns=stamp_ns,
-        hands={str(name): _hand(hands[name], state) for name, state in states.items()},
-        objects={name: _object(T) for name, T in things.items()},
+        hands={str(name): _hand_truth(hands[name], state) for name, state in states.items()},
+        objects={name: _object_truth(T) for name, T in objects.items()},
     )
 
 
-def _hand(hand: Hand, state: HandState) -> HandTruth:
+def _hand_truth(hand: Hand, state: HandState) -> HandTruth:
     positions, _ = hand.joints(state)
-    angles = {
-        digit: FingerAngles(
-            **{"pip": 0.0, **{n: round(float(a), 6) for n, a in zip(names, row, strict=True)}}
-        )
-        for digit, names, row in zip(DIGITS, DIGIT_ANGLES, state.angles_rad, strict=True)
-    }
+    angles = {}
+    for digit, names, row in zip(DIGITS, DIGIT_ANGLES, state.angles_rad, strict=True):
+        rounded = {name: round(float(angle), 6) for name, angle in zip(names, row, strict=True)}
+        # The thumb has no middle joint.
+        angles[digit] = FingerAngles(**{"pip": 0.0, **rounded})
     return HandTruth(
-        points_m={name: vector(positions[i]) for i, name in enumerate(JOINTS)},
+        points_m={name: rounded_vector(positions[i]) for i, name in enumerate(JOINTS)},
         wrist=WristPose(
-            position_m=vector(state.wrist_m), orientation_wxyz=_quaternion(state.wrist_rotation)
+            position_m=rounded_vector(state.wrist_m),
+            orientation_wxyz=_rounded_quaternion(state.wrist_rotation),
         ),
         angles_rad=angles,
     )
 
 
-def _object(T_rig_from_object: Array) -> ObjectTruth:
+def _object_truth(T_rig_from_object: Array) -> ObjectTruth:
     return ObjectTruth(
-        position_m=vector(T_rig_from_object[:3, 3]),
-        orientation_wxyz=_quaternion(T_rig_from_object[:3, :3]),
+        position_m=rounded_vector(T_rig_from_object[:3, 3]),
+        orientation_wxyz=_rounded_quaternion(T_rig_from_object[:3, :3]),
     )
 
 
-def vector(values: Array) -> tuple[float, float, float]:
-    """A vector (3,) as messages have it, rounded to micrometres (or the like)."""
+def rounded_vector(values: Array) -> tuple[float, float, float]:
+    """A vector (3,) as messages have it, rounded to six digits: micrometres of a length in m."""
     x, y, z = (round(float(v), 6) for v in values)
     return x, y, z
 
 
-def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
+def _rounded_quaternion(rotation: Array) -> tuple[float, float, float, float]:
     w, x, y, z = (round(float(v), 7) for v in quaternion_from_rotation(rotation))
     return w, x, y, z

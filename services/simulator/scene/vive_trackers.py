@@ -1,4 +1,4 @@
-"""The simulated Vive trackers, in OpenVR's shape. Pure.
+"""The simulated Vive trackers, with the fields of OpenVR. Pure.
 
 Poses are in the lighthouse frame with the jitter of a real tracker; the same (scene, object, seq)
 gives the same pose.
@@ -12,9 +12,9 @@ import numpy as np
 
 from rhot.geometry.transforms import Array, inverse, rotation_from_vector, vector_from_rotation
 from rhot.messages import OpenVrDevice, OpenVrPose
-from services.simulator.scene.actors import Thing
+from services.simulator.scene.actors import SceneObject
 from services.simulator.scene.scene import Scene
-from services.simulator.scene.truth import vector
+from services.simulator.scene.truth import rounded_vector
 
 # Jitter of a Vive tracker in daily use; the laser-tracker study in the real recordings leaves 5.65
 # mm RMS over a room.
@@ -26,45 +26,46 @@ _RUNNING_OK = 200
 
 
 def tracker_pose(
-    scene: Scene, thing: Thing, index: int, t_s: float, seq: int, stamp_ns: int
+    scene: Scene, item: SceneObject, index: int, t_s: float, seq: int, stamp_ns: int
 ) -> OpenVrPose:
-    """What SteamVR would say of the object's tracker at t_s: lighthouse frame, sensor noise,
-    Valve's fields.
+    """What SteamVR would report of an object's tracker at t_s, sensor noise included.
 
     stamp_ns is the instant on the master's clock; the message carries it late by the object's
     time_offset_ns.
     """
-    rng = np.random.default_rng([scene.seed, zlib.crc32(thing.serial.encode()), seq])
-    T_before, T, T_after = (_tracker(scene, thing, t_s + step) for step in (-_STEP_S, 0.0, _STEP_S))
+    rng = np.random.default_rng([scene.seed, zlib.crc32(item.serial.encode()), seq])
+    T_before = _tracker_frame(scene, item, t_s - _STEP_S)
+    T = _tracker_frame(scene, item, t_s)
+    T_after = _tracker_frame(scene, item, t_s + _STEP_S)
     velocity = (T_after[:3, 3] - T_before[:3, 3]) / (2.0 * _STEP_S)
-    turning = vector_from_rotation(T_after[:3, :3] @ T_before[:3, :3].T) / (2.0 * _STEP_S)
+    angular_velocity = vector_from_rotation(T_after[:3, :3] @ T_before[:3, :3].T) / (2.0 * _STEP_S)
     rotation = rotation_from_vector(rng.normal(0.0, _TURN_SIGMA_RAD / np.sqrt(3.0), 3)) @ T[:3, :3]
     position = T[:3, 3] + rng.normal(0.0, _POSITION_SIGMA_M / np.sqrt(3.0), 3)
     rows = np.round(np.column_stack([rotation, position]), 7).tolist()
     return OpenVrPose(
         v=1,
         seq=seq,
-        stamp_ns=max(0, stamp_ns + thing.place.time_offset_ns),
+        stamp_ns=max(0, stamp_ns + item.place.time_offset_ns),
         universe="simulated",
         device=OpenVrDevice(
             index=index,
-            serial=thing.serial,
+            serial=item.serial,
             device_class="GenericTracker",
             model="VIVE Tracker Pro MV",
             battery=0.9,
             charging=False,
         ),
         mDeviceToAbsoluteTracking=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])),
-        vVelocity=vector(velocity + rng.normal(0.0, 0.005, 3)),
-        vAngularVelocity=vector(turning + rng.normal(0.0, 0.01, 3)),
+        vVelocity=rounded_vector(velocity + rng.normal(0.0, 0.005, 3)),
+        vAngularVelocity=rounded_vector(angular_velocity + rng.normal(0.0, 0.01, 3)),
         eTrackingResult=_RUNNING_OK,
         bPoseIsValid=True,
         bDeviceIsConnected=True,
     )
 
 
-def _tracker(scene: Scene, thing: Thing, t_s: float) -> Array:
+def _tracker_frame(scene: Scene, item: SceneObject, t_s: float) -> Array:
     """T_lighthouse_from_tracker (4, 4)."""
-    # What nobody holds does not depend on the hands, which are the dearer part.
-    T_rig_from_object = thing.at(scene.hand_states(t_s) if thing.holder else {})
-    return inverse(scene.T_rig_from_lighthouse) @ T_rig_from_object @ thing.T_object_from_tracker
+    # What nobody holds does not depend on the hands, whose state takes longer to compute.
+    T_rig_from_object = item.pose_given(scene.hand_states(t_s) if item.holder else {})
+    return inverse(scene.T_rig_from_lighthouse) @ T_rig_from_object @ item.T_object_from_tracker

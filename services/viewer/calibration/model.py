@@ -1,35 +1,37 @@
-"""Calibrating one camera's colours in the page: what was pointed at, what came of it, what a person
-changed by hand. Pure.
+"""Calibrating one camera's colours in the page: what was clicked, what was fitted to it, what a
+person changed by hand. Pure.
 
-The ranges shown and saved are those in force, under those fitted to what was pointed at, under
-those set with the sliders. A place that shows no paint is forgotten again, with the reason; nothing
-is in force before it is saved.
+The ranges shown and saved are the applied ones, replaced by those fitted to the clicks, replaced by
+those set with the sliders. A click that shows no paint is forgotten again, with the reason. Nothing
+is applied before it is saved.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeGuard
 
 import msgspec
 
 from rhot.camera_messages import ColorRange, Colors, FitRequest, FitResult, PointedAt
 
-# What sliders begin with for a colour that nobody has pointed at yet: everything saturated.
+# What sliders begin with for a colour that was not clicked yet: everything saturated.
 _ANY = ColorRange(hsv_low=(0, 80, 40), hsv_high=(179, 255, 255))
+_NO_ANSWER = "the tracker does not answer; is it running?"
 
 
 @dataclass
-class Session:
-    """One camera's calibration.
+class ColorCalibration:
+    """The calibration of one camera's colours.
 
-    wanted are the colours of rig.toml, next_camera is one that was not calibrated yet, "" if all
-    were.
+    wanted are the colours of rig.toml, applied is what the tracker uses now. saved is the date of
+    what was applied from here. next_camera is one that was not calibrated yet, "" if all were.
     """
 
     camera: str
     wanted: list[str]
-    in_force: Colors = field(default_factory=lambda: Colors(colors={}))
-    pointed: list[PointedAt] = field(default_factory=list)
+    applied: Colors = field(default_factory=lambda: Colors(colors={}))
+    clicks: list[PointedAt] = field(default_factory=list)
     result: FitResult = field(default_factory=FitResult)
     edited: dict[str, ColorRange] = field(default_factory=dict)
     error: str = ""
@@ -38,13 +40,13 @@ class Session:
 
     @property
     def names(self) -> list[str]:
-        """Colours there are: rig.toml's, else those in force; never none."""
-        return self.wanted or sorted(self.in_force.colors) or ["green"]
+        """The colours to calibrate: rig.toml's, else the applied ones; never none."""
+        return self.wanted or sorted(self.applied.colors) or ["green"]
 
     @property
     def ranges(self) -> dict[str, ColorRange]:
-        """Of every colour that has any."""
-        return {**self.in_force.colors, **self.result.colors, **self.edited}
+        """The range of every colour that has one."""
+        return {**self.applied.colors, **self.result.colors, **self.edited}
 
     def range_of(self, color: str) -> ColorRange:
         """What the sliders show."""
@@ -53,44 +55,42 @@ class Session:
     @property
     def changed(self) -> bool:
         """Whether there is anything to save."""
-        return self.ranges != self.in_force.colors
+        return self.ranges != self.applied.colors
 
     @property
     def missing(self) -> list[str]:
         """Colours of rig.toml without a range: they are not tracked."""
         return [name for name in self.wanted if name not in self.ranges]
 
-    def point(self, color: str, picture: str, x_px: float, y_px: float) -> None:
-        """A click on a marker."""
-        self.pointed.append(
+    def click(self, color: str, picture: str, x_px: float, y_px: float) -> None:
+        """Take a click on a marker."""
+        self.clicks.append(
             PointedAt(color=color, picture=picture, x_px=round(x_px, 1), y_px=round(y_px, 1))
         )
         self.error = self.saved = ""
 
     def request(self) -> FitRequest:
         """What the tracker is to fit."""
-        return FitRequest(pointed=self.pointed)
+        return FitRequest(pointed=self.clicks)
 
-    def take(self, result: FitResult | None) -> bool:
-        """The tracker's answer to the last click, None if there was none.
+    def take_fit(self, result: FitResult | None) -> bool:
+        """Take the tracker's answer to the last click, None if there was none.
 
-        Whether it showed paint.
+        Returns whether the click showed paint.
         """
-        if result is None or result.error:
-            self.error = result.error if result else "the tracker does not answer; is it running?"
-            if self.pointed:
-                self.pointed.pop()
+        if not self._is_good(result):
+            if self.clicks:
+                self.clicks.pop()
             return False
         self.result, self.error = result, ""
-        for color in {one.color for one in self.pointed[-1:]}:
-            # Who points at a colour again wants it fitted anew.
+        for color in {click.color for click in self.clicks[-1:]}:
+            # Who clicks a colour again wants it fitted anew.
             self.edited.pop(color, None)
         return True
 
     def take_proposal(self, result: FitResult | None) -> bool:
-        """The tracker's proposal of everything that stands out: as if it had been pointed at."""
-        if result is None or result.error:
-            self.error = result.error if result else "the tracker does not answer; is it running?"
+        """Take the tracker's proposal of everything that stands out, as if it had been clicked."""
+        if not self._is_good(result):
             return False
         known = {
             name: span
@@ -98,7 +98,7 @@ class Session:
             if not self.wanted or name in self.wanted
         }
         self.result = msgspec.structs.replace(result, colors=known)
-        self.pointed = [
+        self.clicks = [
             PointedAt(
                 color=p.color,
                 picture=p.picture,
@@ -114,35 +114,42 @@ class Session:
         self.error = self.saved = ""
         return True
 
+    def _is_good(self, result: FitResult | None) -> TypeGuard[FitResult]:
+        """Whether an answer came and is no refusal; the error says what it is otherwise."""
+        if result is None or result.error:
+            self.error = result.error if result else _NO_ANSWER
+            return False
+        return True
+
     def undo(self) -> None:
         """Forget the last click; what is left must be fitted again."""
-        if self.pointed:
-            self.pointed.pop()
-        if not self.pointed:
+        if self.clicks:
+            self.clicks.pop()
+        if not self.clicks:
             self.result = FitResult()
         self.error = self.saved = ""
 
     def reset(self) -> None:
-        """Back to what is in force."""
-        self.pointed.clear()
+        """Back to what is applied."""
+        self.clicks.clear()
         self.edited.clear()
         self.result, self.error, self.saved = FitResult(), "", ""
 
     def edit(self, color: str, span: ColorRange) -> None:
-        """A slider was moved."""
+        """Take a range that was set with the sliders."""
         self.edited[color] = span
         self.saved = ""
 
     def next_after(self, color: str) -> str:
-        """The next colour nobody has pointed at, else this one."""
-        done = {one.color for one in self.pointed}
+        """The next colour that was not clicked, else this one."""
+        done = {click.color for click in self.clicks}
         names = self.names
         at = names.index(color) if color in names else 0
         return next((name for name in names[at + 1 :] + names[:at] if name not in done), color)
 
-    def file(self, date: str) -> Colors:
+    def as_file(self, date: str) -> Colors:
         """What is saved."""
-        places = [f"{p.color}={p.x_px:g},{p.y_px:g}" for p in self.pointed]
+        places = [f"{click.color}={click.x_px:g},{click.y_px:g}" for click in self.clicks]
         inputs = {"places": places, "by_hand": sorted(self.edited)}
         return Colors(
             date=date,
@@ -152,7 +159,7 @@ class Session:
             colors=self.ranges,
         )
 
-    def was_saved(self, made: Colors) -> None:
-        """It is in force now."""
-        self.in_force, self.saved, self.error = made, made.date, ""
+    def was_applied(self, made: Colors) -> None:
+        """The tracker uses these now."""
+        self.applied, self.saved, self.error = made, made.date, ""
         self.edited.clear()

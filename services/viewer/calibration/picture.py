@@ -1,5 +1,5 @@
-"""The calibration page's picture: what each range takes, painted over, and boxes around the patches
-found. Pure.
+"""The picture of the calibration page: masks of what each range takes, and boxes around the patches
+of paint that were found. Pure.
 
 A picture that cannot be decoded is None, and the page keeps the last one.
 """
@@ -21,16 +21,16 @@ Image = npt.NDArray[Any]
 # takes, black around the others.
 _STRENGTH = 0.8
 _CHOSEN, _OTHER = (255, 255, 255), (0, 0, 0)
-# As erosion in the tracker: single pixels are noise and are not taken.
+# As the tracker's erosion does: single pixels are noise and are not taken.
 _KERNEL = np.ones((2, 2), np.uint8)
 
 
 def decoded(picture: bytes) -> Image | None:
-    """PNG as BGR (h, w, 3), None if it is none."""
+    """PNG as BGR (h, w, 3), None if it is no picture."""
     try:
         return cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error:
-        # Nothing at all, or a picture of a size that no memory holds.
+        # No bytes, or a picture larger than memory.
         return None
 
 
@@ -48,7 +48,7 @@ def mask_of(hsv: Image, span: ColorRange) -> Image:
     return cv2.dilate(cv2.erode(mask, _KERNEL, anchor=(0, 0)), _KERNEL, anchor=(1, 1))
 
 
-def shown(
+def annotated(
     bgr: Image,
     ranges: Mapping[str, ColorRange],
     paints: Mapping[str, Rgb],
@@ -57,24 +57,27 @@ def shown(
     *,
     masks: bool,
 ) -> Image:
-    """The picture as RGB (h, w, 3) with masks and boxes."""
+    """The picture as RGB (h, w, 3) with boxes, and with masks in the colours of the paints."""
     rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
     if masks:
         # Averaged over 2x2, as the tracker's cells are.
         small = cv2.resize(bgr, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         hsv = cv2.cvtColor(small, cv2.COLOR_BGR2HSV)
         for color, span in ranges.items():
-            mask = cv2.resize(
-                mask_of(hsv, span), (bgr.shape[1], bgr.shape[0]), interpolation=cv2.INTER_NEAREST
-            )
-            taken = mask > 0
-            rgb[taken] = (
-                _STRENGTH * np.array(paints.get(color, (255, 255, 255)))
-                + (1.0 - _STRENGTH) * rgb[taken]
-            ).astype(np.uint8)
-            contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-            cv2.drawContours(rgb, contours, -1, _CHOSEN if color == chosen else _OTHER, 1)
+            outline = _CHOSEN if color == chosen else _OTHER
+            _draw_mask(rgb, mask_of(hsv, span), paints.get(color, _CHOSEN), outline)
     for patch in patches:
         x, y, w, h = patch.box_px
         cv2.rectangle(rgb, (x - 4, y - 4), (x + w + 3, y + h + 3), _CHOSEN, 1)
     return rgb
+
+
+def _draw_mask(rgb: Image, small_mask: Image, paint: Rgb, outline: Rgb) -> None:
+    """Paint a mask of half the picture's size over it, in place."""
+    size = (rgb.shape[1], rgb.shape[0])
+    mask = cv2.resize(small_mask, size, interpolation=cv2.INTER_NEAREST)
+    taken = mask > 0
+    mixed = _STRENGTH * np.array(paint) + (1.0 - _STRENGTH) * rgb[taken]
+    rgb[taken] = mixed.astype(np.uint8)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(rgb, contours, -1, outline, 1)

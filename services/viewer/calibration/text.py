@@ -1,5 +1,5 @@
-"""What the calibration page says, as HTML: what to do next, how well the colours can be told apart,
-whether they are in force. Pure.
+"""The texts of the calibration page, as HTML: what to do next, how well the colours can be told
+apart, whether they are applied. Pure.
 
 Texts from the network are escaped and shortened; numbers that are missing are left out.
 """
@@ -8,69 +8,77 @@ from __future__ import annotations
 
 from typing import Any
 
-from services.viewer.calibration.model import Session
+from services.viewer.calibration.model import ColorCalibration
 from services.viewer.live.panels import text
 
 _STYLE = "font-size:0.85em;line-height:1.4;padding:0 0.6em;"
 _RED, _GREEN, _AMBER = "#c0392b", "#1e8449", "#b9770e"
 _LEGEND = (
-    '<div style="color:#666;font-size:0.9em">taken: share of the paint in its range; d\': how far apart, in standard deviations; '
+    '<div style="color:#666;font-size:0.9em">taken: share of the paint inside its range; '
+    "d': distance from skin and from the nearest other colour in standard deviations; "
     "4 and more is good</div>"
 )
 # Lines of warnings and notes: enough for six colours, short enough for a panel.
 _MOST = 8
 
 
-def to_do(session: Session, chosen: str, *, pictures: bool) -> str:
+def to_do(calibration: ColorCalibration, chosen: str, *, pictures: bool) -> str:
     """What the person should do now."""
     if not pictures:
         return _box(
-            f"waiting for a picture of camera {text(session.camera)} ... (is its tracker running?)"
+            f"waiting for a picture of camera {text(calibration.camera)} ..."
+            " (is its tracker running?)"
         )
-    done = {one.color for one in session.pointed}
+    done = {click.color for click in calibration.clicks} & set(calibration.names)
     lines = []
-    if session.error:
-        lines.append(_colored(session.error, _RED))
-    clicks = sum(one.color == chosen for one in session.pointed)
-    complete = done.issuperset(session.names)
-    if complete and session.changed:
-        lines.append(
-            "All colours are pointed at: <b>put them in force</b>, or turn the hand and click again where a mask has holes."
-        )
-    elif complete:
-        onward = (
-            f"Now <b>camera {text(session.next_camera)}</b>."
-            if session.next_camera
-            else "Untick <i>show picture</i> to see the hand."
-        )
-        lines.append(f"This camera is done. {onward}")
-    elif clicks:
-        lines.append(
-            f"<b>{text(chosen)}</b>: {clicks} click{'s' if clicks > 1 else ''}. Click again where its mask has holes, or move on."
-        )
-    else:
-        lines.append(
-            f"Hold the hand still and <b>click the middle of the {text(chosen)} marker</b> in the picture."
-        )
+    if calibration.error:
+        lines.append(_colored(calibration.error, _RED))
+    lines.append(_next_step(calibration, chosen, complete=len(done) == len(calibration.names)))
     lines.append(
-        f"{len(done & set(session.names))} of {len(session.names)} colours pointed at. Drag turns, the wheel zooms."
+        f"{len(done)} of {len(calibration.names)} colours clicked. Drag turns, the wheel zooms."
     )
     return _box("<br>".join(lines))
 
 
-def report(session: Session) -> str:
+def _next_step(calibration: ColorCalibration, chosen: str, *, complete: bool) -> str:
+    if complete and calibration.changed:
+        return (
+            "Every colour is clicked: press <b>apply</b>,"
+            " or turn the hand and click again where a mask has holes."
+        )
+    if complete and calibration.next_camera:
+        return f"This camera is done. Now <b>camera {text(calibration.next_camera)}</b>."
+    if complete:
+        return "This camera is done. Untick <i>show picture</i> to see the hand."
+    clicks = sum(click.color == chosen for click in calibration.clicks)
+    if clicks:
+        return (
+            f"<b>{text(chosen)}</b>: {clicks} click{'s' if clicks > 1 else ''}."
+            " Click again where its mask has holes, or move on."
+        )
+    return (
+        f"Hold the hand still and <b>click the middle of the {text(chosen)} marker</b>"
+        " in the picture."
+    )
+
+
+def report(calibration: ColorCalibration) -> str:
     """Separation of the fitted colours, and warnings."""
-    statistics = session.result.residuals
-    rows = [_row(color, statistics) for color in session.names if color in session.result.colors]
-    lines = [_colored(warning, _AMBER) for warning in session.result.warnings[:_MOST]]
-    lines += [text(note, 200) for note in session.result.notes[:_MOST]]
-    if session.edited:
-        lines.append("set by hand: " + ", ".join(text(color) for color in sorted(session.edited)))
+    statistics = calibration.result.residuals
+    rows = [
+        _row(color, statistics) for color in calibration.names if color in calibration.result.colors
+    ]
+    lines = [_colored(warning, _AMBER) for warning in calibration.result.warnings[:_MOST]]
+    lines += [text(note, 200) for note in calibration.result.notes[:_MOST]]
+    if calibration.edited:
+        lines.append(
+            "set by hand: " + ", ".join(text(color) for color in sorted(calibration.edited))
+        )
     if not rows and not lines:
         return _box(
-            "nothing fitted yet; the masks show what is in force"
-            if session.in_force.colors
-            else "no colours are in force yet"
+            "nothing fitted yet; the masks show the applied ranges"
+            if calibration.applied.colors
+            else "no colours are applied yet"
         )
     head = "<tr><td></td><td>taken</td><td>from skin</td><td>nearest</td></tr>" if rows else ""
     table = (
@@ -85,7 +93,9 @@ def _row(color: str, statistics: dict[str, Any]) -> str:
     own = _table(_table(statistics, "colors"), color)
     near = _nearest(color, _table(statistics, "separation"))
     skin = _number(own.get("skin"), "d' {:.1f}")
-    return f"<tr><td><b>{text(color)}</b></td><td>{_number(own.get('inside'), '{:.0%}')}</td><td>{skin}</td><td>{near}</td></tr>"
+    inside = _number(own.get("inside"), "{:.0%}")
+    cells = (f"<b>{text(color)}</b>", inside, skin, near)
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 def _nearest(color: str, pairs: dict[str, Any]) -> str:
@@ -112,24 +122,20 @@ def _number(value: Any, form: str) -> str:
     )
 
 
-def verdict(session: Session) -> str:
-    """What is in force, and what is missing."""
+def status(calibration: ColorCalibration) -> str:
+    """Whether what the page shows is applied, and what is missing."""
     lines = []
-    if session.saved:
-        lines.append(
-            _colored(
-                f"in force on camera {session.camera}, and written on its machine, {_clock(session.saved)}",
-                _GREEN,
-            )
-        )
-    elif session.changed:
-        lines.append("not in force yet: press the button")
-    if session.missing:
-        lines.append(f"still missing: {', '.join(text(name) for name in session.missing)}")
-    return _box("<br>".join(lines) or "this is what is in force")
+    if calibration.saved:
+        saved = f"applied on camera {calibration.camera} and saved on its machine"
+        lines.append(_colored(f"{saved}, {_time_of_day(calibration.saved)}", _GREEN))
+    elif calibration.changed:
+        lines.append("not applied yet: press <b>apply</b>")
+    if calibration.missing:
+        lines.append(f"still missing: {', '.join(text(name) for name in calibration.missing)}")
+    return _box("<br>".join(lines) or "these are the applied ranges")
 
 
-def _clock(date: str) -> str:
+def _time_of_day(date: str) -> str:
     """The time of day of an ISO date."""
     return date.partition("T")[2][:8]
 

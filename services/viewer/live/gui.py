@@ -1,6 +1,6 @@
-"""The panel beside the picture: switches, texts and camera pictures.
+"""The panel beside the 3D scene: switches, texts and camera pictures.
 
-What it shows is made in panels.py.
+Its texts are made in services/viewer/live/panels.py.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from rhot.hand import HandName
 from services.viewer.live import panels
 from services.viewer.live.model import View
 
-# What JPEG files begin with; other bytes are not shown to a browser.
+# JPEG files begin with this; other bytes are not sent to a browser.
 _JPEG = b"\xff\xd8\xff"
 
 
-class Gui:
-    """Switches and texts of one viewer, shared by all who look."""
+class LivePanel:
+    """Switches and texts of one viewer, shared by all browsers."""
 
     def __init__(self, server: viser.ViserServer, config: RigConfig, notes: Sequence[str]) -> None:
         gui = server.gui
@@ -48,12 +48,12 @@ class Gui:
 
     @property
     def trails(self) -> bool:
-        """Whether trails are wanted."""
+        """Whether trails are switched on."""
         return bool(self._trails.value)
 
     @property
     def pictures(self) -> bool:
-        """Whether camera pictures are wanted."""
+        """Whether camera pictures are switched on."""
         return bool(self._pictures.value)
 
     def show(self, view: View) -> None:
@@ -65,15 +65,15 @@ class Gui:
                 panels.angles(view.hands[hand].pose) if hand in view.hands else panels.no_angles()
             )
 
-    def show_pictures(self, wanted: bool) -> None:
-        """Make room for pictures, or take it back."""
+    def show_pictures(self, visible: bool) -> None:
+        """Show the pictures, or hide and forget them."""
         for camera, handle in self._previews.items():
-            handle.visible = wanted
-            if not wanted:
+            handle.visible = visible
+            if not visible:
                 handle.content = panels.preview(camera, None)
 
-    def picture(self, camera: str, jpeg: bytes) -> bool:
-        """Show one camera's picture; false if it is none, or of no camera of this rig."""
+    def set_picture(self, camera: str, jpeg: bytes) -> bool:
+        """Show one camera's picture; false if it is no JPEG, or of no camera of this rig."""
         if camera not in self._previews or not jpeg.startswith(_JPEG):
             return False
         self._previews[camera].content = panels.preview(camera, base64.b64encode(jpeg).decode())

@@ -1,7 +1,7 @@
-"""What the live view shows, reduced from messages. Pure: time is an argument (seconds of one
+"""The state of the live view, kept from messages. Pure: time is an argument (seconds of one
 monotonic clock).
 
-Whatever has not come for a second is hidden, and said to be missing. Absurd positions (not finite,
+What has not come for a second is hidden, and said to be missing. Implausible positions (not finite,
 beyond 100 m) are not drawn. Objects in the lighthouse frame are not drawn either: where they are in
 the rig would be a guess. Nothing from the network makes the state grow without bound.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,7 +18,10 @@ from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
 from rhot.messages import HandPoints, HandPose, Health, ObjectPose
 
-# Older than this is no live view any more.
+K = TypeVar("K")
+V = TypeVar("V")
+
+# What is older than this is not live any more.
 STALE_S = 1.0
 # Three beats of a service's health.
 HEALTH_STALE_S = 3.5
@@ -33,7 +37,7 @@ _MAX_LATENCY_S = 10.0
 
 @dataclass(frozen=True, eq=False)
 class HandView:
-    """A hand to draw; sources are those of its joints."""
+    """A hand to draw; sources are those of its 26 joints."""
 
     hand: HandName
     positions_m: Array  # (26, 3)
@@ -44,7 +48,7 @@ class HandView:
 
 @dataclass(frozen=True)
 class PointView:
-    """A marked landmark; predicted ones were not seen just now."""
+    """A painted landmark; a predicted one is not measured at this instant."""
 
     hand: HandName
     name: str
@@ -77,7 +81,7 @@ class View:
     objects: dict[str, ObjectView]
     trails: dict[HandName, Array]
     health: list[Health]
-    # Glass to pose arriving here, ms, of the newest pose; None where its stamp says nothing.
+    # From exposure to the newest pose's arrival here, ms; None where its stamp is no guide.
     latency_ms: dict[HandName, float | None]
 
 
@@ -90,21 +94,24 @@ class _Hand:
 
 
 class ViewModel:
-    """Takes messages in, gives views out."""
+    """Takes messages, gives views.
+
+    implausible counts positions that were left out.
+    """
 
     def __init__(self) -> None:
         self._hands: dict[HandName, _Hand] = {}
         self._points: dict[HandName, tuple[float, list[PointView]]] = {}
         self._objects: dict[str, tuple[float, ObjectView]] = {}
         self._health: dict[tuple[str, str], tuple[float, Health]] = {}
-        self.absurd = 0
+        self.implausible = 0
 
     def pose(self, pose: HandPose, now_s: float, wall_ns: int) -> None:
-        """A hand pose that arrived now, at wall_ns of the wall clock."""
+        """Take a hand pose that arrived now, at wall_ns of the wall clock."""
         positions = np.array([joint.position_m for joint in pose.joints])  # (26, 3)
         radii = np.array([joint.radius_m for joint in pose.joints])
         if not np.all(np.abs(positions) <= _MAX_M) or not np.all(radii <= _MAX_M):
-            self.absurd += 1
+            self.implausible += 1
             return
         view = HandView(
             pose.hand, positions, radii, tuple(joint.source for joint in pose.joints), pose
@@ -118,7 +125,7 @@ class ViewModel:
         known.trail.append(positions[CHAIN_JOINTS[:, 3]])
 
     def points(self, points: HandPoints, now_s: float) -> None:
-        """The marked landmarks of a hand."""
+        """Take the painted landmarks of a hand."""
         drawn = []
         for point in points.points:
             if point.name in LANDMARKS and all(abs(v) <= _MAX_M for v in point.position_m):
@@ -128,14 +135,14 @@ class ViewModel:
                     )
                 )
             else:
-                self.absurd += 1
+                self.implausible += 1
         self._points[points.hand] = (now_s, drawn)
 
     def object(self, pose: ObjectPose, now_s: float) -> None:
-        """An object's pose."""
+        """Take an object's pose."""
         norm = float(np.sqrt(np.sum(np.minimum(np.abs(pose.orientation_wxyz), 1e9) ** 2)))
         if not all(abs(v) <= _MAX_M for v in pose.position_m) or not 0.5 < norm < 2.0:
-            self.absurd += 1
+            self.implausible += 1
             return
         if pose.object in self._objects or len(self._objects) < _MAX_OBJECTS:
             view = ObjectView(
@@ -144,7 +151,7 @@ class ViewModel:
             self._objects[pose.object] = (now_s, view)
 
     def health(self, health: Health, now_s: float) -> None:
-        """A service's beat."""
+        """Take a service's health."""
         key = (health.service, health.instance)
         if key in self._health or len(self._health) < _MAX_SERVICES:
             self._health[key] = (now_s, health)
@@ -154,15 +161,9 @@ class ViewModel:
         self._hands = {
             name: hand for name, hand in self._hands.items() if now_s - hand.seen_s <= STALE_S
         }
-        self._points = {
-            name: entry for name, entry in self._points.items() if now_s - entry[0] <= STALE_S
-        }
-        self._objects = {
-            name: entry for name, entry in self._objects.items() if now_s - entry[0] <= STALE_S
-        }
-        self._health = {
-            key: entry for key, entry in self._health.items() if now_s - entry[0] <= HEALTH_STALE_S
-        }
+        self._points = _fresh(self._points, now_s, STALE_S)
+        self._objects = _fresh(self._objects, now_s, STALE_S)
+        self._health = _fresh(self._health, now_s, HEALTH_STALE_S)
         return View(
             hands={name: hand.view for name, hand in self._hands.items()},
             points={(p.hand, p.name): p for _, points in self._points.values() for p in points},
@@ -173,3 +174,10 @@ class ViewModel:
             ],
             latency_ms={name: hand.latency_ms for name, hand in self._hands.items()},
         )
+
+
+def _fresh(
+    entries: dict[K, tuple[float, V]], now_s: float, stale_s: float
+) -> dict[K, tuple[float, V]]:
+    """Those of the entries, (arrival, value) each, that are not stale."""
+    return {key: entry for key, entry in entries.items() if now_s - entry[0] <= stale_s}

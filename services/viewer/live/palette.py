@@ -1,6 +1,6 @@
-"""Colours of the live view: sources of joints, paints of markers. Pure.
+"""Colours of the live view: of joints by their source, of markers by their paint. Pure.
 
-A colour nobody knows is grey.
+An unknown paint is grey.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from rhot.messages import JointSource
 
 Rgb = tuple[int, int, int]
 
-# Tell seen from guessed at a glance, also with red-green blindness (after Okabe and Ito's palette).
+# Measured, solved and predicted can be told apart at a glance, also with red-green blindness (after
+# Okabe and Ito's palette).
 SOURCE_RGB: dict[JointSource, Rgb] = {
     "measured": (0, 158, 115),
     "solved": (60, 120, 225),
     "predicted": (230, 159, 0),
 }
 UNKNOWN: Rgb = (150, 150, 150)
-# Paints people name in rig.toml before they have calibrated them.
+# Paints by the names people use in rig.toml, calibrated or not.
 _NAMED: dict[str, Rgb] = {
     "red": (220, 40, 40),
     "orange": (240, 130, 20),
@@ -39,9 +40,7 @@ _NAMED: dict[str, Rgb] = {
 
 
 def paint_rgb(color: str, calibrations: Iterable[Colors]) -> Rgb:
-    """A paint as it should look: by its name, else by the middle hue of its calibrated range, else
-    grey.
-    """
+    """RGB of a paint: by its name, else by the middle hue of its calibrated range, else grey."""
     if color in _NAMED:
         return _NAMED[color]
     for calibration in calibrations:

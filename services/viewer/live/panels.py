@@ -1,7 +1,7 @@
-"""The texts beside the picture, as HTML. Pure.
+"""The texts of the live view's panel, as HTML. Pure.
 
 Everything that came over the network is escaped and shortened: a browser executes what it is given.
-What is missing is said in words, with what to look at.
+What is missing is said in words, with what to check.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.hand import DIGIT_ANGLES, DIGITS
+from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
 from rhot.messages import HandPose, Health, StreamHealth
 from services.viewer.live.model import View
 from services.viewer.live.palette import SOURCE_RGB
@@ -26,43 +26,41 @@ _LEFT = "padding:0 0.5em 0 0;text-align:left"
 
 
 def text(value: str, longest: int = 60) -> str:
-    """Any string, made harmless."""
+    """Any string, made harmless for a browser and shortened."""
     return html.escape("".join(c for c in value if c.isprintable())[:longest])
 
 
 def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
-    """What is seen, what is waited for, and standing notes such as missing calibration."""
-    lines = []
-    for hand in config.hand:
-        if hand in view.hands:
-            latency = view.latency_ms.get(hand)
-            lines.append(
-                f"{hand} hand: tracked"
-                + ("" if latency is None else f", {latency:.0f} ms after the light")
-            )
-        elif any(h == hand for h, _ in view.points):
-            lines.append(
-                f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)"
-            )
-        else:
-            lines.append(f"waiting for hand poses of the {hand} hand ... ({_missing(view)})")
+    """What is tracked, what is waited for, and standing notes such as missing calibration."""
+    lines = [_hand_line(hand, view) for hand in config.hand]
     if not config.hand:
         lines.append("no hand is configured: add [hand.right.markers] to rig.toml")
-    for table in config.object:
-        known = view.objects.get(table.name)
-        if known is None:
-            lines.append(f"waiting for the object {text(table.name)} ...")
-        elif not known.registered:
-            lines.append(
-                f"object {text(table.name)}: not registered to the rig; run `rhot calibrate objects`"
-            )
-        else:
-            lines.append(f"object {text(table.name)}: {text(known.tracking.replace('_', ' '))}")
+    lines += [_object_line(table.name, view) for table in config.object]
     lines += [text(note, 200) for note in notes]
     return _box("<br>".join(lines))
 
 
+def _hand_line(hand: HandName, view: View) -> str:
+    if hand in view.hands:
+        latency = view.latency_ms.get(hand)
+        after = "" if latency is None else f", {latency:.0f} ms after the light"
+        return f"{hand} hand: tracked{after}"
+    if any(of_hand == hand for of_hand, _ in view.points):
+        return f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)"
+    return f"waiting for hand poses of the {hand} hand ... ({_missing(view)})"
+
+
+def _object_line(name: str, view: View) -> str:
+    known = view.objects.get(name)
+    if known is None:
+        return f"waiting for the object {text(name)} ..."
+    if not known.registered:
+        return f"object {text(name)}: not registered to the rig; run `rhot calibrate objects`"
+    return f"object {text(name)}: {text(known.tracking.replace('_', ' '))}"
+
+
 def _missing(view: View) -> str:
+    """The first service on the way to a pose that is not heard."""
     services = {health.service for health in view.health}
     for needed, hint in (
         ("pi_tracker", "no camera's tracker is heard"),
@@ -75,7 +73,7 @@ def _missing(view: View) -> str:
 
 
 def legend() -> str:
-    """What the colours of joints and bones say."""
+    """What the colours of joints and bones mean."""
     return _box(
         " &nbsp; ".join(
             f'<span style="color:rgb{rgb}">&#9679;</span> {name}'
@@ -96,7 +94,7 @@ def angles(pose: HandPose) -> str:
 
 
 def no_angles() -> str:
-    """Instead of angles, while no hand is tracked."""
+    """What stands in place of the angles while no hand is tracked."""
     return _box("waiting for hand poses ...")
 
 
@@ -107,9 +105,8 @@ def rates(health: Sequence[Health]) -> str:
     rows = [_row(("stream", "Hz", "of", "ms", "lost"), head=True)]
     for beat in health:
         name = f"{beat.service}/{beat.instance}"
-        rows.append(
-            f'<tr><td colspan="5"><b>{text(name)}</b> {min(beat.cpu_percent, 9999.0):.0f} % of a core</td></tr>'
-        )
+        cpu = f"{min(beat.cpu_percent, 9999.0):.0f} % of a core"
+        rows.append(f'<tr><td colspan="5"><b>{text(name)}</b> {cpu}</td></tr>')
         rows += [_stream(stream) for stream in beat.streams]
         if beat.last_error:
             rows.append(
@@ -145,9 +142,8 @@ def preview(camera: str, jpeg_base64: str | None) -> str:
     """One camera's picture, or that it is waited for."""
     if jpeg_base64 is None:
         return _box(f"waiting for the picture of {text(camera)} ...")
-    return _box(
-        f'{text(camera)}<br><img style="width:100%" src="data:image/jpeg;base64,{jpeg_base64}" alt="{text(camera)}">'
-    )
+    source = f"data:image/jpeg;base64,{jpeg_base64}"
+    return _box(f'{text(camera)}<br><img style="width:100%" src="{source}" alt="{text(camera)}">')
 
 
 def _degrees(angle_rad: float) -> float:

@@ -1,4 +1,4 @@
-"""The 3D picture: a View applied to viser's scene.
+"""The 3D scene of the live view: draws a View with viser.
 
 Meshes are made once and then moved; a hand, point or object that is gone is hidden. Without
 calibration there are no frusta.
@@ -20,20 +20,20 @@ from services.viewer.live.model import HandView, ObjectView, PointView, View
 from services.viewer.live.palette import SOURCE_RGB, UNKNOWN, Rgb
 from services.viewer.live.shapes import BONES, cylinders, unit_cylinder, unit_sphere
 
-# Where hands work: RHOT section 6 has them half a metre in front of the cameras; first camera's
-# frame.
-_LOOK_CAMERA = np.array([0.09, 0.02, 0.48])
+# What the viewer looks at first, in the first camera's frame: hands work half a metre in front of
+# the cameras (RHOT section 6).
+_LOOK_AT_CAMERA = np.array([0.09, 0.02, 0.48])
 # From behind and above the cameras, to the right: the hand in the middle, its fingers apart, the
 # frusta still in view.
-_EYE_CAMERA = np.array([0.36, -0.36, -0.26])
+_VIEWPOINT_CAMERA = np.array([0.36, -0.36, -0.26])
 _FOV_RAD = float(np.deg2rad(34.0))
 # A desk is some 20 cm under the cameras.
 _GRID_CAMERA = np.array([0.0, 0.2, 0.5])
-# A world's desk is at z = 0.
-_IN_PLANE = np.array([1.0, 1.0, 0.0])
+# In a world frame the desk is at z = 0.
+_ON_DESK = np.array([1.0, 1.0, 0.0])
 # Joints at their full skin radius would hide the bones; with these shares of it, both are seen.
 _JOINT_SHARE, _BONE_SHARE = 0.72, 0.42
-_POINT_RADIUS_M, _PREDICTED_RADIUS_M = 0.008, 0.004
+_POINT_RADIUS_M, _PREDICTED_RADIUS_M, _HIDDEN_RADIUS_M = 0.008, 0.004, 1e-6
 _OBJECT_BOX_M = (0.06, 0.06, 0.09)
 _TRAIL_RGB: Rgb = (90, 90, 90)
 # Sources from most to least certain: a bone is as certain as its worse end.
@@ -41,8 +41,8 @@ _SOURCES = tuple(SOURCE_RGB)
 _PALETTE = np.array([SOURCE_RGB[source] for source in _SOURCES], dtype=np.uint8)
 
 
-class Scene:
-    """Everything in the picture. paints is what each hand's landmarks are painted with."""
+class LiveScene:
+    """Everything that is drawn; paints is what each hand's landmarks are painted with."""
 
     def __init__(
         self,
@@ -57,43 +57,45 @@ class Scene:
         self._hands: dict[HandName, _Hand] = {}
         self._points: dict[HandName, _Points] = {}
         self._objects: dict[str, _Object] = {}
-        self._stage(server, config)
+        self._add_grid(server, config)
         for camera in cameras.values():
-            self._frustum(camera)
+            self._add_frustum(camera)
 
     def show(self, view: View, *, trails: bool) -> None:
         """Bring the picture up to date."""
         with self._atomic():
             for hand in {*self._hands, *view.hands}:
-                if hand not in self._hands:
-                    self._hands[hand] = _Hand(self._scene, hand)
-                self._hands[hand].show(
-                    view.hands.get(hand), view.trails.get(hand) if trails else None
-                )
+                self._show_hand(hand, view, trails=trails)
             for hand in {*self._points, *(name for name, _ in view.points)}:
-                if hand not in self._points:
-                    self._points[hand] = _Points(
-                        self._scene,
-                        hand,
-                        {n: rgb for (h, n), rgb in self._paints.items() if h == hand},
-                    )
-                self._points[hand].show(
-                    {name: point for (h, name), point in view.points.items() if h == hand}
-                )
+                self._show_points(hand, view)
             for name in {*self._objects, *view.objects}:
                 if name not in self._objects:
                     self._objects[name] = _Object(self._scene, name)
                 self._objects[name].show(view.objects.get(name))
 
-    def _stage(self, server: viser.ViserServer, config: RigConfig) -> None:
-        """Up, grid and first look: y is down in a camera's frame.
+    def _show_hand(self, hand: HandName, view: View, *, trails: bool) -> None:
+        if hand not in self._hands:
+            self._hands[hand] = _Hand(self._scene, hand)
+        trail = view.trails.get(hand) if trails else None
+        self._hands[hand].show(view.hands.get(hand), trail)
 
-        A world of its own has z up and its desk at z = 0.
+    def _show_points(self, hand: HandName, view: View) -> None:
+        if hand not in self._points:
+            paints = {name: rgb for (of_hand, name), rgb in self._paints.items() if of_hand == hand}
+            self._points[hand] = _Points(self._scene, hand, paints)
+        self._points[hand].show(
+            {name: point for (of_hand, name), point in view.points.items() if of_hand == hand}
+        )
+
+    def _add_grid(self, server: viser.ViserServer, config: RigConfig) -> None:
+        """Up direction, grid and first viewpoint.
+
+        y is down in a camera's frame; a world frame has z up and its desk at z = 0.
         """
         world = config.rig.world
         T_rig_from_camera = np.eye(4) if world is None else np.array(world.T_rig_from_camera)
         self._scene.set_up_direction("-y" if world is None else "+z")
-        # The studio lighting of the default washes the colours out, which say something here.
+        # viser's default lighting washes out the colours, which have a meaning here.
         self._scene.configure_environment_map(environment_intensity=0.35)
         self._scene.add_grid(
             "/grid",
@@ -104,14 +106,14 @@ class Scene:
             section_size=0.1,
             cell_color=(225, 225, 225),
             section_color=(190, 190, 190),
-            position=apply(T_rig_from_camera, _GRID_CAMERA) * (1.0 if world is None else _IN_PLANE),
+            position=apply(T_rig_from_camera, _GRID_CAMERA) * (1.0 if world is None else _ON_DESK),
         )
         self._scene.add_frame("/rig", axes_length=0.04, axes_radius=0.0012)
-        server.initial_camera.position = apply(T_rig_from_camera, _EYE_CAMERA)
-        server.initial_camera.look_at = apply(T_rig_from_camera, _LOOK_CAMERA)
+        server.initial_camera.position = apply(T_rig_from_camera, _VIEWPOINT_CAMERA)
+        server.initial_camera.look_at = apply(T_rig_from_camera, _LOOK_AT_CAMERA)
         server.initial_camera.fov = _FOV_RAD
 
-    def _frustum(self, camera: Camera) -> None:
+    def _add_frustum(self, camera: Camera) -> None:
         width, height = camera.size_px
         self._scene.add_camera_frustum(
             f"/cameras/{camera.name}",
@@ -127,7 +129,7 @@ class Scene:
 
 
 class _Hand:
-    """Joints as spheres, bones as tubes, and the trails of the finger tips."""
+    """A hand: joints as spheres, bones as tubes, and the trails of the finger tips."""
 
     def __init__(self, scene: viser.SceneApi, hand: HandName) -> None:
         turns = np.tile([1.0, 0.0, 0.0, 0.0], (26, 1))
@@ -159,28 +161,25 @@ class _Hand:
         self._trails.visible = view is not None and trail is not None and len(trail) > 1
         if view is None:
             return
-        doubt = np.array([_SOURCES.index(source) for source in view.sources])
+        uncertainty = np.array([_SOURCES.index(source) for source in view.sources])
         self._joints.batched_positions = _f32(view.positions_m)
         self._joints.batched_scales = _f32(
             np.repeat(_JOINT_SHARE * view.radii_m[:, None], 3, axis=1)
         )
-        self._joints.batched_colors = _PALETTE[doubt]
+        self._joints.batched_colors = _PALETTE[uncertainty]
         start, end = BONES.T
         middle, wxyz, length = cylinders(view.positions_m[start], view.positions_m[end])
         radius = _BONE_SHARE * np.minimum(view.radii_m[start], view.radii_m[end])
         self._bones.batched_positions = _f32(middle)
         self._bones.batched_wxyzs = _f32(wxyz)
         self._bones.batched_scales = _f32(np.stack([radius, radius, length], axis=1))
-        self._bones.batched_colors = _PALETTE[np.maximum(doubt[start], doubt[end])]
+        self._bones.batched_colors = _PALETTE[np.maximum(uncertainty[start], uncertainty[end])]
         if self._trails.visible and trail is not None:
             self._trails.points = _f32(np.stack([trail[:-1], trail[1:]], axis=2).reshape(-1, 2, 3))
 
 
 class _Points:
-    """Marked landmarks in the colour of their paint.
-
-    Those carried on without being seen are smaller.
-    """
+    """Painted landmarks in the colour of their paint; predicted ones are smaller."""
 
     def __init__(self, scene: viser.SceneApi, hand: HandName, paints: Mapping[str, Rgb]) -> None:
         self._names = list(paints)
@@ -190,17 +189,16 @@ class _Points:
             *unit_sphere(),
             np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
             np.zeros((count, 3)),
-            batched_scales=np.full((count, 3), 1e-6),
+            batched_scales=np.full((count, 3), _HIDDEN_RADIUS_M),
             batched_colors=np.array(list(paints.values()) or [UNKNOWN], dtype=np.uint8),
             lod="off",
         )
 
     def show(self, points: Mapping[str, PointView]) -> None:
         self._handle.visible = bool(points)
-        positions, radii = (
-            np.zeros((max(len(self._names), 1), 3)),
-            np.full(max(len(self._names), 1), 1e-6),
-        )
+        # viser wants at least one; those that are not there are too small to be seen.
+        count = max(len(self._names), 1)
+        positions, radii = np.zeros((count, 3)), np.full(count, _HIDDEN_RADIUS_M)
         for slot, name in enumerate(self._names):
             if name in points:
                 positions[slot] = points[name].position_m
@@ -210,7 +208,7 @@ class _Points:
 
 
 class _Object:
-    """Axes, a box and a name."""
+    """An object as axes, a box and a name."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._frame = scene.add_frame(f"/objects/{name}", axes_length=0.06, axes_radius=0.0018)
@@ -231,5 +229,5 @@ class _Object:
 
 
 def _f32(values: Array) -> npt.NDArray[np.float32]:
-    """What goes to the browser."""
+    """As float32, which is what goes to the browser."""
     return values.astype(np.float32)

@@ -1,7 +1,7 @@
 """Meshes and skeleton geometry of the live view. Pure.
 
-Unit meshes are drawn many times over with a position, an orientation and a scale each; degenerate
-bones get no length, never NaN.
+A unit mesh is drawn many times, each with a position, an orientation and a scale. Degenerate bones
+get no length, never NaN.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ BONES = _bones()
 
 
 def cylinders(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
-    """Middles (n, 3), orientations wxyz (n, 4) and lengths (n,) that lay a unit cylinder along z
-    from start to end (n, 3).
+    """Middles (n, 3), orientations wxyz (n, 4) and lengths (n,) of cylinders from start to end.
+
+    start and end (n, 3); the unit cylinder that they turn and scale lies along z.
     """
     along = end_m - start_m
     length = np.sqrt(np.sum(along**2, axis=1))
     z = np.where(length[:, None] > 1e-9, along / np.maximum(length, 1e-9)[:, None], [0.0, 0.0, 1.0])
-    # The shortest turn from +z to the bone: (1 + z . u, z x u), which vanishes for a bone along -z:
-    # half a turn about x.
+    # The shortest rotation from +z to the bone u is (1 + z . u, z x u). It vanishes for a bone
+    # along -z: half a turn about x instead.
     wxyz = np.stack([1.0 + z[:, 2], -z[:, 1], z[:, 0], np.zeros(len(z))], axis=1)
     norm = np.sqrt(np.sum(wxyz**2, axis=1))
     wxyz = np.where(

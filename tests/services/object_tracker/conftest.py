@@ -89,9 +89,9 @@ class FakeSystem:
     def getBoolTrackedDeviceProperty(self, index: int, prop: int) -> bool:  # noqa: N802
         return False
 
-    def getDeviceToAbsoluteTrackingPose(
+    def getDeviceToAbsoluteTrackingPose(  # noqa: N802
         self, origin: int, seconds: float, array: list[Any]
-    ) -> None:  # noqa: N802
+    ) -> None:
         array[2].mDeviceToAbsoluteTracking.m = self.matrix
 
 

@@ -1,4 +1,4 @@
-"""The running object tracker between a real router, a publisher of poses and a reader of objects."""
+"""The running object tracker with a real router, a publisher of poses and a reader of objects."""
 
 from __future__ import annotations
 

@@ -272,7 +272,7 @@ def test_any_numbers_give_a_message_that_survives_the_wire(
 def test_real_steamvr_drift_recording_is_all_rotations(
     config: RigConfig, make_pose: MakePose, vive: Path
 ) -> None:
-    """20 minutes of a still tracker in SteamVR's 3x4 rows (MarvinGravert/Vive-Accuracy-Experiment)."""
+    """20 minutes of a still tracker, 3x4 rows (MarvinGravert/Vive-Accuracy-Experiment)."""
     recorded = np.loadtxt(vive / "marvin" / "drift20minExperiment.txt.gz").reshape(-1, 3, 4)
     step = ObjectStep(config, None)
     results = [step.step(make_pose(matrix)) for matrix in recorded[::10]]

@@ -11,7 +11,7 @@ import pytest
 
 from rhot.errors import CaptureError
 from services.recorder.reader import is_finished, read, read_attachments, summarize
-from services.recorder.recover import recover, target_of, unfinished
+from services.recorder.recover import recover, target_of, truncated_recordings
 from services.recorder.writer import RecordingWriter
 
 Write = Callable[..., Path]
@@ -48,11 +48,11 @@ writer.flush()
 os.kill(os.getpid(), signal.SIGKILL)
 """
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == -9
-    assert unfinished(tmp_path) == [path]
+    assert truncated_recordings(tmp_path) == [path]
     done = recover(path)
     assert [r.log_time_ns for r in read(done.target)] == list(range(done.messages))
     assert done.messages > 1500
-    assert unfinished(tmp_path) == [], "recovered once is enough"
+    assert truncated_recordings(tmp_path) == [], "recovered once is enough"
 
 
 def test_damage_in_the_middle_costs_only_its_chunk(
@@ -103,7 +103,7 @@ def test_missing_and_foreign_files(tmp_path: Path) -> None:
 def test_a_file_being_recorded_is_left_alone(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.mcap", "desk") as writer:
         writer.flush()
-        assert unfinished(tmp_path) == []
+        assert truncated_recordings(tmp_path) == []
         with pytest.raises(CaptureError, match="being recorded"):
             recover(tmp_path / "a.mcap")
 
@@ -112,12 +112,12 @@ def test_a_recovery_that_was_cut_is_done_again(tmp_path: Path, write: Write) -> 
     path = write(tmp_path / "a.mcap")
     path.write_bytes(path.read_bytes()[:-5])
     (tmp_path / f".{target_of(path).name}.part").write_bytes(b"half")
-    assert unfinished(tmp_path) == [path]
+    assert truncated_recordings(tmp_path) == [path]
     assert recover(path).messages == 1000
 
 
 def test_whole_recordings_need_nothing(tmp_path: Path, write: Write) -> None:
     write(tmp_path / "a.mcap")
     (tmp_path / "notes.txt").write_text("")
-    assert unfinished(tmp_path) == []
-    assert unfinished(tmp_path / "missing") == []
+    assert truncated_recordings(tmp_path) == []
+    assert truncated_recordings(tmp_path / "missing") == []

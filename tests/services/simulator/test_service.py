@@ -20,7 +20,7 @@ from rhot.messages import OpenVrPose
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame, Truth
 from services.simulator.scene.scene import load_scene
-from services.simulator.service import StageClock, serve
+from services.simulator.service import SceneClock, serve
 
 
 async def collect(
@@ -124,7 +124,7 @@ async def test_an_unknown_scene_ends_the_service(router, live):
 
 
 async def test_missed_ticks_are_left_out(monkeypatch):
-    clock = StageClock()
+    clock = SceneClock()
     ticks = clock.ticks(0.01)
     number, due_s = await anext(ticks)
     assert (number, due_s) == (0, 0.0)

@@ -14,7 +14,7 @@ import websockets.asyncio.server
 from websockets.exceptions import InvalidStatus
 
 from rhot.errors import BusError
-from services.viewer.server import Audience, open_server
+from services.viewer.server import BrowserCount, open_server
 
 
 def addresses() -> list[str]:
@@ -78,7 +78,7 @@ def test_foreign_pages_are_refused(browse: Callable[..., object]) -> None:
             browse(server.get_port(), origin=origin)
 
 
-def test_the_audience_is_counted(browse: Callable[..., object]) -> None:
+def test_browsers_are_counted(browse: Callable[..., object]) -> None:
     counts: list[int] = []
     changed = threading.Condition()
 
@@ -92,7 +92,7 @@ def test_the_audience_is_counted(browse: Callable[..., object]) -> None:
             return changed.wait_for(lambda: bool(counts) and counts[-1] == count, timeout=5.0)
 
     with open_server("127.0.0.1", 0) as server:
-        Audience(server, note)
+        BrowserCount(server, note)
         first = browse(server.get_port())
         assert seen(1)
         browse(server.get_port())

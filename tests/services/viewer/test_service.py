@@ -6,12 +6,15 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from rhot import topics
+from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
-from rhot.messages import HandPoints, HandPose, Health, ObjectPose
 from services.viewer.service import serve
 
 Make = Callable[..., Any]
+Message = tuple[str, dict[str, Any]]
 JPEG = b"\xff\xd8\xff\xe0picture"
 
 
@@ -21,75 +24,69 @@ async def until(condition: Callable[[], object]) -> None:
         await asyncio.sleep(0.01)
 
 
+def hears(words: str) -> Message:
+    """A text of the panel that contains these words."""
+    return "GuiUpdateMessage", {"updates": lambda u: words in u.get("content", "")}
+
+
+# Every kind of message that is published, as drawn and as text.
+DRAWN: tuple[Message, ...] = (
+    ("BatchedMeshesMessage", {"name": "/hands/right/joints"}),
+    ("BatchedMeshesMessage", {"name": "/hands/right/points"}),
+    ("SetPositionMessage", {"name": "/objects/cup"}),
+    hears("right hand: tracked"),
+    hears("hand/right/points"),
+    hears("57&deg;"),
+)
+# Nothing comes any more: the hand is hidden, and said to be missing.
+MISSING: tuple[Message, ...] = (
+    ("SetSceneNodeVisibilityMessage", {"name": "/hands/right/joints", "visible": False}),
+    hears("waiting for hand poses"),
+)
+
+
+@pytest.fixture
+def send_everything(
+    make_pose: Make, make_points: Make, make_object: Make, make_health: Make
+) -> Callable[[Bus], Callable[[], None]]:
+    """A function of the bus that sends one message of every kind, and garbage on their keys."""
+
+    def prepare(bus: Bus) -> Callable[[], None]:
+        messages = (
+            (bus.publisher(topics.POSE, hand="right"), make_pose()),
+            (bus.publisher(topics.POINTS, hand="right"), make_points("index_tip")),
+            (bus.publisher(topics.OBJECT, object="cup"), make_object()),
+            (bus.publisher(topics.HEALTH, service="fusion", instance="main"), make_health()),
+        )
+
+        def send() -> None:
+            for publisher, message in messages:
+                publisher.put(message)
+                bus.put_raw(publisher.key, b'\xff{"garbage"')
+
+        return send
+
+    return prepare
+
+
 async def test_what_is_published_is_drawn_and_told(
     running: Callable,
     config: RigConfig,
     browse: Make,
-    make_pose: Make,
-    make_points: Make,
-    make_object: Make,
-    make_health: Make,
+    send_everything: Callable[[Bus], Callable[[], None]],
     sending: Callable,
 ) -> None:
     async with running("viewer", serve, config) as (service, bus):
         await until(lambda: service.state == "running")
-        pose, points = (
-            bus.publisher(topics.POSE, hand="right"),
-            bus.publisher(topics.POINTS, hand="right"),
-        )
-        thing, health = (
-            bus.publisher(topics.OBJECT, object="cup"),
-            bus.publisher(topics.HEALTH, service="fusion", instance="main"),
-        )
-
-        def send() -> None:
-            message: HandPose | HandPoints | ObjectPose | Health
-            for publisher, message in (
-                (pose, make_pose()),
-                (points, make_points("index_tip")),
-                (thing, make_object()),
-                (health, make_health()),
-            ):
-                publisher.put(message)  # type: ignore[arg-type]
-            for key in (
-                "hand/right/pose",
-                "hand/right/points",
-                "object/cup/pose",
-                "service/fusion/main/health",
-            ):
-                bus.put_raw(f"rhot/desk/{key}", b'\xff{"garbage"')
-
+        send = send_everything(bus)
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
         with sending(send):
-            for type_, fields in (
-                ("BatchedMeshesMessage", {"name": "/hands/right/joints"}),
-                ("BatchedMeshesMessage", {"name": "/hands/right/points"}),
-                ("SetPositionMessage", {"name": "/objects/cup"}),
-                (
-                    "GuiUpdateMessage",
-                    {"updates": lambda u: "right hand: tracked" in u.get("content", "")},
-                ),
-                (
-                    "GuiUpdateMessage",
-                    {"updates": lambda u: "hand/right/points" in u.get("content", "")},
-                ),
-                ("GuiUpdateMessage", {"updates": lambda u: "57&deg;" in u.get("content", "")}),
-            ):
-                await asyncio.to_thread(browser.wait_for, type_, **fields)
+            for kind, fields in DRAWN:
+                await asyncio.to_thread(browser.wait_for, kind, **fields)
             await until(lambda: sum(stats.rejected for stats in service.bus.streams) >= 4)
         browser.forget()
-        # Nothing comes any more: the hand is hidden, and said to be missing.
-        await asyncio.to_thread(
-            browser.wait_for,
-            "SetSceneNodeVisibilityMessage",
-            name="/hands/right/joints",
-            visible=False,
-        )
-        await asyncio.to_thread(
-            browser.wait_for,
-            "GuiUpdateMessage",
-            updates=lambda u: "waiting for hand poses" in u.get("content", ""),
-        )
+        for kind, fields in MISSING:
+            await asyncio.to_thread(browser.wait_for, kind, **fields)
 
 
 async def test_uncalibrated_cameras_are_left_out_with_a_note(

@@ -13,7 +13,7 @@ from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand, forwar
 from rhot.hand_exercises import CYCLE_S
 from rhot.messages import HandPoint, HandPoints
 from services.simulator.scene.calibration_exercises import guided
-from services.simulator.scene.gestures import Unrest
+from services.simulator.scene.involuntary_motion import InvoluntaryMotion
 
 _FPS = 15.0
 
@@ -34,7 +34,7 @@ def _other(hand: HandName, factors: tuple[float, ...]) -> HandModel:
 
 
 def _messages(model: HandModel, begin_s: float = 0.0, still: bool = False) -> list[HandPoints]:
-    rng, unrest, motion, told = np.random.default_rng(5), Unrest(5), guided(model, 5), []
+    rng, unrest, motion, told = np.random.default_rng(5), InvoluntaryMotion(5), guided(model, 5), []
     for frame in range(int(CYCLE_S * _FPS)):
         t_s = frame / _FPS
         turn, shift = unrest(t_s)

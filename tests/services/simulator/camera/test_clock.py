@@ -1,18 +1,17 @@
-"""When simulated cameras take their pictures, and how wrong their clocks are."""
+"""When simulated cameras expose their frames, and the errors of their clocks."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from rhot.files.config import CameraTable
 from services.simulator.camera.clock import CameraClock, camera_clock
 
 
 def pair(seed: int = 1, fps: float = 30.0) -> tuple[CameraClock, CameraClock]:
-    left, right = (
-        camera_clock(name, i, 2, fps, 480, 0.008, seed) for i, name in enumerate(("left", "right"))
-    )
-    return left, right
+    left, right = (CameraTable(name=name, fps=fps) for name in ("left", "right"))
+    return camera_clock(left, 0, 2, 0.008, seed), camera_clock(right, 1, 2, 0.008, seed)
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 90.0])

@@ -36,7 +36,7 @@ def test_recorded_frames_have_almost_the_right_time(fist):
 
 def test_lost_frames_keep_their_number_and_have_no_picture(live):
     lost = next(k for k in range(1000) if live.clock.dropped(k))
-    assert live.shot(lost).dropped
+    assert live.frame_time(lost).dropped
     taken = live.take(lost)
     assert taken.dropped
     assert taken.image is None

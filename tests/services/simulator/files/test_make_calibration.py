@@ -1,4 +1,4 @@
-"""The simulated rig's calibration: loadable, near the nominal rig, and with colours that tell
+"""The simulated rig's calibration: it can be loaded, is near the nominal rig, and its colours tell
 paints apart.
 """
 
@@ -13,7 +13,7 @@ from rhot.files.calibration import load_cameras, load_colors, load_exposure, loa
 from rhot.files.config import CameraTable
 from rhot.geometry.transforms import angle_between
 from services.simulator.files import make_calibration
-from services.simulator.files.fit_colors import fit, inside, samples
+from services.simulator.files.fit_colors import fit_ranges, in_range, sample_pixels
 from services.simulator.render.renderer import Renderer
 from services.simulator.scene.scene import load_scene
 
@@ -45,7 +45,7 @@ def test_any_number_of_cameras_of_any_size(config, tmp_path, monkeypatch):
     cameras = [CameraTable(name=f"pi{k}", source="simulator", size_px=(320, 240)) for k in range(3)]
     own = msgspec.structs.replace(config, camera=cameras, folder=str(tmp_path))
     # A few frames of one scene are enough to see that ranges come out.
-    monkeypatch.setattr(make_calibration, "_SAMPLED", ("piano",))
+    monkeypatch.setattr(make_calibration, "_SCENES", ("piano",))
     monkeypatch.setattr(make_calibration, "_FRAMES", (3, 20, 37, 54))
     paths = make_calibration.write_all(own, "2025-01-01")
     assert len(paths) == 3 * 3 + 2
@@ -64,14 +64,17 @@ def test_any_number_of_cameras_of_any_size(config, tmp_path, monkeypatch):
 def test_colour_ranges_fit_scenes_they_were_not_fitted_to(config, camera, name):
     colors = load_colors(config.calibration_dir, camera).colors
     renderer = Renderer(load_scene(config, name, seed=5), camera)
-    painted, other = samples(renderer, (10, 45, 80))
-    for (hand, landmark), surface in renderer.cast.marks.items():
+    painted, other = sample_pixels(renderer, (10, 45, 80))
+    for (hand, landmark), surface in renderer.shapes.paint_surfaces.items():
         color = config.hand[hand].markers[landmark]
-        assert inside(colors[color], painted[surface]).mean() > 0.95, color
-        assert inside(colors[color], other).mean() < 1e-4, color
-        for mark, another in renderer.cast.marks.items():
-            if mark != (hand, landmark):
-                assert inside(colors[color], painted[another]).mean() < 0.01, (color, mark)
+        assert in_range(colors[color], painted[surface]).mean() > 0.95, color
+        assert in_range(colors[color], other).mean() < 1e-4, color
+        for landmark_of_another, another in renderer.shapes.paint_surfaces.items():
+            if landmark_of_another != (hand, landmark):
+                assert in_range(colors[color], painted[another]).mean() < 0.01, (
+                    color,
+                    landmark_of_another,
+                )
 
 
 def test_hues_that_wrap_through_red():
@@ -79,13 +82,13 @@ def test_hues_that_wrap_through_red():
     hue = rng.integers(-6, 7, 500) % 180
     red = np.stack([hue, np.full(500, 200), np.full(500, 150)], axis=1)
     skin = np.stack([np.full(100, 14), np.full(100, 90), np.full(100, 180)], axis=1)
-    bounds = fit({"red": red}, skin, "", "test").colors["red"]
+    bounds = fit_ranges({"red": red}, skin, "", "test").colors["red"]
     assert bounds.hsv_low[0] > bounds.hsv_high[0]
-    assert inside(bounds, red).mean() > 0.95
-    assert not inside(bounds, skin).any()
+    assert in_range(bounds, red).mean() > 0.95
+    assert not in_range(bounds, skin).any()
 
 
 def test_a_colour_nobody_sees_is_an_error():
     nothing = np.empty((0, 3), np.int64)
     with pytest.raises(CalibrationError, match="blue"):
-        fit({"blue": nothing}, nothing, "", "test")
+        fit_ranges({"blue": nothing}, nothing, "", "test")

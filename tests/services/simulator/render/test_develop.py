@@ -1,4 +1,4 @@
-"""The dark room: blur, gamma, averaged chroma, noise."""
+"""From light to a picture: blur, gamma, averaged chroma."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from services.simulator.render import develop
+from services.simulator.render.noise import NoiseBank, NoiseDraw, add_noise
 
 EVERYTHING = np.tile([0, 47], (32, 1))
 
 
-def developed(light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    luma, chroma = np.empty((32, 48), np.float32), np.empty((2, 16, 24), np.float32)
-    develop.develop(EVERYTHING, develop.tone_curve(), light.astype(np.float32), luma, chroma)
-    return luma, chroma
+def developed(light: np.ndarray) -> develop.Planes:
+    planes = develop.empty_planes(48, 32)
+    develop.to_yuv420(EVERYTHING, develop.tone_curve(), light.astype(np.float32), planes)
+    return planes
 
 
 def test_chroma_is_the_mean_of_four_pixels():
@@ -35,10 +36,10 @@ def test_chroma_is_the_mean_of_four_pixels():
 
 def test_colours_come_back_through_opencv():
     for linear in ((0.5, 0.1, 0.05), (0.02, 0.4, 0.1), (0.9, 0.9, 0.9), (0.0, 0.0, 0.0)):
-        luma, chroma = developed(np.broadcast_to(linear, (32, 48, 3)))
+        planes = developed(np.broadcast_to(linear, (32, 48, 3)))
         out = np.empty((48, 48), np.uint8)
-        bank = np.zeros((160, 176), np.int8), np.zeros((2, 80, 88), np.int8)
-        develop.expose(luma, chroma, *bank, 0, 0, 1.0, 0.0, out)
+        bank = NoiseBank(np.zeros((160, 176), np.int8), np.zeros((2, 80, 88), np.int8))
+        add_noise(planes, bank, NoiseDraw(0, 0, 1.0, 0.0), out)
         bgr = cv2.cvtColor(out, cv2.COLOR_YUV2BGR_I420)
         grey = [
             255 * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055)
@@ -68,19 +69,3 @@ def test_blur_of_a_part_equals_the_blur_of_everything():
     some[8:22] = (10, 33)
     develop.blur(some, weights, picture, np.zeros_like(picture), part)
     np.testing.assert_array_equal(part[8:22, 10:34], full[8:22, 10:34])
-
-
-def test_noise_of_each_colour_channel_has_unit_strength():
-    luma, chroma = develop.noise_bank(480, 640, seed=3)
-    assert luma.shape == (608, 768)
-    assert chroma.shape == (2, 304, 384)
-    assert luma.std() / develop.NOISE_UNIT == pytest.approx(0.574, rel=0.12)
-    # A camera's noise has neighbours: demosaicing smears it.
-    y = luma.astype(float)
-    assert np.corrcoef(y[:, :-2].ravel(), y[:, 2:].ravel())[0, 1] > 0.02
-
-
-def test_noise_offsets_are_even_and_inside_the_bank():
-    offsets = {develop.noise_offsets(1, frame) for frame in range(500)}
-    assert len(offsets) > 400
-    assert all(r % 2 == c % 2 == 0 and 0 <= r < 128 and 0 <= c < 128 for r, c in offsets)

@@ -1,4 +1,4 @@
-"""Pictures agree with the truth: geometry, rolling shutter, motion blur, noise."""
+"""Pictures agree with the ground truth: geometry, rolling shutter, motion blur, noise."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ import pytest
 from rhot.files.config import HandTable, RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import landmark_point
-from services.simulator.camera.visibility import sights
+from services.simulator.camera.visibility import patch_visibility
 from services.simulator.render.renderer import Renderer
-from services.simulator.scene.scene import Scene, load_scene
+from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.scene import Scene, build_scene, load_scene
 
 
 def projected(scene: Scene, camera: Camera, landmark: str, t_s: float) -> np.ndarray:
     """Pixel (2,) of the right hand's landmark point at t_s."""
     hand = scene.hands["right"]
-    point = landmark_point(hand.model, landmark, *hand.joints(hand.at(t_s)))
+    point = landmark_point(hand.model, landmark, *hand.joints(hand.state_at(t_s)))
     return camera.project(point)[0]
 
 
@@ -31,18 +32,18 @@ def test_paint_lies_where_the_truth_says(config, camera):
         renderer = Renderer(scene, camera)
         for frame in (3, 40, 77):
             t_s = renderer.clock.time_s(frame)
-            for (_, landmark), sight in sights(renderer, t_s).items():
-                if sight.share < 0.95:
+            for (_, landmark), patch in patch_visibility(renderer, t_s).items():
+                if patch.share < 0.95:
                     continue
-                own_s = t_s + sight.centre_px[1] * renderer.clock.row_time_ns * 1e-9
-                off = np.array(sight.centre_px) - projected(
+                own_s = t_s + patch.centre_px[1] * renderer.clock.row_time_ns * 1e-9
+                off = np.array(patch.centre_px) - projected(
                     scene, scene.cameras[camera], landmark, own_s
                 )
                 # The middle of a patch seen at a slant is not the point that stands for it: up to 2
                 # px = 2 mm at 0.5 m.
                 assert np.hypot(*off) < 2.5, (name, frame, landmark, off)
                 # Pixels of a tip: 14 mm by twice its radius, seen from the side or from its end.
-                assert 80 < sight.seen_px < 420, (name, frame, landmark)
+                assert 80 < patch.visible_px < 420, (name, frame, landmark)
 
 
 def test_rows_are_taken_one_after_the_other(fast):
@@ -51,12 +52,12 @@ def test_rows_are_taken_one_after_the_other(fast):
     right, wrong = [], []
     for frame in range(0, 30, 2):
         t_s = renderer.clock.time_s(frame)
-        for (_, landmark), sight in sights(renderer, t_s).items():
-            rows_later_s = sight.centre_px[1] * row_s
+        for (_, landmark), patch in patch_visibility(renderer, t_s).items():
+            rows_later_s = patch.centre_px[1] * row_s
             right.append(
-                sight.centre_px[0] - projected(fast, camera, landmark, t_s + rows_later_s)[0]
+                patch.centre_px[0] - projected(fast, camera, landmark, t_s + rows_later_s)[0]
             )
-            wrong.append(sight.centre_px[0] - projected(fast, camera, landmark, t_s)[0])
+            wrong.append(patch.centre_px[0] - projected(fast, camera, landmark, t_s)[0])
     # The patch's own shape makes up to a pixel; 6 ms at 1.3 m/s would be 8.
     assert np.std(right) < 0.8
     assert np.std(wrong) > 3.0
@@ -84,14 +85,14 @@ def test_motion_blur_is_the_mean_over_the_exposure(fast):
     assert error < 0.4 * blur
     local = cv2.blur(ours - mean, (5, 5))[smeared]
     assert np.sqrt(np.mean(local**2)) < 0.12 * blur
-    # And no light is lost or won.
+    # And no light is lost or gained.
     assert abs((ours - mean)[smeared].mean()) < 0.02 * blur
 
 
 def test_outlines_are_smooth(config):
     """A hand that moves by a quarter of a pixel changes the picture a quarter as much as by one."""
     renderer = Renderer(load_scene(config, "still"), "left")
-    mask = renderer.labels(0.5) == 1 + renderer.cast.marks["right", "index_tip"]
+    mask = renderer.labels(0.5) == 1 + renderer.shapes.paint_surfaces["right", "index_tip"]
     rows, columns = np.nonzero(mask)
     window = np.s_[rows.min() - 3 : rows.max() + 4, columns.min() - 3 : columns.max() + 4]
 
@@ -154,17 +155,14 @@ def test_any_joint_can_be_painted(config):
     markers = {"middle_proximal": "red", "wrist": "violet", "palm": "yellow"}
     rig: RigConfig = msgspec.structs.replace(config, hand={"right": HandTable(markers=markers)})
     renderer = Renderer(load_scene(rig, "still"), "left")
-    seen = sights(renderer, 0.1)
-    assert seen["right", "wrist"].seen_px > 100
+    seen = patch_visibility(renderer, 0.1)
+    assert seen["right", "wrist"].visible_px > 100
     # Dabs of other joints are on the back of the hand, which the cameras do not see.
-    assert seen["right", "middle_proximal"].seen_px == 0
+    assert seen["right", "middle_proximal"].visible_px == 0
     assert seen["right", "palm"].share == 0.0
 
 
 def test_a_hand_outside_the_picture_leaves_the_wall(config):
-    from services.simulator.scene.catalog import SCENES
-    from services.simulator.scene.scene import build_scene
-
     bare = msgspec.structs.replace(config, object=[])
     away = build_scene(
         bare, dataclasses.replace(SCENES["still"], shift_m=(5.0, 0.0)), "away", seed=1

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rhot.hand import JOINT_INDEX, TIPS, default_hand, forward
-from services.simulator.scene.bodies import ARM, HAND_FRAMES, Shapes, add_hand, arrays
+from services.simulator.scene.bodies import ARM, HAND_FRAMES, ShapeBuilder, add_hand
 
 
 @pytest.mark.parametrize("hand", ["left", "right"])
 def test_fingers_end_at_their_tips_and_the_wrist_is_as_thick_as_said(hand):
     model = default_hand(hand)
-    shapes = Shapes()
+    shapes = ShapeBuilder()
     add_hand(shapes, model, 0, 0, {"index_tip": 3, "wrist": 4})
-    table = arrays(shapes)
+    table = shapes.arrays()
     positions, rotations = forward(model, np.eye(3), np.zeros(3), model.limits_rad.mean(axis=2))
     ends = {}
     for c, (_, b) in enumerate(table.frame):
@@ -43,9 +43,9 @@ def test_fingers_end_at_their_tips_and_the_wrist_is_as_thick_as_said(hand):
 def test_hands_mirror():
     tables = []
     for hand in ("left", "right"):
-        shapes = Shapes()
+        shapes = ShapeBuilder()
         add_hand(shapes, default_hand(hand), 0, 0, {})
-        tables.append(arrays(shapes))
+        tables.append(shapes.arrays())
     left, right = tables
     np.testing.assert_array_equal(left.radius, right.radius)
     np.testing.assert_allclose(left.offset * (-1, 1, 1), right.offset, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Scenes: named, seeded, complete, and with the hand where the cameras see it."""
+"""Scenes: named, repeatable, complete, and with the hand where the cameras see it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rhot.errors import CalibrationError, ConfigError
 from rhot.files.config import CameraTable, HandTable, ObjectTable, Simulator, World
 from rhot.geometry.transforms import angle_between, apply, rotation_x, transform
 from rhot.hand import TIPS
-from services.simulator.render.renderer import cast_of
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import load_scene
+from services.simulator.scene.scene_shapes import scene_shapes
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -41,8 +41,12 @@ def test_the_hand_is_half_a_metre_away_and_shows_its_palm(config, name):
 def test_the_same_again_and_another(config):
     one, same, other = (load_scene(config, "random", seed=seed) for seed in (1, 1, 2))
     for t_s in (0.0, 1.234, 5000.0):
-        np.testing.assert_array_equal(one.bodies(t_s).positions, same.bodies(t_s).positions)
-        assert np.abs(one.bodies(t_s).positions - other.bodies(t_s).positions).max() > 1e-3
+        np.testing.assert_array_equal(
+            one.body_frames(t_s).positions, same.body_frames(t_s).positions
+        )
+        assert (
+            np.abs(one.body_frames(t_s).positions - other.body_frames(t_s).positions).max() > 1e-3
+        )
 
 
 def test_defaults_come_from_rig_toml(config):
@@ -59,7 +63,7 @@ def test_speed_moves_faster_and_tremor_does_not(config):
     slow, fast = (
         load_scene(config, "wave", seed=1, speed=speed).hands["right"] for speed in (0.5, 2.0)
     )
-    np.testing.assert_array_equal(slow.unrest(1.0)[1], fast.unrest(1.0)[1])
+    np.testing.assert_array_equal(slow.involuntary(1.0)[1], fast.involuntary(1.0)[1])
     np.testing.assert_allclose(slow.motion(0.5 * 4.0).turn_rad, fast.motion(2.0 * 1.0).turn_rad)
 
 
@@ -70,7 +74,7 @@ def test_unknown_names_are_told_the_valid_ones(config):
         config, hand={"right": HandTable(markers={"index_tip": "mauve"})}
     )
     with pytest.raises(ConfigError, match=r"no paint 'mauve'.*magenta"):
-        cast_of(load_scene(wrong, "still"))
+        scene_shapes(load_scene(wrong, "still"))
 
 
 def test_what_is_missing_is_named(config, tmp_path):
@@ -88,7 +92,7 @@ def test_what_is_missing_is_named(config, tmp_path):
 def test_an_object_is_taken_without_a_jump_and_then_rides_along(config):
     scene = load_scene(config, "grab", seed=1)
     times = np.arange(0.0, 8.0, 0.005)
-    poses = np.array([scene.thing_poses(float(t))["cup"] for t in times])
+    poses = np.array([scene.object_poses(float(t))["cup"] for t in times])
     assert (
         np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).max() < 0.005 * 0.35
     )  # under 0.35 m/s, no jump
@@ -98,7 +102,7 @@ def test_an_object_is_taken_without_a_jump_and_then_rides_along(config):
     relative = []
     for t in held[:: len(held) // 10]:
         state = scene.hand_states(float(t))["right"]
-        relative.append(np.linalg.inv(state.T_rig_from_wrist) @ scene.thing_poses(float(t))["cup"])
+        relative.append(np.linalg.inv(state.T_rig_from_wrist) @ scene.object_poses(float(t))["cup"])
     np.testing.assert_allclose(
         relative, np.broadcast_to(relative[0], np.shape(relative)), atol=1e-9
     )
@@ -135,7 +139,7 @@ def test_the_world_frame_moves_everything_together(config):
     rig = msgspec.structs.replace(config.rig, world=World(T_rig_from_camera=rows))
     plain = load_scene(config, "piano", seed=1)
     turned = load_scene(msgspec.structs.replace(config, rig=rig), "piano", seed=1)
-    a, b = plain.bodies(2.0), turned.bodies(2.0)
+    a, b = plain.body_frames(2.0), turned.body_frames(2.0)
     np.testing.assert_allclose(b.positions, apply(T, a.positions), atol=1e-9)
     for name, camera in turned.cameras.items():
         np.testing.assert_allclose(
@@ -144,9 +148,9 @@ def test_the_world_frame_moves_everything_together(config):
 
 
 def test_more_objects_stand_in_a_row(config):
-    things = [ObjectTable(name=name, serial=f"LHR-{name}") for name in ("cup", "pen", "box")]
-    scene = load_scene(msgspec.structs.replace(config, object=things), "grab")
-    assert [thing.holder for thing in scene.things] == ["right", None, None]
-    poses = scene.thing_poses(4.0)
+    tables = [ObjectTable(name=name, serial=f"LHR-{name}") for name in ("cup", "pen", "box")]
+    scene = load_scene(msgspec.structs.replace(config, object=tables), "grab")
+    assert [item.holder for item in scene.objects] == ["right", None, None]
+    poses = scene.object_poses(4.0)
     assert np.linalg.norm(poses["pen"][:3, 3] - poses["box"][:3, 3]) > 0.05
     assert angle_between(poses["pen"][:3, :3], poses["box"][:3, :3]) < 1e-6

@@ -30,6 +30,6 @@ def test_points_follow_from_wrist_and_angles(fist, t_s):
 
 def test_objects_are_in_the_rig_frame(fist):
     cup = fist.truth(1.0).objects["cup"]
-    T = fist.thing_poses(1.0)["cup"]
+    T = fist.object_poses(1.0)["cup"]
     np.testing.assert_allclose(cup.position_m, T[:3, 3], atol=1e-6)
     np.testing.assert_allclose(rotation_from_quaternion(cup.orientation_wxyz), T[:3, :3], atol=1e-6)

@@ -13,7 +13,7 @@ from services.simulator.scene.vive_trackers import tracker_pose
 
 def poses(scene, times, first_seq=0):
     return [
-        tracker_pose(scene, scene.things[0], 1, float(t), first_seq + k, 1000 + k)
+        tracker_pose(scene, scene.objects[0], 1, float(t), first_seq + k, 1000 + k)
         for k, t in enumerate(times)
     ]
 
@@ -24,7 +24,7 @@ def matrix(pose) -> np.ndarray:
 
 def test_the_objects_pose_follows_from_the_trackers(config):
     scene = load_scene(config, "piano")
-    truth = scene.thing_poses(0.0)["cup"]
+    truth = scene.object_poses(0.0)["cup"]
     objects = load_objects(config.calibration_dir)
     place = objects.objects["cup"]
     T_tracker_from_object = transform(
@@ -65,8 +65,8 @@ def test_velocities_are_those_of_the_motion(config):
     times = np.arange(2.5, 5.5, 0.05)
     seen = poses(scene, times)
     for pose, t in zip(seen[::10], times[::10], strict=True):
-        before, after = (scene.thing_poses(float(t) + s)["cup"] for s in (-0.01, 0.01))
-        lever = scene.things[0].T_object_from_tracker
+        before, after = (scene.object_poses(float(t) + s)["cup"] for s in (-0.01, 0.01))
+        lever = scene.objects[0].T_object_from_tracker
         v_rig = ((after @ lever)[:3, 3] - (before @ lever)[:3, 3]) / 0.02
         v_lighthouse = scene.T_rig_from_lighthouse[:3, :3].T @ v_rig
         np.testing.assert_allclose(pose.vVelocity, v_lighthouse, atol=0.03)

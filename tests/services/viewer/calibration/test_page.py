@@ -1,5 +1,5 @@
-"""The calibration page without a browser: switches, clicks and answers, against a tracker made of
-three answers.
+"""The calibration page without a browser: switches, clicks and answers, with a tracker that gives
+three fixed answers.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ async def open_page(service: Service, browse: Callable[..., Any]) -> Page:
     return page
 
 
-async def test_a_click_is_fitted_shown_and_put_in_force(
+async def test_a_click_is_fitted_shown_and_applied(
     running: Callable, config: RigConfig, browse: Callable
 ) -> None:
     async with running("viewer", serve, config) as (service, bus):
@@ -112,13 +112,13 @@ async def test_a_click_is_fitted_shown_and_put_in_force(
         (pointed,) = tracker.requests[0].pointed
         assert (pointed.color, pointed.x_px, pointed.y_px) == ("blue", 16.0, 24.0)
         assert pointed.picture == picture_name(tracker.png)
-        await page.says("not in force yet")
+        await page.says("not applied yet")
         page.browser._send(
             _messages.GuiUpdateMessage(
-                await page.uuid("GuiButtonMessage", "put in force"), {"value": True}
+                await page.uuid("GuiButtonMessage", "apply"), {"value": True}
             )
         )
-        await page.says("in force on camera left")
+        await page.says("applied on camera left")
         assert tracker.colors.colors == {"violet": GREEN, "blue": GREEN}
         assert tracker.colors.tool == "rhot viewer"
         assert tracker.colors.date
@@ -135,12 +135,12 @@ async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(
         await asyncio.to_thread(page.browser.wait_for, "ImageMessage", name="/calibrate")
         page.click_picture(0.5, 0.5)
         assert "that is &lt;grey&gt;" in await page.says("that is")
-        await page.says("0 of 2 colours pointed at")
+        await page.says("0 of 2 colours clicked")
         # Beside the picture is nowhere.
         page.click_picture(1.5, 0.5)
         tracker.refuses = ""
         page.click_picture(0.5, 0.5)
-        await page.says("1 of 2 colours pointed at")
+        await page.says("1 of 2 colours clicked")
         assert [len(request.pointed) for request in tracker.requests] == [1, 1]
 
 

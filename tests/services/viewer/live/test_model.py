@@ -1,4 +1,4 @@
-"""Messages in, views out: freshness, absurd values, bounds."""
+"""Messages in, views out: freshness, implausible values, bounds."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_hand_is_shown_until_it_is_stale(
     assert view.latency_ms["right"] == pytest.approx(31.0)
     assert list(view.points) == [("right", "index_tip")]
     assert not view.points["right", "index_tip"].predicted
-    assert model.absurd == 1
+    assert model.implausible == 1
     empty = model.view(1.01 + STALE_S)
     assert empty.hands == empty.points == empty.latency_ms == empty.trails == {}
 
@@ -48,7 +48,7 @@ def test_stamps_of_another_time_say_nothing_about_latency(
 @pytest.mark.parametrize(
     "at", [(math.nan, 0.0, 0.0), (0.0, 1e300, 0.0), (0.0, 0.0, -101.0), (math.inf, 0.0, 0.0)]
 )
-def test_absurd_positions_are_not_drawn(
+def test_implausible_positions_are_not_drawn(
     make_pose: Callable[..., HandPose],
     make_points: Callable[..., HandPoints],
     make_object: Callable[..., ObjectPose],
@@ -60,13 +60,13 @@ def test_absurd_positions_are_not_drawn(
     model.object(make_object(position_m=at), 0.0)
     view = model.view(0.0)
     assert view.hands == view.points == view.objects == {}
-    assert model.absurd == 3
+    assert model.implausible == 3
 
 
 @pytest.mark.parametrize(
     "wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1e300, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)]
 )
-def test_absurd_orientations_are_not_drawn(
+def test_implausible_orientations_are_not_drawn(
     make_object: Callable[..., ObjectPose], wxyz: tuple[float, ...]
 ) -> None:
     model = ViewModel()
