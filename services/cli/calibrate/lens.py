@@ -40,7 +40,7 @@ def lens(
     from rhot.files.calibration import save
     from services.calibrator.board.picture_folder import one_camera
     from services.calibrator.lens.calibrate import calibrate_camera
-    from services.calibrator.output.calibration_files import lens_of
+    from services.calibrator.output.calibration_files import lens_file
     from services.calibrator.output.report import lens_text
 
     rig = options.rig_if_named(config, needed=live)
@@ -53,7 +53,7 @@ def lens(
     known, found, blind = options.detect_all(pictures, known, square or options.SQUARE_M, progress)
     result = calibrate_camera(name, found[name], known)
     result = replace(result, left_out=(*blind, *result.left_out))
-    made = lens_of(result, known, options.now_text(), str(folder))
+    made = lens_file(result, known, options.now_text(), str(folder))
     path = options.out_folder(out, rig) / f"{name}.lens.json"
     save(path, made)
     if as_json:

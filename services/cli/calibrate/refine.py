@@ -45,7 +45,7 @@ def refine(
     """Adjust the cameras' places to moving markers: a wand waved before all cameras, or a painted
     hand.
     """
-    from services.calibrator.output.calibration_files import refined_of
+    from services.calibrator.output.calibration_files import refined_rig_file
     from services.calibrator.output.report import refined_text
     from services.calibrator.recalibrate import marker_tracks
     from services.calibrator.recalibrate.refine_rig import refine_rig
@@ -58,13 +58,13 @@ def refine(
     known = _wand(wand)
     cameras = load_cameras(rig.calibration_dir, [camera.name for camera in rig.camera])
     result = refine_rig(
-        marker_tracks.recording(
+        marker_tracks.build_tracks(
             messages(recording, topics.MARKERS, MarkerFrame, "markers"), cameras
         ),
         cameras,
         known,
     )
-    geometry = refined_of(result, options.now_text(), str(recording), wand or "")
+    geometry = refined_rig_file(result, options.now_text(), str(recording), wand or "")
     path = options.out_folder(out, rig) / "rig.json"
     save(path, geometry)
     if as_json:

@@ -56,7 +56,7 @@ def stereo(
     """Find where the cameras stand to each other, and their lenses, from pictures of a board that
     all of them see.
     """
-    from services.calibrator.output.calibration_files import given_lenses
+    from services.calibrator.output.calibration_files import lens_vectors
     from services.calibrator.rig.calibrate import calibrate_rig
 
     rig = options.rig_if_named(config, needed=live)
@@ -72,7 +72,7 @@ def stereo(
         {camera: load_lens(target, camera) for camera in pictures.cameras} if keep_lenses else None
     )
     known, found, blind = options.detect_all(pictures, known, square or options.SQUARE_M, progress)
-    result = calibrate_rig(found, known, given_lenses(kept, found) if kept else None)
+    result = calibrate_rig(found, known, lens_vectors(kept, found) if kept else None)
     result = replace(result, left_out=(*blind, *result.left_out))
     _write(result, target, folder, as_json)
     if note := options.square_note(square):
@@ -100,14 +100,14 @@ def _pictures(folder: Path, names: list[str] | None, side_by_side: bool) -> Pict
 
 
 def _write(result: RigResult, target: Path, folder: Path, as_json: bool) -> None:
-    from services.calibrator.output.calibration_files import lenses_of, rig_of
+    from services.calibrator.output.calibration_files import rig_lens_files, rig_file
     from services.calibrator.output.report import rig_text
 
     date = options.now_text()
     files = {
-        f"{name}.lens.json": made for name, made in lenses_of(result, date, str(folder)).items()
+        f"{name}.lens.json": made for name, made in rig_lens_files(result, date, str(folder)).items()
     }
-    geometry = rig_of(result, date, str(folder))
+    geometry = rig_file(result, date, str(folder))
     for name, made in files.items():
         save(target / name, made)
     # Last: a rig.json of these lenses is never beside older ones.
