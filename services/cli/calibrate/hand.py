@@ -95,16 +95,17 @@ def _fit(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    from services.calibrator.hand.fit import fit_person
-    from services.calibrator.hand.recording import recording_of
-    from services.calibrator.hand.report import hand_file, report_text
+    from services.calibrator.hand.fit import fit_hand
+    from services.calibrator.hand.recording import sort_exercises
+    from services.calibrator.hand.hand_file import hand_file
+    from services.calibrator.hand.report import report_text
 
     if not messages:
         raise CalibrationError(
             f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?"
         )
     table = default_hand(which)
-    problem, found = fit_person(recording_of(messages, table, start_s=start), table, known)
+    problem, found = fit_hand(sort_exercises(messages, table, start_s=start), table, known)
     made = hand_file(problem, found, table, date=options.now_text(), inputs=source)
     if not dry_run:
         save(target, made)
