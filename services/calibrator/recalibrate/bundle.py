@@ -4,7 +4,7 @@ This is what `rhot calibrate refine` solves. The marker points are eliminated: f
 the extrinsics each marker is triangulated at each instant, and the reprojection errors that remain
 are minimised, robustly against wrong markers (Triggs et al., "Bundle Adjustment - A Modern
 Synthesis", 1999, section 6). Whatever the data, something finite comes out: the old extrinsics are
-a prior (residuals.PRIOR_*), and a sigma near the prior's says that the data told nothing.
+a prior (residuals.PRIOR_*), and a sigma near the prior's says that the data determined nothing.
 """
 
 from __future__ import annotations

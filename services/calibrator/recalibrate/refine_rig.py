@@ -23,9 +23,9 @@ from services.calibrator.recalibrate.held_out import held_out_errors
 from services.calibrator.recalibrate.marker_tracks import MarkerTracks
 from services.calibrator.recalibrate.residuals import ExtrinsicsProblem, WandEnds
 
-# More points than this gain nothing beside the time they cost: 3000 tell a rotation to .004 deg.
+# More points than this gain nothing for the time they cost: 3000 give a rotation to .004 deg.
 _MAX_POINTS = 3000
-# A wand shorter than its markers are wide tells no scale; a longer one is given in another unit.
+# A wand shorter than its markers are wide gives no scale; a longer one is given in another unit.
 _MIN_WAND_M, _MAX_WAND_M = 0.02, 2.0
 
 

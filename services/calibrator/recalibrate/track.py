@@ -8,7 +8,7 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 
-# Samples further apart than this many usual steps do not tell what lies between; a lost frame is 2.
+# Nothing is known between samples further apart than this many usual steps; a lost frame is 2.
 _GAP_STEPS = 2.5
 # An outlier lies this many times the usual deviation from its neighbours (motion is a part of
 # that), and at least so far: 5 px at the usual lens.

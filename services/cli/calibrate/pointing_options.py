@@ -1,4 +1,4 @@
-"""What `rhot calibrate colors` is told of paint in pictures: --box, --click and --at, as text, to
+"""Where `rhot calibrate colors` finds paint in pictures: --box, --click, --at and --auto, parsed to
 pointers. Pure.
 """
 

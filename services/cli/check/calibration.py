@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 

@@ -75,8 +75,18 @@ def test_stereo_says_when_the_squares_were_assumed_and_prints_json(run, folder, 
     result = run("stereo", pictures, "--board", "9x6", "--out", tmp_path, "--json")
     assert json.loads(result.stdout)["inputs"]["square_m"] == 0.025
     assert "25 mm were assumed" in result.stderr
-    words = ["--square", 0.05, "--out", tmp_path, "--keep-lenses", "--json"]
-    again = run("stereo", pictures, "--board", "9x6", *words)
+    again = run(
+        "stereo",
+        pictures,
+        "--board",
+        "9x6",
+        "--square",
+        0.05,
+        "--out",
+        tmp_path,
+        "--keep-lenses",
+        "--json",
+    )
     residuals = json.loads(again.stdout)["residuals"]
     assert residuals["square_mm"] == pytest.approx(50.0, rel=5e-3)
     assert np.linalg.norm(load_cameras(tmp_path, ["right"])["right"].centre_rig) == pytest.approx(
@@ -149,13 +159,26 @@ def test_board_writes_a_pdf_and_says_how_to_use_it(tmp_path):
     app = typer.Typer()
     app.command()(board)
     path = tmp_path / "new" / "board.pdf"
-    words = ["--kind=charuco", "--cols=7", "--rows=5", "--square-mm=30", f"--out={path}"]
-    result = CliRunner().invoke(app, words)
+    result = CliRunner().invoke(
+        app,
+        [
+            "--kind",
+            "charuco",
+            "--cols",
+            "7",
+            "--rows",
+            "5",
+            "--square-mm",
+            "30",
+            "--out",
+            str(path),
+        ],
+    )
     assert path.read_bytes().startswith(b"%PDF")
     assert "--board 7x5 --square 0.03 --kind charuco" in result.stdout
 
 
-def test_refine_writes_the_extrinsics_that_a_hand_gives(run, tmp_path):
+def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
     """The right camera stands half a degree and 2 mm off its rig.json.
 
     The report says so, and services read the new file.

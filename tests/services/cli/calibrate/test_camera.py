@@ -29,17 +29,11 @@ TIPS = [
     Tip("green", 70.0, 80.0, width_px=14.0, length_px=16.0),
     Tip("blue", 130.0, 70.0, width_px=14.0, length_px=16.0),
 ]
-RIG = """
-[rig]
-name = "desk"
-[[camera]]
-name = "left"
-source = "simulator"
-size_px = [240, 160]
-[hand.right.markers]
-index_tip = "green"
-thumb_tip = "blue"
-"""
+RIG = (
+    '[rig]\nname = "desk"\n'
+    '[[camera]]\nname = "left"\nsource = "simulator"\nsize_px = [240, 160]\n'
+    '[hand.right.markers]\nindex_tip = "green"\nthumb_tip = "blue"\n'
+)
 
 
 @pytest.fixture(scope="module")
