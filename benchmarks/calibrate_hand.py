@@ -1,5 +1,5 @@
-"""What `rhot calibrate hand` is worth: the solver's error with the tables' bones, with calibrated
-ones, with the true ones.
+"""What `rhot calibrate hand` gains: the solver's error with the tables' bones, with calibrated and
+with true ones.
 
     python benchmarks/calibrate_hand.py --hands 4 --json calibrate_hand.json
 
@@ -15,28 +15,22 @@ import argparse
 import json
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import (
-    Array,
-    angle_between,
-    rotation_from_quaternion,
-    rotation_from_vector,
-)
-from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand, forward, landmark_point
+from rhot.geometry.transforms import Array, angle_between, rotation_from_quaternion
+from rhot.hand import HandModel, default_hand
 from rhot.hand_exercises import CYCLE_S
-from rhot.messages import HandPoint, HandPoints, HandPose
-from services.calibrator.hand.fit import fit_person
-from services.calibrator.hand.recording import recording_of
+from rhot.messages import HandPoints, HandPose
+from services.calibrator.hand.fit import fit_hand
+from services.calibrator.hand.recording import sort_exercises
 from services.simulator.scene.calibration_exercises import guided
 from services.simulator.scene.gestures import MOTIONS, Motion
 from services.simulator.scene.involuntary_motion import InvoluntaryMotion
 from services.solver.step import SolverStep
+from testing.synthetic_hands import hand_message, noisy_points, with_bone_factors, wrist_rotation
 
-_NOISE_M, _FPS = 1e-3, 30.0
-_START = rotation_from_vector(np.array([1.2, 0.3, 0.1]))
+_FPS = 30.0
 
 
 def main() -> None:
@@ -45,117 +39,85 @@ def main() -> None:
     parser.add_argument("--hands", type=int, default=4, help="of each kind")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
-    results: dict[str, dict[str, list[float]]] = {}
     print(f"{'kind':8}{'bones':12}{'flexion_deg':>12}{'orientation_deg':>17}{'ratios to true':>22}")
-    for kind in ("finger", "bone"):
-        errors: dict[str, list[tuple[float, float]]] = {}
-        for seed in range(options.hands):
-            truth = other_hand(kind, seed)
-            table = default_hand(truth.hand)
-            problem, found = fit_person(
-                recording_of(messages(truth, guided(truth, seed), seed, CYCLE_S)[0], table), table
-            )
-            for name, model in (
-                ("true", truth),
-                ("tables", table),
-                ("calibrated", problem.shape.model(found.x)),
-            ):
-                errors.setdefault(name, []).append(solver_error(truth, model, seed))
-        means = {name: np.mean(values, axis=0) for name, values in errors.items()}
-        results[kind] = {}
-        for name, mean in means.items():
-            ratio = mean / means["true"]
-            print(f"{kind:8}{name:12}{mean[0]:12.2f}{mean[1]:17.2f}{ratio[0]:14.2f}{ratio[1]:8.2f}")
-            results[kind] |= {
-                f"{name}_flexion_deg": round(float(mean[0]), 3),
-                f"{name}_orientation_deg": round(float(mean[1]), 3),
-            }
-            results[kind] |= {
-                f"{name}_flexion_ratio": round(float(ratio[0]), 3),
-                f"{name}_orientation_ratio": round(float(ratio[1]), 3),
-            }
+    results = {kind: measure(kind, options.hands) for kind in ("finger", "bone")}
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 
 
+def measure(kind: str, hands: int) -> dict[str, float]:
+    """Mean errors over some hands of one kind, and their ratios to those with true bones."""
+    errors: dict[str, list[tuple[float, float]]] = {}
+    for seed in range(hands):
+        truth = other_hand(kind, seed)
+        table = default_hand(truth.hand)
+        published, _ = messages(truth, guided(truth, seed), seed, CYCLE_S)
+        problem, found = fit_hand(sort_exercises(published, table), table)
+        calibrated = problem.parameters.model(found.x)
+        for name, model in (("true", truth), ("tables", table), ("calibrated", calibrated)):
+            errors.setdefault(name, []).append(solver_error(truth, model, seed))
+    means = {name: np.mean(values, axis=0) for name, values in errors.items()}
+    figures: dict[str, float] = {}
+    for name, mean in means.items():
+        ratio = mean / means["true"]
+        print(f"{kind:8}{name:12}{mean[0]:12.2f}{mean[1]:17.2f}{ratio[0]:14.2f}{ratio[1]:8.2f}")
+        figures |= {
+            f"{name}_flexion_deg": round(float(mean[0]), 3),
+            f"{name}_orientation_deg": round(float(mean[1]), 3),
+            f"{name}_flexion_ratio": round(float(ratio[0]), 3),
+            f"{name}_orientation_ratio": round(float(ratio[1]), 3),
+        }
+    return figures
+
+
 def other_hand(kind: str, seed: int) -> HandModel:
     """A hand whose bones, metacarpals too, are 10 % longer or shorter than the tables'."""
-    rng = np.random.default_rng([seed, 3])
-    signs = rng.permutation([-1.0, 1.0, -1.0, 1.0, rng.choice([-1.0, 1.0])])
-    digits = []
-    for digit, sign in zip(default_hand().digits, signs, strict=True):
-        factors = 1.0 + 0.1 * (np.full(4, sign) if kind == "finger" else rng.choice([-1.0, 1.0], 4))
-        start = np.array(digit.metacarpal_m)
-        base = start + factors[3] * (np.array(digit.base_m) - start)
-        lengths = factors[:3] * np.array(digit.lengths_m)
-        digits.append(
-            msgspec.structs.replace(
-                digit, base_m=tuple(base.tolist()), lengths_m=tuple(lengths.tolist())
-            )
-        )
-    return msgspec.structs.replace(default_hand(), digits=tuple(digits))
+    random = np.random.default_rng([seed, 3])
+    signs = random.permutation([-1.0, 1.0, -1.0, 1.0, random.choice([-1.0, 1.0])])
+    factors = [
+        1.0 + 0.1 * (np.full(4, sign) if kind == "finger" else random.choice([-1.0, 1.0], 4))
+        for sign in signs
+    ]
+    return with_bone_factors(default_hand(), np.array(factors))
 
 
 def messages(
     model: HandModel, motion: Motion, seed: int, seconds: float
 ) -> tuple[list[HandPoints], list[tuple[Array, Array]]]:
-    """A motion as fusion would tell it, and the truth: wrist rotation and angles of every frame."""
-    rng, unrest = np.random.default_rng([seed, 17]), InvoluntaryMotion(seed)
-    told, truth = [], []
+    """A motion as fusion would publish it, and the true wrist rotation and angles of each frame."""
+    random, unrest = np.random.default_rng([seed, 17]), InvoluntaryMotion(seed)
+    published, truth = [], []
     for frame in range(int(seconds * _FPS)):
-        gesture, (turn, shift) = motion(frame / _FPS), unrest(frame / _FPS)
-        R = _START @ rotation_from_vector(gesture.turn_rad) @ rotation_from_vector(turn)
-        joints = forward(
-            model, R, np.array([0.0, 0.05, 0.5]) + gesture.shift_m + shift, gesture.angles_rad
-        )
-        points = [
-            HandPoint(
-                name=name,
-                position_m=tuple(
-                    (landmark_point(model, name, *joints) + rng.normal(0.0, _NOISE_M, 3)).tolist()
-                ),
-                sigma_m=(_NOISE_M,) * 3,
-                cameras=["left", "right"],
-                source="measured",
-            )
-            for name in BASIC_LANDMARKS
-        ]
-        told.append(
-            HandPoints(
-                hand=model.hand,
-                seq=frame,
-                stamp_ns=10**18 + round(frame * 1e9 / _FPS),
-                points=points,
-            )
-        )
+        gesture, (sway, shift) = motion(frame / _FPS), unrest(frame / _FPS)
+        R = wrist_rotation(gesture, sway)
+        position_m = np.array([0.0, 0.05, 0.5]) + gesture.shift_m + shift
+        points = noisy_points(model, R, position_m, gesture.angles_rad, random)
+        published.append(hand_message(model, frame, frame / _FPS, points))
         truth.append((R, gesture.angles_rad))
-    return told, truth
+    return published, truth
 
 
 def solver_error(truth: HandModel, model: HandModel, seed: int) -> tuple[float, float]:
-    """Mean flexion error of the four fingers and mean orientation error in degrees, over random
-    motion and fists.
+    """Mean flexion error of the four fingers and mean orientation error, deg, with a hand model.
+
+    Over random motion and fists.
     """
-    flexion, turn = [], []
+    flexion, orientation = [], []
     for kind in ("random", "fist"):
-        told, true = messages(truth, MOTIONS[kind](truth, seed), seed + 100, 5.0)
+        published, true = messages(truth, MOTIONS[kind](truth, seed), seed + 100, 5.0)
         step = SolverStep(RigConfig(), {truth.hand: model})
-        for message, (R, angles) in zip(told, true, strict=True):
+        for message, (R, angles) in zip(published, true, strict=True):
             pose = step.step(message)
             if pose is None:
                 raise SystemExit("the solver gave no pose")
-            flexion.append(float(np.rad2deg(np.abs(_angles(pose) - angles[1:, 1:]).mean())))
-            turn.append(
-                float(
-                    np.rad2deg(
-                        angle_between(rotation_from_quaternion(pose.wrist.orientation_wxyz), R)
-                    )
-                )
-            )
-    return float(np.mean(flexion)), float(np.mean(turn))
+            flexion.append(float(np.rad2deg(np.abs(_flexions(pose) - angles[1:, 1:]).mean())))
+            found_R = rotation_from_quaternion(pose.wrist.orientation_wxyz)
+            orientation.append(float(np.rad2deg(angle_between(found_R, R))))
+    return float(np.mean(flexion)), float(np.mean(orientation))
 
 
-def _angles(pose: HandPose) -> Array:
+def _flexions(pose: HandPose) -> Array:
+    """Flexions (4, 3) of the fingers without the thumb, rad."""
     return np.array(
         [(f.angles_rad.mcp, f.angles_rad.pip, f.angles_rad.dip) for f in pose.fingers[1:]]
     )

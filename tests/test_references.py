@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import typer
 
-from services.cli.__main__ import application
+from services.cli.application import application
 from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
 
 # What is named before it is built, and the issue that builds it.

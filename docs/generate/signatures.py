@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import typer
 from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 
-from services.cli.__main__ import application
+from services.cli.application import application
 
 _WORDS = {Path: "PATH", str: "TEXT", int: "N", float: "NUMBER"}
 

@@ -1,4 +1,4 @@
-"""The measures of a person's hand from a recording of its painted landmarks. Pure.
+"""The parameters of a person's hand from a recording of its painted landmarks. Pure.
 
 `rhot calibrate hand` is the command.
 """

@@ -1,10 +1,9 @@
-"""Bundle adjustment of a person over the poses of a recording: frames, then takes are eliminated
-(Schur complements), the rest is small.
+"""Bundle adjustment of a hand's parameters over the poses of a recording. Pure.
 
-Levenberg and Marquardt's method (Triggs et al. 2000, section 6). The covariance of the person is
-that with all poses unknown. Data that determine nothing leave the prior, which is proper, so that
-the equations are always definite; numbers so absurd that they are not end the iteration at the best
-person so far.
+Levenberg and Marquardt's method; frames, then segments are eliminated by Schur complements, and
+what remains is small (Triggs et al. 2000, section 6). The covariance of the hand is that with all
+poses unknown. Data that determine nothing leave the prior, which is proper, so that the equations
+are always definite; numbers so absurd that they are not end the iteration at the best hand so far.
 """
 
 from __future__ import annotations
@@ -14,76 +13,87 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.calibrator.hand.problem import Equations, Poses, Problem, equations
+from services.calibrator.hand.normal_equations import NormalEquations, normal_equations
+from services.calibrator.hand.problem import Poses, Problem
 
 # 15 to 40 on simulated recordings.
 _ROUNDS = 100
-_DAMPING_START, _DAMPING_DOWN, _DAMPING_UP, _DAMPING_MOST = 1e-3, 0.2, 6.0, 1e8
+_DAMPING_START, _DAMPING_DOWN, _DAMPING_UP = 1e-3, 0.2, 6.0
+_DAMPING_MIN, _DAMPING_MAX = 1e-9, 1e8
+# A thousandth of a squared standard deviation is far below what any length is good for.
+_MIN_COST_GAIN = 1e-3
 
 
-class Adjusted(NamedTuple):
-    """The person x (p,) in prior standard deviations, covariance (p, p), the poses, the equations
-    there, and rounds used.
-    """
+class Adjustment(NamedTuple):
+    """The most plausible hand and poses."""
 
-    x: Array
-    covariance: Array
+    x: Array  # (p,), in standard deviations of the prior
+    covariance: Array  # (p, p)
     poses: Poses
-    found: Equations
+    equations: NormalEquations  # at x and poses
     rounds: int
 
 
-def adjust(problem: Problem, x: Array, poses: Poses) -> Adjusted:
-    """The most plausible person and poses from a first guess."""
-    damping, found = _DAMPING_START, equations(problem, x, poses)
+def adjust(problem: Problem, x: Array, poses: Poses) -> Adjustment:
+    """The most plausible hand and poses from initial ones."""
+    damping, equations = _DAMPING_START, normal_equations(problem, x, poses)
     used = 0
-    while used < _ROUNDS and damping < _DAMPING_MOST:
+    while used < _ROUNDS and damping < _DAMPING_MAX:
         used += 1
         try:
-            dx, step, held, _ = _solved(problem, found, damping)
+            step = _solve(problem, equations, damping)
         except np.linalg.LinAlgError:
             damping *= _DAMPING_UP
             continue
-        tried = poses.moved(step, held)
-        new = equations(problem, x + dx, tried)
-        if new.cost < found.cost:
-            # A thousandth of a squared standard deviation is far below what any length is good for.
-            done = found.cost - new.cost < 1e-3
-            x, poses, found, damping = x + dx, tried, new, max(damping * _DAMPING_DOWN, 1e-9)
-            if done:
+        trial_x, trial_poses = x + step.hand, poses.updated(step.frames, step.constant)
+        trial = normal_equations(problem, trial_x, trial_poses)
+        if trial.cost < equations.cost:
+            converged = equations.cost - trial.cost < _MIN_COST_GAIN
+            x, poses, equations = trial_x, trial_poses, trial
+            damping = max(damping * _DAMPING_DOWN, _DAMPING_MIN)
+            if converged:
                 break
         else:
             damping *= _DAMPING_UP
-    *_, A = _solved(problem, found, 0.0)
-    return Adjusted(x, np.asarray(np.linalg.inv(A), dtype=np.float64), poses, found, used)
+    information = _solve(problem, equations, 0.0).information
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    return Adjustment(x, covariance, poses, equations, used)
 
 
-def _solved(
-    problem: Problem, found: Equations, damping: float
-) -> tuple[Array, Array, Array, Array]:
-    """Step of the person (p,), the frames (n, k) and the held angles (t, 20).
+class _Step(NamedTuple):
+    """A damped Gauss-Newton step, and the information of the hand with poses eliminated."""
 
-    And the person's information (p, p), poses eliminated.
-    """
-    k, a, p = found.H.shape[1], found.H_held.shape[1], found.X.shape[2]
-    H = found.H * (1.0 + damping * np.eye(k))
-    # Frames: H y + B h + X x + g = 0.
-    Z = np.linalg.solve(H, np.concatenate([found.B, found.X, found.g[:, :, None]], axis=2))
-    Bt = np.swapaxes(found.B, 1, 2)
-    takes = problem.by_take(Bt @ Z)
-    S = found.H_held * (1.0 + damping * np.eye(a)) - takes[:, :, :a]
-    right = np.concatenate([found.X_held, found.held_g[:, :, None]], axis=2) - takes[:, :, a:]
+    hand: Array  # (p,)
+    frames: Array  # (n, k)
+    constant: Array  # (s, 20)
+    information: Array  # (p, p)
+
+
+def _solve(problem: Problem, found: NormalEquations, damping: float) -> _Step:
+    k, a, p = found.H_frame.shape[1], found.H_constant.shape[1], found.H_frame_hand.shape[2]
+    # Frames: H y + H_frame_constant h + H_frame_hand x + g = 0, solved for y.
+    right_frames = np.concatenate(
+        [found.H_frame_constant, found.H_frame_hand, found.g_frame[:, :, None]], axis=2
+    )
+    Z = np.linalg.solve(found.H_frame * (1.0 + damping * np.eye(k)), right_frames)
+    eliminated = problem.sum_by_segment(np.swapaxes(found.H_frame_constant, 1, 2) @ Z)
+    # Constant angles: the Schur complement S h + ... = 0, solved for h.
+    S = found.H_constant * (1.0 + damping * np.eye(a)) - eliminated[:, :, :a]
+    right_segments = np.concatenate([found.H_constant_hand, found.g_constant[:, :, None]], axis=2)
+    right = right_segments - eliminated[:, :, a:]
     V = np.linalg.solve(S, right)
-    frames_X = np.einsum("nkp,nkq->pq", found.X, Z[:, :, a:])
-    takes_X = np.einsum("tap,taq->pq", right[:, :, :p], V)
-    A = found.H_person - frames_X[:, :p] - takes_X[:, :p]
-    b = found.person_g - frames_X[:, p] - takes_X[:, p]
+    # Hand: A x + b = 0.
+    by_frames = np.einsum("nkp,nkq->pq", found.H_frame_hand, Z[:, :, a:])
+    by_segments = np.einsum("tap,taq->pq", right[:, :, :p], V)
+    A = found.H_hand - by_frames[:, :p] - by_segments[:, :p]
+    b = found.g_hand - by_frames[:, p] - by_segments[:, p]
     A = 0.5 * (A + A.T)
-    dx = -np.linalg.solve(A + damping * np.diag(np.diag(found.H_person)), b)
-    held = -(V[:, :, :p] @ dx) - V[:, :, p]
-    step = (
+    dx = -np.linalg.solve(A + damping * np.diag(np.diag(found.H_hand)), b)
+    # Back substitution.
+    constant = -(V[:, :, :p] @ dx) - V[:, :, p]
+    frames = (
         -Z[:, :, a + p]
         - np.einsum("nkp,p->nk", Z[:, :, a : a + p], dx)
-        - np.einsum("nka,na->nk", Z[:, :, :a], held[problem.take_of])
+        - np.einsum("nka,na->nk", Z[:, :, :a], constant[problem.segment_of])
     )
-    return dx, step, held, A
+    return _Step(dx, frames, constant, A)

@@ -1,8 +1,8 @@
-"""Where the landmarks of many frames are for given angles, with derivatives.
+"""Forward kinematics of the painted landmarks, with Jacobians, for many frames at once.
 
-All in the wrist frame. A frame's 26 unknowns are a small turn and shift of the wrist (both in the
-wrist frame) and the 20 angles; the person's are the measures of shape.Geometry. Plain numpy over
-all frames at once: a calibration looks at a hundred.
+All in the wrist frame. A frame's 26 unknowns are a small rotation and shift of the wrist (both in
+the wrist frame) and the 20 angles; the hand's are the measures of HandGeometry. Plain numpy over
+all frames: a calibration has a hundred.
 """
 
 from __future__ import annotations
@@ -12,52 +12,62 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.calibrator.hand.hand_parameters import Geometry, Shape
+from services.calibrator.hand.hand_parameters import (
+    BASE_ROWS,
+    METACARPAL_ROWS,
+    OFFSET_ROWS,
+    ROTATION_ROWS,
+    HandGeometry,
+    HandParameters,
+    triple,
+)
 
-UNKNOWNS = 26
-# The joint about whose root each of a chain's angles turns: abduction and first flexion share
+# Of a frame: rotation (3) and shift (3) of the wrist, 20 angles.
+POSE_UNKNOWNS, FIRST_ANGLE = 26, 6
+# The joint about whose root each of a chain's angles rotates: abduction and first flexion share
 # theirs.
 _ROOT = (0, 0, 1, 2)
 
 
-class Marks(NamedTuple):
-    """n frames, m landmarks."""
+class Landmarks(NamedTuple):
+    """Landmarks of n frames, m each, and their Jacobians."""
 
     points: Array  # (n, m, 3)
-    J: Array  # (n, m, 3, 26) by a frame's unknowns
-    by_measure: Array  # (n, m, 3, measures) by the person's
+    by_pose: Array  # (n, m, 3, 26), by a frame's unknowns
+    by_measure: Array  # (n, m, 3, measures), by the hand's
 
 
-def marks_of(shape: Shape, measures: Geometry, angles: Array, side: float) -> Marks:
+def landmarks_of(
+    parameters: HandParameters, measures: HandGeometry, angles: Array, side: float
+) -> Landmarks:
     """Landmarks for angles (n, 5, 4); side +1 right hand, -1 left."""
-    n, m = len(angles), len(shape.names)
+    n, m = len(angles), len(parameters.names)
     roots, axes, frames = _chains(measures, angles, side)
     points = np.empty((n, m, 3))
-    J = np.zeros((n, m, 3, UNKNOWNS))
-    by_measure = np.zeros((n, m, 3, shape.measures))
-    for i, (row, k) in enumerate(shape.places):
+    by_pose = np.zeros((n, m, 3, POSE_UNKNOWNS))
+    by_measure = np.zeros((n, m, 3, parameters.measures))
+    for i, (row, k) in enumerate(parameters.joint_of):
         own = by_measure[:, i]
-        own[:, :, 60 + 3 * i : 63 + 3 * i] = np.eye(3) if row < 0 else frames[:, row, min(k, 2)]
+        own[:, :, triple(OFFSET_ROWS, i)] = np.eye(3) if row < 0 else frames[:, row, min(k, 2)]
         if row < 0:
             points[:, i] = measures.offsets[i] + _fixed(measures, row, k, own)
         else:
             p = roots[:, row, k] + frames[:, row, min(k, 2)] @ measures.offsets[i]
             points[:, i] = p
             for a in range(min(k + 2, 4)):
-                J[:, i, :, 6 + 4 * row + a] = np.cross(axes[:, row, a], p - roots[:, row, _ROOT[a]])
+                lever = p - roots[:, row, _ROOT[a]]
+                by_pose[:, i, :, FIRST_ANGLE + 4 * row + a] = np.cross(axes[:, row, a], lever)
             for bone in range(k):
                 own[:, :, 3 * row + bone] = -frames[:, row, bone, :, 2]
-            own[:, :, 15 + 3 * row : 18 + 3 * row] = np.eye(3)
-            own[:, :, 45 + 3 * row : 48 + 3 * row] = _cross_columns(p - measures.bases[row])
-        J[:, i, :, :3] = _cross_columns(points[:, i])
-        J[:, i, :, 3:6] = np.eye(3)
-    return Marks(points, J, by_measure)
+            own[:, :, triple(BASE_ROWS, row)] = np.eye(3)
+            own[:, :, triple(ROTATION_ROWS, row)] = _cross_columns(p - measures.bases[row])
+        by_pose[:, i, :, :3] = _cross_columns(points[:, i])
+        by_pose[:, i, :, 3:6] = np.eye(3)
+    return Landmarks(points, by_pose, by_measure)
 
 
-def _chains(measures: Geometry, angles: Array, side: float) -> tuple[Array, Array, Array]:
-    """Roots (n, 5, 4, 3) and axes (n, 5, 4, 3) of the joints, and the bones' frames (n, 5, 3, 3,
-    3).
-    """
+def _chains(measures: HandGeometry, angles: Array, side: float) -> tuple[Array, Array, Array]:
+    """Roots and axes of the joints, both (n, 5, 4, 3), and the bones' frames (n, 5, 3, 3, 3)."""
     n = len(angles)
     roots, axes, frames = np.empty((n, 5, 4, 3)), np.empty((n, 5, 4, 3)), np.empty((n, 5, 3, 3, 3))
     for row in range(5):
@@ -75,16 +85,16 @@ def _chains(measures: Geometry, angles: Array, side: float) -> tuple[Array, Arra
     return roots, axes, frames
 
 
-def _fixed(measures: Geometry, row: int, k: int, own: Array) -> Array:
-    """The joint of a landmark that no angle moves; fills its derivatives."""
+def _fixed(measures: HandGeometry, row: int, k: int, own: Array) -> Array:
+    """The joint (3,) of a landmark that no angle moves; fills its derivatives own."""
     if row == -2:
-        own[:, :, 30 + 3 * k : 33 + 3 * k] = np.eye(3)
+        own[:, :, triple(METACARPAL_ROWS, k)] = np.eye(3)
         return measures.metacarpals[k]
     if k == 0:
         return np.zeros(3)
     # The palm is half way along the middle metacarpal.
-    own[:, :, 36:39] = 0.5 * np.eye(3)
-    own[:, :, 21:24] = 0.5 * np.eye(3)
+    own[:, :, triple(METACARPAL_ROWS, 2)] = 0.5 * np.eye(3)
+    own[:, :, triple(BASE_ROWS, 2)] = 0.5 * np.eye(3)
     return 0.5 * (measures.metacarpals[2] + measures.bases[2])
 
 

@@ -1,6 +1,5 @@
-"""What `rhot calibrate` prints: the figures that matter first, then picture by picture.
-
-Pure text.
+"""What `rhot calibrate lens`, `stereo` and `refine` print: the figures that matter first, then
+picture by picture. Pure text.
 """
 
 from __future__ import annotations
@@ -14,25 +13,32 @@ from services.calibrator.board.board import Board
 from services.calibrator.board.board_views import LeftOut
 from services.calibrator.bundle.lens_model import FX, FY, K1
 from services.calibrator.lens.result import LensResult
-from services.calibrator.recalibrate.refine_rig import Refined
+from services.calibrator.recalibrate.refine_rig import RefinedRig
 from services.calibrator.rig.result import RigResult
 
 
 def lens_text(result: LensResult, board: Board) -> str:
     """The report of `rhot calibrate lens`."""
-    seen, held_out_mm = result.coverage, 1e3 * board.square_m * result.held_out_squares
+    seen = result.coverage
+    size = "{}x{}".format(*result.size_px)
+    held_out_mm = 1e3 * board.square_m * result.held_out_squares
+    held_out = (
+        f"{result.held_out_px:.3f} px, {result.held_out_squares:.4f} squares = "
+        f"{held_out_mm:.3f} mm on the board"
+    )
+    tilts = f"tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f} degrees"
     lines = [
-        f"camera {result.camera}, {result.size_px[0]}x{result.size_px[1]} px, {len(result.pictures)} pictures, board {board.name}",
+        f"camera {result.camera}, {size} px, {len(result.pictures)} pictures, board {board.name}",
         f"  lens          {_lens(result.lens, result.sigma)}, distortion {result.model}",
         f"  RMS           {result.rms_px:.3f} px",
-        f"  held out      {result.held_out_px:.3f} px, {result.held_out_squares:.4f} squares = {held_out_mm:.3f} mm on the board",
-        f"  coverage      {100 * seen.share:.0f} % of the image, tilts {min(seen.tilt_deg):.0f} to {max(seen.tilt_deg):.0f} degrees",
+        f"  held out      {held_out}",
+        f"  coverage      {100 * seen.share:.0f} % of the image, {tilts}",
         *("    " + row for row in seen.drawing().splitlines()),
         "  picture           RMS px   held out px   squares   pull on the others",
     ]
     lines += [
-        f"  {each.key:<16} {each.rms_px:>7.3f} {each.held_out_px:>13.3f} {each.held_out_squares:>9.4f} "
-        f"{each.influence_percent:>10.1f} %{_hurts(each.suspect)}"
+        f"  {each.key:<16} {each.rms_px:>7.3f} {each.held_out_px:>13.3f} "
+        f"{each.held_out_squares:>9.4f} {_pull(each.influence_percent, each.suspect)}"
         for each in result.pictures
     ]
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
@@ -40,22 +46,11 @@ def lens_text(result: LensResult, board: Board) -> str:
 
 def rig_text(result: RigResult) -> str:
     """The report of `rhot calibrate stereo`."""
-    square_mm = 1e3 * result.board.square_m
-    held_out = [position for position in result.positions if position.held_out]
-    fit_mm = square_mm * result.held_out_squares
-    side = f"{square_mm * result.square_ratio:.3f} mm"
-    lines = [
-        f"rig of {', '.join(result.cameras)}, {len(result.positions)} positions ({len(held_out)} seen by two cameras), {result.board.name}",
-        f"  stereo RMS           {result.rms_px:.3f} px",
-        f"  held-out board fit   {result.held_out_squares:.4f} squares = {fit_mm:.3f} mm, {result.held_out_px:.3f} px",
-        f"  held-out square      {side} of {square_mm:g} mm: {_percent(result.square_ratio)}, worst {_percent(result.square_worst)}",
-        f"  held-out epipolar    {result.epipolar_px:.3f} px",
-    ]
+    lines = _rig_summary(result)
     for k, name in enumerate(result.cameras):
+        lens = _lens(result.state.lenses[k], result.lens_sigma[k])
         known = f"distortion {result.model}, RMS {result.camera_rms_px[k]:.3f} px"
-        lines.append(
-            f"  camera {name}: {_lens(result.state.lenses[k], result.lens_sigma[k])}, {known}"
-        )
+        lines.append(f"  camera {name}: {lens}, {known}")
         if k:
             lines.append(
                 f"    {_place(result.state.T_camera_from_rig[k], result.extrinsics_sigma[k])}"
@@ -63,50 +58,71 @@ def rig_text(result: RigResult) -> str:
         lines.append(f"    corners cover {100 * result.coverage[k].share:.0f} % of the image")
         lines += ["      " + row for row in result.coverage[k].drawing().splitlines()]
     lines.append(
-        "  position          RMS px   held out: squares   square side   epipolar px   at mm   pull on the others"
+        "  position          RMS px   held out: squares   square side   epipolar px   at mm   "
+        "pull on the others"
     )
-    for position in result.positions:
-        error = position.held_out
-        figures = (
-            f"{error.fit_squares:>19.4f} {_percent(error.square_ratio):>13} {error.epipolar_px:>13.3f} {1e3 * error.distance_m:>7.0f}"
-            if error
-            else f"{'seen by one camera only':>55}"
-        )
-        lines.append(
-            f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {position.influence_percent:>10.1f} %{_hurts(position.suspect)}"
-        )
+    lines += [_position(result, number) for number in range(len(result.positions))]
     return "\n".join([*lines, *_notes(result.left_out, result.warnings)])
 
 
-def refined_text(result: Refined) -> str:
+def _rig_summary(result: RigResult) -> list[str]:
+    square_mm = 1e3 * result.board.square_m
+    fit_mm = square_mm * result.held_out_squares
+    side = f"{square_mm * result.square_ratio:.3f} mm of {square_mm:g} mm"
+    several = sum(1 for position in result.positions if position.held_out)
+    positions = f"{len(result.positions)} positions ({several} seen by two cameras)"
+    board_fit = f"{result.held_out_squares:.4f} squares = {fit_mm:.3f} mm"
+    ratios = f"{_percent(result.square_ratio)}, worst {_percent(result.square_worst)}"
+    return [
+        f"rig of {', '.join(result.cameras)}, {positions}, {result.board.name}",
+        f"  stereo RMS           {result.rms_px:.3f} px",
+        f"  held-out board fit   {board_fit}, {result.held_out_px:.3f} px",
+        f"  held-out square      {side}: {ratios}",
+        f"  held-out epipolar    {result.epipolar_px:.3f} px",
+    ]
+
+
+def _position(result: RigResult, number: int) -> str:
+    """One board position's line."""
+    position = result.positions[number]
+    error = position.held_out
+    figures = f"{'seen by one camera only':>55}"
+    if error:
+        figures = (
+            f"{error.fit_squares:>19.4f} {_percent(error.square_ratio):>13} "
+            f"{error.epipolar_px:>13.3f} {1e3 * error.distance_m:>7.0f}"
+        )
+    pull = _pull(position.influence_percent, position.suspect)
+    return f"  {position.key:<16} {position.rms_px:>7.3f} {figures} {pull}"
+
+
+def refined_text(result: RefinedRig) -> str:
     """The report of `rhot calibrate refine`."""
+    before_px, after_px = result.epipolar_before_px, result.epipolar_px
+    cameras, seconds = ", ".join(result.cameras), f"{result.seconds:.0f} s"
     lines = [
-        f"rig of {', '.join(result.cameras)}, {result.points} marker points in {result.seconds:.0f} s",
-        f"  held-out epipolar    {result.epipolar_px:.3f} px, before {result.epipolar_before_px:.3f} px",
+        f"rig of {cameras}, {result.points} marker points in {seconds}",
+        f"  held-out epipolar    {after_px:.3f} px, before {before_px:.3f} px",
     ]
     if result.wand_mm is not None:
-        lines.append(
-            f"  held-out wand        {result.wand_mm[1]:.2f} mm off, before {result.wand_mm[0]:.2f} mm"
-        )
+        before_mm, after_mm = result.wand_mm
+        lines.append(f"  held-out wand        {after_mm:.2f} mm off, before {before_mm:.2f} mm")
     else:
         lines.append(
-            "  scale                kept: the distance of the first two cameras is taken as it was (a wand would measure it)"
+            "  scale                kept: the distance of the first two cameras is taken as it was "
+            "(a wand would measure it)"
         )
-    for name, moved in result.moved.items():
-        turned, shifted = (
-            _three(*pair)
-            for pair in (
-                (moved.turned_deg, moved.turned_sigma_deg),
-                (moved.shifted_mm, moved.shifted_sigma_mm),
-            )
-        )
+    for name, change in result.changes.items():
+        rotation = _with_sigmas(change.rotation_deg, change.rotation_sigma_deg)
+        shift = _with_sigmas(change.shift_mm, change.shift_sigma_mm)
         lines.append(
-            f"  camera {name}: turned about its x, y, z by {turned} deg, shifted by {shifted} mm; stamps late by {moved.late_ms:.2f} ms"
+            f"  camera {name}: turned about its x, y, z by {rotation} deg, shifted by {shift} mm; "
+            f"stamps late by {change.delay_ms:.2f} ms"
         )
     return "\n".join(lines)
 
 
-def _three(values: Array, sigmas: Array) -> str:
+def _with_sigmas(values: Array, sigmas: Array) -> str:
     return ", ".join(
         f"{value:.2f} +- {sigma:.2f}" for value, sigma in zip(values, sigmas, strict=True)
     )
@@ -122,21 +138,19 @@ def _lens(lens: Array, sigma: Array) -> str:
 
 def _place(T_camera_from_rig: Array, sigma: Array) -> str:
     p = 1e3 * inverse(T_camera_from_rig)[:3, 3]
-    angle = np.degrees(
-        np.arccos(np.clip((np.trace(T_camera_from_rig[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))
-    )
-    return (
-        f"at {p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f} mm (+- {1e3 * sigma[3:].max():.1f}), {np.linalg.norm(p):.1f} mm from the first camera, "
-        f"turned {angle:.2f} degrees"
-    )
+    cosine = (np.trace(T_camera_from_rig[:3, :3]) - 1.0) / 2.0
+    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    at = f"{p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f} mm (+- {1e3 * sigma[3:].max():.1f})"
+    distance = f"{np.linalg.norm(p):.1f} mm from the first camera"
+    return f"at {at}, {distance}, turned {angle:.2f} degrees"
 
 
 def _percent(ratio: float) -> str:
     return f"{100.0 * (ratio - 1.0):+.2f} %"
 
 
-def _hurts(hurts: bool) -> str:
-    return "   <- hurts" if hurts else ""
+def _pull(percent: float, hurts: bool) -> str:
+    return f"{percent:>10.1f} %{'   <- hurts' if hurts else ''}"
 
 
 def _notes(left_out: Sequence[LeftOut], warnings: Sequence[str]) -> list[str]:

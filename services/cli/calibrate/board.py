@@ -29,12 +29,10 @@ def board(
     document = board_pdf(made, paper.lower())
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(document)
-    charuco = (
-        f" --kind charuco --marker {marker:g} --dictionary {dictionary}"
-        if kind is Kind.CHARUCO
-        else ""
-    )
+    charuco = f" --kind charuco --marker {marker:g} --dictionary {dictionary}"
+    shown = f"--board {cols}x{rows} --square {made.square_m:g}"
     typer.echo(
-        f"{out}: {made.name}. Print it at 100 %, check the 100 mm line with a ruler, glue it to something flat and stiff, then e.g.\n"
-        f"  rhot calibrate stereo PICTURES --board {cols}x{rows} --square {made.square_m:g}{charuco}"
+        f"{out}: {made.name}. Print it at 100 %, check the 100 mm line with a ruler, glue it to "
+        "something flat and stiff, then e.g.\n"
+        f"  rhot calibrate stereo PICTURES {shown}{charuco if kind is Kind.CHARUCO else ''}"
     )

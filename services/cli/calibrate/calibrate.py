@@ -1,5 +1,6 @@
-"""`rhot calibrate ...`: everything a rig must know about itself, each command in the file of its
-name (camera and colors: eye.py).
+"""`rhot calibrate ...`: everything a rig must know about itself.
+
+Each command is in the file of its name; colors is in camera.py, stereo and world are in rig.py.
 """
 
 from __future__ import annotations
@@ -9,8 +10,7 @@ from services.cli.calibrate.depth import depth
 from services.cli.calibrate.hand import hand
 from services.cli.calibrate.lens import lens
 from services.cli.calibrate.refine import refine
-from services.cli.calibrate.stereo import stereo
-from services.cli.calibrate.world import world
+from services.cli.calibrate.rig import stereo, world
 from services.cli.options import menu
 
 COMMANDS = (camera, colors, lens, stereo, refine, world, depth, hand)

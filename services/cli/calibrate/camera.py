@@ -3,7 +3,7 @@ can see paint, from any machine.
 
 With a running rig, pictures and results cross the bus, and the camera's tracker writes its own
 files; with --video, a recording is used and the file is written here. A camera that does not
-answer, and places that show no paint, are errors that say so; warnings do not stop it.
+answer, and boxes or clicks that show no paint, are errors that say so; warnings do not stop it.
 """
 
 from __future__ import annotations
@@ -19,25 +19,12 @@ from rhot.client import RigClient
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
 from services.cli.calibrate import options
+from services.cli.calibrate.pointing_options import PointingOptions
+from services.cli.option_groups import grouped
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints, router_session
 
 Name = Annotated[str, typer.Argument(help="the camera's name in rig.toml")]
-# Ways of saying what is paint; all may be repeated.
-Boxes = Annotated[
-    list[str] | None,
-    typer.Option("--box", metavar="COLOR=X,Y,W,H", help="a marker in the pictures; repeatable"),
-]
-Clicks = Annotated[
-    list[str] | None,
-    typer.Option("--click", metavar="COLOR=X,Y", help="the middle of a marker; repeatable"),
-]
-Ats = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--at", metavar="FRAME:COLOR=X,Y[,W,H]", help="a marker in one frame of --video; repeatable"
-    ),
-]
 
 
 def camera(
@@ -63,7 +50,7 @@ def camera(
 ) -> None:
     """Set exposure, gain and white balance of a running camera.
 
-    Without options, show and judge what is in force.
+    Without options, show the exposure in use and what is wrong with the pictures.
     """
     by_hand = ExposureControl(
         exposure_us=exposure_us or 0.0,
@@ -83,7 +70,7 @@ async def _camera(
     rig: RigConfig, endpoints: list[str], name: str, wanted: list[ExposureControl]
 ) -> None:
     from services.cli.calibrate.camera_text import exposure_text, light_text
-    from services.cli.calibrate.pictures import live
+    from services.cli.calibrate.live_pictures import next_frames
     from services.pi_tracker.colors.exposure_advice import advice, assess
 
     async with router_session(rig.rig.name, endpoints) as bus:
@@ -94,7 +81,7 @@ async def _camera(
                 "running the automatics ..." if one.mode == "auto" else "setting ...", err=True
             )
             state = await client.set_exposure(name, one)
-        light = assess(await live(bus, name, 3))
+        light = assess(await next_frames(bus, name, 3))
     typer.echo(f"camera {name}: {exposure_text(state)}")
     typer.echo(light_text(light))
     if not state.adjustable:
@@ -104,15 +91,12 @@ async def _camera(
         typer.echo(f"warning: {line}", err=True)
 
 
+@grouped
 def colors(
     name: Name,
     config: options.ConfigOption = None,
-    box: Boxes = None,
-    click: Clicks = None,
-    at: Ats = None,
-    auto: Annotated[
-        bool, typer.Option("--auto", help="propose what stands out, named by its hue")
-    ] = False,
+    *,
+    pointing: PointingOptions,
     video: Annotated[
         Path | None,
         typer.Option(help="a recording instead of the running camera: video, capture or folder"),
@@ -131,7 +115,7 @@ def colors(
     ] = None,
     dry_run: Annotated[
         bool,
-        typer.Option("--dry-run", help="only report; put nothing in force, write no calibration"),
+        typer.Option("--dry-run", help="only report; apply nothing, write no calibration"),
     ] = False,
     connect: ConnectOption = None,
     as_json: options.JsonOption = False,
@@ -142,25 +126,16 @@ def colors(
     # Not above: OpenCV takes longer to import than other commands take to run.
     from services.cli.calibrate.colors import Request, from_camera, from_recording
 
-    if not (box or click or at or auto):
+    if not pointing:
         raise CalibrationError(
-            "nothing is pointed at; give --box, --click or --auto, or use the page of rhot-viewer (calibrate colours)"
+            "nothing is pointed at; give --box, --click or --auto, or use the page of rhot-viewer "
+            "(calibrate colours)"
         )
-    request = Request(
-        name,
-        tuple(box or ()),
-        tuple(click or ()),
-        tuple(at or ()),
-        auto,
-        out,
-        picture,
-        dry_run,
-        as_json,
-    )
+    request = Request(name, pointing, out, picture, dry_run, as_json)
     if video is not None:
         from_recording(request, options.rig_if_named(config), video, frames)
         return
-    if at or frames:
+    if pointing.at or frames:
         raise CalibrationError("--at and --frames name frames of a recording; give it with --video")
     rig, endpoints = rig_and_endpoints(config, connect)
     rig.camera_named(name)

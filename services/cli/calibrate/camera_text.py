@@ -1,5 +1,5 @@
-"""What `rhot calibrate colors` and `camera` say, and the picture that shows what was taken for
-paint. Pure.
+"""What `rhot calibrate colors` and `camera` print, and the picture of what was taken for paint.
+Pure.
 """
 
 from __future__ import annotations
@@ -19,9 +19,12 @@ from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.image.yuv_planes import picture
 
+# Of boxes and names, BGR.
+_RED = (0, 0, 255)
+
 
 def range_text(span: ColorRange) -> str:
-    """hue, saturation and value from to, as OpenCV has them."""
+    """Hue, saturation and value from to, as OpenCV has them."""
     return " ".join(
         f"{name} {low:3d}..{high:3d}"
         for name, low, high in zip("hsv", span.hsv_low, span.hsv_high, strict=True)
@@ -32,8 +35,11 @@ def report_text(report: Report, fitted: dict[str, ColorRange]) -> str:
     """A line per colour, and how each is told from its nearest."""
     lines = []
     for one in report.colors:
-        line = f"{one.color:10s} {range_text(fitted[one.color])}   takes {100 * one.inside:.0f} % of {4 * one.cells} px in {one.pictures}"
-        line += " picture" + ("s" if one.pictures > 1 else "")
+        plural = "s" if one.pictures > 1 else ""
+        line = (
+            f"{one.color:10s} {range_text(fitted[one.color])}   takes {100 * one.inside:.0f} % "
+            f"of {4 * one.cells} px in {one.pictures} picture{plural}"
+        )
         pairs = [
             pair
             for pair in report.pairs
@@ -41,7 +47,8 @@ def report_text(report: Report, fitted: dict[str, ColorRange]) -> str:
         ]
         if pairs:
             near = min(pairs, key=lambda pair: pair.separation)
-            line += f"; nearest {near.b if near.a == one.color else near.a}, d' {near.separation}"
+            other = near.b if near.a == one.color else near.a
+            line += f"; nearest {other}, d' {near.separation}"
         line += f"; skin, d' {one.skin}" if one.skin >= 0.0 else "; no skin in the pictures"
         lines.append(line)
     return "\n".join(lines)
@@ -51,21 +58,16 @@ def proposals_text(proposals: Sequence[Proposal], suggestions: Sequence[Suggesti
     """What stands out, ready to be given as --box or --at, and what else would."""
     lines = ["these patches stand out:"]
     for one in proposals:
-        x, y, w, h = (
-            round(v)
-            for v in (
-                one.boxes[0].x_px,
-                one.boxes[0].y_px,
-                one.boxes[0].width_px,
-                one.boxes[0].height_px,
-            )
-        )
+        first = one.boxes[0]
+        x, y, w, h = map(round, (first.x_px, first.y_px, first.width_px, first.height_px))
         lines.append(
-            f"  {one.color:10s} hue {one.hue:5.1f}, seen in {one.pictures} picture(s), e.g. --box {one.color}={x},{y},{w},{h}"
+            f"  {one.color:10s} hue {one.hue:5.1f}, seen in {one.pictures} picture(s), "
+            f"e.g. --box {one.color}={x},{y},{w},{h}"
         )
     free = ", ".join(f"{one.color} ({one.clearance:.0f} hues clear)" for one in suggestions)
     lines.append(
-        f"further paints that would stand out from skin, room and these: {free or 'none of the common ones'}"
+        "further paints that would stand out from skin, room and these: "
+        f"{free or 'none of the common ones'}"
     )
     return "\n".join(lines)
 
@@ -74,8 +76,7 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
     """The pictures one below the other: what the ranges take in white, boxes around what was
     pointed at.
     """
-    names = sorted(colors.colors)
-    table = compile_colors(colors, names)
+    table = compile_colors(colors, sorted(colors.colors))
     shown = []
     for number, frame in enumerate(frames):
         image = picture(frame)
@@ -86,44 +87,43 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
             if frame.layout == "bgr"
             else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
         )
-        mask = cv2.resize(
-            (labels > 0).astype(np.uint8),
-            (bgr.shape[1], bgr.shape[0]),
-            interpolation=cv2.INTER_NEAREST,
-        )
-        bgr[mask > 0] = 255
+        size = (bgr.shape[1], bgr.shape[0])
+        taken = cv2.resize((labels > 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        bgr[taken > 0] = 255
         for color, samples in study.samples.items():
             for swatch in samples.swatches:
                 if swatch.frame == number:
-                    x, y, w, h = swatch.box_px
-                    cv2.rectangle(bgr, (x - 2, y - 2), (x + w + 1, y + h + 1), (0, 0, 255), 1)
-                    cv2.putText(
-                        bgr,
-                        color,
-                        (x, max(y - 6, 10)),
-                        cv2.FONT_HERSHEY_SIMPLEX,
-                        0.4,
-                        (0, 0, 255),
-                        1,
-                        cv2.LINE_AA,
-                    )
+                    _draw_box(bgr, color, swatch.box_px)
         shown.append(bgr)
     return np.vstack(shown)
 
 
+def _draw_box(bgr: Image, color: str, box_px: tuple[int, int, int, int]) -> None:
+    """A box with the colour's name above it."""
+    x, y, w, h = box_px
+    cv2.rectangle(bgr, (x - 2, y - 2), (x + w + 1, y + h + 1), _RED, 1)
+    corner, font = (x, max(y - 6, 10)), cv2.FONT_HERSHEY_SIMPLEX
+    cv2.putText(bgr, color, corner, font, 0.4, _RED, 1, cv2.LINE_AA)
+
+
 def light_text(light: Light) -> str:
     """One line on the light in the pictures."""
-    cast = (
-        "nothing neutral in view"
-        if light.red_cast is None or light.blue_cast is None
-        else (f"cast of red {100 * light.red_cast:+.0f} %, blue {100 * light.blue_cast:+.0f} %")
+    cast = "nothing neutral in view"
+    if light.red_cast is not None and light.blue_cast is not None:
+        cast = f"cast of red {100 * light.red_cast:+.0f} %, blue {100 * light.blue_cast:+.0f} %"
+    return (
+        f"median brightness {light.value:.0f} of 255, {100 * light.clipped:.1f} % overexposed, "
+        f"{100 * light.black:.0f} % black, {cast}"
     )
-    return f"median brightness {light.value:.0f} of 255, {100 * light.clipped:.1f} % overexposed, {100 * light.black:.0f} % black, {cast}"
 
 
 def exposure_text(state: ExposureControl) -> str:
-    """One line on the exposure in force."""
+    """One line on the exposure in use."""
+    note = f" ({state.note})" if state.note else ""
     if state.exposure_us <= 0.0:
-        return f"exposure unknown ({state.note})" if state.note else "exposure unknown"
-    values = f"{state.exposure_us:.0f} us, gain {state.gain:.2f}, red gain {state.red_gain:.2f}, blue gain {state.blue_gain:.2f}"
-    return f"exposure {values}, {state.mode}" + (f" ({state.note})" if state.note else "")
+        return f"exposure unknown{note}"
+    values = (
+        f"{state.exposure_us:.0f} us, gain {state.gain:.2f}, red gain {state.red_gain:.2f}, "
+        f"blue gain {state.blue_gain:.2f}"
+    )
+    return f"exposure {values}, {state.mode}{note}"

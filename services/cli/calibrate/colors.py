@@ -1,5 +1,6 @@
-"""The work of `rhot calibrate colors`: pictures and places in, ranges and a report out, into force
-or into a file.
+"""The work of `rhot calibrate colors`: pictures and pointers in, colour ranges and a report out.
+
+The ranges are applied to the running camera, or written to a file.
 """
 
 from __future__ import annotations
@@ -11,24 +12,25 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import msgspec
 import typer
 
 from rhot.client import RigClient
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import RigConfig
-from services.cli.calibrate import options, pictures
+from services.cli.calibrate import options
 from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
-from services.cli.calibrate.pointing_options import at, everywhere, numbers_of
+from services.cli.calibrate.live_pictures import next_frames
+from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
+from services.cli.recorded_frames import frames_by_number, spread_numbers
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.paint_patch import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import colors_file, examine
-from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.frame import Frame, Image
 
-# Frames of a recording that --auto looks at unless told otherwise.
+# Frames of a recording that --auto uses unless told otherwise.
 _AUTO_FRAMES = 6
 
 
@@ -37,10 +39,7 @@ class Request:
     """What the person asks for."""
 
     camera: str
-    boxes: tuple[str, ...]
-    clicks: tuple[str, ...]
-    at: tuple[str, ...]
-    auto: bool
+    pointing: PointingOptions
     out: Path | None
     picture: Path | None
     dry_run: bool
@@ -53,28 +52,24 @@ def from_recording(
     """Fit to frames of a recording and write the file."""
     if request.out is None and rig is None and not request.dry_run:
         raise CalibrationError(
-            "say where the result goes: --out DIR, or --config rig.toml, whose calibration folder is taken"
+            "say where the result goes: --out DIR, or --config rig.toml, whose calibration folder "
+            "is taken"
         )
     path = options.out_folder(request.out, rig) / f"{request.camera}.colors.json"
-    numbers, pointers = at(request.at)
+    numbers, pointers = request.pointing.in_single_frames()
     first = len(numbers)
-    numbers += numbers_of(frames) if frames else []
+    numbers += frame_numbers(frames) if frames else []
     if not numbers:
-        if not request.auto:
+        if not request.pointing.auto:
             raise CalibrationError(
-                "say which frames the places are in: --frames 10,200,500, or --at FRAME:color=x,y,width,height"
+                "say which frames the boxes or clicks are in: --frames 10,200,500, "
+                "or --at FRAME:color=x,y,width,height"
             )
-        numbers = pictures.spread(request.camera, video, _AUTO_FRAMES)
-    pointers += everywhere(request.boxes, request.clicks, range(first, len(numbers)))
-    taken = pictures.recorded(request.camera, video, numbers)
-    made = fitted(
-        request,
-        taken,
-        pointers,
-        _known(path),
-        rig.colors if rig else [],
-        {"recording": video.name, "frames": numbers},
-    )
+        numbers = spread_numbers(request.camera, video, _AUTO_FRAMES)
+    pointers += request.pointing.in_every_frame(range(first, len(numbers)))
+    taken = frames_by_number(request.camera, video, numbers)
+    inputs = {"recording": video.name, "frames": numbers}
+    made = fitted(request, taken, pointers, _known(path), rig.colors if rig else [], inputs)
     if not request.dry_run:
         save(path, made)
         typer.echo(f"written: {path}", err=True)
@@ -82,22 +77,20 @@ def from_recording(
 
 def _known(path: Path) -> dict[str, ColorRange]:
     """Ranges of other colours that are in the file already, and stay."""
-    return (
-        load_colors(path.parent, path.name.removesuffix(".colors.json")).colors
-        if path.exists()
-        else {}
-    )
+    if not path.exists():
+        return {}
+    return load_colors(path.parent, path.name.removesuffix(".colors.json")).colors
 
 
 async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], count: int) -> None:
-    """Fit to the running camera's next pictures, and put the result in force there (or into --out)."""
+    """Fit to the running camera's next pictures; apply the result there, or write it to --out."""
     async with router_session(rig.rig.name, endpoints) as bus:
         client = RigClient(bus)
-        in_force = await client.colors(request.camera)
-        taken = await pictures.live(bus, request.camera, count)
-        pointers = everywhere(request.boxes, request.clicks, range(count))
+        known = (await client.colors(request.camera)).colors
+        taken = await next_frames(bus, request.camera, count)
+        pointers = request.pointing.in_every_frame(range(count))
         made = await asyncio.to_thread(
-            fitted, request, taken, pointers, in_force.colors, rig.colors, {"pictures": count}
+            fitted, request, taken, pointers, known, rig.colors, {"pictures": count}
         )
         if request.dry_run:
             return
@@ -108,7 +101,7 @@ async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], co
             return
         await client.set_colors(request.camera, made)
     typer.echo(
-        f"in force, and written to {request.camera}.colors.json on the camera's machine", err=True
+        f"applied, and written to {request.camera}.colors.json on the camera's machine", err=True
     )
 
 
@@ -117,18 +110,19 @@ def fitted(
     frames: Sequence[Frame],
     pointers: list[Pointer],
     known: Mapping[str, ColorRange],
-    wanted: Sequence[str],
+    rig_colors: Sequence[str],
     inputs: dict[str, Any],
 ) -> Colors:
-    """Fit, judge, print; the file to be written.
+    """Fit, check, print; the file to be written.
+
+    known are the ranges there are, rig_colors those that rig.toml's markers need.
 
     Raises CalibrationError if what is pointed at, or stands out, is no paint.
     """
-    if request.auto:
+    if request.pointing.auto:
         given = {pointer.color for pointer in pointers}
-        pointers = pointers + [
-            box for box in _proposed(frames, wanted, request) if box.color not in given
-        ]
+        proposed = _proposed(frames, rig_colors, dry_run=request.dry_run)
+        pointers = pointers + [box for box in proposed if box.color not in given]
     study = gather(frames, pointers)
     ranges = fit(study.samples)
     others = {name: span for name, span in known.items() if name not in ranges}
@@ -137,37 +131,41 @@ def fitted(
     made = colors_file(
         report, ranges, others, date=options.now_text(), tool="rhot calibrate colors", inputs=inputs
     )
-    typer.echo(
-        msgspec.json.format(msgspec.json.encode(made), indent=1).decode()
-        if request.as_json
-        else report_text(report, ranges)
-    )
+    if request.as_json:
+        options.echo_json(made)
+    else:
+        typer.echo(report_text(report, ranges))
     for note in study.notes:
         typer.echo(f"note: {note}", err=True)
     for warning in report.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    if request.picture is not None and not cv2.imwrite(
-        str(request.picture), overlay(study, frames, made)
-    ):
-        raise CalibrationError(
-            f"--picture {request.picture} cannot be written; name a .png in a folder that exists"
-        )
+    if request.picture is not None:
+        _write_picture(request.picture, overlay(study, frames, made))
     return made
 
 
-def _proposed(frames: Sequence[Frame], wanted: Sequence[str], request: Request) -> list[Pointer]:
+def _write_picture(path: Path, image: Image) -> None:
+    if not cv2.imwrite(str(path), image):
+        raise CalibrationError(
+            f"--picture {path} cannot be written; name a .png in a folder that exists"
+        )
+
+
+def _proposed(frames: Sequence[Frame], wanted: Sequence[str], *, dry_run: bool) -> list[Pointer]:
+    """Boxes around what stands out: of the wanted colours, or of all if none is."""
     proposals, suggestions = propose(frames, wanted)
     if not proposals:
         raise CalibrationError(
-            "no patch of saturated colour stands out in these pictures; point at the markers with --box or --click"
+            "no patch of saturated colour stands out in these pictures; point at the markers with "
+            "--box or --click"
         )
     typer.echo(proposals_text(proposals, suggestions), err=True)
     if not wanted:
         return boxes_of(proposals)
     missing = [color for color in wanted if color not in {one.color for one in proposals}]
-    if missing and not request.dry_run:
+    if missing and not dry_run:
         raise CalibrationError(
-            f"no patch was found that could be {', '.join(missing)} of rig.toml's markers; point at it with --box, "
-            "or give the markers the names of what was found in rig.toml"
+            f"no patch was found that could be {', '.join(missing)} of rig.toml's markers; point "
+            "at it with --box, or give the markers the names of what was found in rig.toml"
         )
     return boxes_of([one for one in proposals if one.color in wanted])

@@ -1,12 +1,13 @@
-"""`rhot calibrate depth bench.csv`: k, z and phi of the seed's depth law from measured distances,
-or from its bench, simulated.
+"""`rhot calibrate depth bench.csv`: k, z and phi of the RHOT paper's depth law.
+
+From measured distances, or from the paper's bench, simulated.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import numpy as np
@@ -17,74 +18,89 @@ from rhot.files.calibration import load_rig_cameras
 from rhot.files.config import load_rig
 from services.cli.calibrate.options import JsonOption
 
+if TYPE_CHECKING:
+    from services.calibrator.depth_law.fit import StereoPair
+
+CsvArgument = Annotated[
+    Path | None, typer.Argument(metavar="CSV", help="columns distance_cm,disparity_px")
+]
+RigOption = Annotated[
+    Path | None,
+    typer.Option("--config", help="rig.toml, for focal length and baseline; default: the paper's"),
+]
+SimulateOption = Annotated[
+    bool, typer.Option("--simulate", help="the paper's bench, simulated, instead of a CSV")
+]
+DivergenceOption = Annotated[
+    float, typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other")
+]
+ZeroOption = Annotated[
+    float,
+    typer.Option(min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras"),
+]
+NoiseOption = Annotated[
+    float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")
+]
+TapeOption = Annotated[
+    float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="random seed of the simulated noise")]
+
 
 def depth(
-    table: Annotated[
-        Path | None, typer.Argument(metavar="CSV", help="columns distance_cm,disparity_px")
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(
-            "--config", help="rig.toml, for focal length and baseline; default: the seed's"
-        ),
-    ] = None,
-    simulate: Annotated[
-        bool, typer.Option("--simulate", help="the seed's bench, simulated, instead of a CSV")
-    ] = False,
-    divergence_deg: Annotated[
-        float,
-        typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other"),
-    ] = 0.0,
-    zero_mm: Annotated[
-        float,
-        typer.Option(
-            min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras"
-        ),
-    ] = 0.0,
-    noise_px: Annotated[
-        float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")
-    ] = 0.1,
-    tape_mm: Annotated[
-        float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")
-    ] = 1.0,
-    seed: Annotated[int, typer.Option(min=0, help="of the simulated noise")] = 1,
+    table: CsvArgument = None,
+    config: RigOption = None,
+    simulate: SimulateOption = False,
+    divergence_deg: DivergenceOption = 0.0,
+    zero_mm: ZeroOption = 0.0,
+    noise_px: NoiseOption = 0.1,
+    tape_mm: TapeOption = 1.0,
+    seed: SeedOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Fit the depth law D = k x^z of the RHOT paper to a bench of measured distances."""
-    from services.calibrator.depth_law import fit as laws
+    from services.calibrator.depth_law.bench import (
+        CSV_HEADER,
+        BenchErrors,
+        read_bench,
+        simulate_bench,
+    )
+    from services.calibrator.depth_law.fit import fit_depth
+    from services.calibrator.depth_law.report import depth_text
 
     if (table is None) == (not simulate):
         raise CalibrationError(
-            f"give either a CSV with the columns {','.join(laws.CSV_HEADER)}, or --simulate for the seed's bench"
+            f"give either a CSV with the columns {','.join(CSV_HEADER)}, or --simulate for the "
+            "paper's bench"
         )
-    focal_px, baseline_cm, width_px = _geometry(config)
+    pair = _stereo_pair(config)
     if table is not None:
-        distances, disparities = laws.read_bench(table)
+        distances, disparities = read_bench(table)
     else:
-        distances, disparities = laws.bench(
-            focal_px=focal_px,
-            baseline_cm=baseline_cm,
+        errors = BenchErrors(
             divergence_rad=float(np.radians(divergence_deg)),
             zero_cm=0.1 * zero_mm,
             noise_px=noise_px,
             tape_cm=0.1 * tape_mm,
-            seed=seed,
         )
-    law = laws.fit_depth(distances, disparities, focal_px, baseline_cm, width_px)
-    typer.echo(msgspec.json.encode(asdict(law)).decode() if as_json else laws.depth_text(law))
+        distances, disparities = simulate_bench(errors, pair=pair, random_seed=seed)
+    law = fit_depth(distances, disparities, pair)
+    typer.echo(msgspec.json.encode(asdict(law)).decode() if as_json else depth_text(law))
 
 
-def _geometry(config: Path | None) -> tuple[float, float, int]:
-    """Focal length px, baseline cm and picture width px of a rig's first two cameras, or of the
-    seed's.
-    """
-    from services.calibrator.depth_law.fit import SEED_BASELINE_CM, SEED_FOCAL_PX, SEED_WIDTH_PX
+def _stereo_pair(config: Path | None) -> StereoPair:
+    """A rig's first two cameras, or the paper's."""
+    from services.calibrator.depth_law.fit import PAPER_PAIR, StereoPair
 
     if config is None:
-        return SEED_FOCAL_PX, SEED_BASELINE_CM, SEED_WIDTH_PX
+        return PAPER_PAIR
     cameras = list(load_rig_cameras(load_rig(config)).values())
     if len(cameras) < 2:
         raise CalibrationError(f"{config}: a depth law needs two cameras; it has {len(cameras)}")
     first, second = cameras[:2]
     baseline_m = float(np.linalg.norm(second.centre_rig - first.centre_rig))
-    return 0.25 * (sum(first.focal_px) + sum(second.focal_px)), 100.0 * baseline_m, first.size_px[0]
+    return StereoPair(
+        focal_px=0.25 * (sum(first.focal_px) + sum(second.focal_px)),
+        baseline_cm=100.0 * baseline_m,
+        width_px=first.size_px[0],
+    )

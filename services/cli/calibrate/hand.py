@@ -1,9 +1,9 @@
 """`rhot calibrate hand right`: a person's bone lengths from a short guided recording, live from the
-rig or from a recording.
+rig or from a file.
 
-Live, it says which exercise is due and which markers are missing. A recording that cannot support a
-calibration is refused with the reason, and nothing is written. Lengths measured by hand stay
-possible (--length) and are kept as given.
+Live, it says which exercise is due and which markers are missing. A recording that does not
+determine the hand is refused with the reason, and nothing is written. Lengths measured by hand
+(--length) are kept as given.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import asyncio
 import tempfile
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
 import uvloop
 
@@ -22,15 +21,18 @@ from rhot import topics
 from rhot.client import RigClient
 from rhot.errors import CalibrationError, CaptureError
 from rhot.files.calibration import save
-from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
 from rhot.hand import BASIC_LANDMARKS, DIGITS, HANDS, HandName, default_hand
 from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES
 from rhot.messages import HandPoints
 from services.cli.calibrate import options
 from services.cli.options import ConnectOption
+from services.cli.recorded_messages import messages as messages_of
 from services.cli.router_session import rig_and_endpoints, router_session
 from services.cli.terminal import Terminal
+
+if TYPE_CHECKING:
+    from services.calibrator.hand.hand_file import HandFile
 
 _BONES = {"proximal": 0, "middle": 1, "distal": 2}
 _THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
@@ -66,55 +68,54 @@ def hand(
     them.
     """
     if exercises:
-        typer.echo(
-            "\n".join(
-                f"{EXERCISE_S * n:3.0f} s  {exercise.prompt}"
-                for n, exercise in enumerate(EXERCISES)
-            )
-        )
+        for number, exercise in enumerate(EXERCISES):
+            typer.echo(f"{EXERCISE_S * number:3.0f} s  {exercise.prompt}")
         return
     known = lengths_of(length or [])
+    rig, endpoints = rig_and_endpoints(config, connect)
     if recording is None:
-        rig, endpoints = rig_and_endpoints(config, connect)
         messages, source = uvloop.run(_live(rig, endpoints, which)), f"live, rig {rig.rig.name}"
     else:
-        rig, _ = rig_and_endpoints(config, connect)
         messages, source = recorded(recording, which, config), str(recording)
+    made = _fit(messages, which, start, known, source)
     target = options.out_folder(out, rig if config else None) / f"hand.{which}.json"
-    _fit(messages, which, start, known, target, source, dry_run=dry_run, as_json=as_json)
+    if not dry_run:
+        save(target, made)
+    if as_json:
+        options.echo_json(made)
+        return
+    _report(made, None if dry_run else target)
 
 
 def _fit(
     messages: list[HandPoints],
     which: HandName,
-    start: float | None,
+    start_s: float | None,
     known: dict[tuple[int, int], float],
-    target: Path,
     source: str,
-    *,
-    dry_run: bool,
-    as_json: bool,
-) -> None:
-    from services.calibrator.hand.fit import fit_person
-    from services.calibrator.hand.recording import recording_of
-    from services.calibrator.hand.report import hand_file, report_text
+) -> HandFile:
+    from services.calibrator.hand.fit import fit_hand
+    from services.calibrator.hand.hand_file import hand_file
+    from services.calibrator.hand.recording import sort_exercises
 
     if not messages:
         raise CalibrationError(
-            f"{source}: has no points of a {which} hand; are the cameras calibrated and the markers in rig.toml?"
+            f"{source}: has no points of a {which} hand; are the cameras calibrated and the "
+            "markers in rig.toml?"
         )
     table = default_hand(which)
-    problem, found = fit_person(recording_of(messages, table, start_s=start), table, known)
-    made = hand_file(problem, found, table, date=options.now_text(), inputs=source)
-    if not dry_run:
-        save(target, made)
-    if as_json:
-        typer.echo(msgspec.json.format(msgspec.json.encode(made), indent=1).decode())
-        return
+    problem, found = fit_hand(sort_exercises(messages, table, start_s=start_s), table, known)
+    return hand_file(problem, found, table, date=options.now_text(), inputs=source)
+
+
+def _report(made: HandFile, written: Path | None) -> None:
+    from services.calibrator.hand.report import report_text
+
     typer.echo(report_text(made))
-    if not dry_run:
+    if written is not None:
         typer.echo(
-            f"written: {target}; running services read it when they start: restart rhot-fusion and rhot-solver"
+            f"written: {written}; running services read it when they start: "
+            "restart rhot-fusion and rhot-solver"
         )
 
 
@@ -134,7 +135,8 @@ def lengths_of(texts: list[str]) -> dict[tuple[int, int], float]:
             millimetres = -1.0
         if digit not in DIGITS or bone not in bones or not 1.0 <= millimetres <= 150.0:
             raise CalibrationError(
-                f"--length {text!r}: give DIGIT:BONE=MM, e.g. index:proximal=39.5; bones: {', '.join(bones)}; 1 to 150 mm"
+                f"--length {text!r}: give DIGIT:BONE=MM, e.g. index:proximal=39.5; "
+                f"bones: {', '.join(bones)}; 1 to 150 mm"
             )
         known[DIGITS.index(digit), bones[bone]] = 1e-3 * millimetres
     return known
@@ -145,36 +147,26 @@ def recorded(path: Path, which: HandName, config: Path | None) -> list[HandPoint
 
     Raises CaptureError if there is none, and what reading it raises.
     """
-    if path.suffix == ".mcap":
-        from services.recorder.reader import read
-
-        messages = [
-            msgspec.json.decode(record.payload, type=HandPoints)
-            for record in read(path)
-            if record.encoding == topics.POINTS.encoding
-        ]
-    elif path.is_file():
-        messages = list(read_lines(path, HandPoints))
-    elif (path / "points.jsonl").is_file():
-        messages = list(read_lines(path / "points.jsonl", HandPoints))
+    if path.is_file() or (path / "points.jsonl").is_file():
+        found = list(messages_of(path, topics.POINTS, HandPoints, "points"))
     elif (path / "rig.toml").is_file():
         from services.cli.offline.inputs import job_of
         from services.cli.offline.run import run
 
         with tempfile.TemporaryDirectory() as folder:
-            run(job_of([str(path)], config), Path(folder) / "out", None)
-            messages = list(read_lines(Path(folder) / "out" / "points.jsonl", HandPoints))
+            tracked = Path(folder) / "out"
+            run(job_of([str(path)], config), tracked, None)
+            found = list(messages_of(tracked, topics.POINTS, HandPoints, "points"))
     else:
         raise CaptureError(f"{path}: is no capture, result of `rhot track`, points.jsonl or .mcap")
-    return [message for message in messages if message.hand == which]
+    return [message for message in found if message.hand == which]
 
 
 async def _live(rig: RigConfig, endpoints: list[str], which: HandName) -> list[HandPoints]:
     """One pass through the exercises, with what to do now and what is missing on standard error."""
     if which not in rig.hand:
-        raise CalibrationError(
-            f"rig.toml has no [hand.{which}.markers]; it has {', '.join(h for h in HANDS if h in rig.hand) or 'no hand'}"
-        )
+        others = ", ".join(hand for hand in HANDS if hand in rig.hand) or "no hand"
+        raise CalibrationError(f"rig.toml has no [hand.{which}.markers]; it has {others}")
     teller, messages, shown = Terminal(), [], -1
     async with router_session(rig.rig.name, endpoints) as bus:
         stream = RigClient(bus).hand_points(which, queue=256)
@@ -188,7 +180,8 @@ async def _live(rig: RigConfig, endpoints: list[str], which: HandName) -> list[H
                 message = await asyncio.wait_for(anext(stream), _SILENT_S)
             except TimeoutError:
                 raise CalibrationError(
-                    f"no points of the {which} hand for {_SILENT_S:.0f} s: is fusion running and the hand in view? `rhot top` shows it"
+                    f"no points of the {which} hand for {_SILENT_S:.0f} s: is fusion running and "
+                    "the hand in view? `rhot top` shows it"
                 ) from None
             messages.append(message)
             number = min(int(passed_s // EXERCISE_S), len(EXERCISES) - 1)

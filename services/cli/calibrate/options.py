@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import msgspec
 import typer
 
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig, load_rig
+from services.cli.options import ConnectOption, ProgressOption
 from services.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
     from services.calibrator.board.picture_folder import PictureSet
 
 # The side of the squares that `rhot board` prints unless told otherwise.
-SQUARE_M = 0.025
+_SQUARE_M = 0.025
 
 
 class Kind(StrEnum):
@@ -30,7 +33,7 @@ class Kind(StrEnum):
     CHARUCO = "charuco"
 
 
-BoardOption = Annotated[
+CornersOption = Annotated[
     str | None,
     typer.Option(
         "--board", help="inner corners, COLSxROWS, e.g. 9x6; default: counted in the pictures"
@@ -67,27 +70,64 @@ CountOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 
-def board_of(
-    corners: str | None, square_m: float | None, kind: Kind, marker: float, dictionary: str
-) -> Board | None:
-    """The board that the options describe; None if its corners are to be counted in the pictures.
+@dataclass(frozen=True)
+class BoardOptions:
+    """The board that is shown in the pictures."""
 
-    Raises CalibrationError for an impossible one.
-    """
-    from services.calibrator.board.board import Board, parse_corners
+    board: CornersOption = None
+    square: SquareOption = None
+    kind: KindOption = Kind.CHESSBOARD
+    marker: MarkerOption = 0.7
+    dictionary: DictionaryOption = "DICT_4X4_50"
 
-    if corners is None:
-        if kind is Kind.CHARUCO:
-            raise CalibrationError(
-                "a ChArUco board's size is not counted in the pictures; give its inner corners, e.g. --board 7x5"
-            )
-        # Checks the square before minutes of detection.
-        Board(9, 6, square_m or SQUARE_M)
-        return None
-    cols, rows = parse_corners(corners)
-    return Board(
-        cols, rows, SQUARE_M if square_m is None else square_m, kind.value, dictionary, marker
-    )
+    @property
+    def square_m(self) -> float:
+        """Side of one square, as given or as `rhot board` prints it."""
+        return self.square or _SQUARE_M
+
+    @property
+    def note(self) -> str:
+        """What to say if the size of the squares was assumed; empty if it was given."""
+        if self.square is not None:
+            return ""
+        return (
+            f"note: squares of {1e3 * _SQUARE_M:g} mm were assumed; measure yours and give "
+            "--square: every distance scales with it"
+        )
+
+    def known_board(self) -> Board | None:
+        """The board that the options describe; None if its corners are to be counted in the
+        pictures.
+
+        Raises CalibrationError for an impossible one.
+        """
+        from services.calibrator.board.board import Board, parse_corners
+
+        if self.board is None:
+            if self.kind is Kind.CHARUCO:
+                raise CalibrationError(
+                    "a ChArUco board's size is not counted in the pictures; give its inner "
+                    "corners, e.g. --board 7x5"
+                )
+            # Checks the square before minutes of detection.
+            Board(9, 6, self.square_m)
+            return None
+        cols, rows = parse_corners(self.board)
+        square_m = _SQUARE_M if self.square is None else self.square
+        return Board(cols, rows, square_m, self.kind.value, self.dictionary, self.marker)
+
+
+@dataclass(frozen=True)
+class PictureOptions:
+    """Where pictures of the board come from, and where the result goes."""
+
+    out: OutOption = None
+    config: ConfigOption = None
+    live: LiveOption = False
+    connect: ConnectOption = None
+    count: CountOption = 15
+    progress: ProgressOption = None
+    as_json: JsonOption = False
 
 
 def out_folder(out: Path | None, config: RigConfig | None) -> Path:
@@ -114,11 +154,9 @@ def now_text() -> str:
     return datetime.datetime.now().astimezone().isoformat(timespec="seconds")
 
 
-def square_note(square_m: float | None) -> str:
-    """What to say if the size of the squares was assumed."""
-    if square_m is not None:
-        return ""
-    return f"note: squares of {1e3 * SQUARE_M:g} mm were assumed; measure yours and give --square: every distance scales with it"
+def echo_json(made: msgspec.Struct) -> None:
+    """Print a calibration file's content."""
+    typer.echo(msgspec.json.format(msgspec.json.encode(made), indent=1).decode())
 
 
 def detect_all(

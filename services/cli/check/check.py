@@ -1,7 +1,6 @@
 """`rhot check CONFIG`: every problem of a rig.toml and of all it refers to, before anything runs.
 
-Exit code 0 if nothing stands in the way (warnings and notes do not), 1 if there is an error;
---strict counts warnings too.
+Exit code 0 without errors, 1 with one; --strict counts warnings as errors.
 """
 
 from __future__ import annotations
@@ -16,17 +15,16 @@ from services.cli.check.problems import Report, report
 
 
 def check(
-    config: Annotated[Path, typer.Argument(help="rig.toml to look at")],
+    config: Annotated[Path, typer.Argument(help="rig.toml to check")],
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="exit with 1 on warnings too")] = False,
 ) -> None:
     """List every problem of a rig.toml: keys, colours, calibrations, sources, network."""
     found = check_config(config)
-    typer.echo(
-        msgspec.json.format(msgspec.json.encode(found), indent=1).decode()
-        if as_json
-        else report_text(found)
-    )
+    if as_json:
+        typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode())
+    else:
+        typer.echo(report_text(found))
     if found.count("error") or (strict and found.count("warning")):
         raise typer.Exit(1)
 
@@ -44,7 +42,7 @@ def check_config(config: Path) -> Report:
 
 
 def report_text(found: Report) -> str:
-    """One line per finding, and a sum."""
+    """One line per finding, and a line that counts them."""
     width = max((len(problem.severity) for problem in found.problems), default=0)
     lines = [
         f"{problem.severity.ljust(width)}  {problem.where}: {problem.what}"

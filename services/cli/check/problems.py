@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Literal
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Literal, TypeVar
 
 import msgspec
 
+from rhot.errors import CalibrationError
+
+T = TypeVar("T")
 Severity = Literal["error", "warning", "note"]
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -57,3 +61,15 @@ def warning(where: object, what: str) -> Problem:
 def note(where: object, what: str) -> Problem:
     """Worth knowing."""
     return Problem(severity="note", where=str(where), what=what)
+
+
+def load_or_report(load: Callable[[], T], problems: list[Problem], path: Path) -> T | None:
+    """What load returns; None if the file is broken, which is a problem of the file it names."""
+    try:
+        return load()
+    except CalibrationError as broken:
+        text = str(broken)
+        files = (path, path.parent / "rig.json")
+        where = next((name for name in files if text.startswith(f"{name}: ")), path)
+        problems.append(error(where, text.removeprefix(f"{where}: ")))
+        return None

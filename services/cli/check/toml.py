@@ -1,7 +1,7 @@
 """Every mistake in a rig.toml, not only the first: what rhot.files.config would reject, key by key.
 
-Values that are wrong are taken out, so that the rest of the file can still be looked at. A file
-that is missing or is not TOML has one problem and no configuration.
+Wrong values are taken out, so that the rest of the file can still be checked. A file that is
+missing or is not TOML has one problem and no configuration.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ def read_rig(path: Path) -> tuple[RigConfig | None, list[Problem]]:
 
 
 def _clean(value: Any, kind: Any, at: str, path: str, problems: list[Problem]) -> Any:
-    """value without what does not fit its type; UNSET if nothing of it does."""
+    """value without what does not fit its type kind; UNSET if nothing of it does.
+
+    at is the key's name for people; problems are added to.
+    """
     table, origin, of = _table_of(kind), get_origin(kind), get_args(kind)
     if table is not None and isinstance(value, dict):
         return _clean_table(value, table, at, path, problems)
@@ -102,9 +105,9 @@ def _clean_dict(
 
 
 def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]:
-    """What rhot.files.config._check says of one thing at a time, said of all.
+    """The rules of rhot.files.config._check, which names one mistake at a time, for all of them.
 
-    Known are the problems so far.
+    known are the problems so far.
     """
     problems = []
     colors: Counter[str] = Counter()
@@ -140,7 +143,7 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
 
 
 def _leftover(path: Path) -> list[Problem]:
-    """What only rhot.files.config itself objects to: its word is the last."""
+    """What only rhot.files.config itself rejects: it decides in the end."""
     try:
         load_rig(path)
     except ConfigError as broken:
@@ -149,7 +152,7 @@ def _leftover(path: Path) -> list[Problem]:
 
 
 def _wrong(value: Any, kind: Any) -> str | None:
-    """Why a value does not fit, in the words of rhot.files.config, or None."""
+    """Why a value does not fit, as rhot.files.config says it, or None."""
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as wrong:
@@ -159,19 +162,15 @@ def _wrong(value: Any, kind: Any) -> str | None:
 
 def _unknown(name: str, valid: list[str], where: str, what: str) -> str:
     near = difflib.get_close_matches(name, valid, n=1)
-    return f"{where}: unknown {what} `{name}`{f', did you mean `{near[0]}`?' if near else '.'} Valid: {', '.join(valid)}"
+    guess = f", did you mean `{near[0]}`?" if near else "."
+    return f"{where}: unknown {what} `{name}`{guess} Valid: {', '.join(valid)}"
 
 
 def _table_of(kind: Any) -> type[msgspec.Struct] | None:
     """The table itself, or the one inside `Table | None`."""
-    return next(
-        (
-            one
-            for one in (kind, *get_args(kind))
-            if get_origin(kind) not in (list, dict) and _is_struct(one)
-        ),
-        None,
-    )
+    if get_origin(kind) in (list, dict):
+        return None
+    return next((one for one in (kind, *get_args(kind)) if _is_struct(one)), None)
 
 
 def _is_struct(kind: Any) -> bool:

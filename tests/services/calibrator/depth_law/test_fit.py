@@ -1,4 +1,4 @@
-"""The seed's depth law and its bench."""
+"""The RHOT paper's depth law."""
 
 from __future__ import annotations
 
@@ -6,25 +6,16 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
-from services.calibrator.depth_law.fit import (
-    SEED_DISTANCES_CM,
-    SEED_K,
-    SEED_Z,
-    bench,
-    depth_text,
-    fit_depth,
-    read_bench,
-)
+from services.calibrator.depth_law.bench import BenchErrors, simulate_bench
+from services.calibrator.depth_law.fit import PAPER_K, PAPER_Z, fit_depth
+from services.calibrator.depth_law.report import depth_text
 
-
-def test_the_bench_is_the_papers():
-    assert SEED_DISTANCES_CM[0] == 100.0
-    assert SEED_DISTANCES_CM[-1] == 20.0
-    assert len(SEED_DISTANCES_CM) == 17
+# Together they give the paper's k and z.
+DIVERGENCE_RAD, ZERO_CM = np.radians(0.095), 1.02
 
 
 def test_ideal_cameras_give_the_geometric_law():
-    law = fit_depth(*bench())
+    law = fit_depth(*simulate_bench())
     assert law.k == pytest.approx(527.3 * 7.5, rel=1e-6)
     assert law.z == pytest.approx(-1.0, abs=1e-6)
     assert law.phi_rad == pytest.approx(0.0, abs=1e-4)
@@ -32,79 +23,53 @@ def test_ideal_cameras_give_the_geometric_law():
     assert law.zero_cm == pytest.approx(0.0, abs=1e-6)
 
 
-def test_the_seeds_numbers_follow_from_a_tenth_of_a_degree_and_a_centimetre():
+def test_the_papers_numbers_follow_from_a_tenth_of_a_degree_and_a_centimetre():
     """Test: cameras .095 degrees apart, the tape's zero 10.2 mm in front of the optical centres.
     Expected: the paper's k and z.
 
     One cause alone cannot give both: turned cameras of z = -1.035 have k = 4794, a displaced zero
     of that z has k = 4382.
     """
-    law = fit_depth(*bench(divergence_rad=np.radians(0.095), zero_cm=1.02))
-    assert law.k == pytest.approx(SEED_K, rel=0.01)
-    assert law.z == pytest.approx(SEED_Z, abs=0.002)
-    turned = fit_depth(*bench(divergence_rad=np.radians(0.3)))
+    law = fit_depth(*simulate_bench(BenchErrors(divergence_rad=DIVERGENCE_RAD, zero_cm=ZERO_CM)))
+    assert law.k == pytest.approx(PAPER_K, rel=0.01)
+    assert law.z == pytest.approx(PAPER_Z, abs=0.002)
+    turned = fit_depth(*simulate_bench(BenchErrors(divergence_rad=np.radians(0.3))))
     assert (turned.k, turned.z) == (
         pytest.approx(4794.0, rel=0.01),
-        pytest.approx(SEED_Z, abs=0.001),
+        pytest.approx(PAPER_Z, abs=0.001),
     )
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_a_noisy_bench_lands_near_the_seed_and_names_the_causes(seed):
+@pytest.mark.parametrize("random_seed", range(5))
+def test_a_noisy_bench_lands_near_the_papers_and_names_the_causes(random_seed):
     """Test: .2 px of noise, target placed to 1 mm.
 
     Expected: k within 3 %, z within .008, and the causes found again.
     """
-    law = fit_depth(
-        *bench(divergence_rad=np.radians(0.095), zero_cm=1.02, noise_px=0.2, tape_cm=0.1, seed=seed)
-    )
-    assert law.k == pytest.approx(SEED_K, rel=0.03)
-    assert law.z == pytest.approx(SEED_Z, abs=0.008)
+    errors = BenchErrors(divergence_rad=DIVERGENCE_RAD, zero_cm=ZERO_CM, noise_px=0.2, tape_cm=0.1)
+    law = fit_depth(*simulate_bench(errors, random_seed=random_seed))
+    assert law.k == pytest.approx(PAPER_K, rel=0.03)
+    assert law.z == pytest.approx(PAPER_Z, abs=0.008)
     assert np.degrees(law.divergence_rad) == pytest.approx(0.095, abs=0.03)
     assert law.zero_cm == pytest.approx(1.02, abs=0.25)
     assert np.sqrt(np.mean(np.square(law.explained_cm))) < 0.6
 
 
 def test_the_power_law_corrects_what_the_geometric_law_cannot():
-    law = fit_depth(*bench(divergence_rad=np.radians(0.3)))
+    law = fit_depth(*simulate_bench(BenchErrors(divergence_rad=np.radians(0.3))))
     assert np.abs(law.power_cm).max() < 0.5 * np.abs(law.geometry_cm).max()
     assert "k = 4" in depth_text(law)
     assert "[fusion.disparity]" in depth_text(law)
 
 
 def test_phi_makes_equation_10_meet_the_measurements():
-    law = fit_depth(*bench(zero_cm=0.5))
+    law = fit_depth(*simulate_bench(BenchErrors(zero_cm=0.5)))
     k = 7.5 * 640 / (2.0 * np.tan(np.arctan(320.0 / 527.3) + law.phi_rad))
     np.testing.assert_allclose(
         np.array(law.distances_cm) + np.array(law.geometry_cm),
         k / np.array(law.disparities_px),
         rtol=1e-9,
     )
-
-
-def test_a_table_is_read(tmp_path):
-    path = tmp_path / "bench.csv"
-    path.write_text("distance_cm,disparity_px\n100,39.5\n\n20, 198\n")
-    distances, disparities = read_bench(path)
-    assert distances.tolist() == [100.0, 20.0]
-    assert disparities.tolist() == [39.5, 198.0]
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("", "line 1: expected the header"),
-        ("cm,px\n1,2\n", "line 1: expected the header"),
-        ("distance_cm,disparity_px\n100,39\n50\n", "line 3: expected two numbers"),
-        ("distance_cm,disparity_px\n100,nan\n", "line 2: distance and disparity must be positive"),
-        ("distance_cm,disparity_px\n-5,39\n", "line 2: distance and disparity must be positive"),
-    ],
-)
-def test_a_bad_table_is_refused_with_its_line(tmp_path, text, reason):
-    path = tmp_path / "bench.csv"
-    path.write_text(text)
-    with pytest.raises(CalibrationError, match=reason):
-        read_bench(path)
 
 
 @pytest.mark.parametrize(
@@ -116,11 +81,6 @@ def test_a_bad_table_is_refused_with_its_line(tmp_path, text, reason):
         ([100.0, 80.0, 60.0, 40.0, float("inf")], [40.0, 50.0, 60.0, 70.0, 80.0], "positive"),
     ],
 )
-def test_measurements_that_carry_no_law_are_refused(distances, disparities, reason):
+def test_measurements_that_determine_no_law_are_refused(distances, disparities, reason):
     with pytest.raises(CalibrationError, match=reason):
         fit_depth(distances, disparities)
-
-
-def test_a_missing_table_is_named(tmp_path):
-    with pytest.raises(CalibrationError, match="cannot be read"):
-        read_bench(tmp_path / "none.csv")

@@ -9,7 +9,12 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import load_cameras, load_lens, save
 from rhot.geometry.transforms import apply
 from services.calibrator.lens.calibrate import calibrate_lens
-from services.calibrator.output.calibration_files import given_lenses, lens_of, lenses_of, rig_of
+from services.calibrator.output.calibration_files import (
+    lens_file,
+    lens_vectors,
+    rig_file,
+    rig_lens_files,
+)
 from services.calibrator.rig.calibrate import calibrate_rig
 
 
@@ -22,9 +27,9 @@ def calibrated(make_bench):
 
 def test_a_rig_is_read_back_as_cameras_that_see_the_board_where_it_was_seen(calibrated, tmp_path):
     bench, result = calibrated
-    for name, lens in lenses_of(result, "2025-01-01", "pictures").items():
+    for name, lens in rig_lens_files(result, "2025-01-01", "pictures").items():
         save(tmp_path / f"{name}.lens.json", lens)
-    save(tmp_path / "rig.json", rig_of(result, "2025-01-01", "pictures"))
+    save(tmp_path / "rig.json", rig_file(result, "2025-01-01", "pictures"))
     cameras = load_cameras(tmp_path, ["left", "right"])
     np.testing.assert_array_equal(cameras["left"].T_rig_from_camera, np.eye(4))
     points = apply(result.state.T_rig_from_board[0], bench.board.points)
@@ -41,7 +46,7 @@ def test_a_rig_is_read_back_as_cameras_that_see_the_board_where_it_was_seen(cali
 
 def test_files_say_how_they_were_made(calibrated):
     _, result = calibrated
-    geometry = rig_of(result, "2025-01-01", "pictures")
+    geometry = rig_file(result, "2025-01-01", "pictures")
     assert (geometry.date, geometry.tool) == ("2025-01-01", "rhot calibrate stereo")
     assert geometry.inputs["board"] == "chessboard 9x6"
     assert geometry.inputs["square_m"] == 0.025
@@ -58,7 +63,7 @@ def test_files_say_how_they_were_made(calibrated):
 def test_one_lens_is_read_back(make_bench, tmp_path):
     bench = make_bench(1, positions=8)
     result = calibrate_lens("left", bench.detections(0.05)["left"], bench.board)
-    save(tmp_path / "left.lens.json", lens_of(result, bench.board, "2025-01-01", "pictures"))
+    save(tmp_path / "left.lens.json", lens_file(result, bench.board, "2025-01-01", "pictures"))
     lens = load_lens(tmp_path, "left")
     assert lens.size_px == (640, 480)
     assert lens.matrix[0][0] == pytest.approx(result.lens[0], abs=1e-3)
@@ -69,9 +74,9 @@ def test_one_lens_is_read_back(make_bench, tmp_path):
 
 def test_a_lens_of_another_picture_size_is_refused(calibrated):
     bench, result = calibrated
-    files = lenses_of(result, "", "")
+    files = rig_lens_files(result, "", "")
     found = bench.detections()
-    assert set(given_lenses(files, found)) == {"left", "right"}
+    assert set(lens_vectors(files, found)) == {"left", "right"}
     other = {
         "left": {
             key: type(shown)(shown.ids, shown.corners, (1280, 960))
@@ -79,4 +84,4 @@ def test_a_lens_of_another_picture_size_is_refused(calibrated):
         }
     }
     with pytest.raises(CalibrationError, match="calibrated at 640x480"):
-        given_lenses(files, other)
+        lens_vectors(files, other)

@@ -18,7 +18,7 @@ from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig, load_rig
 from services.calibrator.board.board import Board
 from services.cli.calibrate import live_pictures
-from services.cli.calibrate.live_pictures import collect, one_each
+from services.cli.calibrate.live_pictures import LiveCameras, collect, one_each
 from testing.synthetic_boards import BenchSetup
 
 
@@ -67,7 +67,7 @@ async def cameras(
 async def test_still_positions_are_kept_as_pictures(rig, router, shown, tmp_path):
     folder = tmp_path / "pictures"
     async with cameras(router, shown) as asked:
-        board = await asyncio.to_thread(collect, rig, [], folder, None, 0.025, 3, None)
+        board = await asyncio.to_thread(collect, LiveCameras(rig, [], folder), None, 0.025, 3)
     assert (board.cols, board.rows, board.square_m) == (9, 6, 0.025)
     assert sorted(path.name for path in folder.iterdir()) == [
         f"{name}_{n:02d}.png" for name in ("left", "right") for n in (1, 2, 3)
@@ -79,7 +79,7 @@ async def test_still_positions_are_kept_as_pictures(rig, router, shown, tmp_path
 async def test_pictures_of_an_earlier_try_stay(rig, router, shown, tmp_path):
     (tmp_path / "left_07.png").write_bytes(b"earlier")
     async with cameras(router, shown):
-        await asyncio.to_thread(collect, rig, ["left"], tmp_path, None, 0.025, 1, None)
+        await asyncio.to_thread(collect, LiveCameras(rig, ["left"], tmp_path), None, 0.025, 1)
     assert (tmp_path / "left_07.png").read_bytes() == b"earlier"
     assert (tmp_path / "left_08.png").read_bytes() == shown["left"][0]
 
@@ -87,26 +87,28 @@ async def test_pictures_of_an_earlier_try_stay(rig, router, shown, tmp_path):
 async def test_a_camera_that_is_silent_is_named(rig, router, shown, tmp_path):
     async with cameras(router, {"left": shown["left"]}):
         with pytest.raises(BusError, match="camera right sends no picture"):
-            await asyncio.to_thread(collect, rig, [], tmp_path, None, 0.025, 3, None)
+            await asyncio.to_thread(collect, LiveCameras(rig, [], tmp_path), None, 0.025, 3)
 
 
 async def test_nobody_showing_anything_new_ends_it(rig, router, shown, tmp_path, monkeypatch):
     monkeypatch.setattr(live_pictures, "_PATIENCE_S", 0.5)
     async with cameras(router, {name: pictures[:1] for name, pictures in shown.items()}):
         with pytest.raises(CalibrationError, match="nothing new was shown") as ended:
-            await asyncio.to_thread(collect, rig, [], tmp_path, Board(9, 6, 0.025), 0.025, 3, None)
+            await asyncio.to_thread(
+                collect, LiveCameras(rig, [], tmp_path), Board(9, 6, 0.025), 0.025, 3
+            )
     assert "/3 positions" in str(ended.value)
     assert str(tmp_path) in str(ended.value)
 
 
 async def test_one_picture_each_for_the_desk(rig, router, shown, tmp_path):
     async with cameras(router, shown):
-        await asyncio.to_thread(one_each, rig, ["left", "right"], tmp_path, None)
+        await asyncio.to_thread(one_each, LiveCameras(rig, ["left", "right"], tmp_path))
     assert (tmp_path / "left.png").read_bytes() == shown["left"][0]
     with pytest.raises(BusError, match="no camera of left, right answers"):
-        await asyncio.to_thread(one_each, rig, ["left", "right"], tmp_path, None)
+        await asyncio.to_thread(one_each, LiveCameras(rig, ["left", "right"], tmp_path))
 
 
 async def test_an_unknown_camera_is_refused_before_anything_is_asked(rig, tmp_path):
     with pytest.raises(Exception, match="has no camera 'top'"):
-        await asyncio.to_thread(collect, rig, ["top"], tmp_path, None, 0.025, 3, None)
+        await asyncio.to_thread(collect, LiveCameras(rig, ["top"], tmp_path), None, 0.025, 3)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 
 from rhot.errors import CalibrationError
-from services.cli.calibrate.pointing_options import at, everywhere, numbers_of
+from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
 from services.pi_tracker.colors.paint_patch import Pointer
 
 
 def test_boxes_and_clicks_count_in_every_picture():
-    found = everywhere(["green=1,2,30,40"], ["blue=5.5,6"], range(2, 4))
+    found = PointingOptions(box=["green=1,2,30,40"], click=["blue=5.5,6"]).in_every_frame(
+        range(2, 4)
+    )
     assert found == [
         Pointer("green", 2, 1.0, 2.0, 30.0, 40.0),
         Pointer("blue", 2, 5.5, 6.0),
@@ -20,7 +22,9 @@ def test_boxes_and_clicks_count_in_every_picture():
 
 
 def test_places_in_single_frames_number_the_frames():
-    frames, pointers = at(["100:green=1,2,3,4", "7:blue=5,6", "100:blue=8,9"])
+    frames, pointers = PointingOptions(
+        at=["100:green=1,2,3,4", "7:blue=5,6", "100:blue=8,9"]
+    ).in_single_frames()
     assert frames == [100, 7]
     assert [(p.frame, p.color) for p in pointers] == [(0, "green"), (1, "blue"), (0, "blue")]
 
@@ -41,7 +45,7 @@ def test_places_in_single_frames_number_the_frames():
 )
 def test_what_is_no_click_says_what_one_is(text):
     with pytest.raises(CalibrationError, match=r"expected color=x,y"):
-        everywhere([], [text], range(1))
+        PointingOptions(click=[text]).in_every_frame(range(1))
 
 
 @pytest.mark.parametrize(
@@ -49,16 +53,23 @@ def test_what_is_no_click_says_what_one_is(text):
 )
 def test_what_is_no_box_says_what_one_is(text):
     with pytest.raises(CalibrationError, match=r"expected color=x,y,width,height|must be above 0"):
-        everywhere([text], [], range(1))
+        PointingOptions(box=[text]).in_every_frame(range(1))
 
 
 @pytest.mark.parametrize("text", ["green=1,2", "x:green=1,2", "-1:green=1,2", "3:green"])
 def test_what_is_no_place_in_a_frame_says_what_one_is(text):
     with pytest.raises(CalibrationError, match=r"expected (FRAME:)?color="):
-        at([text])
+        PointingOptions(at=[text]).in_single_frames()
+
+
+def test_any_way_of_pointing_counts():
+    assert not PointingOptions()
+    assert not PointingOptions(box=[])
+    for used in (PointingOptions(click=["green=1,2"]), PointingOptions(auto=True)):
+        assert used
 
 
 def test_frame_numbers():
-    assert numbers_of("10, 200,10") == [10, 200]
+    assert frame_numbers("10, 200,10") == [10, 200]
     with pytest.raises(CalibrationError, match="expected frame numbers"):
-        numbers_of("1,x")
+        frame_numbers("1,x")

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from rhot.files.calibration import ColorRange, Lens, load_geometry, load_lens, save
 from services.cli.application import application
-from services.cli.check.calibration import overlap
 from services.cli.check.check import check_config
+from services.cli.check.colors import overlap
 from services.cli.defaults import config_dir, sim_toml
 
 
