@@ -1,6 +1,4 @@
-"""`rhot calibrate stereo` on synthetic rigs: places are found again, bad data are refused with
-their reason.
-"""
+"""`rhot calibrate stereo` on synthetic rigs: found again, or refused with the reason."""
 
 from __future__ import annotations
 
