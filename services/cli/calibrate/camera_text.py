@@ -11,9 +11,10 @@ import numpy as np
 
 from rhot.camera_messages import ExposureControl
 from rhot.files.calibration import ColorRange, Colors
-from services.pi_tracker.colors.exposure_advice import Light
-from services.pi_tracker.colors.fit import Study
-from services.pi_tracker.colors.propose import Proposal, Suggestion
+from services.pi_tracker.colors.exposure_advice import ExposureStatistics
+from services.pi_tracker.colors.fit import TrainingSet
+from services.pi_tracker.colors.paint_names import Suggestion
+from services.pi_tracker.colors.propose import Proposal
 from services.pi_tracker.colors.report import Report
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.frame import Frame, Image
@@ -70,7 +71,7 @@ def proposals_text(proposals: Sequence[Proposal], suggestions: Sequence[Suggesti
     return "\n".join(lines)
 
 
-def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
+def overlay(training: TrainingSet, frames: Sequence[Frame], colors: Colors) -> Image:
     """The pictures one below the other: what the ranges take in white, boxes around what was
     pointed at.
     """
@@ -92,10 +93,10 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
             interpolation=cv2.INTER_NEAREST,
         )
         bgr[mask > 0] = 255
-        for color, samples in study.samples.items():
-            for swatch in samples.swatches:
-                if swatch.frame == number:
-                    x, y, w, h = swatch.box_px
+        for color, samples in training.samples.items():
+            for patch in samples.patches:
+                if patch.frame == number:
+                    x, y, w, h = patch.box_px
                     cv2.rectangle(bgr, (x - 2, y - 2), (x + w + 1, y + h + 1), (0, 0, 255), 1)
                     cv2.putText(
                         bgr,
@@ -111,7 +112,7 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
     return np.vstack(shown)
 
 
-def light_text(light: Light) -> str:
+def light_text(light: ExposureStatistics) -> str:
     """One line on the light in the pictures."""
     cast = (
         "nothing neutral in view"

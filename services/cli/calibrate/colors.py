@@ -23,7 +23,7 @@ from services.cli.calibrate.camera_text import overlay, proposals_text, report_t
 from services.cli.calibrate.pointing_options import at, everywhere, numbers_of
 from services.cli.router_session import reach
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import colors_file, examine
 from services.pi_tracker.image.frame import Frame

@@ -10,7 +10,7 @@ import msgspec
 
 from rhot.errors import CalibrationError
 from rhot.messages import Name
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 
 
 def numbers_of(text: str) -> list[int]:

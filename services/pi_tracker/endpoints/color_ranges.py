@@ -21,7 +21,7 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import Colors, load_colors, load_lens, save
 from rhot.messages import Marker
 from rhot.process.service import Service
-from services.pi_tracker.colors.light_drift import Drift
+from services.pi_tracker.colors.light_drift import DriftMonitor
 from services.pi_tracker.colors.validate import check_colors
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
@@ -60,7 +60,7 @@ class Coloring:
 
     def look(self, frame: Frame, markers: list[Marker]) -> None:
         """Watch for drift."""
-        if not self._drift.look(frame, markers):
+        if not self._drift.update(frame, markers):
             return
         self._service.values.update(self._drift.values())
         for drifted in self._drift.drifted():
@@ -159,7 +159,7 @@ class Coloring:
         )
 
     def _put_in_force(self, colors: Colors, step: TrackerStep) -> None:
-        self.in_force, self.step, self._drift = colors, step, Drift(colors)
+        self.in_force, self.step, self._drift = colors, step, DriftMonitor(colors)
         self._told_ns.clear()
         if self._service.last_error == self._complaint:
             self._service.last_error = ""
