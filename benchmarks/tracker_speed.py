@@ -24,10 +24,10 @@ import numpy.typing as npt
 from rhot.files.calibration import Colors
 from rhot.files.config import Tracker
 from services.pi_tracker.detect import search_region
-from services.pi_tracker.detect.blob import Blob
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.paper_finder import PaperFinder
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import Rect, picture
 from services.pi_tracker.step import TrackerStep

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.pi_tracker.detect.blob import Blob, make_blob
+from services.pi_tracker.image.blob import Blob, make_blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.yuv_planes import Rect
 

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from rhot.files.config import Tracker
-from services.pi_tracker.detect.blob import Blob, blobs_of_contours, external_contours, make_blob
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.detect.morphology import opening
+from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours, make_blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.yuv_planes import Picture, Rect
 

@@ -14,12 +14,12 @@ import msgspec
 from rhot.files.config import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
-from services.pi_tracker.detect.blob import Blob
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.identify.marker_identity import Association, MarkerIdentity
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, Rect, picture

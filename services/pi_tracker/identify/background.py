@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from services.pi_tracker.detect.blob import Blob, blobs_of_contours, external_contours
+from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, Rect

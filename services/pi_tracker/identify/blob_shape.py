@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.pi_tracker.detect.blob import Blob
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.yuv_planes import Rect
 
 # Paint patches seen from any side, blurred by fast motion, stay within this ratio of sides and fill

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from services.pi_tracker.detect.blob import Blob
+from services.pi_tracker.image.blob import Blob
 
 # Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm
 # wide: markers lie within 14 patch widths, mostly within 10.

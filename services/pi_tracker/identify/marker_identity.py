@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from statistics import median
 
-from services.pi_tracker.detect.blob import Blob
 from services.pi_tracker.identify.blob_shape import may_be_rim, touch
 from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
 from services.pi_tracker.identify.track import AREA_MEMORY, Track
+from services.pi_tracker.image.blob import Blob
 
 # Blobs whose score is below this (a perfect one has 1) are not the marker.
 _MIN_SCORE = 0.25

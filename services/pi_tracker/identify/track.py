@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.pi_tracker.detect.blob import Blob
+from services.pi_tracker.image.blob import Blob
 
 # A hand at arm's length moves 2 m/s when it is fast: at 0.5 m and f = 527 px that is 2100 px/s.
 _MAX_SPEED_PX_S = 2100.0

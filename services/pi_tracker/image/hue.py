@@ -5,13 +5,14 @@ Hues are OpenCV's: 0..180 for a full turn, so that one step is two degrees.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 # Mostly float64; OpenCV's stubs do not say the type of what it returns.
 Array = npt.NDArray[Any]
+Hue = TypeVar("Hue", float, Array)
 
 # BT.601 with Y in 16..235: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U',
 # where L = 1.164 (Y - 16), U' = U - 128, V' = V - 128.
@@ -46,16 +47,8 @@ def hue_of_chroma(u: Array, v: Array) -> ChromaHue:
     return ChromaHue(np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0), spread, top)
 
 
-@overload
-def hue_difference(hue: float, other: float) -> float: ...
-
-
-@overload
-def hue_difference(hue: Array, other: float | Array) -> Array: ...
-
-
-def hue_difference(hue: float | Array, other: float | Array) -> float | Array:
-    """Signed difference hue - other, -90..90."""
+def hue_difference(hue: Hue, other: Hue | float) -> Hue:
+    """Signed difference hue - other, -90..90; of one hue or of an array."""
     return (hue - other + 90.0) % 180.0 - 90.0
 
 

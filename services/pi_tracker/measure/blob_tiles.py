@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from services.pi_tracker.detect.blob import Blob
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.yuv_planes import Picture, Rect
 

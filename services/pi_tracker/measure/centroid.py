@@ -24,7 +24,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from services.pi_tracker.detect.blob import Blob
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture

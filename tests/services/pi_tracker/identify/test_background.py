@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rhot.files.config import Tracker
-from services.pi_tracker.detect.blob import make_blob
 from services.pi_tracker.identify.background import BackgroundModel
+from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import picture
