@@ -1,18 +1,18 @@
-"""The tracker in the simulator's hard scene: `python benchmarks/hard.py [--frames N] [--seeds N]
-[--json FILE]`.
+"""Recall, identity and re-acquisition of pi_tracker in the simulator's hard scene.
+
+`python benchmarks/hard.py [--frames N] [--seeds N] [--json FILE]`
 
 Fast motion, blur, things of the paints' own colours in the room, coloured light on the skin. Both
-cameras, one after the other, each with the colour ranges of config/calibration; rendering takes
-nearly all of the time (0.1 s a frame; the whole run 20 minutes). Against the renderer's own account
-of what each pixel shows (services/simulator/camera/visibility.py):
-    recall              of the frames in which at least half of a patch is visible - of what would
-                        be seen of it if no other part of the hand were there -, the share in which
-                        its marker is reported on it; the worst marker's
+cameras, one after the other, each with the colour ranges of config/calibration. Rendering takes
+nearly all of the time (0.1 s a frame; the whole run 20 minutes). Ground truth is what the renderer
+shows in each pixel (services/simulator/camera/visibility.py):
+    recall              of the frames in which at least half of a patch is visible, the share in
+                        which its marker is reported on it; the worst marker's. Half is of what
+                        would be seen if no other part of the hand were there.
     wrong_identity      share of all reported markers that are not on their paint: more than 3 px
                         from every pixel that shows it
     refound_next_frame  of the frames that show half of a patch whose marker was lost, i.e. not
-    reported on it in the frame before, the
-                        share in which it is
+                        reported on it in the frame before, the share in which it is
 A patch that the picture's edge cuts counts by what lies inside the picture.
 """
 
@@ -39,31 +39,31 @@ from services.simulator.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
 SCENE = "hard"
-VISIBLE = 0.5
+MIN_VISIBLE = 0.5
 # Shading, noise and blur move a centroid by less than a pixel; fingers are 10 px apart.
 ON_PAINT_PX = 3.0
 
 
 @dataclass
 class Tally:
-    """What became of one colour."""
+    """Counts of frames for one colour."""
 
-    visible: int = 0
-    found: int = 0
+    visible: int = 0  # at least half of the patch
+    found: int = 0  # of those, with its marker on it
     reported: int = 0
-    wrong: int = 0
-    lost: int = 0
-    refound: int = 0
+    wrong: int = 0  # of those, not on the paint
+    lost: int = 0  # visible, and not reported on it in the frame before
+    refound: int = 0  # of those, with its marker on it
     # Whether it was reported in the last frame; None before it ever was: what was never found
     # cannot be lost.
     known: bool | None = None
 
     def add(
-        self, sight: PatchVisibility, marker: Marker | None, shows: npt.NDArray[np.bool_]
+        self, sight: PatchVisibility, marker: Marker | None, paint: npt.NDArray[np.bool_]
     ) -> None:
-        """Take in one frame; shows (h, w) is where the paint is seen."""
-        right = marker is not None and on_paint(marker, shows)
-        visible = sight.share >= VISIBLE
+        """Take in one frame; paint (h, w) is where the paint is seen."""
+        right = marker is not None and on_paint(marker, paint)
+        visible = sight.share >= MIN_VISIBLE
         self.visible += visible
         self.found += visible and right
         self.reported += marker is not None
@@ -85,23 +85,18 @@ def share(part: int, whole: int) -> float:
     return part / whole if whole else 1.0
 
 
-def on_paint(marker: Marker, shows: npt.NDArray[np.bool_]) -> bool:
-    """Whether a marker is on its paint."""
+def on_paint(marker: Marker, paint: npt.NDArray[np.bool_]) -> bool:
+    """Whether a marker is on its paint (h, w)."""
     reach = int(ON_PAINT_PX)
     x, y = round(marker.x_px), round(marker.y_px)
-    return bool(shows[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1].any())
+    return bool(paint[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1].any())
 
 
 def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str, Tally]) -> None:
     """Track `count` frames of one camera."""
     source = FrameSource(load_scene(config, SCENE, seed), camera)
-    step = TrackerStep(
-        camera,
-        load_colors(config.calibration_dir, camera),
-        config.tracker,
-        source.camera.size_px,
-        config.colors,
-    )
+    colors = load_colors(config.calibration_dir, camera)
+    step = TrackerStep(camera, colors, config.tracker, source.camera.size_px, config.colors)
     landmarks = {
         color: landmark
         for table in config.hand.values()
@@ -130,24 +125,15 @@ def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str
 def frame_of(taken: TakenFrame) -> Frame:
     """As the simulator's source would hand it to the tracker."""
     assert taken.image is not None, "lost frames are left out"
-    return Frame(
-        taken.camera,
-        taken.seq,
-        taken.stamp_ns,
-        taken.row_time_ns,
-        taken.size_px,
-        taken.image,
-        "i420",
-    )
+    stamp_ns, row_time_ns = taken.stamp_ns, taken.row_time_ns
+    return Frame(taken.camera, taken.seq, stamp_ns, row_time_ns, taken.size_px, taken.image, "i420")
 
 
 def summary(tallies: dict[str, Tally]) -> dict[str, float]:
     """The keys of the JSON file."""
-    reported, wrong = (
-        sum(getattr(tally, name) for tally in tallies.values()) for name in ("reported", "wrong")
-    )
-    lost, refound = (
-        sum(getattr(tally, name) for tally in tallies.values()) for name in ("lost", "refound")
+    reported, wrong, lost, refound = (
+        sum(getattr(tally, name) for tally in tallies.values())
+        for name in ("reported", "wrong", "lost", "refound")
     )
     return {
         "recall": min(tally.recall for tally in tallies.values()),
@@ -158,6 +144,19 @@ def summary(tallies: dict[str, Tally]) -> dict[str, float]:
         "lost": lost,
         **{f"recall_{color}": tally.recall for color, tally in tallies.items()},
     }
+
+
+def print_table(tallies: dict[str, Tally]) -> None:
+    """A line for each colour."""
+    print(
+        f"{'marker':10s} {'half visible':>12s} {'recall':>8s} "
+        f"{'reported':>9s} {'wrong':>6s} {'lost':>5s} {'refound':>8s}"
+    )
+    for color, t in tallies.items():
+        print(
+            f"{color:10s} {t.visible:12d} {t.recall:8.4f} "
+            f"{t.reported:9d} {t.wrong:6d} {t.lost:5d} {t.refound:8d}"
+        )
 
 
 def main() -> None:
@@ -180,14 +179,8 @@ def main() -> None:
         for camera in config.camera:
             run(config, camera.name, seed, each, tallies)
             print(f"seed {seed}, camera {camera.name}: {each} frames", file=sys.stderr)
-    print(
-        f"{'marker':10s} {'half visible':>12s} {'recall':>8s} {'reported':>9s} {'wrong':>6s} {'lost':>5s} {'refound':>8s}"
-    )
-    for color, t in tallies.items():
-        print(
-            f"{color:10s} {t.visible:12d} {t.recall:8.4f} {t.reported:9d} {t.wrong:6d} {t.lost:5d} {t.refound:8d}"
-        )
     result = summary(tallies)
+    print_table(tallies)
     for name in ("recall", "wrong_identity", "refound_next_frame"):
         print(f"{name:20s} {result[name]:.5f}")
     if options.json:

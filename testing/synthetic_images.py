@@ -1,8 +1,8 @@
-"""Pictures with a known truth: painted finger tips on skin before a wall, with shading, blur, noise
-and 2x2 averaged chroma.
+"""Pictures with known ground truth: painted finger tips on skin before a wall.
 
-For tests and benchmarks of the eye alone; whole hands in whole rooms are the simulator's. Pure: the
-same seed gives the same picture. A tip that reaches over the picture's edge is cut there.
+With shading, blur, noise and 2x2 averaged chroma. For tests and benchmarks of pi_tracker alone;
+whole hands in whole rooms are the simulator's. Pure: the same random seed gives the same picture. A
+tip that reaches over the picture's edge is cut there.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from rhot.files.calibration import ColorRange, Colors
 from services.pi_tracker.image.frame import Frame, Image, Layout
 
 Bgr = tuple[float, float, float]
-# Paints that a pair of cameras can tell apart, skin, and a grey wall, as a camera shows them in
-# full light.
+# Paints that can be told apart, skin, and a grey wall, as a camera shows them in full light.
 PAINTS: dict[str, Bgr] = {
     "green": (60, 150, 50),
     "blue": (190, 90, 30),
@@ -29,10 +28,13 @@ PAINTS: dict[str, Bgr] = {
 }
 SKIN: Bgr = (120, 150, 200)
 WALL: Bgr = (150, 152, 149)
-# Edges are drawn so many times finer and averaged.
-_FINE = 6
+# Places of six tips in a row, far enough apart not to touch.
+ROW_X_PX: dict[str, float] = {name: 30.0 + 36.0 * number for number, name in enumerate(PAINTS)}
+# Supersampling: edges are drawn so many times finer and averaged.
+_SUPERSAMPLING = 6
 # The part of its light that comes from all around: no side of a finger is black.
-_DARKEST = 0.15
+_AMBIENT = 0.15
+# BT.601, rounded to four digits unlike yuv_planes.py: measured figures are with these.
 _YUV_FROM_BGR = np.array(
     [[0.0979, 0.5041, 0.2568], [0.4392, -0.2910, -0.1482], [-0.0714, -0.3678, 0.4392]], np.float32
 )
@@ -40,15 +42,15 @@ _YUV_FROM_BGR = np.array(
 
 @dataclass(frozen=True)
 class Tip:
-    """A painted finger tip: the middle of its paint, width and length in px, direction in rad, the
-    side the light comes from in rad.
-    """
+    """A painted finger tip."""
 
     color: str
+    # The middle of its paint, before shading and other tips.
     x_px: float
     y_px: float
     width_px: float = 9.0
     length_px: float = 10.0
+    # The direction it points in, and the side the light comes from.
     turn_rad: float = 0.4
     light_rad: float = 0.3
 
@@ -60,20 +62,23 @@ def clean(
     blur_px: float = 0.8,
     wall: Bgr | Image = WALL,
 ) -> tuple[Image, dict[str, tuple[float, float]]]:
-    """The picture without noise, float32 BGR (h, w, 3), and the centre of the visible paint of each
-    colour, as if no other tip hid it.
+    """The picture without noise, float32 BGR (h, w, 3), and each colour's centre, px.
 
-    shading 0 is flat light, 1 light from one direction only; blur_px is the standard deviation of
-    the lens; a wall of several colours is an image (h, w, 3).
+    That is the centre of the visible paint, as if no other tip occluded it. shading 0 is flat
+    light, 1 light from one direction only; blur_px is the standard deviation of the lens; a wall of
+    several colours is an image (h, w, 3).
     """
-    image = np.empty((size_px[1], size_px[0], 3), np.float32)
-    image[:] = _light(wall)
-    truth = {tip.color: _draw(image, tip, shading) for tip in tips}
+    light = np.empty((size_px[1], size_px[0], 3), np.float32)
+    light[:] = _linear_light(wall)
+    truth = {tip.color: _draw(light, tip, shading) for tip in tips}
     # A lens blurs light, not grey levels.
-    light = cv2.GaussianBlur(image, (0, 0), blur_px)
-    return np.float32(255.0) * np.where(
-        light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055
-    ), truth
+    blurred = cv2.GaussianBlur(light, (0, 0), blur_px)
+    return np.float32(255.0) * _srgb(blurred), truth
+
+
+def _srgb(light: Image) -> Image:
+    """Levels 0..1 of linear light 0..1, by the sRGB curve (IEC 61966-2-1)."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
 def noisy(image: Image, sigma: float, seed: int) -> Image:
@@ -111,33 +116,36 @@ def _range(bgr: Bgr) -> ColorRange:
     return ColorRange(hsv_low=((hue - 10) % 180, 90, 30), hsv_high=((hue + 10) % 180, 255, 255))
 
 
-def _light(bgr: Bgr | Image) -> Image:
-    """Linear light 0..1 of grey levels (..., 3), by the sRGB curve (IEC 61966-2-1)."""
+def _linear_light(bgr: Bgr | Image) -> Image:
+    """Linear light 0..1 of grey levels (..., 3), the inverse of _srgb."""
     levels = np.array(bgr) / 255.0
     return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
 
 
 def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
-    """Draw a tip in linear light, sharp but anti-aliased; returns the centre of its paint."""
+    """Draw a tip in linear light, sharp but anti-aliased; returns the centre of its paint.
+
+    A cylinder that ends in a hemisphere, lit from one side and from all around.
+    """
     reach = int(3.2 * tip.length_px + tip.width_px)
     x0, y0 = max(int(tip.x_px) - reach, 0), max(int(tip.y_px) - reach, 0)
     window = image[y0 : int(tip.y_px) + reach, x0 : int(tip.x_px) + reach]
     height, width = window.shape[:2]
-    fine = window.repeat(_FINE, 0).repeat(_FINE, 1)
-    rows, columns = np.mgrid[: height * _FINE, : width * _FINE].astype(np.float32)
-    x, y = (columns + 0.5) / _FINE - 0.5 + x0 - tip.x_px, (rows + 0.5) / _FINE - 0.5 + y0 - tip.y_px
+    fine = window.repeat(_SUPERSAMPLING, 0).repeat(_SUPERSAMPLING, 1)
+    rows, columns = np.mgrid[: height * _SUPERSAMPLING, : width * _SUPERSAMPLING].astype(np.float32)
+    x = (columns + 0.5) / _SUPERSAMPLING - 0.5 + x0 - tip.x_px
+    y = (rows + 0.5) / _SUPERSAMPLING - 0.5 + y0 - tip.y_px
     c, s = np.cos(tip.turn_rad), np.sin(tip.turn_rad)
     along, across = x * c + y * s, -x * s + y * c
-    # A cylinder that ends in a hemisphere, lit from one side and from all around.
     radius, start = tip.width_px / 2, -tip.length_px / 2 + tip.width_px / 2
-    away = np.where(along < start, np.hypot(along - start, across), np.abs(across))
-    finger = (away < radius) & (along < 3 * tip.length_px)
+    from_axis = np.where(along < start, np.hypot(along - start, across), np.abs(across))
+    finger = (from_axis < radius) & (along < 3 * tip.length_px)
     paint = finger & (along < tip.length_px / 2)
-    facing = np.sqrt(np.clip(1 - (away / radius) ** 2, 0, 1)) * np.cos(
+    facing = np.sqrt(np.clip(1 - (from_axis / radius) ** 2, 0, 1)) * np.cos(
         tip.light_rad
     ) + across / radius * np.sin(tip.light_rad)
-    light = np.clip(1 - shading + shading * facing, _DARKEST, 1.0)[..., None]
-    fine[finger] = (_light(SKIN) * light)[finger]
-    fine[paint] = (_light(PAINTS[tip.color]) * light)[paint]
+    light = np.clip(1 - shading + shading * facing, _AMBIENT, 1.0)[..., None]
+    fine[finger] = (_linear_light(SKIN) * light)[finger]
+    fine[paint] = (_linear_light(PAINTS[tip.color]) * light)[paint]
     window[:] = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     return float(x[paint].mean() + tip.x_px), float(y[paint].mean() + tip.y_px)

@@ -16,7 +16,7 @@ from rhot.files.calibration import Colors, Lens
 from rhot.files.config import Tracker
 from rhot.messages import Marker, MarkerFrame
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.detect.marker_finder import LutFinder
+from services.pi_tracker.detect.marker_finder import MarkerFinder
 from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier
@@ -27,10 +27,10 @@ Clock = Callable[[], int]
 class TrackerStep:
     """The tracker of one camera.
 
-    wanted are the colours to look for; all must be in colors, else CalibrationError (naming
+    color_names are the colours to track; all must be in colors, else CalibrationError (naming
     colors_path). size_px is the size in rig.toml; a frame of another size is tracked as it is.
-    clock, if given, is read at the stages' ends, for times_ms. With a lens, frames are rectified
-    first (rectify.py).
+    clock, if given, is read at the end of each stage, for times_ms. With a lens, frames are
+    undistorted first (image/rectify.py).
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class TrackerStep:
         colors: Colors,
         settings: Tracker,
         size_px: tuple[int, int],
-        wanted: Sequence[str],
+        color_names: Sequence[str],
         clock: Clock | None = None,
         colors_path: Path | str = "",
         lens: Lens | None = None,
@@ -49,25 +49,25 @@ class TrackerStep:
         self.camera_name = camera_name
         self.size_px = size_px
         self._settings = settings
-        self._wanted = tuple(wanted)
+        self._color_names = tuple(color_names)
         self._rectifier = None if lens is None else Rectifier(lens)
         self._clock = clock
         self._last_ns = 0
         # Duration of each stage of the last step in ms; empty without a clock.
         self.times_ms: dict[str, float] = {}
-        self.recolor(colors, colors_path or f"{camera_name}.colors.json")
+        self.apply_colors(colors, colors_path or f"{camera_name}.colors.json")
 
-    def recolor(self, colors: Colors, path: Path | str) -> None:
-        """Take new colour ranges into force with the next frame.
+    def apply_colors(self, colors: Colors, path: Path | str) -> None:
+        """Use new colour ranges from the next frame on.
 
         Raises CalibrationError and keeps the old ones.
         """
-        table = compile_colors(colors, self._wanted, path)
-        self._finder: LutFinder | PaperFinder
+        table = compile_colors(colors, self._color_names, path)
+        self._finder: MarkerFinder | PaperFinder
         if self._settings.method == "paper":
-            self._finder = PaperFinder(colors, self._settings, self._wanted)
+            self._finder = PaperFinder(colors, self._settings, self._color_names)
         else:
-            self._finder = LutFinder(table, self._settings, self._lap)
+            self._finder = MarkerFinder(table, self._settings, self._time_stage)
 
     def step(self, frame: Frame, clock_offset_ns: int = 0, clock_sigma_ns: int = -1) -> MarkerFrame:
         """Find the markers of one frame.
@@ -93,11 +93,12 @@ class TrackerStep:
     def _find(self, frame: Frame) -> list[Marker]:
         if self._rectifier is None:
             return self._finder.find(frame)
-        rectified = self._rectifier.frame(frame)
-        self._lap("rectify")
-        return self._rectifier.back(self._finder.find(rectified))
+        rectified = self._rectifier.rectify(frame)
+        self._time_stage("rectify")
+        return self._rectifier.to_camera_pixels(self._finder.find(rectified))
 
-    def _lap(self, stage: str) -> None:
+    def _time_stage(self, stage: str) -> None:
+        """Note how long the stage that ends now took."""
         if self._clock is not None:
             now_ns = self._clock()
             self.times_ms[stage] = (now_ns - self._last_ns) * 1e-6

@@ -12,7 +12,7 @@ from rhot.clock import Offset
 from rhot.files.calibration import Colors, load_lens
 from rhot.files.config import CameraTable, RigConfig
 from rhot.messages import MarkerFrame
-from services.pi_tracker.colors.light_drift import Drift, Drifted
+from services.pi_tracker.colors.light_drift import Drifted, DriftMonitor
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
 
@@ -32,7 +32,7 @@ class CameraTracker:
         self.colors = Colors(colors={})
         self._config, self._clock = config, clock
         self._step: TrackerStep
-        self._drift: Drift
+        self._drift: DriftMonitor
 
     def wanted(self, colors: Colors) -> list[str]:
         """The colours that rig.toml's hands use; without a hand, all that there are."""
@@ -62,7 +62,7 @@ class CameraTracker:
 
     def use(self, colors: Colors, step: TrackerStep) -> None:
         """Track with a prepared step from the next frame on."""
-        self.colors, self._step, self._drift = colors, step, Drift(colors)
+        self.colors, self._step, self._drift = colors, step, DriftMonitor(colors)
 
     def step(self, frame: Frame, offset: Offset) -> MarkerFrame:
         """The markers of one frame; offset is that of the camera's clock."""
@@ -77,6 +77,6 @@ class CameraTracker:
         self, frame: Frame, found: MarkerFrame
     ) -> tuple[dict[str, float], list[Drifted]]:
         """Figures for health, and the colours that have drifted; both empty between two checks."""
-        if not self._drift.look(frame, found.markers):
+        if not self._drift.update(frame, found.markers):
             return {}, []
         return self._drift.values(), self._drift.drifted()

@@ -11,9 +11,10 @@ import numpy as np
 
 from rhot.camera_messages import ExposureControl
 from rhot.files.calibration import ColorRange, Colors
-from services.pi_tracker.colors.exposure_advice import Light
-from services.pi_tracker.colors.fit import Study
-from services.pi_tracker.colors.propose import Proposal, Suggestion
+from services.pi_tracker.colors.exposure_advice import ExposureStatistics
+from services.pi_tracker.colors.fit import TrainingSet
+from services.pi_tracker.colors.paint_names import Suggestion
+from services.pi_tracker.colors.propose import Proposal
 from services.pi_tracker.colors.report import Report
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.frame import Frame, Image
@@ -72,7 +73,7 @@ def proposals_text(proposals: Sequence[Proposal], suggestions: Sequence[Suggesti
     return "\n".join(lines)
 
 
-def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
+def overlay(training: TrainingSet, frames: Sequence[Frame], colors: Colors) -> Image:
     """The pictures one below the other: what the ranges take in white, boxes around what was
     pointed at.
     """
@@ -90,10 +91,10 @@ def overlay(study: Study, frames: Sequence[Frame], colors: Colors) -> Image:
         size = (bgr.shape[1], bgr.shape[0])
         taken = cv2.resize((labels > 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
         bgr[taken > 0] = 255
-        for color, samples in study.samples.items():
-            for swatch in samples.swatches:
-                if swatch.frame == number:
-                    _draw_box(bgr, color, swatch.box_px)
+        for color, samples in training.samples.items():
+            for patch in samples.patches:
+                if patch.frame == number:
+                    _draw_box(bgr, color, patch.box_px)
         shown.append(bgr)
     return np.vstack(shown)
 
@@ -106,7 +107,7 @@ def _draw_box(bgr: Image, color: str, box_px: tuple[int, int, int, int]) -> None
     cv2.putText(bgr, color, corner, font, 0.4, _RED, 1, cv2.LINE_AA)
 
 
-def light_text(light: Light) -> str:
+def light_text(light: ExposureStatistics) -> str:
     """One line on the light in the pictures."""
     cast = "nothing neutral in view"
     if light.red_cast is not None and light.blue_cast is not None:

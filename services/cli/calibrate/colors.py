@@ -25,7 +25,7 @@ from services.cli.calibrate.pointing_options import PointingOptions, frame_numbe
 from services.cli.recorded_frames import frames_by_number, spread_numbers
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import colors_file, examine
 from services.pi_tracker.image.frame import Frame, Image

@@ -15,7 +15,7 @@ from rhot.errors import CalibrationError
 from rhot.messages import Name
 
 if TYPE_CHECKING:
-    from services.pi_tracker.colors.paint_patch import Pointer
+    from services.pi_tracker.colors.pointer import Pointer
 
 # No picture is wider, px; keeps nonsense out of integers.
 _MAX_PX = 1e6
@@ -51,7 +51,7 @@ class PointingOptions:
 
     def in_every_frame(self, frames: Iterable[int]) -> list[Pointer]:
         """The boxes and clicks in each of several pictures: of a hand that is held still."""
-        from services.pi_tracker.colors.paint_patch import Pointer
+        from services.pi_tracker.colors.pointer import Pointer
 
         found = [_parse(text, text, "--box", (4,)) for text in self.box or ()]
         found += [_parse(text, text, "--click", (2,)) for text in self.click or ()]
@@ -59,7 +59,7 @@ class PointingOptions:
 
     def in_single_frames(self) -> tuple[list[int], list[Pointer]]:
         """The frame numbers of --at, and pointers that count these frames in that order."""
-        from services.pi_tracker.colors.paint_patch import Pointer
+        from services.pi_tracker.colors.pointer import Pointer
 
         frames: list[int] = []
         pointers: list[Pointer] = []

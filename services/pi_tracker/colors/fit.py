@@ -1,9 +1,8 @@
-"""HSV ranges of paints from patches that a person pointed at, held against skin, background and
-each other. Pure.
+"""HSV ranges of paints from patches that a person pointed at, against skin, background and others.
 
-Only pictures in which a colour was pointed at say what is not that colour: elsewhere its marker may
-be in view, too. A paint that cannot be told apart still gets a range, and the report
-(color_report.py) says so.
+Pure. Only pictures in which a colour was pointed at say what is not that colour: elsewhere its
+marker may be in view, too. A paint that cannot be told apart still gets a range, and the report
+(report.py) says so.
 """
 
 from __future__ import annotations
@@ -17,23 +16,18 @@ import numpy as np
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ColorRange
 from services.pi_tracker.colors.bounds import bounds, hues_of
-from services.pi_tracker.colors.paint_patch import Pointer, Swatch, find_swatch
-from services.pi_tracker.image.chroma import (
-    Cells,
-    Mask,
-    cells_of,
-    hue_from,
-    joined,
-    looks_like_skin,
-)
+from services.pi_tracker.colors.paint_patch import PaintPatch, find_patch
+from services.pi_tracker.colors.pointer import Pointer
+from services.pi_tracker.image.chroma import Cells, Mask, cells_of, concatenate, skin_mask
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.hue import hue_difference
 
 # One paint's hue varies no more than this between pictures; the next paint of a set of six is 20
 # away.
 _SAME_HUE = 12.0
 # Rim of a patch, in cells and as share of its size, that is neither paint nor background: blur, and
 # the light that paint throws on skin.
-_RIM, _RIM_SHARE = 3, 0.2
+_RIM_CELLS, _RIM_SHARE = 3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +35,7 @@ class Samples:
     """What one colour is, and what it is not, in the pictures in which it was pointed at."""
 
     color: str
-    swatches: tuple[Swatch, ...]
+    patches: tuple[PaintPatch, ...]
     paint: Cells  # (n,)
     skin: Cells  # (m,)
     room: Cells  # (k,)
@@ -49,11 +43,11 @@ class Samples:
     @property
     def frames(self) -> list[int]:
         """The pictures, by number."""
-        return sorted({swatch.frame for swatch in self.swatches})
+        return sorted({patch.frame for patch in self.patches})
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class TrainingSet:
     """Pictures, the patches in them, and notes on pointers that were left out."""
 
     cells: list[Cells]  # (h, w) each
@@ -62,30 +56,48 @@ class Study:
     notes: list[str]
 
 
-def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> Study:
-    """The samples of every colour; a pointer that shows nothing, or another colour than the rest,
-    is noted and left out.
+def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> TrainingSet:
+    """The samples of every colour.
 
-    frames are in the order of Pointer.frame. Raises CalibrationError if a colour has no pointer
-    that shows it.
+    A pointer that shows nothing, or another colour than the rest, is noted and left out. frames are
+    in the order of Pointer.frame. Raises CalibrationError if a colour has no pointer that shows it.
     """
     if not pointers:
         raise CalibrationError(
-            "nothing is pointed at; click on a marker in the picture, or give --box COLOR=x,y,width,height"
+            "nothing is pointed at; click on a marker in the picture, "
+            "or give --box COLOR=x,y,width,height"
         )
     cells = [cells_of(frame) for frame in frames]
-    swatches: dict[str, list[Swatch]] = {pointer.color: [] for pointer in pointers}
+    patches, notes = _found_patches(cells, pointers)
+    for color, found in patches.items():
+        patches[color], outliers = _without_outliers(found, cells)
+        notes += [
+            f"{color} in picture {patch.frame}: has another hue than in the others "
+            "(left out: was something else pointed at?)"
+            for patch in outliers
+        ]
+    all_patches = [patch for found in patches.values() for patch in found]
+    covered = [_covered(all_patches, number, part.shape) for number, part in enumerate(cells)]
+    samples = {color: _samples(color, found, cells, covered) for color, found in patches.items()}
+    return TrainingSet(cells, covered, samples, notes)
+
+
+def _found_patches(
+    cells: list[Cells], pointers: Sequence[Pointer]
+) -> tuple[dict[str, list[PaintPatch]], list[str]]:
+    """The patches of every colour, and notes on pointers without one."""
+    patches: dict[str, list[PaintPatch]] = {pointer.color: [] for pointer in pointers}
     failures: dict[str, list[str]] = {}
     for pointer in pointers:
-        if not 0 <= pointer.frame < len(frames):
+        if not 0 <= pointer.frame < len(cells):
             raise CalibrationError(
-                f"{pointer}: there is no picture {pointer.frame}; there are {len(frames)}"
+                f"{pointer}: there is no picture {pointer.frame}; there are {len(cells)}"
             )
         try:
-            swatches[pointer.color].append(find_swatch(cells[pointer.frame], pointer))
+            patches[pointer.color].append(find_patch(cells[pointer.frame], pointer))
         except CalibrationError as error:
             failures.setdefault(pointer.color, []).append(str(error))
-    for color, found in swatches.items():
+    for color, found in patches.items():
         if not found:
             raise CalibrationError(failures[color][0])
     notes = [
@@ -93,69 +105,48 @@ def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> Study:
         for texts in failures.values()
         for text in texts
     ]
-    for color, found in swatches.items():
-        swatches[color], odd = _agreeing(found, cells)
-        notes += [
-            f"{color} in picture {s.frame}: has another hue than in the others (left out: was something else pointed at?)"
-            for s in odd
-        ]
-    covered = [
-        _covered([s for found in swatches.values() for s in found], number, part.shape)
-        for number, part in enumerate(cells)
-    ]
-    return Study(
-        cells,
-        covered,
-        {color: _samples(color, found, cells, covered) for color, found in swatches.items()},
-        notes,
+    return patches, notes
+
+
+def _without_outliers(
+    patches: list[PaintPatch], cells: list[Cells]
+) -> tuple[list[PaintPatch], list[PaintPatch]]:
+    """Patches of like hue, and the outliers among three or more.
+
+    Of two it is unknown which is wrong.
+    """
+    if len(patches) < 3:
+        return patches, []
+    hues = np.array([hues_of(cells[patch.frame][patch.core]).middle for patch in patches])
+    near = np.abs(hue_difference(hues[:, None], hues[None, :])) <= _SAME_HUE  # (n, n)
+    kept = near[int(np.argmax(near.sum(1)))]
+    if 2 * np.count_nonzero(kept) <= len(patches):
+        return patches, []
+    return (
+        [patch for patch, keep in zip(patches, kept, strict=True) if keep],
+        [patch for patch, keep in zip(patches, kept, strict=True) if not keep],
     )
 
 
-def _agreeing(swatches: list[Swatch], cells: list[Cells]) -> tuple[list[Swatch], list[Swatch]]:
-    """Patches of like hue, and the odd ones among three or more.
-
-    Of two nobody knows which is wrong.
-    """
-    if len(swatches) < 3:
-        return swatches, []
-    hues = np.array([hues_of(cells[s.frame][s.core]).middle for s in swatches])
-    near = np.abs(hue_from(hues[:, None], hues[None, :])) <= _SAME_HUE
-    kept = near[int(np.argmax(near.sum(1)))]
-    if 2 * np.count_nonzero(kept) <= len(swatches):
-        return swatches, []
-    return [s for s, keep in zip(swatches, kept, strict=True) if keep], [
-        s for s, keep in zip(swatches, kept, strict=True) if not keep
-    ]
-
-
-def _covered(swatches: Sequence[Swatch], number: int, shape: tuple[int, ...]) -> Mask:
-    """Patches of one picture with their rims."""
+def _covered(patches: Sequence[PaintPatch], number: int, shape: tuple[int, ...]) -> Mask:
+    """Patches of one picture with their rims, (h, w)."""
     mask = np.zeros(shape, np.uint8)
-    for swatch in swatches:
-        if swatch.frame == number:
-            rim = max(_RIM, round(_RIM_SHARE * np.count_nonzero(swatch.whole) ** 0.5))
-            mask = np.maximum(
-                mask,
-                cv2.dilate(
-                    swatch.whole.astype(np.uint8), np.ones((2 * rim + 1, 2 * rim + 1), np.uint8)
-                ),
-            )
+    for patch in patches:
+        if patch.frame == number:
+            rim = max(_RIM_CELLS, round(_RIM_SHARE * np.count_nonzero(patch.whole) ** 0.5))
+            element = np.ones((2 * rim + 1, 2 * rim + 1), np.uint8)
+            mask = np.maximum(mask, cv2.dilate(patch.whole.astype(np.uint8), element))
     return mask.astype(bool)
 
 
 def _samples(
-    color: str, swatches: list[Swatch], cells: list[Cells], covered: list[Mask]
+    color: str, patches: list[PaintPatch], cells: list[Cells], covered: list[Mask]
 ) -> Samples:
-    numbers = sorted({swatch.frame for swatch in swatches})
-    rest = joined([cells[number][~covered[number]] for number in numbers])
-    skin = looks_like_skin(rest)
-    return Samples(
-        color,
-        tuple(swatches),
-        joined([cells[s.frame][s.core] for s in swatches]),
-        rest[skin],
-        rest[~skin],
-    )
+    numbers = sorted({patch.frame for patch in patches})
+    paint = concatenate([cells[patch.frame][patch.core] for patch in patches])
+    rest = concatenate([cells[number][~covered[number]] for number in numbers])
+    skin = skin_mask(rest)
+    return Samples(color, tuple(patches), paint, rest[skin], rest[~skin])
 
 
 def fit(samples: Mapping[str, Samples]) -> dict[str, ColorRange]:
@@ -163,9 +154,8 @@ def fit(samples: Mapping[str, Samples]) -> dict[str, ColorRange]:
     hues = {color: hues_of(own.paint) for color, own in samples.items()}
     ranges = {}
     for color, own in samples.items():
-        foreign = joined(
-            [own.skin, own.room, *(other.paint for name, other in samples.items() if name != color)]
-        )
-        near = [hues[name] for name in samples if name != color]
-        ranges[color] = bounds(own.paint, hues[color], near, foreign, len(own.frames))
+        others = [other for name, other in samples.items() if name != color]
+        foreign = concatenate([own.skin, own.room, *(other.paint for other in others)])
+        neighbours = [hues[other.color] for other in others]
+        ranges[color] = bounds(own.paint, hues[color], neighbours, foreign, len(own.frames))
     return ranges

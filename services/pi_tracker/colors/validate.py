@@ -1,6 +1,6 @@
-"""Whether colour ranges can be put in force. Pure.
+"""Validation of colour ranges before they are applied. Pure.
 
-Types and bounds are checked where a message is decoded; what is left are ranges that take nothing,
+Types and bounds are checked where a message is decoded. What is left are ranges that take nothing,
 names no marker can have, and colours that are missing.
 """
 
@@ -15,21 +15,21 @@ from rhot.files.calibration import Colors
 from rhot.messages import Name
 
 # A hand has 26 joints, and there are two hands; more is a mistake, and costs the tracker.
-MOST_COLORS = 64
+MAX_COLORS = 64
 
 
-def check_colors(colors: Colors, wanted: Sequence[str]) -> None:
+def check_colors(colors: Colors, required: Sequence[str]) -> None:
     """Raises CalibrationError saying which colour is wrong, and how.
 
-    wanted are colours that must be there.
+    required are colours that must be there.
     """
     if not colors.colors:
         raise CalibrationError("there is no colour in it")
-    if len(colors.colors) > MOST_COLORS:
+    if len(colors.colors) > MAX_COLORS:
         raise CalibrationError(
-            f"{len(colors.colors)} colours are in it, at most {MOST_COLORS} are possible"
+            f"{len(colors.colors)} colours are in it, at most {MAX_COLORS} are possible"
         )
-    for name, span in colors.colors.items():
+    for name, color_range in colors.colors.items():
         try:
             msgspec.convert(name, Name)
         except msgspec.ValidationError:
@@ -37,15 +37,19 @@ def check_colors(colors: Colors, wanted: Sequence[str]) -> None:
                 f"{name[:80]!r} cannot name a colour; use letters, digits, '_', '-' and '.'"
             ) from None
         for what, low, high in zip(
-            ("saturation", "value"), span.hsv_low[1:], span.hsv_high[1:], strict=True
+            ("saturation", "value"), color_range.hsv_low[1:], color_range.hsv_high[1:], strict=True
         ):
             if low > high:
                 raise CalibrationError(
-                    f"colour {name!r}: its lowest {what}, {low}, is above its highest, {high}; only hues wrap"
+                    f"colour {name!r}: its lowest {what}, {low}, is above its highest, {high}; "
+                    "only hues wrap"
                 )
-    missing = [name for name in wanted if name not in colors.colors]
+    # Alike in detect/color_table.py: that message is for who starts a tracker, this for who sends
+    # colours.
+    missing = [name for name in required if name not in colors.colors]
     if missing:
         raise CalibrationError(
-            f"{', '.join(map(repr, missing))} of rig.toml's markers, which {'is' if len(missing) == 1 else 'are'} tracked, would be lost; "
+            f"{', '.join(map(repr, missing))} of rig.toml's markers, "
+            f"which {'is' if len(missing) == 1 else 'are'} tracked, would be lost; "
             f"it has {', '.join(sorted(colors.colors))}"
         )

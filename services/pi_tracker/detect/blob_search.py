@@ -1,53 +1,38 @@
-"""Blobs of all colours in a rectangle: one lookup, one pass of mask filters, one contour search.
+"""Blob detection for all colours at once: one table lookup, one opening, one contour search.
 
-Pure. A rectangle without any colour gives no blobs; one so cluttered that a room of the right hue
-fills it gives the largest few per colour.
+Pure. A rectangle without any colour gives no blobs. One that a room of the right hue fills gives
+the largest few per colour.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from rhot.files.config import Tracker
 from services.pi_tracker.detect.color_table import ColorTable
-from services.pi_tracker.detect.morphology import opened
+from services.pi_tracker.detect.morphology import opening
+from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours, make_blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.yuv_planes import Picture, Rect
 
-# Contours looked at in one rectangle, largest first. Six markers, their reflections and a dozen
+# Contours examined in one rectangle, largest first. Six markers, their reflections and a dozen
 # distractors stay far below; a room full of colour must not cost more than a frame: 28 ms at most,
 # where unlimited it was 24 s.
 _MAX_CONTOURS = 64
-# A look at every other row of a picture of 76800 cells costs 32 us, classifying all of it 56 us, a
-# tenth of it 16 us: worth it where there are many cells, and colour was not all over the place the
-# last time.
-_LARGE_CELLS, _SPARSE = 20000, 0.4
+# A coarse search of every other row of a picture of 76800 cells costs 32 us, classifying all of it
+# 56 us, a tenth of it 16 us: worth it where there are many cells, and colour was not all over the
+# picture the last time.
+_COARSE_MIN_CELLS, _SPARSE_SHARE = 20000, 0.4
 # What is left of a marker among others after a cell of its width is taken away, at least; of a seam
 # next to nothing is.
 _SEAM_CELLS, _SEAM_SHARE = 3, 0.25
 _NEIGHBOURS = np.ones((3, 3), np.uint8)
 
 
-class Blob(NamedTuple):
-    """A connected patch of one colour: class index from 0, its cells' bounding rectangle, their
-    mask and how many have the colour.
-    """
-
-    color: int
-    rect: Rect
-    mask: Image  # (h, w) of the rectangle, not 0 where the blob is
-    cells: int
-    # Area in pixels, and the middle of the rectangle: near enough to tell blobs apart.
-    area_px: float
-    x_px: float
-    y_px: float
-
-
-class Searcher:
+class BlobDetector:
     """Finds blobs with one colour table and the mask filters of rig.toml."""
 
     def __init__(self, table: ColorTable, settings: Tracker) -> None:
@@ -61,140 +46,121 @@ class Searcher:
         # Every cell that survives erosion and dilation lies in a square of so many cells a side
         # that all have a colour: every so many rows are enough to see whether and where there is
         # any.
-        self._step = 1 if self._gaussian else 1 + self._erode
+        self._row_step = 1 if self._gaussian else 1 + self._erode
         self._sparse = True
-        # Filters work where there is any colour, and around it as far as they reach; at the least
-        # there is a cell between what stands at the right side and what stands at the left, a row
-        # below: `opened` sees them side by side.
+        # Filters work where there is any colour, and around it as far as they reach. At least one
+        # empty cell is needed between a row's right end and the next row's left end: `opening`
+        # sees them side by side.
         self._margin = 1 + self._gaussian + max(self._dilate - self._erode, 0)
         self._min_cells = max(1, round(settings.min_area_px / 4.0))
 
-    def blobs(self, picture: Picture, rect: Rect, thin: bool = False) -> list[Blob]:
-        """All blobs of at least min_area_px, in no order.
+    def detect(self, picture: Picture, rect: Rect, keep_thin: bool = False) -> list[Blob]:
+        """All blobs of at least min_area_px in a rectangle, in no order.
 
         Thin ones beside another colour only if asked for: they may be its edge.
         """
-        whole = (rect[2] - rect[0]) * (rect[3] - rect[1])
-        large = whole >= _LARGE_CELLS
-        if large and self._step > 1 and self._sparse:
-            rect = self._narrowed(picture, rect)
-        x0, y0, labels, mask = self._table.patch(*picture.cells(rect), self._margin)
+        whole_cells = (rect[2] - rect[0]) * (rect[3] - rect[1])
+        large = whole_cells >= _COARSE_MIN_CELLS
+        if large and self._row_step > 1 and self._sparse:
+            rect = self._coarse_search(picture, rect)
+        patch = self._table.classify_cropped(*picture.cells(rect), self._margin)
         if large:
-            self._sparse = mask.size <= _SPARSE * whole
-        if not mask.size:
+            self._sparse = patch.mask.size <= _SPARSE_SHARE * whole_cells
+        if not patch.mask.size:
             return []
-        mask = self._filtered(mask)
+        mask = self._filtered(patch.mask)
         contours = _largest(cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0])
+        left, top = rect[0] + patch.left, rect[1] + patch.top
         found: list[Blob] = []
-        left, top = rect[0] + x0, rect[1] + y0
         for contour in contours:
             x, y, w, h = cv2.boundingRect(contour)
             if w * h < self._min_cells:
                 continue
-            inside = labels[y : y + h, x : x + w]
+            classes = patch.classes[y : y + h, x : x + w]
             # Counting in bytes is five times faster than numpy's bincount on as few.
-            inner = inside.tobytes()
-            k = inner[h // 2 * w + w // 2] or max(inner)
-            mine = inner.count(k)
-            if inner.count(0) + mine < w * h:
-                found += self._parted(contour, inside, (x, y), (left + x, top + y), thin)
-            elif k and mine >= self._min_cells:
+            class_bytes = classes.tobytes()
+            k = class_bytes[h // 2 * w + w // 2] or max(class_bytes)
+            cells = class_bytes.count(k)
+            if class_bytes.count(0) + cells < w * h:
+                own = _filled(contour, (x, y), classes.shape)
+                found += self._split_by_color(own, classes, (left + x, top + y), keep_thin)
+            elif k and cells >= self._min_cells:
                 # One colour only, as a rule.
-                found.append(_blob(k, mask[y : y + h, x : x + w], mine, left + x, top + y, w, h))
+                blob_rect = (left + x, top + y, left + x + w, top + y + h)
+                found.append(make_blob(k - 1, blob_rect, mask[y : y + h, x : x + w], cells))
         return found
 
-    def _narrowed(self, picture: Picture, rect: Rect) -> Rect:
-        """The part of a rectangle in which there may be blobs."""
+    def _coarse_search(self, picture: Picture, rect: Rect) -> Rect:
+        """The part of a rectangle in which there may be blobs, from every so many rows."""
         x0, y0, x1, y1 = rect
-        x, y, w, h = cv2.boundingRect(self._table.likely(*picture.cells(rect, self._step)))
-        top, bottom = y0 + max((y - 1) * self._step + 1, 0), min(y0 + (y + h) * self._step, y1)
-        # The column to the right keeps what stands there and what stands at the left apart, as the
-        # margin does.
-        return (x0 + x, top, min(x0 + x + w + 1, x1), bottom) if w else (x0, y0, x0 + 1, y0 + 1)
+        candidates = self._table.candidates(*picture.cells(rect, self._row_step))
+        x, y, w, h = cv2.boundingRect(candidates)
+        if not w:
+            return (x0, y0, x0 + 1, y0 + 1)
+        top = y0 + max((y - 1) * self._row_step + 1, 0)
+        bottom = min(y0 + (y + h) * self._row_step, y1)
+        # The empty column to the right keeps a row's ends apart, as the margin does.
+        return (x0 + x, top, min(x0 + x + w + 1, x1), bottom)
 
     def _filtered(self, mask: Image) -> Image:
         """The mask after Gaussian, erosion and dilation."""
         if self._gaussian:
             mask = cv2.GaussianBlur(mask, (self._gaussian, self._gaussian), 0)
             mask = cv2.threshold(mask, 127, 255, cv2.THRESH_BINARY)[1]
-        return opened(mask, self._erode, self._dilate)
+        return opening(mask, self._erode, self._dilate)
 
-    def _parted(
-        self,
-        contour: Image,
-        labels: Image,
-        at: tuple[int, int],
-        origin: tuple[int, int],
-        thin: bool,
+    def _split_by_color(
+        self, inside: Image, classes: Image, origin: tuple[int, int], keep_thin: bool
     ) -> list[Blob]:
-        """The blobs of a contour whose rectangle holds several colours, as where markers touch."""
-        inside = np.zeros(labels.shape, np.uint8)
-        cv2.drawContours(inside, [contour], 0, 1, cv2.FILLED, offset=(-at[0], -at[1]))
-        counts = np.bincount((labels * inside).ravel(), minlength=2).tolist()
-        classes = [k for k, count in enumerate(counts) if k and count >= self._min_cells]
-        if len(classes) == 1:
-            # A few cells of other colours are noise.
-            return [
-                _blob(
-                    classes[0],
-                    inside,
-                    counts[classes[0]],
-                    *origin,
-                    labels.shape[1],
-                    labels.shape[0],
-                )
-            ]
-        masks = {k: (labels == k).view(np.uint8) & inside for k in classes}
-        return [
-            blob
-            for k in classes
-            if not _is_seam(masks, k, thin)
-            for blob in self._of_class(masks[k], k, origin)
-        ]
+        """The blobs of a contour whose rectangle holds several colours, as where markers touch.
 
-    def _of_class(self, mask: Image, k: int, origin: tuple[int, int]) -> list[Blob]:
-        contours = _largest(cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0])
+        inside (h, w) is 1 within the contour.
+        """
+        counts = np.bincount((classes * inside).ravel(), minlength=2).tolist()
+        present = [k for k, count in enumerate(counts) if k and count >= self._min_cells]
+        if len(present) == 1:
+            # A few cells of other colours are noise.
+            (k,) = present
+            (left, top), (h, w) = origin, classes.shape
+            return [make_blob(k - 1, (left, top, left + w, top + h), inside, counts[k])]
+        masks = {k: (classes == k).view(np.uint8) & inside for k in present}
         found: list[Blob] = []
-        for x, y, w, h in map(cv2.boundingRect, contours):
-            part = mask[y : y + h, x : x + w]
-            cells = cv2.countNonZero(part)
-            if cells >= self._min_cells:
-                found.append(_blob(k, part, cells, origin[0] + x, origin[1] + y, w, h))
+        for k, mask in masks.items():
+            if not _is_seam(masks, k, keep_thin):
+                contours = _largest(external_contours(mask))
+                found += blobs_of_contours(contours, mask, k - 1, origin, self._min_cells)
         return found
 
 
+def _filled(contour: Image, at: tuple[int, int], shape: tuple[int, ...]) -> Image:
+    """1 within a contour, 0 elsewhere; (h, w) of a shape whose top left is `at`."""
+    inside = np.zeros(shape, np.uint8)
+    return cv2.drawContours(inside, [contour], 0, 1, cv2.FILLED, offset=(-at[0], -at[1]))
+
+
 def _largest(contours: Sequence[Image]) -> Sequence[Image]:
-    """As many as are worth a look."""
-    return (
-        contours
-        if len(contours) <= _MAX_CONTOURS
-        else sorted(contours, key=cv2.contourArea, reverse=True)[:_MAX_CONTOURS]
-    )
+    """At most _MAX_CONTOURS of them."""
+    if len(contours) <= _MAX_CONTOURS:
+        return contours
+    return sorted(contours, key=cv2.contourArea, reverse=True)[:_MAX_CONTOURS]
 
 
-def _is_seam(masks: dict[int, Image], k: int, thin: bool) -> bool:
-    """Whether a class among others is but the seam of two: where paints meet, a cell or two have
-    the mixed colour, which may be a third paint's: green beside blue is cyan. With thin, what lies
-    beside a single one is none.
+def _is_seam(masks: dict[int, Image], k: int, keep_thin: bool) -> bool:
+    """Whether a class among others is but the seam of two.
+
+    Where paints meet, a cell or two have the mixed colour, which may be a third paint's: green
+    beside blue is cyan. With keep_thin, what lies beside a single one is none.
     """
     mask = masks[k]
-    if cv2.countNonZero(opened(mask, 1, 0)) >= max(
-        _SEAM_CELLS, _SEAM_SHARE * cv2.countNonZero(mask)
-    ):
+    eroded_cells = cv2.countNonZero(opening(mask, 1, 0))
+    if eroded_cells >= max(_SEAM_CELLS, _SEAM_SHARE * cv2.countNonZero(mask)):
         return False
+    if not keep_thin:
+        return True
     around = cv2.dilate(mask, _NEIGHBOURS)
-    return (
-        not thin
-        or sum(
-            cv2.countNonZero(around & other) >= _SEAM_CELLS
-            for number, other in masks.items()
-            if number != k
-        )
-        > 1
+    neighbours = sum(
+        cv2.countNonZero(around & other) >= _SEAM_CELLS
+        for number, other in masks.items()
+        if number != k
     )
-
-
-def _blob(k: int, mask: Image, cells: int, x: int, y: int, w: int, h: int) -> Blob:
-    return Blob(
-        k - 1, (x, y, x + w, y + h), mask, cells, 4.0 * cells, x + x + w - 0.5, y + y + h - 0.5
-    )
+    return neighbours > 1

@@ -1,6 +1,6 @@
-"""Markers by chroma lookup table: search where they can be, tell which blob is which, measure it.
+"""Markers of one camera, frame after frame: blob search, data association, sub-pixel centroid.
 
-Pure. A colour that is not seen is searched in the whole image from the next frame on; its place and
+Pure. A colour that is not seen is searched in the whole image from the next frame on. Its place and
 size are remembered, so that a blob that cannot be it is not taken for it.
 """
 
@@ -14,167 +14,201 @@ import msgspec
 from rhot.files.config import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
-from services.pi_tracker.detect.blob_search import Blob, Searcher
+from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
-from services.pi_tracker.identify.background import Room
-from services.pi_tracker.identify.marker_identity import Identity, shape_fits
+from services.pi_tracker.identify.background import BackgroundModel
+from services.pi_tracker.identify.blob_shape import is_paint_shaped
+from services.pi_tracker.identify.marker_identity import Association, MarkerIdentity
+from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, Rect, picture
 from services.pi_tracker.measure.centroid import Centroid, centroids
 
 # Every so many frames the whole image is searched although nothing is lost, so that a mistake does
-# not last; and in the first ones, to learn what stands in the room.
-_REVIEW, _FIRST = 15, 6
-# A marker that fits the others worse than this may be a thing in the room.
-_LEAST_SUPPORT = 0.3
-# Where half of a disc is hidden, the centre of the rest is 4 r / (3 pi) from the whole's: .24 of
-# the square root of its area, in some direction; so much per coordinate and share. And never is all
-# of it hidden.
-_HIDDEN_SIGMA, _MOST_HIDDEN = 0.34, 0.9
+# not last; and in the first ones, to learn the static background.
+_FULL_SEARCH_PERIOD, _FIRST_FRAMES = 15, 6
+# A marker less consistent with the others than this may be something in the background.
+_MIN_CONSISTENCY = 0.3
+# Where half of a disc is occluded, the centre of the rest is 4 r / (3 pi) from the whole's: .24 of
+# the square root of its area, in some direction; so much per coordinate and fraction. And never is
+# all of it occluded.
+_OCCLUSION_SIGMA, _MAX_OCCLUDED = 0.34, 0.9
 # About a marker's width around the place where it must be.
-_SLIVER_PX = 14
-# A thin one beside another's paint counts when it is at least this share of the marker: an
+_REMAINDER_MARGIN_PX = 14
+# A thin blob beside another's paint counts when it is at least this share of the marker: an
 # occluder's own edge is less. (Of the two crescents of half visible markers that the seam test took
 # in the hard scene, one had .35, the other .47 of the marker's area.)
-_CRESCENT = 0.25
-Lap = Callable[[str], None]
+_MIN_THIN_SHARE = 0.25
+# Called with the name of each stage at its end.
+OnStage = Callable[[str], None]
 
 
-class LutFinder:
-    """Markers of one camera, frame after frame."""
+class MarkerFinder:
+    """Finds the markers of one camera, frame after frame."""
 
-    def __init__(self, table: ColorTable, settings: Tracker, lap: Lap) -> None:
+    def __init__(self, table: ColorTable, settings: Tracker, on_stage: OnStage) -> None:
         self._names = table.names
         self._settings = settings
-        self._searcher = Searcher(table, settings)
-        self._unfiltered = Searcher(
+        self._detector = BlobDetector(table, settings)
+        self._unfiltered_detector = BlobDetector(
             table, msgspec.structs.replace(settings, erode=0, dilate=0, gaussian_px=0)
         )
-        self._lap = lap
+        self._on_stage = on_stage
         self._noise = Noise()
-        self._searches = 0
-        self._identity = Identity(len(table.names), settings.roi_margin_px)
-        self._room = Room()
-        # All blobs of the frame in hand, things in the room among them, and where they were
-        # searched.
-        self._all: list[Blob] = []
-        self._region: Rect = (0, 0, 0, 0)
-        # Where all markers were, None if one was not seen, and how far around it they will be.
-        self._hull: Rect | None = None
+        self._frame_count = 0
+        self._identity = MarkerIdentity(len(table.names), settings.roi_margin_px)
+        self._background = BackgroundModel()
+        # All blobs of this frame, background among them, and the rectangle they were searched in.
+        self._all_blobs: list[Blob] = []
+        self._searched: Rect = (0, 0, 0, 0)
+        # The rectangle of all markers, None if one was not seen, and how far around it they will be
+        # in the next frame.
+        self._markers_rect: Rect | None = None
         self._margin_px = settings.roi_margin_px
 
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image, at most one per colour."""
         image = picture(frame)
-        self._noise.look(image)
-        blobs = self._search(image)
-        for color, own in enumerate(blobs):
-            place = None if own else self._identity.expected(color, frame.stamp_ns)
-            if place is not None:
-                own += self._slivers(image, color, place)
-        self._lap("search")
-        chosen = {
-            color: choice
-            for color, choice in enumerate(self._identity.choose(blobs, frame.stamp_ns))
-            if choice is not None
+        self._noise.update(image)
+        blobs = self._search(image, frame.stamp_ns)
+        self._on_stage("search")
+        associated = {
+            color: association
+            for color, association in enumerate(self._identity.associate(blobs, frame.stamp_ns))
+            if association is not None
         }
-        if len(self._all) > len(chosen) or not self._room.settled:
-            self._room.learn(
-                image,
-                self._region,
-                self._all,
-                [choice.blob.rect for choice in chosen.values()],
-                self._noise,
-                frame.stamp_ns,
-            )
-        self._lap("identity")
-        # A marker that strayed from the others is looked for everywhere the next time.
-        self._expect(
-            [choice.blob.rect for choice in chosen.values() if choice.support >= _LEAST_SUPPORT]
+        self._update_background(image, associated, frame.stamp_ns)
+        self._on_stage("identity")
+        # A marker that strayed from the others is searched everywhere the next time.
+        self._set_search_region(
+            [
+                association.blob.rect
+                for association in associated.values()
+                if association.consistency >= _MIN_CONSISTENCY
+            ]
         )
-        markers = []
-        measured = centroids(image, [choice.blob for choice in chosen.values()], self._noise)
-        for (color, choice), found in zip(chosen.items(), measured, strict=True):
-            hidden = self._identity.follow(
-                color, found.x_px, found.y_px, found.area_px, frame.stamp_ns
-            )
-            markers.append(_marker(self._names[color], found, choice.certainty, hidden))
-        self._lap("centroid")
+        markers = self._measure(image, associated, frame.stamp_ns)
+        self._on_stage("centroid")
         return markers
 
-    def _search(self, image: Picture) -> list[list[Blob]]:
+    def _search(self, image: Picture, stamp_ns: int) -> list[list[Blob]]:
+        """Plausible blobs of each colour, remainders of occluded markers among them."""
+        blobs = self._search_all_colors(image)
+        for color, own in enumerate(blobs):
+            predicted = None if own else self._identity.predicted(color, stamp_ns)
+            if predicted is not None:
+                own += self._occluded_remainders(image, color, predicted)
+        return blobs
+
+    def _search_all_colors(self, image: Picture) -> list[list[Blob]]:
         """Plausible blobs of each colour: near the last places, else in the whole image."""
-        everywhere = search_region.whole(image.size)
-        self._searches += 1
-        if self._hull is None or self._searches <= _FIRST or self._searches % _REVIEW == 0:
-            return self._blobs(image, everywhere)
-        region = search_region.around(self._hull, self._margin_px, image.size)
-        found = self._blobs(image, region)
+        whole = search_region.whole(image.size)
+        self._frame_count += 1
+        full_search = (
+            self._frame_count <= _FIRST_FRAMES or self._frame_count % _FULL_SEARCH_PERIOD == 0
+        )
+        if self._markers_rect is None or full_search:
+            return self._detect(image, whole)
+        region = search_region.around(self._markers_rect, self._margin_px, image.size)
+        found = self._detect(image, region)
         if any(
-            not own or search_region.cut(max(own, key=_cells).rect, region, image.size)
+            not own or search_region.is_clipped(max(own, key=_cells).rect, region, image.size)
             for own in found
         ):
             # A marker has moved further than the margin: the same frame may still show it.
-            return self._blobs(image, everywhere)
+            return self._detect(image, whole)
         return found
 
-    def _slivers(self, image: Picture, color: int, place: tuple[float, float]) -> list[Blob]:
-        """What the mask filters took away of a marker that another one hides, where it must be."""
+    def _detect(self, image: Picture, region: Rect) -> list[list[Blob]]:
+        """Plausible blobs of each colour in a rectangle."""
+        found: list[list[Blob]] = [[] for _ in self._names]
+        self._searched, self._all_blobs = region, self._detector.detect(image, region)
+        for blob in self._background.foreground(image, self._all_blobs, self._noise):
+            if is_paint_shaped(blob, self._settings.max_area_px):
+                found[blob.color].append(blob)
+        return found
+
+    def _occluded_remainders(
+        self, image: Picture, color: int, predicted_px: tuple[float, float]
+    ) -> list[Blob]:
+        """What mask filters took of a marker that another one occludes, near its predicted place.
+
+        Ordinary blobs first; only without any, thin ones beside the other's paint.
+        """
         column, row = (
-            min(max(int(v) // 2, 0), n - 1) for v, n in zip(place, image.size, strict=True)
+            min(max(int(px) // 2, 0), cells - 1)
+            for px, cells in zip(predicted_px, image.size, strict=True)
         )
-        region = search_region.around((column, row, column + 1, row + 1), _SLIVER_PX, image.size)
-        for thin in (False, True):
-            found = self._room.without(
-                image, self._unfiltered.blobs(image, region, thin), self._noise
-            )
-            least_px2 = _CRESCENT * self._identity.area_px2(color) if thin else 0.0
+        cell = (column, row, column + 1, row + 1)
+        region = search_region.around(cell, _REMAINDER_MARGIN_PX, image.size)
+        for keep_thin in (False, True):
+            blobs = self._unfiltered_detector.detect(image, region, keep_thin)
+            min_area_px2 = _MIN_THIN_SHARE * self._identity.area_px2(color) if keep_thin else 0.0
             found = [
-                b
-                for b in found
-                if b.color == color
-                and b.area_px >= least_px2
-                and shape_fits(b, self._settings.max_area_px)
+                blob
+                for blob in self._background.foreground(image, blobs, self._noise)
+                if blob.color == color
+                and blob.area_px >= min_area_px2
+                and is_paint_shaped(blob, self._settings.max_area_px)
             ]
             if found:
                 return found
         return []
 
-    def _expect(self, rects: list[Rect]) -> None:
-        """Where to look in the next frame, given where markers are in this one."""
-        if not rects or len(rects) < len(self._names):
-            self._hull = None
-            return
-        now = search_region.hull(rects)
-        self._margin_px = search_region.margin(self._hull, now, self._settings.roi_margin_px)
-        self._hull = now
+    def _update_background(
+        self, image: Picture, associated: dict[int, Association], stamp_ns: int
+    ) -> None:
+        """Learn what was found and is no marker, while there is anything to learn."""
+        if len(self._all_blobs) > len(associated) or not self._background.settled:
+            markers = [association.blob.rect for association in associated.values()]
+            self._background.update(
+                image, self._searched, self._all_blobs, markers, self._noise, stamp_ns
+            )
 
-    def _blobs(self, image: Picture, region: Rect) -> list[list[Blob]]:
-        """Plausible blobs of each colour in a rectangle."""
-        found: list[list[Blob]] = [[] for _ in self._names]
-        self._region, self._all = region, self._searcher.blobs(image, region)
-        for blob in self._room.without(image, self._all, self._noise):
-            if shape_fits(blob, self._settings.max_area_px):
-                found[blob.color].append(blob)
-        return found
+    def _set_search_region(self, rects: list[Rect]) -> None:
+        """Where to search in the next frame, given the markers' rectangles in this one."""
+        if not rects or len(rects) < len(self._names):
+            self._markers_rect = None
+            return
+        now = search_region.bounding_rect(rects)
+        self._margin_px = search_region.motion_margin(
+            self._markers_rect, now, self._settings.roi_margin_px
+        )
+        self._markers_rect = now
+
+    def _measure(
+        self, image: Picture, associated: dict[int, Association], stamp_ns: int
+    ) -> list[Marker]:
+        """Sub-pixel positions; takes them into the tracks."""
+        blobs = [association.blob for association in associated.values()]
+        measured = centroids(image, blobs, self._noise)
+        markers = []
+        for (color, association), centroid in zip(associated.items(), measured, strict=True):
+            occluded = self._identity.update(
+                color, centroid.x_px, centroid.y_px, centroid.area_px, stamp_ns
+            )
+            markers.append(_marker(self._names[color], centroid, association.certainty, occluded))
+        return markers
 
 
 def _cells(blob: Blob) -> int:
     return blob.cells
 
 
-def _marker(name: str, found: Centroid, certainty: float, hidden: float) -> Marker:
-    """hidden is the share of it that is covered: it moves the centre, nobody knows where to."""
-    whole_px2 = found.area_px / (1.0 - min(hidden, _MOST_HIDDEN))
+def _marker(name: str, centroid: Centroid, certainty: float, occluded: float) -> Marker:
+    """A marker of which the fraction `occluded` is covered.
+
+    That moves the centre; where to is unknown, so sigma grows.
+    """
+    whole_px2 = centroid.area_px / (1.0 - min(occluded, _MAX_OCCLUDED))
+    occlusion_sigma_px = _OCCLUSION_SIGMA * occluded * math.sqrt(whole_px2)
     return Marker(
         color=name,
         # A hundredth of the best sigma is as fine as the position deserves.
-        x_px=round(found.x_px, 3),
-        y_px=round(found.y_px, 3),
-        area_px=round(found.area_px, 1),
-        sigma_px=round(
-            math.hypot(found.sigma_px, _HIDDEN_SIGMA * hidden * math.sqrt(whole_px2)), 4
-        ),
-        quality=round(found.quality * certainty * (1.0 - hidden), 3),
+        x_px=round(centroid.x_px, 3),
+        y_px=round(centroid.y_px, 3),
+        area_px=round(centroid.area_px, 1),
+        sigma_px=round(math.hypot(centroid.sigma_px, occlusion_sigma_px), 4),
+        quality=round(centroid.quality * certainty * (1.0 - occluded), 3),
     )

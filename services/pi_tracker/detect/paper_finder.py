@@ -1,8 +1,8 @@
-"""The seed's own pipeline, for comparison: per colour HSV, Gaussian, inRange, erosion, dilation,
-largest contour, its centroid.
+"""The RHOT paper's marker detection, for comparison (sections 8 and 9.1).
 
-RHOT, sections 8 and 9.1. Searched in the last box + margin, or in the whole image where the colour
-was lost. Pure; a colour without a contour has no marker.
+Per colour: HSV, Gaussian, inRange, erosion, dilation, largest contour, its centroid. Searched in
+the last box + margin, or in the whole image where the colour was lost. Pure; a colour without a
+contour has no marker.
 """
 
 from __future__ import annotations
@@ -15,36 +15,37 @@ import numpy as np
 from rhot.files.calibration import Colors
 from rhot.files.config import Tracker
 from rhot.messages import Marker
-from services.pi_tracker.detect.color_table import hsv_mask
+from services.pi_tracker.detect.hsv_range import hsv_mask
 from services.pi_tracker.image.frame import Frame, Image
 
 # Standard deviation of a binary contour's centroid, a 9 px tip at sigma 5: .22 px of disparity
 # between two views.
 _SIGMA_PX = 0.155
+# x, y, width, height; px.
 Box = tuple[int, int, int, int]
 
 
 class PaperFinder:
-    """Markers as the seed found them."""
+    """Markers of one camera, frame after frame, as the paper finds them."""
 
-    def __init__(self, colors: Colors, settings: Tracker, wanted: Sequence[str]) -> None:
-        self._spans = {name: colors.colors[name] for name in wanted}
+    def __init__(self, colors: Colors, settings: Tracker, color_names: Sequence[str]) -> None:
+        self._ranges = {name: colors.colors[name] for name in color_names}
         self._settings = settings
         self._element = np.ones((3, 3), np.uint8)
-        self._boxes: dict[str, Box] = {}
+        self._last_boxes: dict[str, Box] = {}
 
     def find(self, frame: Frame) -> list[Marker]:
-        """Markers of one image."""
+        """Markers of one image, at most one per colour."""
         bgr = (
             frame.image
             if frame.layout == "bgr"
             else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
         )
         markers = []
-        for name in self._spans:
-            found = self._largest(bgr, name)
-            if found is not None:
-                markers.append(found)
+        for name in self._ranges:
+            marker = self._marker(bgr, name)
+            if marker is not None:
+                markers.append(marker)
         return markers
 
     def mask(self, bgr: Image, name: str) -> Image:
@@ -53,18 +54,14 @@ class PaperFinder:
         if self._settings.gaussian_px > 1:
             size = self._settings.gaussian_px | 1
             hsv = cv2.GaussianBlur(hsv, (size, size), 0)
-        mask = hsv_mask(hsv, self._spans[name])
+        mask = hsv_mask(hsv, self._ranges[name])
         mask = cv2.erode(mask, self._element, iterations=self._settings.erode)
         return cv2.dilate(mask, self._element, iterations=self._settings.dilate)
 
-    def _largest(self, bgr: Image, name: str) -> Marker | None:
+    def _marker(self, bgr: Image, name: str) -> Marker | None:
+        """The largest contour of one colour, if its area fits."""
         height, width = bgr.shape[:2]
-        margin = self._settings.roi_margin_px
-        box = self._boxes.pop(name, None)
-        x0, y0, x1, y1 = (0, 0, width, height)
-        if box is not None:
-            x0, y0 = max(box[0] - margin, 0), max(box[1] - margin, 0)
-            x1, y1 = min(box[0] + box[2] + margin, width), min(box[1] + box[3] + margin, height)
+        x0, y0, x1, y1 = self._search_rect(name, width, height)
         contours, _ = cv2.findContours(
             self.mask(bgr[y0:y1, x0:x1], name), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
         )
@@ -76,7 +73,7 @@ class PaperFinder:
         if not max(self._settings.min_area_px, 1.0) <= area <= self._settings.max_area_px:
             return None
         x, y, w, h = cv2.boundingRect(contour)
-        self._boxes[name] = (x0 + x, y0 + y, w, h)
+        self._last_boxes[name] = (x0 + x, y0 + y, w, h)
         return Marker(
             color=name,
             x_px=round(x0 + moments["m10"] / area, 3),
@@ -84,4 +81,18 @@ class PaperFinder:
             area_px=round(area, 1),
             sigma_px=_SIGMA_PX,
             quality=1.0,
+        )
+
+    def _search_rect(self, name: str, width: int, height: int) -> Box:
+        """The last box and its margin, as x0, y0, x1, y1; forgets the box."""
+        box = self._last_boxes.pop(name, None)
+        if box is None:
+            return 0, 0, width, height
+        x, y, w, h = box
+        margin = self._settings.roi_margin_px
+        return (
+            max(x - margin, 0),
+            max(y - margin, 0),
+            min(x + w + margin, width),
+            min(y + h + margin, height),
         )

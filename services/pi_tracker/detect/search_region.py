@@ -1,5 +1,4 @@
-"""Where to look: the rectangles around the last markers, or the whole image for those that are
-lost.
+"""Regions of interest: the rectangle to search in the next frame, and how far markers may move.
 
 Pure. Rectangles are in cells of 2x2 pixels. A rectangle outside the image is clamped to it and
 keeps at least one cell.
@@ -13,7 +12,7 @@ from services.pi_tracker.image.yuv_planes import Rect
 
 # A hand at rest still trembles and turns, and from one frame to the next a motion seldom more than
 # doubles. (What escapes is found in the same frame by searching the whole image.)
-_STILL_MARGIN_PX, _STEPS = 8, 2
+_REST_MARGIN_PX, _MOTION_FACTOR = 8, 2
 
 
 def whole(size: tuple[int, int]) -> Rect:
@@ -37,33 +36,30 @@ def around(rect: Rect, margin_px: int, size: tuple[int, int]) -> Rect:
     )
 
 
-def hull(rects: Iterable[Rect]) -> Rect:
-    """The smallest rectangle around all, at least one: one search of a hand costs less than one for
-    each of its markers.
+def bounding_rect(rects: Iterable[Rect]) -> Rect:
+    """The smallest rectangle around all, at least one.
+
+    One search of a hand costs less than one for each of its markers.
     """
     x0, y0, x1, y1 = zip(*rects, strict=True)
     return (min(x0), min(y0), max(x1), max(y1))
 
 
-def margin(before: Rect | None, now: Rect, most_px: int) -> int:
-    """The margin that the motion of the markers' hull from the last frame to this one asks for.
+def motion_margin(before: Rect | None, now: Rect, max_px: int) -> int:
+    """The margin in px for the next frame, from the motion of the markers' rectangle.
 
-    most_px where it is unknown.
+    before is the rectangle of the last frame, None where it is unknown: then max_px.
     """
     if before is None:
-        return most_px
-    step = max(
-        abs(now[0] - before[0]),
-        abs(now[1] - before[1]),
-        abs(now[2] - before[2]),
-        abs(now[3] - before[3]),
-    )
-    return min(most_px, _STILL_MARGIN_PX + _STEPS * 2 * step)
+        return max_px
+    step_cells = max(abs(new - old) for new, old in zip(now, before, strict=True))
+    return min(max_px, _REST_MARGIN_PX + _MOTION_FACTOR * 2 * step_cells)
 
 
-def cut(blob: Rect, rect: Rect, size: tuple[int, int]) -> bool:
-    """Whether a blob reaches the border of its rectangle where that is not the image's: there may
-    be more of it outside.
+def is_clipped(blob: Rect, rect: Rect, size: tuple[int, int]) -> bool:
+    """Whether a blob reaches the border of its search rectangle: there may be more of it outside.
+
+    Where that border is the image's, too, there is no more.
     """
     return (
         (blob[0] <= rect[0] > 0)

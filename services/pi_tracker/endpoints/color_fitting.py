@@ -18,7 +18,7 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import ColorRange, Colors
 from rhot.process.service import Service
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import examine, statistics
 from services.pi_tracker.endpoints.picture_cache import PictureCache
@@ -82,9 +82,9 @@ def answer(
     }
     report = examine(study, fitted, known)
     patches = [
-        Patch(color=color, picture=names[swatch.frame], box_px=swatch.box_px)
+        Patch(color=color, picture=names[patch.frame], box_px=patch.box_px)
         for color, samples in study.samples.items()
-        for swatch in samples.swatches
+        for patch in samples.patches
     ]
     return FitResult(
         colors=fitted,

@@ -20,7 +20,7 @@ from rhot.camera_messages import ExposureControl
 from rhot.errors import CalibrationError, RefusalCode, RefusedError
 from rhot.files.calibration import Exposure, load_exposure, save
 from rhot.process.service import Service
-from services.pi_tracker.colors.exposure_advice import Settling
+from services.pi_tracker.colors.settling import Settling
 from services.pi_tracker.sources.controls import Controls
 
 # picamera2's automatics settle in one to two seconds, a webcam's in five.

@@ -1,8 +1,8 @@
-"""Colours of all cells of a picture: hue, saturation and value as the lookup table understands
-them, and chroma free of shading. Pure.
+"""Colours of cells (2x2 pixels): HSV as the lookup tables define it, and chromaticity. Pure.
 
-A cell without light has no colour: its hue and saturation are those of noise, and whoever uses them
-must ask for some value first.
+Chromaticity is chroma over luma: shading scales both alike, so it depends on the paint and the
+light's colour only. A cell without light has no colour. Its hue and saturation are those of noise:
+ask for some value first.
 """
 
 from __future__ import annotations
@@ -14,24 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.image.yuv_planes import picture
+from services.pi_tracker.image.hue import LUMA_GAIN, Array, hue_of_chroma
+from services.pi_tracker.image.yuv_planes import Picture, Rect, picture
 
-# Mostly float64; OpenCV's stubs do not say the type of what it returns.
-Array = npt.NDArray[Any]
 Mask = npt.NDArray[np.bool_]
 
-# As in colors.py: R = L + 1.596 V', G = L - .392 U' - .813 V', B = L + 2.017 U', L = 1.164 (Y -
-# 16).
-_LUMA_GAIN = 255.0 / 219.0
-_RED_V, _GREEN_U, _GREEN_V, _BLUE_U = 1.596027, -0.391762, -0.812968, 2.017232
-# Below this luma (of 219) a cell counts as dark, so that its chroma is not divided by next to
-# nothing.
-_DARK = 8.0
+# Below this luma (of 219) a cell counts as dark: chroma is not divided by next to nothing.
+_DARK_LUMA = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of 2x2 pixels: y is luma less 16, u and v are chroma less 128.
+    """Cells of 2x2 pixels: y = Y - 16, u = U - 128, v = V - 128.
 
     All of one shape, (h, w) or (n,).
     """
@@ -46,31 +40,24 @@ class Cells:
 
     @property
     def chroma(self) -> Array:
-        """How strong the colour is, in grey levels of chroma."""
+        """Magnitude of the chroma, grey levels."""
         return np.hypot(self.u, self.v)
 
     @property
-    def tint(self) -> Array:
-        """Chroma over luma, (..., 2): what shading leaves as it is."""
-        scale = 1.0 / np.maximum(self.y, _DARK)
+    def chromaticity(self) -> Array:
+        """Chroma over luma, (..., 2), which shading does not change."""
+        scale = 1.0 / np.maximum(self.y, _DARK_LUMA)
         return np.stack([self.u * scale, self.v * scale], axis=-1)
 
     def hsv(self) -> tuple[Array, Array, Array]:
-        """OpenCV hue (0..180), saturation and value (0..255), not rounded and, as in the lookup
-        table, not clipped to RGB.
+        """OpenCV hue (0..180), saturation and value (0..255).
+
+        Not rounded, and, as in the lookup tables, RGB is not clipped.
         """
-        red, green, blue = _RED_V * self.v, _GREEN_U * self.u + _GREEN_V * self.v, _BLUE_U * self.u
-        top = np.maximum(np.maximum(red, green), blue)
-        spread = top - np.minimum(np.minimum(red, green), blue)
-        safe = np.maximum(spread, 1e-9)
-        sector = np.where(
-            top == red,
-            (green - blue) / safe,
-            np.where(top == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe),
-        )
-        value = np.maximum(_LUMA_GAIN * self.y + top, 1.0)
+        hue, spread, top = hue_of_chroma(self.u, self.v)
+        value = np.maximum(LUMA_GAIN * self.y + top, 1.0)
         return (
-            np.where(spread > 0.0, (30.0 * sector) % 180.0, 0.0),
+            hue,
             np.minimum(255.0 * spread / value, 255.0),
             np.minimum(value, 255.0),
         )
@@ -82,8 +69,12 @@ class Cells:
 def cells_of(frame: Frame) -> Cells:
     """All cells of a frame, (h, w)."""
     image = picture(frame)
-    width, height = image.size
-    luma, chroma = image.cells((0, 0, width, height))
+    return cells_in(image, (0, 0, *image.size))
+
+
+def cells_in(image: Picture, rect: Rect) -> Cells:
+    """Cells of a rectangle, (h, w)."""
+    luma, chroma = image.cells(rect)
     return Cells(
         luma.astype(np.float64) - 16.0,
         chroma[..., 0].astype(np.float64) - 128.0,
@@ -91,41 +82,21 @@ def cells_of(frame: Frame) -> Cells:
     )
 
 
-def joined(parts: list[Cells]) -> Cells:
-    """Cells of several pictures in one row, (n,)."""
+def concatenate(parts: list[Cells]) -> Cells:
+    """Cells of several pictures as one list, (n,)."""
     flat = [(part.y.ravel(), part.u.ravel(), part.v.ravel()) for part in parts]
     if not flat:
         return Cells(np.empty(0), np.empty(0), np.empty(0))
-    y, u, v = (np.concatenate(rows) for rows in zip(*flat, strict=True))
+    y, u, v = (np.concatenate(planes) for planes in zip(*flat, strict=True))
     return Cells(y, u, v)
 
 
-def hue_from(hue: Array, centre: float | Array) -> Array:
-    """Signed distance of hues from a centre, -90..90."""
-    return (hue - centre + 90.0) % 180.0 - 90.0
+def skin_mask(cells: Cells) -> Mask:
+    """Which cells have the chroma of skin of any complexion: Cb 77..127, Cr 133..173.
 
-
-def hue_apart(hue: float, other: float) -> float:
-    """Signed distance of one hue from another, -90..90."""
-    return (hue - other + 90.0) % 180.0 - 90.0
-
-
-def mean_hue(hue: Array, weight: Array) -> float:
-    """Circular mean of OpenCV hues, 0..180; 0 of none."""
-    angle = hue * (np.pi / 90.0)
-    return float(
-        np.arctan2(np.sum(weight * np.sin(angle)), np.sum(weight * np.cos(angle)))
-        * (90.0 / np.pi)
-        % 180.0
-    )
-
-
-def looks_like_skin(cells: Cells) -> Mask:
-    """Cells whose chroma is that of skin of any complexion, after Chai and Ngan (IEEE Trans.
-
-    CSVT 1999): Cb 77..127, Cr 133..173.
+    Chai and Ngan, IEEE Trans. CSVT 1999.
     """
-    # Near grey everything is a little like everything: skin has at least this much chroma.
+    # Near grey every colour is a little like skin: skin has at least this much chroma.
     return (
         (cells.u >= -51.0)
         & (cells.u <= -1.0)

@@ -1,7 +1,7 @@
-"""One image of one camera with its instant: what every source yields and the tracker's step takes.
+"""One image of one camera with its time stamp: what sources yield and the tracker's step takes.
 
-Pure data. A source that does not know its rolling shutter says row_time_ns = 0, and every row then
-counts as taken at stamp_ns.
+Pure data. A source that does not know its rolling shutter says row_time_ns = 0; every row then
+counts as exposed at stamp_ns.
 """
 
 from __future__ import annotations

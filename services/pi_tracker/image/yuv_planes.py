@@ -1,6 +1,6 @@
-"""Any frame as luma and chroma: the one form in which colours are looked up and blobs are measured.
+"""Any frame as luma and chroma: the one form in which colours are classified and blobs measured.
 
-Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it; a BGR image is averaged
+Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it. A BGR image is averaged
 2x2 first, never sampled (one pixel's chroma costs .87 px of centroid, the average .41). Only the
 part asked for is converted. An odd last row or column is left out. Cells are 2x2 pixels: cell (i,
 j) covers pixels 2i..2i+1, 2j..2j+1, so its centre lies at pixel 2i + 0.5.
@@ -42,12 +42,13 @@ class Picture(Protocol):
         """
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        """Copy a rectangle into the top left of buffers: luma of every pixel (2h, 2w), u, v of
-        every cell (2, h, w).
+        """Copy a rectangle into the top left of buffers.
+
+        luma (2h, 2w) of every pixel, chroma u, v (2, h, w) of every cell.
         """
 
 
-class _Planar:
+class _PlanarPicture:
     """I420."""
 
     def __init__(self, image: Image, width: int, height: int) -> None:
@@ -59,63 +60,62 @@ class _Planar:
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
-        luma = cv2.resize(
-            self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1],
-            (x1 - x0, y1 - y0),
-            interpolation=cv2.INTER_AREA,
-        )
+        luma = _cell_means(_pixels(self._y, rect))
         # Merging copies of the parts is three times faster than merging the parts.
-        u, v = (
-            np.ascontiguousarray(self._u[y0:y1:step, x0:x1]),
-            np.ascontiguousarray(self._v[y0:y1:step, x0:x1]),
-        )
+        u = np.ascontiguousarray(self._u[y0:y1:step, x0:x1])
+        v = np.ascontiguousarray(self._v[y0:y1:step, x0:x1])
         return luma[::step], cv2.merge((u, v))
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect
         w, h = x1 - x0, y1 - y0
-        luma[: 2 * h, : 2 * w] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+        luma[: 2 * h, : 2 * w] = _pixels(self._y, rect)
         chroma[:, :h, :w] = self._chroma[:, y0:y1, x0:x1]
 
 
-class _Packed:
-    """BGR."""
+class _BgrPicture:
+    """BGR, converted where it is asked for."""
 
     def __init__(self, image: Image, width: int, height: int) -> None:
         self.size = (width // 2, height // 2)
         self._image = image
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
-        x0, y0, x1, y1 = rect
-        bgr = cv2.resize(
-            self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1],
-            (x1 - x0, y1 - y0),
-            interpolation=cv2.INTER_AREA,
-        )
-        return cv2.transform(bgr[::step], _LUMA), cv2.transform(bgr[::step], _CHROMA)
+        bgr = _cell_means(_pixels(self._image, rect))[::step]
+        return cv2.transform(bgr, _LUMA), cv2.transform(bgr, _CHROMA)
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect
         w, h = x1 - x0, y1 - y0
-        bgr = self._image[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+        bgr = _pixels(self._image, rect)
         luma[: 2 * h, : 2 * w] = cv2.transform(bgr, _LUMA)
-        chroma[:, :h, :w] = cv2.split(
-            cv2.transform(cv2.resize(bgr, (w, h), interpolation=cv2.INTER_AREA), _CHROMA)
-        )
+        chroma[:, :h, :w] = cv2.split(cv2.transform(_cell_means(bgr), _CHROMA))
 
 
 def picture(frame: Frame) -> Picture:
-    """The frame as luma and chroma; no pixel is touched yet."""
+    """The frame as luma and chroma; no pixel is read yet."""
     width, height = frame.size_px
     image = frame.image
     expected = (height * 3 // 2, width) if frame.layout == "i420" else (height, width, 3)
     if image.shape != expected or image.dtype != np.uint8 or min(width, height) < 2:
         raise SourceError(
-            f"camera {frame.camera!r}: frame {frame.seq} is an image of shape {image.shape} ({image.dtype}), "
-            f"expected {expected} of uint8 for {width}x{height} {frame.layout}"
+            f"camera {frame.camera!r}: frame {frame.seq} is an image of shape {image.shape} "
+            f"({image.dtype}), expected {expected} of uint8 for {width}x{height} {frame.layout}"
         )
     if frame.layout == "bgr":
-        return _Packed(image, width, height)
+        return _BgrPicture(image, width, height)
     if width % 2 or height % 2:
         raise SourceError(f"camera {frame.camera!r}: I420 needs even sizes, got {width}x{height}")
-    return _Planar(np.ascontiguousarray(image), width, height)
+    return _PlanarPicture(np.ascontiguousarray(image), width, height)
+
+
+def _pixels(plane: Image, rect: Rect) -> Image:
+    """The pixels of a rectangle of cells, (2h, 2w) or (2h, 2w, 3)."""
+    x0, y0, x1, y1 = rect
+    return plane[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+
+
+def _cell_means(pixels: Image) -> Image:
+    """The mean of every 2x2 pixels; (2h, 2w, ...) -> (h, w, ...)."""
+    height, width = pixels.shape[:2]
+    return cv2.resize(pixels, (width // 2, height // 2), interpolation=cv2.INTER_AREA)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from rhot.errors import CaptureError
 from rhot.files.capture import Capture, FrameStamp, read_stamps
-from services.pi_tracker.image.frame import Frame, Image
-from services.pi_tracker.sources.video import Decoder
+from services.pi_tracker.image.frame import Frame, Image, Layout
+from services.pi_tracker.sources.video_decoder import VideoDecoder
 
 
 class CaptureReader:
@@ -28,7 +28,7 @@ class CaptureReader:
         self._camera = camera
         self._capture = Capture(folder)
         self._start_ns = start_ns
-        self._decoder = Decoder(self._capture.video(camera))
+        self._decoder = VideoDecoder(self._capture.video(camera))
         self._stamps: list[FrameStamp] = []
         self._shift_ns = 0
         self._index = 0
@@ -38,9 +38,9 @@ class CaptureReader:
         if not folder.is_dir():
             raise CaptureError(f"{folder}: no such capture folder")
         if not self._capture.video(self._camera).is_file():
-            there = sorted(path.stem for path in folder.glob("*.mkv"))
+            names = ", ".join(sorted(path.stem for path in folder.glob("*.mkv")))
             raise CaptureError(
-                f"{folder}: has no video of camera {self._camera!r}; it has {', '.join(there) or 'none'}"
+                f"{folder}: has no video of camera {self._camera!r}; it has {names or 'none'}"
             )
         self._stamps = read_stamps(self._capture.stamps(self._camera))
         if self._start_ns is not None:
@@ -65,35 +65,29 @@ class CaptureReader:
 
     def _frame(self, stamp: FrameStamp, image: Image) -> Frame:
         height, width = image.shape[:2]
-        at_ns = stamp.stamp_ns + self._shift_ns
-        if not self._decoder.grey:
-            return Frame(
-                self._camera, stamp.frame, at_ns, stamp.row_time_ns, (width, height), image, "bgr"
-            )
-        if height % 3 or width % 2:
-            video = self._capture.video(self._camera)
-            raise CaptureError(
-                f"{video}: is grey and {width}x{height}; a grey video must hold I420 pictures of 3/2 their height"
-            )
-        return Frame(
-            self._camera,
-            stamp.frame,
-            at_ns,
-            stamp.row_time_ns,
-            (width, height * 2 // 3),
-            image,
-            "i420",
-        )
+        layout: Layout = "bgr"
+        if self._decoder.grey:
+            if height % 3 or width % 2:
+                raise CaptureError(
+                    f"{self._capture.video(self._camera)}: is grey and {width}x{height}; "
+                    "a grey video must hold I420 pictures of 3/2 their height"
+                )
+            layout, height = "i420", height * 2 // 3
+        stamp_ns = stamp.stamp_ns + self._shift_ns
+        size_px = (width, height)
+        return Frame(self._camera, stamp.frame, stamp_ns, stamp.row_time_ns, size_px, image, layout)
 
     def _check_end(self, *, more: bool) -> None:
         video, stamps = self._capture.video(self._camera), self._capture.stamps(self._camera)
         if more:
             raise CaptureError(
-                f"{stamps}: has stamps of {len(self._stamps)} frames, but {video.name} has more: the capture is damaged"
+                f"{stamps}: has stamps of {len(self._stamps)} frames, but {video.name} has more: "
+                "the capture is damaged"
             )
         if self._index < len(self._stamps):
             raise CaptureError(
-                f"{video}: ends after {self._index} of the {len(self._stamps)} frames in {stamps.name}: cut short or damaged"
+                f"{video}: ends after {self._index} of the {len(self._stamps)} frames in "
+                f"{stamps.name}: cut short or damaged"
             )
 
     def close(self) -> None:

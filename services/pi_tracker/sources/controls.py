@@ -1,8 +1,8 @@
-"""Exposure of a running camera: a mailbox between the event loop and the thread that reads the
-camera.
+"""Exposure of a running camera: a mailbox between the event loop and the thread that reads frames.
 
-The reader takes what is wanted before its next image and tells what images were really taken with.
-A driver that tells nothing leaves `reported` None; whoever waits for it must have a deadline.
+The reader takes the last request before its next image, and reports what images were really taken
+with. A driver that reports nothing leaves `reported` None; whoever waits for it must have a
+deadline.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from rhot.files.calibration import Exposure
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExposureRequest:
     """Values to be fixed, or None for the camera's automatics."""
 
     exposure: Exposure | None
@@ -27,23 +27,23 @@ class Controls:
         self.note = note
         # What the newest image was taken with, as far as the driver tells.
         self.reported: Exposure | None = None
-        # Whether anybody wants to know: asking a driver for every image costs time.
+        # Whether anybody waits for a report: asking a driver for every image costs time.
         self.watched = False
         self._lock = threading.Lock()
-        self._wanted: Wanted | None = None
+        self._request: ExposureRequest | None = None
 
     def adjust(self, exposure: Exposure | None) -> None:
-        """Ask for these values, or for the automatics, from any thread.
+        """Request these values, or the automatics, from any thread.
 
-        The last one asked for counts.
+        The last request counts.
         """
         with self._lock:
-            self._wanted = Wanted(exposure)
+            self._request = ExposureRequest(exposure)
             self.reported = None
             self.watched = exposure is None
 
-    def take(self) -> Wanted | None:
-        """What is asked for since the last call; for the reader."""
+    def take(self) -> ExposureRequest | None:
+        """The request since the last call; for the reader."""
         with self._lock:
-            wanted, self._wanted = self._wanted, None
-        return wanted
+            request, self._request = self._request, None
+        return request

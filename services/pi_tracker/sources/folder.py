@@ -1,7 +1,7 @@
-"""A folder of images as a frame source, in the order of the numbers in their names, at the frame
-rate of the [[camera]] table.
+"""A folder of images as a frame source, in the order of the numbers in their names.
 
-An image that cannot be decoded, or a folder without any, is a CaptureError.
+The frame rate is that of the [[camera]] table. An image that cannot be decoded, or a folder without
+any, is a CaptureError.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import cv2
 
 from rhot.errors import CaptureError
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.sources.numbered_frames import NumberedFrames
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".webp")
 
@@ -24,47 +25,40 @@ class FolderReader:
 
     def __init__(self, camera: str, folder: Path, fps: float, start_ns: int = 0) -> None:
         self.notes: list[str] = []
-        self._camera = camera
         self._folder = folder
-        self._fps = fps
-        self._start_ns = start_ns
         self._paths: list[Path] = []
-        self._seq = 0
+        self._frames = NumberedFrames(camera, fps, start_ns)
 
     def open(self) -> None:
         if not self._folder.is_dir():
             raise CaptureError(f"{self._folder}: no such folder of images")
         self._paths = sorted(
             (path for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES),
-            key=_by_number,
+            key=_number_key,
         )
         if not self._paths:
-            raise CaptureError(
-                f"{self._folder}: has no images; it should hold files {', '.join('*' + s for s in _SUFFIXES)}"
-            )
+            valid = ", ".join("*" + suffix for suffix in _SUFFIXES)
+            raise CaptureError(f"{self._folder}: has no images; it should hold files {valid}")
 
     def read(self) -> Frame | None:
-        if self._seq >= len(self._paths):
+        number = self._frames.count
+        if number >= len(self._paths):
             return None
-        path = self._paths[self._seq]
+        path = self._paths[number]
         image = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if image is None:
             raise CaptureError(
-                f"{path}: cannot be decoded (image {self._seq + 1} of {len(self._paths)}); remove or replace it"
+                f"{path}: cannot be decoded (image {number + 1} of {len(self._paths)}); "
+                "remove or replace it"
             )
-        stamp_ns = self._start_ns + round(self._seq * 1e9 / self._fps)
-        frame = Frame(
-            self._camera, self._seq, stamp_ns, 0.0, (image.shape[1], image.shape[0]), image, "bgr"
-        )
-        self._seq += 1
-        return frame
+        return self._frames.next(image)
 
     def close(self) -> None:
         self._paths = []
 
 
-def _by_number(path: Path) -> list[tuple[int, int, str]]:
-    """img2 before img10."""
+def _number_key(path: Path) -> list[tuple[int, int, str]]:
+    """Sorts img2 before img10."""
     return [
         (0, int(part), "") if part.isdigit() else (1, 0, part)
         for part in re.split(r"(\d+)", path.name)

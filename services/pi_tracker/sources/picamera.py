@@ -1,12 +1,13 @@
-"""A Raspberry Pi camera through picamera2: YUV420 frames, fixed exposure, gain and colour gains, a
-stamp on CLOCK_REALTIME.
+"""A Raspberry Pi camera through picamera2: YUV420 frames at a fixed exposure.
 
-FrameWallClock is the instant at which row 0 starts to be read out, the end of its exposure; half
-the exposure before it is the middle. SensorTimestamp counts from boot and is never used. Without an
-exposure calibration the camera's auto modes stay on and the notes say so. A missing package or
-camera, a system too old for FrameWallClock, and a camera that stops delivering raise SourceError.
+FrameWallClock, on CLOCK_REALTIME, is the instant at which row 0 starts to be read out, the end of
+its exposure; half the exposure before it is the stamp. SensorTimestamp counts from boot and is
+never used. Without an exposure calibration the camera's auto modes stay on and the notes say so. A
+missing package or camera, a system too old for FrameWallClock, and a camera that stops delivering
+raise SourceError.
+
 With sync in the [[camera]] table cameras of several Pis expose together (libcamera's software
-synchronisation, picamera2 0.3.25 on); frames are delivered before that is reached, too, with their
+synchronisation, picamera2 0.3.25 on). Frames are delivered before that is reached, too, with their
 true stamps, and a camera that finds no partner says so once. Written from picamera2's sources and
 tested against a stand-in; not tried on hardware.
 """
@@ -16,13 +17,19 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-import numpy as np
-
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
 from rhot.files.config import CameraTable
-from services.pi_tracker.image.frame import Frame, Image
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
+from services.pi_tracker.sources.picamera_settings import (
+    AUTOMATIC,
+    best_sensor_mode,
+    fixed_exposure,
+    reported_exposure,
+    sync_control,
+    unpadded,
+)
 
 # Readout of one sensor line in the binned modes, measured: ov5647 (camera v1) 33.7 us, imx219 (v2)
 # 18.9 us.
@@ -33,7 +40,7 @@ _SILENCE_S = 2.0
 # then hears no server.
 _SYNC_S = 15.0
 # A client moves its frames by stretching and shortening them: a sensor at its fastest cannot.
-_FULL_SPEED = 0.97
+_MAX_SYNC_RATE = 0.97
 
 
 class PiCamera:
@@ -52,15 +59,15 @@ class PiCamera:
         self._size = table.size_px
         self._row_time_ns = 0.0
         self._seq = 0
-        self._synced = table.sync == "off"
+        self._sync_done = table.sync == "off"
 
     def open(self) -> None:
-        module = _package()
-        there = module.Picamera2.global_camera_info()
-        if self._number >= len(there):
-            names = [f"{index}: {info.get('Model', '?')}" for index, info in enumerate(there)]
-            raise SourceError(
-                f"camera {self._table.name!r}: this machine has no camera {self._number}; it has {', '.join(names) or 'none'}. "
+        module = _picamera2()
+        cameras = module.Picamera2.global_camera_info()
+        if self._number >= len(cameras):
+            names = [f"{index}: {info.get('Model', '?')}" for index, info in enumerate(cameras)]
+            raise self._error(
+                f"this machine has no camera {self._number}; it has {', '.join(names) or 'none'}. "
                 "Check the ribbon cable and `rpicam-hello --list-cameras`"
             )
         try:
@@ -68,12 +75,16 @@ class PiCamera:
             self._configure()
             self._camera.start()
         except RuntimeError as error:
-            raise SourceError(
-                f"camera {self._table.name!r}: cannot be started: {error}; does another program use it?"
-            ) from None
+            raise self._error(f"cannot be started: {error}; does another program use it?") from None
+
+    def _error(self, text: str) -> SourceError:
+        return SourceError(f"camera {self._table.name!r}: {text}")
+
+    def _note(self, text: str) -> None:
+        self.notes.append(f"camera {self._table.name!r}: {text}")
 
     def _configure(self) -> None:
-        mode = _best_mode(self._camera.sensor_modes, self._table)
+        mode = best_sensor_mode(self._camera.sensor_modes, self._table)
         config = self._camera.create_video_configuration(
             main={"size": self._table.size_px, "format": "YUV420"},
             # BT.601 with Y in 16..235 at every size: the colour tables' convention.
@@ -82,60 +93,50 @@ class PiCamera:
             # No frame waits in a queue: each request is the next one to be exposed.
             queue=False,
             buffer_count=4,
-            controls=self._controls(),
+            controls=self._initial_controls(),
         )
         self._camera.configure(config)
-        if mode and self._table.sync != "off" and self._table.fps > _FULL_SPEED * mode["fps"]:
-            self.notes.append(
-                f"camera {self._table.name!r}: fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one"
-            )
+        if mode and self._table.sync != "off" and self._table.fps > _MAX_SYNC_RATE * mode["fps"]:
+            self._note(f"fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one")
         main = self._camera.camera_configuration()["main"]
         self._stride, self._size = int(main["stride"]), (int(main["size"][0]), int(main["size"][1]))
         if self._size != tuple(self._table.size_px):
-            self.notes.append(
-                f"camera {self._table.name!r}: delivers {self._size[0]}x{self._size[1]} instead of {self._table.size_px}"
-            )
+            width, height = self._size
+            self._note(f"delivers {width}x{height} instead of {self._table.size_px}")
         line_us = _LINE_US.get(str(self._camera.camera_properties.get("Model", "")), 0.0)
         self._row_time_ns = line_us * 1000.0 * (mode["size"][1] / self._size[1] if mode else 1.0)
         if not line_us:
-            self.notes.append(
-                f"camera {self._table.name!r}: the sensor's readout time is unknown; rows count as taken at once"
-            )
+            self._note("the sensor's readout time is unknown; rows count as taken at once")
 
-    def _controls(self) -> dict[str, Any]:
+    def _initial_controls(self) -> dict[str, Any]:
         frame_us = round(1e6 / self._table.fps)
-        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)} | _sync(
-            self._table
-        )
+        controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)}
+        controls |= sync_control(self._table)
         if self._exposure is None:
-            self.notes.append(
-                f"camera {self._table.name!r}: no exposure calibration, its auto modes stay on and colours may drift; "
+            self._note(
+                "no exposure calibration, its auto modes stay on and colours may drift; "
                 f"run `rhot calibrate camera {self._table.name}`"
             )
             return controls
-        return controls | _fixed(self._exposure)
+        return controls | fixed_exposure(self._exposure)
 
     def read(self) -> Frame:
-        wanted = self.controls.take()
-        if wanted is not None:
+        request = self.controls.take()
+        if request is not None:
             self._camera.set_controls(
-                {"AeEnable": True, "AwbEnable": True}
-                if wanted.exposure is None
-                else _fixed(wanted.exposure)
+                AUTOMATIC if request.exposure is None else fixed_exposure(request.exposure)
             )
         try:
-            request = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
+            completed = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
         except TimeoutError:
-            raise SourceError(
-                f"camera {self._table.name!r}: no image for {_SILENCE_S:g} s; is its cable loose?"
-            ) from None
+            raise self._error(f"no image for {_SILENCE_S:g} s; is its cable loose?") from None
         try:
-            metadata = request.get_metadata()
-            image = unpadded(request.make_buffer("main"), self._size, self._stride)
+            metadata = completed.get_metadata()
+            image = unpadded(completed.make_buffer("main"), self._size, self._stride)
         finally:
-            request.release()
-        self.controls.reported = _reported(metadata)
-        self._watch_sync(metadata)
+            completed.release()
+        self.controls.reported = reported_exposure(metadata)
+        self._check_sync(metadata)
         frame = Frame(
             self._table.name,
             self._seq,
@@ -148,23 +149,23 @@ class PiCamera:
         self._seq += 1
         return frame
 
-    def _watch_sync(self, metadata: dict[str, Any]) -> None:
-        """Say once that there is no server, where a camera is to be in step with others."""
-        if self._synced:
+    def _check_sync(self, metadata: dict[str, Any]) -> None:
+        """Note once that there is no server, where a camera is to be in step with others."""
+        if self._sync_done:
             return
-        self._synced = bool(metadata.get("SyncReady"))
-        if not self._synced and self._seq >= _SYNC_S * self._table.fps:
-            self.notes.append(
-                f"camera {self._table.name!r}: sync = {self._table.sync!r}, but not in step with any other after {_SYNC_S:g} s; "
+        self._sync_done = bool(metadata.get("SyncReady"))
+        if not self._sync_done and self._seq >= _SYNC_S * self._table.fps:
+            self._note(
+                f"sync = {self._table.sync!r}, but not in step with any other after {_SYNC_S:g} s; "
                 "is there one camera with the other role, at the same fps, in the same network?"
             )
-            self._synced = True
+            self._sync_done = True
 
     def _stamp_ns(self, metadata: dict[str, Any]) -> int:
         wall_ns = metadata.get("FrameWallClock")
         if wall_ns is None:
-            raise SourceError(
-                f"camera {self._table.name!r}: libcamera gives no FrameWallClock; update with `sudo apt full-upgrade`"
+            raise self._error(
+                "libcamera gives no FrameWallClock; update with `sudo apt full-upgrade`"
             )
         return int(wall_ns) - round(float(metadata.get("ExposureTime", 0.0)) * 500.0)
 
@@ -174,64 +175,7 @@ class PiCamera:
             self._camera = None
 
 
-def _sync(table: CameraTable) -> dict[str, Any]:
-    """The control that gives a camera its part in software synchronisation."""
-    if table.sync == "off":
-        return {}
-    roles = getattr(
-        getattr(importlib.import_module("libcamera").controls, "rpi", None), "SyncModeEnum", None
-    )
-    if roles is None:
-        raise SourceError(
-            f'camera {table.name!r}: this libcamera cannot synchronise; `sudo apt full-upgrade`, or set sync = "off"'
-        )
-    return {"SyncMode": roles.Server if table.sync == "server" else roles.Client}
-
-
-def _fixed(exposure: Exposure) -> dict[str, Any]:
-    """The controls that fix an exposure."""
-    return {
-        "AeEnable": False,
-        "AwbEnable": False,
-        "ExposureTime": round(exposure.exposure_us),
-        "AnalogueGain": exposure.gain,
-        "ColourGains": (exposure.red_gain, exposure.blue_gain),
-    }
-
-
-def _reported(metadata: dict[str, Any]) -> Exposure | None:
-    """What an image was taken with; None if the metadata do not say all of it."""
-    exposure_us, gain, gains = (
-        metadata.get(key) for key in ("ExposureTime", "AnalogueGain", "ColourGains")
-    )
-    if not exposure_us or gain is None or gains is None or len(gains) != 2:
-        return None
-    return Exposure(
-        exposure_us=float(exposure_us),
-        gain=float(gain),
-        red_gain=float(gains[0]),
-        blue_gain=float(gains[1]),
-    )
-
-
-def unpadded(buffer: Image, size_px: tuple[int, int], stride: int) -> Image:
-    """A YUV420 buffer, whose rows are padded to `stride` bytes (chroma: half of it), as packed I420
-    (height * 3 / 2, width).
-    """
-    width, height = size_px
-    needed = stride * height * 3 // 2
-    if buffer.size < needed:
-        raise SourceError(
-            f"camera buffer of {buffer.size} bytes is too small for {width}x{height} YUV420 at stride {stride} ({needed})"
-        )
-    if stride == width:
-        return buffer[:needed].reshape(height * 3 // 2, width)
-    luma = buffer[: stride * height].reshape(height, stride)[:, :width]
-    chroma = buffer[stride * height : needed].reshape(height, stride // 2)[:, : width // 2]
-    return np.concatenate([luma.ravel(), chroma.ravel()]).reshape(height * 3 // 2, width)
-
-
-def _package() -> Any:
+def _picamera2() -> Any:
     try:
         return importlib.import_module("picamera2")
     except ImportError as error:
@@ -239,21 +183,3 @@ def _package() -> Any:
             f"picamera2 is not installed ({error}): run `sudo apt install python3-picamera2`, "
             "and make the virtual environment with --system-site-packages"
         ) from None
-
-
-def _best_mode(modes: list[dict[str, Any]], table: CameraTable) -> dict[str, Any] | None:
-    """The sensor mode that sees the most at the wanted rate, and of those the smallest that covers
-    the image.
-    """
-    usable = [
-        mode
-        for mode in modes
-        if "crop_limits" in mode
-        and mode["fps"] >= table.fps
-        and mode["size"][1] >= table.size_px[1]
-    ]
-    return min(
-        usable,
-        key=lambda mode: (-mode["crop_limits"][2] * mode["crop_limits"][3], mode["size"][0]),
-        default=None,
-    )

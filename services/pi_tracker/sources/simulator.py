@@ -1,9 +1,8 @@
-"""The simulator's frames as a source: I420 images over the bus, with a camera computer's clock of
-their own.
+"""The simulator's frames as a source: I420 images over the bus.
 
-Frames that come faster than they are used are dropped, oldest first. While there is no simulator
-nothing comes, and nothing fails; an attachment or payload that is not what it should be is rejected
-and counted.
+Their stamps are on a simulated camera computer's clock. Frames that come faster than they are used
+are dropped, oldest first. While there is no simulator nothing comes, and nothing fails. An
+attachment or payload that is not what it should be is rejected and counted.
 """
 
 from __future__ import annotations
@@ -52,21 +51,27 @@ class SimulatorSource:
 
     def _frame(self, sample: Sample) -> Frame | None:
         try:
-            told = self._decoder.decode(sample.attachment)
+            header = self._decoder.decode(sample.attachment)
         except (msgspec.DecodeError, UnicodeDecodeError):
             return None
-        width, height = told.size_px
-        sane = (
-            told.camera == self._camera
+        width, height = header.size_px
+        valid = (
+            header.camera == self._camera
             and min(width, height) >= 2
             and width % 2 == 0
             and height % 2 == 0
-            and told.row_time_ns <= 1e8
+            and header.row_time_ns <= 1e8
         )
-        if not sane or len(sample.payload) != width * height * 3 // 2:
+        if not valid or len(sample.payload) != width * height * 3 // 2:
             return None
-        self._skew_ns = told.clock_skew_ns
+        self._skew_ns = header.clock_skew_ns
         image = np.frombuffer(sample.payload, np.uint8).reshape(height * 3 // 2, width)
         return Frame(
-            self._camera, told.seq, told.stamp_ns, told.row_time_ns, told.size_px, image, "i420"
+            self._camera,
+            header.seq,
+            header.stamp_ns,
+            header.row_time_ns,
+            header.size_px,
+            image,
+            "i420",
         )

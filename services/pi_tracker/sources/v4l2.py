@@ -1,8 +1,8 @@
 """A USB camera through V4L2, or any camera through a GStreamer pipeline, by OpenCV.
 
 Auto exposure and white balance are switched off and the calibrated values set; what the driver
-refuses is noted. The driver stamps frames with CLOCK_MONOTONIC when they arrive, which is brought
-to CLOCK_REALTIME less half the exposure; a driver without stamps gets the time of reading. Rolling
+refuses is noted. The driver stamps frames with CLOCK_MONOTONIC when they arrive. That is converted
+to CLOCK_REALTIME, less half the exposure; a driver without stamps gets the time of reading. Rolling
 shutter is unknown (row_time_ns 0). A camera that is missing, unplugged or silent is a SourceError.
 Not tried on hardware.
 """
@@ -26,13 +26,14 @@ from services.pi_tracker.sources.controls import Controls
 # counts in 100 us.
 _MANUAL, _AUTOMATIC, _EXPOSURE_UNIT_US = 1, 3, 100.0
 # A stamp further from now than this is not of this frame.
-_STAMP_SLACK_NS = 2_000_000_000
+_MAX_AGE_NS = 2_000_000_000
 
 
 class OpenCvCamera:
-    """device is a number, a path such as /dev/video0, or a GStreamer pipeline.
+    """One camera.
 
-    Api an OpenCV CAP_ constant.
+    device is a number, a path such as /dev/video0, or a GStreamer pipeline; api an OpenCV CAP_
+    constant; open_capture what opens the device.
     """
 
     live = True
@@ -43,10 +44,10 @@ class OpenCvCamera:
         device: int | str,
         exposure: Exposure | None,
         api: int = cv2.CAP_V4L2,
-        capture: Callable[..., Any] = cv2.VideoCapture,
+        open_capture: Callable[..., Any] = cv2.VideoCapture,
     ) -> None:
         self.notes: list[str] = []
-        # A GStreamer pipeline has properties of its own for that.
+        # A GStreamer pipeline has properties of its own for its exposure.
         self.controls = (
             Controls("what the driver reports while its automatics run may be old")
             if api == cv2.CAP_V4L2
@@ -56,12 +57,12 @@ class OpenCvCamera:
         self._device = device
         self._exposure = exposure
         self._api = api
-        self._make = capture
+        self._open_capture = open_capture
         self._capture: Any = None
         self._seq = 0
 
     def open(self) -> None:
-        self._capture = self._make(self._device, self._api)
+        self._capture = self._open_capture(self._device, self._api)
         if not self._capture.isOpened():
             hint = (
                 "see `v4l2-ctl --list-devices`"
@@ -69,7 +70,8 @@ class OpenCvCamera:
                 else "OpenCV needs GStreamer support (Debian's python3-opencv has it)"
             )
             raise SourceError(
-                f"camera {self._table.name!r}: {self._device!r} cannot be opened; {hint} and check [[camera]] source in rig.toml"
+                f"camera {self._table.name!r}: {self._device!r} cannot be opened; {hint} "
+                "and check [[camera]] source in rig.toml"
             )
         if self._api != cv2.CAP_V4L2:
             return
@@ -97,17 +99,20 @@ class OpenCvCamera:
         self._set("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _AUTOMATIC)
         self._set("automatic white balance", cv2.CAP_PROP_AUTO_WB, 1)
 
-    def _obey(self, controls: Controls) -> None:
-        """Set what is wanted; while the automatics run, tell what the driver says."""
-        wanted = controls.take()
-        if wanted is not None:
-            self._exposure = wanted.exposure
-            if wanted.exposure is None:
+    def _apply(self, controls: Controls) -> None:
+        """Set what is requested; while the automatics run, report what the driver says."""
+        request = controls.take()
+        if request is not None:
+            self._exposure = request.exposure
+            if request.exposure is None:
                 self._automatic()
             else:
-                self._fix(wanted.exposure)
-        if not controls.watched:
-            return
+                self._fix(request.exposure)
+        if controls.watched:
+            controls.reported = self._reported()
+
+    def _reported(self) -> Exposure | None:
+        """What the driver says of the exposure, None if it does not say all of it."""
         keys = (
             cv2.CAP_PROP_EXPOSURE,
             cv2.CAP_PROP_GAIN,
@@ -116,20 +121,19 @@ class OpenCvCamera:
         )
         units, gain, red, blue = (float(self._capture.get(key)) for key in keys)
         # OpenCV says -1 or 0 of what a driver does not have.
-        known = units > 0.0 and min(gain, red, blue) >= 0.0
-        controls.reported = (
-            Exposure(exposure_us=units * _EXPOSURE_UNIT_US, gain=gain, red_gain=red, blue_gain=blue)
-            if known
-            else None
-        )
+        if not (units > 0.0 and min(gain, red, blue) >= 0.0):
+            return None
+        exposure_us = units * _EXPOSURE_UNIT_US
+        return Exposure(exposure_us=exposure_us, gain=gain, red_gain=red, blue_gain=blue)
 
     def read(self) -> Frame:
         if self.controls is not None:
-            self._obey(self.controls)
+            self._apply(self.controls)
         ok, image = self._capture.read()
         if not ok or image is None:
             raise SourceError(
-                f"camera {self._table.name!r}: {self._device!r} delivers no more images; is it unplugged?"
+                f"camera {self._table.name!r}: {self._device!r} delivers no more images; "
+                "is it unplugged?"
             )
         frame = Frame(
             self._table.name,
@@ -146,10 +150,11 @@ class OpenCvCamera:
     def _stamp_ns(self) -> int:
         now_ns = clock.now_ns()
         half_exposure_ns = (
-            round(self._exposure.exposure_us * 500.0) if self._exposure is not None else 0
+            0 if self._exposure is None else round(self._exposure.exposure_us * 500.0)
         )
-        age_ns = time.monotonic_ns() - round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
-        return now_ns - half_exposure_ns - (age_ns if 0 <= age_ns < _STAMP_SLACK_NS else 0)
+        driver_ns = round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
+        age_ns = time.monotonic_ns() - driver_ns
+        return now_ns - half_exposure_ns - (age_ns if 0 <= age_ns < _MAX_AGE_NS else 0)
 
     def close(self) -> None:
         if self._capture is not None:

@@ -1,4 +1,4 @@
-"""A studio that takes pictures with a known truth (testing/synthetic_images.py)."""
+"""Pictures with known ground truth (testing/synthetic_images.py), and what detects in them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from rhot.files.calibration import Colors
 from rhot.files.config import Tracker
-from services.pi_tracker.detect.blob_search import Searcher
+from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.noise import Noise
 from testing import synthetic_images
@@ -21,9 +21,9 @@ class Studio:
     of = staticmethod(synthetic_images.frame_of)
 
     @staticmethod
-    def frame(tips, seq=0, layout="i420", sigma=5.0, size_px=(64, 64), **look):
-        """A noisy frame and the truth."""
-        image, truth = synthetic_images.clean(tips, size_px, **look)
+    def frame(tips, seq=0, layout="i420", sigma=5.0, size_px=(64, 64), **options):
+        """A noisy frame and the ground truth."""
+        image, truth = synthetic_images.clean(tips, size_px, **options)
         return synthetic_images.frame_of(
             synthetic_images.noisy(image, sigma, seq), seq, layout
         ), truth
@@ -48,9 +48,9 @@ def colors() -> Colors:
 
 
 @pytest.fixture
-def searcher(colors) -> Searcher:
-    """A searcher for all paints, in the order of PAINTS, with the default settings."""
-    return Searcher(compile_colors(colors, list(synthetic_images.PAINTS)), Tracker())
+def detector(colors) -> BlobDetector:
+    """A detector for all paints, in the order of PAINTS, with the default settings."""
+    return BlobDetector(compile_colors(colors, list(synthetic_images.PAINTS)), Tracker())
 
 
 @pytest.fixture

@@ -47,8 +47,9 @@ def test_nothing_is_found_where_no_ball_is(tracked):
 
 
 def test_the_track_is_one_ball(tracked):
-    """A ball of 45-70 px that a hand moves: no jump beyond 110 px a frame (24 Hz), no shrinking but
-    at the edge.
+    """A ball of 45-70 px that a hand moves: no jump beyond 110 px a frame (24 Hz).
+
+    And no shrinking but at the edge.
     """
     path = {seq: markers[0] for seq, (_, markers) in enumerate(tracked) if markers}
     for seq, marker in path.items():

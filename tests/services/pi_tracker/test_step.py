@@ -1,4 +1,4 @@
-"""The whole step: MarkerFrame for every frame, the same for the same input."""
+"""The whole step: a MarkerFrame for every frame, the same for the same input."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def moving(studio, tip):
     return frames
 
 
-def tracker(colors, wanted=("green", "blue", "magenta"), clock=None, **settings):
-    return TrackerStep("left", colors, Tracker(**settings), SIZE, wanted, clock)
+def tracker(colors, color_names=("green", "blue", "magenta"), clock=None, **settings):
+    return TrackerStep("left", colors, Tracker(**settings), SIZE, color_names, clock)
 
 
 @pytest.mark.parametrize("layout", ["i420", "bgr"])
@@ -82,10 +82,10 @@ def test_a_jump_further_than_the_margin_is_found_in_the_same_frame(studio, tip, 
 
 def test_a_reflection_of_the_colour_does_not_win(studio, tip, colors):
     step = tracker(colors)
-    wanted = [tip("green", 100.0, 100.0), tip("blue", 125.0, 90.0), tip("magenta", 110.0, 135.0)]
-    thing = tip("green", 290.0, 30.0, 40.0, 30.0, turn_rad=1.57)
+    hand = [tip("green", 100.0, 100.0), tip("blue", 125.0, 90.0), tip("magenta", 110.0, 135.0)]
+    reflection = tip("green", 290.0, 30.0, 40.0, 30.0, turn_rad=1.57)
     for seq in range(3):
-        frame, _ = studio.frame([*wanted, thing], seq, size_px=SIZE)
+        frame, _ = studio.frame([*hand, reflection], seq, size_px=SIZE)
         green = next(marker for marker in step.step(frame).markers if marker.color == "green")
         assert green.x_px < 150
 
@@ -128,14 +128,14 @@ def test_stages_are_timed_with_the_clock_that_is_given(moving, colors):
     assert untimed.times_ms == {}
 
 
-def test_new_colours_are_in_force_with_the_next_frame(studio, tip, colors):
+def test_new_colours_apply_from_the_next_frame(studio, tip, colors):
     step = tracker(colors, ["green"])
     frame, _ = studio.frame([tip("green", 60.0, 60.0)], size_px=SIZE)
     assert len(step.step(frame).markers) == 1
-    step.recolor(Colors(colors={"green": colors.colors["blue"]}), "left.colors.json")
+    step.apply_colors(Colors(colors={"green": colors.colors["blue"]}), "left.colors.json")
     assert step.step(frame).markers == []
     with pytest.raises(CalibrationError, match="'green'"):
-        step.recolor(Colors(colors={}), "left.colors.json")
+        step.apply_colors(Colors(colors={}), "left.colors.json")
     assert step.step(frame).markers == []
 
 

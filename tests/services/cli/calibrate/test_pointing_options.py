@@ -6,7 +6,7 @@ import pytest
 
 from rhot.errors import CalibrationError
 from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 
 
 def test_boxes_and_clicks_count_in_every_picture():

@@ -10,35 +10,29 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import Colors
 from rhot.files.config import Tracker
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.report import examine
-from services.pi_tracker.image.chroma import cells_of, hue_apart
+from services.pi_tracker.image.chroma import cells_of
+from services.pi_tracker.image.hue import hue_difference
 from services.pi_tracker.step import TrackerStep
+from testing.synthetic_images import ROW_X_PX
 
 SIZE = (240, 120)
-PLACES = {
-    "green": 30.0,
-    "blue": 66.0,
-    "magenta": 102.0,
-    "cyan": 138.0,
-    "violet": 174.0,
-    "lime": 210.0,
-}
 
 
 @pytest.fixture(scope="module")
 def hand(studio, tip):
     """Frames of six tips, a little elsewhere and in other light each time, and clicks on them."""
 
-    def make(count, layout="i420", first=0, **look):
+    def make(count, layout="i420", first=0, **options):
         frames, pointers = [], []
         for number in range(count):
             tips = [
                 tip(c, x + 2 * number, 60.0 + 3 * number, width_px=13.0, length_px=14.0)
-                for c, x in PLACES.items()
+                for c, x in ROW_X_PX.items()
             ]
             frame, truth = studio.frame(
-                tips, seq=first + number, size_px=SIZE, layout=layout, **look
+                tips, seq=first + number, size_px=SIZE, layout=layout, **options
             )
             frames.append(frame)
             pointers += [Pointer(color, number, *place) for color, place in truth.items()]
@@ -50,18 +44,18 @@ def hand(studio, tip):
 @pytest.mark.parametrize("layout", ["i420", "bgr"])
 def test_fitted_ranges_find_every_marker_and_nothing_else(hand, layout):
     frames, pointers = hand(3, layout)
-    study = gather(frames, pointers)
-    fitted = fit(study.samples)
-    assert study.notes == []
-    report = examine(study, fitted)
+    training = gather(frames, pointers)
+    fitted = fit(training.samples)
+    assert training.notes == []
+    report = examine(training, fitted)
     assert report.warnings == ()
     assert all(one.inside > 0.9 and one.pictures == 3 for one in report.colors)
-    step = TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES))
-    for look in ({}, {"sigma": 8.0}, {"blur_px": 1.6}, {"shading": 0.7}):
-        fresh, _ = hand(4, layout, first=50, **look)
+    step = TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(ROW_X_PX))
+    for options in ({}, {"sigma": 8.0}, {"blur_px": 1.6}, {"shading": 0.7}):
+        fresh, _ = hand(4, layout, first=50, **options)
         for frame in fresh:
             found = {marker.color: marker.x_px for marker in step.step(frame).markers}
-            assert set(found) == set(PLACES), look
+            assert set(found) == set(ROW_X_PX), options
 
 
 def test_the_same_input_gives_the_same_ranges(hand):
@@ -74,11 +68,11 @@ def test_hues_wrap_through_red(studio, tip, monkeypatch):
     frame, truth = studio.frame(
         [tip("red", 60.0, 60.0, width_px=16.0, length_px=18.0)], size_px=SIZE
     )
-    study = gather([frame], [Pointer("red", 0, *truth["red"])])
-    span = fit(study.samples)["red"]
+    training = gather([frame], [Pointer("red", 0, *truth["red"])])
+    span = fit(training.samples)["red"]
     assert span.hsv_low[0] > 150
     assert span.hsv_high[0] < 30
-    assert examine(study, {"red": span}).colors[0].inside > 0.8
+    assert examine(training, {"red": span}).colors[0].inside > 0.8
 
 
 def test_neighbours_share_the_hues_between_them(hand):
@@ -93,8 +87,8 @@ def test_two_dabs_of_one_paint_collide(hand):
     frames, pointers = hand(2)
     twice = [p for p in pointers if p.color == "green"]
     twice += [Pointer("blue", p.frame, p.x_px, p.y_px) for p in twice]
-    study = gather(frames, twice)
-    report = examine(study, fit(study.samples))
+    training = gather(frames, twice)
+    report = examine(training, fit(training.samples))
     assert any(
         "blue and green collide" in warning and "cannot be told apart" in warning
         for warning in report.warnings
@@ -108,8 +102,8 @@ def test_paint_of_the_colour_of_skin_is_warned_of(studio, tip, monkeypatch):
         [tip("ochre", 60.0, 60.0, width_px=18.0, length_px=20.0)], size_px=SIZE
     )
     x, y = truth["ochre"]
-    study = gather([frame], [Pointer("ochre", 0, x - 10, y - 10, 20, 20)])
-    report = examine(study, fit(study.samples))
+    training = gather([frame], [Pointer("ochre", 0, x - 10, y - 10, 20, 20)])
+    report = examine(training, fit(training.samples))
     assert any(
         "colour of skin" in warning or "close to skin" in warning for warning in report.warnings
     )
@@ -118,8 +112,10 @@ def test_paint_of_the_colour_of_skin_is_warned_of(studio, tip, monkeypatch):
 def test_a_room_of_the_same_hue_is_warned_of_with_its_place(studio, tip):
     clean, truth = studio.clean([tip("green", 60.0, 60.0, width_px=14.0, length_px=16.0)], SIZE)
     clean[20:50, 180:220] = studio.paints["green"]
-    study = gather([studio.of(studio.bgr(clean, 5.0, 1))], [Pointer("green", 0, *truth["green"])])
-    report = examine(study, fit(study.samples))
+    training = gather(
+        [studio.of(studio.bgr(clean, 5.0, 1))], [Pointer("green", 0, *truth["green"])]
+    )
+    report = examine(training, fit(training.samples))
     (warning,) = [
         warning for warning in report.warnings if "the room has the hue of green" in warning
     ]
@@ -134,18 +130,20 @@ def test_a_room_of_weaker_colour_is_kept_out(studio, tip):
     """A greenish grey cupboard: pale enough to be left outside by saturation."""
     clean, truth = studio.clean([tip("green", 60.0, 60.0, width_px=14.0, length_px=16.0)], SIZE)
     clean[10:110, 130:230] = (115, 135, 112)
-    study = gather([studio.of(studio.bgr(clean, 5.0, 1))], [Pointer("green", 0, *truth["green"])])
-    fitted = fit(study.samples)
-    assert examine(study, fitted).warnings == ()
-    assert examine(study, fitted).colors[0].inside > 0.85
+    training = gather(
+        [studio.of(studio.bgr(clean, 5.0, 1))], [Pointer("green", 0, *truth["green"])]
+    )
+    fitted = fit(training.samples)
+    assert examine(training, fitted).warnings == ()
+    assert examine(training, fitted).colors[0].inside > 0.85
 
 
 def test_ranges_that_are_already_there_are_checked_too(hand, colors):
     frames, pointers = hand(1)
     green = [p for p in pointers if p.color == "green"]
-    study = gather(frames, green)
+    training = gather(frames, green)
     wide = {"lime": colors.colors["green"]}
-    report = examine(study, fit(study.samples), wide)
+    report = examine(training, fit(training.samples), wide)
     assert any("ranges of green and lime overlap" in warning for warning in report.warnings)
 
 
@@ -153,19 +151,19 @@ def test_a_click_beside_the_marker_is_left_out_with_a_note(hand):
     frames, pointers = hand(3)
     green = [p for p in pointers if p.color == "green"]
     grey = Pointer("green", 1, 5.0, 5.0)
-    study = gather(frames, [green[0], grey, green[2]])
-    assert len(study.samples["green"].swatches) == 2
-    assert "something grey" in study.notes[0]
-    assert "left out" in study.notes[0]
+    training = gather(frames, [green[0], grey, green[2]])
+    assert len(training.samples["green"].patches) == 2
+    assert "something grey" in training.notes[0]
+    assert "left out" in training.notes[0]
 
 
 def test_another_colour_among_three_is_left_out_with_a_note(hand):
     frames, pointers = hand(3)
     green = [p for p in pointers if p.color == "green"]
     blue = next(p for p in pointers if p.color == "blue" and p.frame == 1)
-    study = gather(frames, [green[0], Pointer("green", 1, blue.x_px, blue.y_px), green[2]])
-    assert [swatch.frame for swatch in study.samples["green"].swatches] == [0, 2]
-    assert "another hue" in study.notes[0]
+    training = gather(frames, [green[0], Pointer("green", 1, blue.x_px, blue.y_px), green[2]])
+    assert [patch.frame for patch in training.samples["green"].patches] == [0, 2]
+    assert "another hue" in training.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -190,7 +188,7 @@ def test_cells_are_those_of_the_lookup_table(hand):
         hue, saturation, _ = cells[int(pointer.y_px) // 2, int(pointer.x_px) // 2].hsv()
         assert (
             abs(
-                hue_apart(
+                hue_difference(
                     float(hue),
                     {
                         "green": 57,
@@ -220,9 +218,9 @@ def test_hues_are_drawn_in_where_skin_begins(studio, tip, monkeypatch):
         frames.append(frame)
         x, y = truth["sand"]
         pointers.append(Pointer("sand", seq, x - 12, y - 12, 24, 24))
-    study = gather(frames, pointers)
-    fitted = fit(study.samples)
-    (one,) = examine(study, fitted).colors
+    training = gather(frames, pointers)
+    fitted = fit(training.samples)
+    (one,) = examine(training, fitted).colors
     assert one.inside > 0.75
     assert one.room_px < 60
     # Skin has a hue of 11 here, the paint 28.

@@ -1,6 +1,4 @@
-"""Light that changes while the tracker runs is told, with the range that would fit, and not
-followed.
-"""
+"""Light that changes while the tracker runs: reported with the range that fits, not followed."""
 
 from __future__ import annotations
 
@@ -11,8 +9,8 @@ from rhot.files.calibration import Colors
 from rhot.files.config import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.light_drift import PERIOD_NS, Drift
-from services.pi_tracker.colors.paint_patch import Pointer
+from services.pi_tracker.colors.light_drift import PERIOD_NS, DriftMonitor
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.step import TrackerStep
 
 SIZE = (200, 120)
@@ -43,22 +41,19 @@ def places(studio, tip):
 
 @pytest.fixture
 def run(studio, places, fitted):
-    """Half a minute under light of the given colour (B, G, R).
+    """Twelve seconds under light of the given colour (B, G, R).
 
-    The drift watch at its end, and colours found all the time.
+    The monitor at their end, and the colours that were missing in any frame.
     """
 
     def make(light, seconds=12):
-        step, drift, lost = (
-            TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES)),
-            Drift(fitted),
-            set(),
-        )
+        step = TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES))
+        drift, lost = DriftMonitor(fitted), set()
         for number in range(seconds * 2):
             bgr = studio.bgr(places[number % 3] * np.array(light, np.float32), 5.0, number)
             frame = studio.of(bgr, number * 15)
             markers = step.step(frame).markers
-            drift.look(frame, markers)
+            drift.update(frame, markers)
             lost |= set(PLACES) - {marker.color for marker in markers}
         return drift, lost
 
@@ -79,10 +74,10 @@ def test_less_light_is_no_drift_of_hue(run):
 
 def test_another_white_balance_is_told_before_markers_are_lost(run, fitted):
     drift, lost = run((1.0, 1.0, 1.12))
-    told = {one.color: one for one in drift.drifted()}
-    assert told
-    assert not lost & set(told)
-    for color, one in told.items():
+    drifted = {one.color: one for one in drift.drifted()}
+    assert drifted
+    assert not lost & set(drifted)
+    for color, one in drifted.items():
         assert one.suggested != fitted[color]
         text = one.text("left")
         assert repr(color) in text
@@ -96,20 +91,20 @@ def test_the_suggested_range_fits(run, fitted, studio, tip):
     one = drift.drifted()[0]
     clean, _ = studio.clean([tip(one.color, 60.0, 60.0, width_px=13.0, length_px=14.0)], SIZE)
     frame = studio.of(studio.bgr(clean * np.array([1.0, 1.0, 1.12], np.float32), 5.0, 99))
-    after = Drift({one.color: one.suggested})
+    after = DriftMonitor({one.color: one.suggested})
     step = TrackerStep(
         "left", Colors(colors={one.color: one.suggested}), Tracker(), SIZE, [one.color]
     )
     markers = step.step(frame).markers
     assert [marker.color for marker in markers] == [one.color]
-    after.look(frame, markers)
+    after.update(frame, markers)
     assert abs(after.values()[f"{one.color}_hue_off"]) < 0.5
 
 
-def test_it_looks_once_a_second(studio, places, fitted):
-    drift = Drift(fitted)
+def test_it_observes_once_a_second(studio, places, fitted):
+    drift = DriftMonitor(fitted)
     frames = [studio.of(studio.bgr(places[0], 5.0, 1), seq) for seq in range(90)]
-    assert sum(drift.look(frame, []) for frame in frames) == 3
+    assert sum(drift.update(frame, []) for frame in frames) == 3
     assert frames[60].stamp_ns - frames[30].stamp_ns == PERIOD_NS
 
 
@@ -119,9 +114,9 @@ def test_it_looks_once_a_second(studio, places, fitted):
 )
 def test_absurd_markers_do_no_harm(studio, fitted, x, y, area):
     clean, _ = studio.clean([], SIZE)
-    drift = Drift(fitted)
+    drift = DriftMonitor(fitted)
     marker = Marker(color="green", x_px=x, y_px=y, area_px=area, sigma_px=0.1, quality=1.0)
     other = Marker(color="unknown", x_px=50.0, y_px=50.0, area_px=10.0, sigma_px=0.1, quality=1.0)
-    drift.look(studio.of(studio.bgr(clean, 5.0, 1)), [marker, other])
+    drift.update(studio.of(studio.bgr(clean, 5.0, 1)), [marker, other])
     assert drift.values() == {}
     assert drift.drifted() == []

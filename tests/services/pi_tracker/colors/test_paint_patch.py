@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
-from services.pi_tracker.colors.paint_patch import Pointer, find_swatch
+from services.pi_tracker.colors.paint_patch import find_patch
+from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.image.chroma import cells_of
 
 SIZE = (160, 120)
@@ -16,12 +17,12 @@ SIZE = (160, 120)
 def scene(studio, tip):
     """Cells of a green and a blue tip, each on a finger."""
 
-    def make(layout="i420", **look):
+    def make(layout="i420", **options):
         tips = [
             tip("green", 50.0, 60.0, width_px=14.0, length_px=16.0),
             tip("blue", 110.0, 50.0, width_px=12.0, length_px=14.0),
         ]
-        frame, truth = studio.frame(tips, size_px=SIZE, layout=layout, **look)
+        frame, truth = studio.frame(tips, size_px=SIZE, layout=layout, **options)
         return cells_of(frame), truth
 
     return make
@@ -45,28 +46,26 @@ def test_the_patch_is_found_and_nothing_else(scene, layout, place):
     pointer = Pointer(
         "green", 0, x + place.get("x", 0.0) - w / 2, y + place.get("y", 0.0) - h / 2, w, h
     )
-    swatch = find_swatch(cells, pointer)
-    rows, columns = np.nonzero(swatch.mask)
+    patch = find_patch(cells, pointer)
+    rows, columns = np.nonzero(patch.mask)
     # The paint is 14 px wide and 16 long: some 200 px, 50 cells.
     assert 30 <= len(rows) <= 70
     assert abs(2 * columns.mean() + 0.5 - x) < 2.0
     assert abs(2 * rows.mean() + 0.5 - y) < 2.0
-    assert not np.any(swatch.core & ~swatch.mask)
-    hue, _, _ = cells[swatch.core].hsv()
+    assert not np.any(patch.core & ~patch.mask)
+    hue, _, _ = cells[patch.core].hsv()
     assert np.all(np.abs(hue - 57.0) < 14.0)
 
 
 def test_a_box_that_cuts_the_patch_knows_the_rest_of_it(scene):
     cells, truth = scene()
     x, y = truth["green"]
-    swatch = find_swatch(cells, Pointer("green", 0, x - 8, y - 8, 8, 16))
-    assert np.count_nonzero(swatch.whole) > 1.3 * np.count_nonzero(swatch.mask)
+    patch = find_patch(cells, Pointer("green", 0, x - 8, y - 8, 8, 16))
+    assert np.count_nonzero(patch.whole) > 1.3 * np.count_nonzero(patch.mask)
 
 
 def test_a_neighbour_in_a_loose_box_is_left_alone(studio, tip):
-    """Fingers held together: the box in the middle of which one tip lies holds half of the next,
-    too.
-    """
+    """Fingers held together: a box about one tip holds half of the next, too."""
     tips = [
         tip("green", 60.0, 60.0, width_px=12.0, length_px=12.0),
         tip("blue", 76.0, 60.0, width_px=12.0, length_px=12.0),
@@ -75,8 +74,8 @@ def test_a_neighbour_in_a_loose_box_is_left_alone(studio, tip):
     cells = cells_of(frame)
     for color, hue_about in (("green", 57.0), ("blue", 109.0)):
         x, y = truth[color]
-        swatch = find_swatch(cells, Pointer(color, 0, x - 12, y - 12, 24, 24))
-        hue, _, _ = cells[swatch.core].hsv()
+        patch = find_patch(cells, Pointer(color, 0, x - 12, y - 12, 24, 24))
+        hue, _, _ = cells[patch.core].hsv()
         # Blur mixes a little of the neighbour in.
         assert abs(float(np.median(hue)) - hue_about) < 8.0
 
@@ -96,16 +95,16 @@ def test_a_neighbour_in_a_loose_box_is_left_alone(studio, tip):
 def test_places_without_paint_say_so(scene, pointer, message):
     cells, _ = scene()
     with pytest.raises(CalibrationError, match=message):
-        find_swatch(cells, pointer)
+        find_patch(cells, pointer)
 
 
 def test_a_box_may_reach_beyond_the_picture(studio, tip):
     frame, _ = studio.frame([tip("green", 6.0, 60.0, width_px=14.0, length_px=16.0)], size_px=SIZE)
-    swatch = find_swatch(cells_of(frame), Pointer("green", 0, -8.0, 46.0, 28.0, 28.0))
-    assert np.count_nonzero(swatch.mask) > 10
+    patch = find_patch(cells_of(frame), Pointer("green", 0, -8.0, 46.0, 28.0, 28.0))
+    assert np.count_nonzero(patch.mask) > 10
 
 
 def test_a_coloured_wall_is_no_marker(studio, tip):
     frame, _ = studio.frame([tip("blue", 80.0, 60.0)], size_px=SIZE, wall=(90, 170, 80))
     with pytest.raises(CalibrationError, match="goes on far beyond the click"):
-        find_swatch(cells_of(frame), Pointer("green", 0, 20.0, 20.0))
+        find_patch(cells_of(frame), Pointer("green", 0, 20.0, 20.0))

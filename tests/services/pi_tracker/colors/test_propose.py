@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.propose import PAINT_HUES, boxes_of, propose
+from services.pi_tracker.colors.paint_names import PAINT_HUES
+from services.pi_tracker.colors.propose import boxes_of, propose
 from services.pi_tracker.colors.report import examine
+from testing.synthetic_images import ROW_X_PX
 
 SIZE = (240, 160)
-PLACES = {
-    "green": 30.0,
-    "blue": 66.0,
-    "magenta": 102.0,
-    "cyan": 138.0,
-    "violet": 174.0,
-    "lime": 210.0,
-}
 
 
 @pytest.fixture
@@ -26,7 +20,7 @@ def hand(studio, tip):
         frames, truths = [], []
         for number in range(count):
             tips = [
-                tip(c, PLACES[c] + 2 * number, 70.0 + 3 * number, width_px=13.0, length_px=14.0)
+                tip(c, ROW_X_PX[c] + 2 * number, 70.0 + 3 * number, width_px=13.0, length_px=14.0)
                 for c in colors
             ]
             clean, truth = studio.clean(tips, SIZE)
@@ -40,16 +34,16 @@ def hand(studio, tip):
 
 
 def test_six_paints_are_found_named_and_can_be_fitted(hand):
-    frames, truths = hand(PLACES)
-    proposals, _ = propose(frames, list(PLACES))
-    assert {one.color for one in proposals} == set(PLACES)
+    frames, truths = hand(ROW_X_PX)
+    proposals, _ = propose(frames, list(ROW_X_PX))
+    assert {one.color for one in proposals} == set(ROW_X_PX)
     for one in proposals:
         for box in one.boxes:
             x, y = truths[box.frame][one.color]
             assert box.x_px <= x <= box.x_px + box.width_px
             assert box.y_px <= y <= box.y_px + box.height_px
-    study = gather(frames, boxes_of(proposals))
-    assert examine(study, fit(study.samples)).warnings == ()
+    training = gather(frames, boxes_of(proposals))
+    assert examine(training, fit(training.samples)).warnings == ()
 
 
 def test_names_are_those_of_the_rig_where_they_fit(hand):

@@ -1,4 +1,4 @@
-"""Ranges that cannot be put in force."""
+"""Ranges that cannot be applied."""
 
 from __future__ import annotations
 

@@ -10,18 +10,22 @@ from hypothesis import strategies as st
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ColorRange, Colors
-from services.pi_tracker.detect.color_table import compile_colors, hsv_mask
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.detect.hsv_range import hsv_mask
 
 
 def span(low, high):
     return ColorRange(hsv_low=low, hsv_high=high)
 
 
+def table_of(**ranges):
+    """The table of all ranges, in their order."""
+    return compile_colors(Colors(colors=ranges), list(ranges))
+
+
 @pytest.fixture(scope="module")
 def gamut():
-    """Luma (h, w) and chroma (h, w, 2) of every kind, the HSV that OpenCV gives them, and which of
-    them RGB can show unclipped.
-    """
+    """Luma (h, w), chroma (h, w, 2), their HSV by OpenCV, and which of them RGB shows unclipped."""
     rng = np.random.default_rng(0)
     luma = rng.integers(16, 236, (240, 320), dtype=np.uint8)
     chroma = rng.integers(16, 241, (240, 320, 2), dtype=np.uint8)
@@ -41,7 +45,7 @@ def gamut():
 )
 def test_the_table_is_the_hsv_test(gamut, low, high):
     luma, chroma, hsv, shown = gamut
-    table = compile_colors(Colors(colors={"a": span(low, high)}), ["a"])
+    table = table_of(a=span(low, high))
     ours, theirs = table.classify(luma, chroma) > 0, hsv_mask(hsv, span(low, high)) > 0
     # OpenCV rounds RGB before it takes the hue: where the chroma is small, the hue moves by more
     # than one.
@@ -57,11 +61,11 @@ def test_the_mask_is_where_a_class_is(gamut):
         "c": span((20, 90, 50), (60, 255, 255)),
     }
     for names in (["c"], ["a", "b", "c"]):
-        table = compile_colors(Colors(colors=ranges), names)
+        table = table_of(**{name: ranges[name] for name in names})
         classes = table.classify(luma, chroma)
-        assert not np.any((classes > 0) & (table.likely(luma, chroma) == 0))
+        assert not np.any((classes > 0) & (table.candidates(luma, chroma) == 0))
         for margin in (0, 2):
-            left, top, inside, mask = table.patch(luma, chroma, margin)
+            left, top, inside, mask = table.classify_cropped(luma, chroma, margin)
             assert np.array_equal(mask > 0, inside > 0)
             placed = np.zeros_like(classes)
             placed[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
@@ -70,26 +74,21 @@ def test_the_mask_is_where_a_class_is(gamut):
 
 def test_numpy_looks_up_what_opencv_does(gamut, monkeypatch):
     luma, chroma, _, _ = gamut
-    colors = Colors(colors={"a": span((100, 100, 60), (130, 255, 255))})
-    expected = compile_colors(colors, ["a"]).classify(luma, chroma).copy()
+    ranges = {"a": span((100, 100, 60), (130, 255, 255))}
+    expected = table_of(**ranges).classify(luma, chroma).copy()
 
     def refuse(*_):
         raise cv2.error("an OpenCV before 5 takes bytes only")
 
     monkeypatch.setattr(cv2, "LUT", refuse)
-    assert np.array_equal(compile_colors(colors, ["a"]).classify(luma, chroma), expected)
+    assert np.array_equal(table_of(**ranges).classify(luma, chroma), expected)
 
 
 def test_a_range_that_is_empty_in_itself_finds_nothing(gamut):
     luma, chroma, _, _ = gamut
-    table = compile_colors(
-        Colors(
-            colors={
-                "a": span((0, 200, 0), (179, 100, 255)),
-                "b": span((0, 0, 200), (179, 255, 100)),
-            }
-        ),
-        ["a", "b"],
+    table = table_of(
+        a=span((0, 200, 0), (179, 100, 255)),
+        b=span((0, 0, 200), (179, 255, 100)),
     )
     assert not table.classify(luma, chroma).any()
 
@@ -97,14 +96,9 @@ def test_a_range_that_is_empty_in_itself_finds_nothing(gamut):
 def test_white_and_black_are_colours_too(gamut):
     luma, chroma, _, _ = gamut
     grey = np.full_like(chroma, 128)
-    table = compile_colors(
-        Colors(
-            colors={
-                "white": span((0, 0, 180), (179, 40, 255)),
-                "black": span((0, 0, 0), (179, 255, 40)),
-            }
-        ),
-        ["white", "black"],
+    table = table_of(
+        white=span((0, 0, 180), (179, 40, 255)),
+        black=span((0, 0, 0), (179, 255, 40)),
     )
     found = table.classify(luma, grey)
     assert set(np.unique(found)) == {0, 1, 2}
@@ -113,14 +107,9 @@ def test_white_and_black_are_colours_too(gamut):
 
 def test_overlapping_hues_go_to_the_nearer_colour(gamut):
     luma, chroma, hsv, shown = gamut
-    table = compile_colors(
-        Colors(
-            colors={
-                "a": span((40, 80, 60), (80, 255, 255)),
-                "b": span((70, 80, 60), (110, 255, 255)),
-            }
-        ),
-        ["a", "b"],
+    table = table_of(
+        a=span((40, 80, 60), (80, 255, 255)),
+        b=span((70, 80, 60), (110, 255, 255)),
     )
     assert len(table.layers) == 1
     found = table.classify(luma, chroma)
@@ -132,7 +121,7 @@ def test_overlapping_hues_go_to_the_nearer_colour(gamut):
 def test_dark_and_light_of_one_hue_are_told_apart(gamut):
     luma, chroma, hsv, shown = gamut
     light, dark = span((100, 100, 160), (130, 255, 255)), span((100, 100, 40), (130, 255, 150))
-    table = compile_colors(Colors(colors={"light": light, "dark": dark}), ["light", "dark"])
+    table = table_of(light=light, dark=dark)
     assert len(table.layers) == 2
     found = table.classify(luma, chroma)
     for number, one in enumerate((light, dark), start=1):

@@ -1,4 +1,4 @@
-"""Search, identity and measurement together: markers that others hide."""
+"""Search, identity and measurement together: markers that others occlude."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ SIZE = (160, 100)
 
 @pytest.fixture
 def shows(studio):
-    """A frame with a green patch at x = 60 and a blue one at a given place, before it, with a rim
-    of another colour.
+    """A frame with a green patch at x = 60 and a blue one before it, at a given place.
+
+    The blue one may have a rim of another colour.
     """
 
     def make(seq, blue_x, rim_px=0):

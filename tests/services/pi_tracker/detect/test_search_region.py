@@ -1,4 +1,4 @@
-"""Rectangles around markers."""
+"""Regions of interest around markers."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def test_a_region_of_nonsense_still_has_a_cell(rect):
 
 
 @given(some=st.lists(rects(), min_size=1, max_size=7))
-def test_the_hull_covers_all_and_no_more(some):
-    x0, y0, x1, y1 = search_region.hull(some)
+def test_the_bounding_rect_covers_all_and_no_more(some):
+    x0, y0, x1, y1 = search_region.bounding_rect(some)
     assert all(x0 <= r[0] and y0 <= r[1] and x1 >= r[2] and y1 >= r[3] for r in some)
     assert any(r[0] == x0 for r in some)
     assert any(r[3] == y1 for r in some)
@@ -43,17 +43,17 @@ def test_the_hull_covers_all_and_no_more(some):
 
 def test_the_margin_follows_the_motion():
     still = (10, 10, 60, 50)
-    assert search_region.margin(still, still, 40) == 8
-    assert search_region.margin(still, (12, 10, 60, 53), 40) == 8 + 2 * 2 * 3
-    assert search_region.margin(still, (90, 10, 140, 50), 40) == 40
-    assert search_region.margin(still, still, 5) == 5
-    assert search_region.margin(None, still, 40) == 40
+    assert search_region.motion_margin(still, still, 40) == 8
+    assert search_region.motion_margin(still, (12, 10, 60, 53), 40) == 8 + 2 * 2 * 3
+    assert search_region.motion_margin(still, (90, 10, 140, 50), 40) == 40
+    assert search_region.motion_margin(still, still, 5) == 5
+    assert search_region.motion_margin(None, still, 40) == 40
 
 
-def test_a_cut_blob_is_one_that_may_go_on_outside():
+def test_a_clipped_blob_is_one_that_may_go_on_outside():
     rect = (10, 0, 60, 50)
-    assert search_region.cut((10, 5, 14, 9), rect, SIZE)
-    assert search_region.cut((50, 5, 60, 9), rect, SIZE)
-    assert not search_region.cut((20, 0, 30, 9), rect, SIZE)  # the image ends there, too
-    assert not search_region.cut((20, 5, 30, 9), rect, SIZE)
-    assert not search_region.cut((300, 5, 320, 9), search_region.whole(SIZE), SIZE)
+    assert search_region.is_clipped((10, 5, 14, 9), rect, SIZE)
+    assert search_region.is_clipped((50, 5, 60, 9), rect, SIZE)
+    assert not search_region.is_clipped((20, 0, 30, 9), rect, SIZE)  # the image ends there, too
+    assert not search_region.is_clipped((20, 5, 30, 9), rect, SIZE)
+    assert not search_region.is_clipped((300, 5, 320, 9), search_region.whole(SIZE), SIZE)

@@ -1,4 +1,4 @@
-"""What stands in the room, and what moves before it."""
+"""Background subtraction: static things are left out, what moves before them is found."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rhot.files.config import Tracker
-from services.pi_tracker.detect.blob_search import Blob
-from services.pi_tracker.identify.background import Room
+from services.pi_tracker.identify.background import BackgroundModel
+from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import picture
@@ -37,15 +37,14 @@ def shot(seq, *patches, size=(120, 90)):
 def blob(rect, mask=None):
     x0, y0, x1, y1 = rect
     mask = np.full((y1 - y0, x1 - x0), 255, np.uint8) if mask is None else mask
-    cells = int(np.count_nonzero(mask))
-    return Blob(0, rect, mask, cells, 4.0 * cells, x0 + x1 - 0.5, y0 + y1 - 0.5)
+    return make_blob(0, rect, mask, int(np.count_nonzero(mask)))
 
 
-def learnt(room, noise, *things, count=5, first=0, markers=()):
-    """Look at things so many times, 30 times a second."""
+def learn(model, noise, *things, count=5, first=0, markers=()):
+    """Show things so many times, 30 times a second."""
     for seq in range(first, first + count):
         image = shot(seq, *((rect, THING) for rect in things))
-        room.learn(
+        model.update(
             image,
             (0, 0, *image.size),
             [blob(rect) for rect in things],
@@ -56,38 +55,38 @@ def learnt(room, noise, *things, count=5, first=0, markers=()):
 
 
 def rects(blobs):
-    """Where they are."""
+    """Rectangles of blobs."""
     return [one.rect for one in blobs]
 
 
-def left(room, image, blobs, noise):
-    """Where what does not stand in the room is."""
-    return rects(room.without(image, blobs, noise))
+def foreground(model, image, blobs, noise):
+    """Rectangles of the foreground."""
+    return rects(model.foreground(image, blobs, noise))
 
 
 def test_a_thing_is_left_out_after_a_few_sightings(noise):
-    room, rect = Room(), (20, 20, 40, 44)
-    learnt(room, noise, rect, count=3)
+    model, rect = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, rect, count=3)
     image = shot(50, (rect, THING))
-    assert left(room, image, [blob(rect)], noise) == rects([blob(rect)])
-    learnt(room, noise, rect, count=2, first=3)
-    assert room.without(image, [blob(rect)], noise) == []
-    # What a hand leaves of it to see is the same thing.
-    assert room.without(image, [blob((20, 20, 30, 30))], noise) == []
+    assert foreground(model, image, [blob(rect)], noise) == rects([blob(rect)])
+    learn(model, noise, rect, count=2, first=3)
+    assert model.foreground(image, [blob(rect)], noise) == []
+    # A part of it, where a hand is before the rest, is background, too.
+    assert model.foreground(image, [blob((20, 20, 30, 30))], noise) == []
     elsewhere = blob((60, 20, 80, 44))
-    assert left(room, image, [elsewhere], noise) == rects([elsewhere])
+    assert foreground(model, image, [elsewhere], noise) == rects([elsewhere])
 
 
 def test_a_marker_before_a_thing_and_beside_it_is_cut_out(noise):
-    room, rect = Room(), (20, 20, 40, 44)
-    learnt(room, noise, rect)
+    model, rect = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, rect)
     for place in ((36, 30, 43, 37), (26, 28, 33, 35)):
         image = shot(60, (rect, THING), (place, MARKER))
         merged = (20, 20, max(place[2], 40), 44)
         mask = np.zeros((24, merged[2] - 20), np.uint8)
         mask[:, :20] = 255
         mask[place[1] - 20 : place[3] - 20, place[0] - 20 : place[2] - 20] = 255
-        (part,) = room.without(image, [blob(merged, mask)], noise)
+        (part,) = model.foreground(image, [blob(merged, mask)], noise)
         assert max(abs(np.subtract(part.rect, place))) <= 1
         assert part.cells == pytest.approx(49, abs=8)
         assert (part.x_px, part.y_px) == pytest.approx(
@@ -96,63 +95,63 @@ def test_a_marker_before_a_thing_and_beside_it_is_cut_out(noise):
 
 
 def test_markers_and_their_rims_are_not_learnt(noise):
-    room, rect = Room(), (20, 20, 30, 30)
-    learnt(room, noise, rect, (32, 20, 34, 30), count=8, markers=[rect])
+    model, rect = BackgroundModel(), (20, 20, 30, 30)
+    learn(model, noise, rect, (32, 20, 34, 30), count=8, markers=[rect])
     image = shot(70, (rect, THING))
-    assert left(room, image, [blob(rect), blob((32, 20, 34, 30))], noise) == rects(
+    assert foreground(model, image, [blob(rect), blob((32, 20, 34, 30))], noise) == rects(
         [blob(rect), blob((32, 20, 34, 30))]
     )
 
 
-def test_what_passes_again_and_again_does_not_stand(noise):
-    room, rect = Room(), (20, 20, 30, 30)
+def test_what_passes_again_and_again_is_not_static(noise):
+    model, rect = BackgroundModel(), (20, 20, 30, 30)
     for round_ in range(6):
-        learnt(room, noise, rect, count=2, first=4 * round_)
-        learnt(room, noise, (60, 60, 70, 70), count=2, first=4 * round_ + 2)
+        learn(model, noise, rect, count=2, first=4 * round_)
+        learn(model, noise, (60, 60, 70, 70), count=2, first=4 * round_ + 2)
     image = shot(71, (rect, THING))
-    assert left(room, image, [blob(rect)], noise) == rects([blob(rect)])
+    assert foreground(model, image, [blob(rect)], noise) == rects([blob(rect)])
 
 
 def test_a_thing_taken_away_is_forgotten_and_other_light_learnt_anew(noise):
-    room, rect = Room(), (20, 20, 40, 44)
-    learnt(room, noise, rect)
+    model, rect = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, rect)
     image = shot(80, (rect, THING))
-    learnt(room, noise, count=1, first=1000)
-    learnt(room, noise, count=1, first=2000)
-    assert left(room, image, [blob(rect)], noise) == rects([blob(rect)])
+    learn(model, noise, count=1, first=1000)
+    learn(model, noise, count=1, first=2000)
+    assert foreground(model, image, [blob(rect)], noise) == rects([blob(rect)])
     dim = shot(81, (rect, (80, 145, 165)))
-    learnt(room, noise, rect, first=2001)
-    assert left(room, dim, [blob(rect)], noise) == rects([blob(rect)])
+    learn(model, noise, rect, first=2001)
+    assert foreground(model, dim, [blob(rect)], noise) == rects([blob(rect)])
     for seq in range(3000, 3012):
-        room.learn(dim, (0, 0, *dim.size), [blob(rect)], [], noise, seq * FRAME_NS)
-    assert room.without(dim, [blob(rect)], noise) == []
+        model.update(dim, (0, 0, *dim.size), [blob(rect)], [], noise, seq * FRAME_NS)
+    assert model.foreground(dim, [blob(rect)], noise) == []
 
 
-def test_another_size_is_another_room_and_clocks_may_jump(noise):
-    room, rect = Room(), (20, 20, 40, 44)
-    learnt(room, noise, rect)
+def test_another_size_starts_a_new_model_and_clocks_may_jump(noise):
+    model, rect = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, rect)
     small = shot(1, size=(60, 50))
-    assert left(room, small, [blob(rect)], noise) == rects([blob(rect)])
+    assert foreground(model, small, [blob(rect)], noise) == rects([blob(rect)])
     for stamp_ns in (5, 2**62, 0):
-        room.learn(small, (0, 0, 60, 50), [blob(rect)], [], Noise(), stamp_ns)
+        model.update(small, (0, 0, 60, 50), [blob(rect)], [], Noise(), stamp_ns)
 
 
 def test_the_tracker_follows_a_marker_across_a_thing_of_its_colour(studio, tip, colors):
-    """A dull green box stands in the room; a green tip, brighter, crosses it beside a blue one."""
+    """A dull green box is in the background; a brighter green tip crosses it beside a blue one."""
     size, found = (180, 100), []
-    room = np.full((100, 180, 3), studio.clean([], (8, 8))[0][0, 0], np.float32)
-    room[25:75, 70:110] = 0.6 * np.array(studio.paints["green"])
+    background = np.full((100, 180, 3), studio.clean([], (8, 8))[0][0, 0], np.float32)
+    background[25:75, 70:110] = 0.6 * np.array(studio.paints["green"])
     tips = [
         tip("green", 30.0, 52.0, width_px=13.0, length_px=14.0),
         tip("blue", 30.0, 25.0, width_px=13.0, length_px=14.0),
     ]
     hand, truth = studio.clean(tips, (60, 100))
     wall, _ = studio.clean([], (60, 100))
-    hidden = np.abs(hand - wall).max(axis=2, keepdims=True) > 6.0
+    is_hand = np.abs(hand - wall).max(axis=2, keepdims=True) > 6.0
     step = TrackerStep("left", colors, Tracker(), size, ["green", "blue"])
     for seq in range(26):
-        left, image = 5 * max(seq - 5, 0), room.copy()
-        image[:, left : left + 60] = np.where(hidden, hand, image[:, left : left + 60])
+        left, image = 5 * max(seq - 5, 0), background.copy()
+        image[:, left : left + 60] = np.where(is_hand, hand, image[:, left : left + 60])
         markers = {
             m.color: m for m in step.step(studio.of(studio.bgr(image, 4.0, seq), seq)).markers
         }

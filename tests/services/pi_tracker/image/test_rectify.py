@@ -1,12 +1,15 @@
-"""Whole pictures without the lens's distortion, and markers that stay where the camera sees them."""
+"""Undistorted pictures, and markers that stay where the camera sees them."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rhot.errors import SourceError
 from rhot.files.calibration import Lens
 from rhot.files.config import Tracker
+from rhot.geometry.camera import Camera
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier
 from services.pi_tracker.step import TrackerStep
 
@@ -22,11 +25,68 @@ def lens():
 
 @pytest.fixture
 def frame(studio, tip):
-    """Two tips of one hand in a corner, at any layout: no further from each other than a hand
-    reaches.
-    """
+    """Two tips of one hand in a corner: no further from each other than a hand reaches."""
     tips = [tip("green", 95.0, 70.0), tip("blue", 40.0, 35.0)]
     return lambda layout="i420": studio.frame(tips, 1, layout, size_px=SIZE, sigma=1.0)[0]
+
+
+def frame_with(plane, values):
+    """A frame with values (h, w) in one plane: bgr, or Y, U or V of I420."""
+    if plane == "bgr":
+        image = np.repeat(values[..., None], 3, axis=2).astype(np.uint8)
+        return Frame("left", 0, 0, 0.0, SIZE, image, "bgr")
+    image = np.full((SIZE[1] * 3 // 2, SIZE[0]), 128, np.uint8)
+    plane_of(image, plane)[:] = values
+    return Frame("left", 0, 0, 0.0, SIZE, image, "i420")
+
+
+def plane_of(image, plane):
+    """One plane (h, w) of an image, as a view."""
+    if plane == "bgr":
+        return image[..., 1]
+    if plane == "Y":
+        return image[: SIZE[1]]
+    return image[SIZE[1] :].reshape(2, SIZE[1] // 2, SIZE[0] // 2)["UV".index(plane)]
+
+
+def interpolated(values, places):
+    """Values (h, w) at places (n, 2), bilinear; all of them inside."""
+    x, y = places.T
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    right, below = x - column, y - row
+    upper = (1 - right) * values[row, column] + right * values[row, column + 1]
+    lower = (1 - right) * values[row + 1, column] + right * values[row + 1, column + 1]
+    return (1 - below) * upper + below * lower
+
+
+@pytest.mark.parametrize(("plane", "pitch"), [("bgr", 1), ("Y", 1), ("U", 2), ("V", 2)])
+def test_a_rectified_picture_agrees_with_the_camera_model(lens, plane, pitch):
+    """Test: a smooth picture, each pixel of which rhot/geometry/camera.py undistorts.
+
+    Expected: the rectified picture, made with OpenCV's maps, shows it at that place: all planes.
+    """
+    width, height = SIZE[0] // pitch, SIZE[1] // pitch
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    elements = np.stack([x.ravel(), y.ravel()], axis=1)  # (n, 2) of the plane
+    centre = 0.5 * (pitch - 1)
+    pixels = elements * pitch + centre
+    shown = np.rint(120.0 + 50.0 * np.sin(0.11 * pixels[:, 0]) + 50.0 * np.cos(0.09 * pixels[:, 1]))
+    frame = frame_with(plane, shown.reshape(height, width))
+    rectified = plane_of(Rectifier(lens).rectify(frame).image, plane).astype(float)
+
+    camera = Camera("lens", SIZE, np.array(MATRIX), np.array(lens.distortion), np.eye(4))
+    rays = camera.rays_from_pixels(pixels)
+    focal, middle = np.diag(MATRIX)[:2], np.array(MATRIX)[:2, 2]
+    places_px = rays * focal + middle
+    assert np.abs(places_px - pixels).max() > 10.0  # the distortion is not small
+    places = (places_px - centre) / pitch
+    inside = ((places >= 0.0) & (places < [width - 1, height - 1])).all(axis=1)
+    assert np.count_nonzero(inside) > 0.8 * len(pixels)
+    error = interpolated(rectified, places[inside]) - shown[inside]
+    # Rounding to whole levels twice. Levels change by up to 7.1 per pixel, so that even this little
+    # would be .1 px.
+    assert np.sqrt(np.mean(error**2)) < 0.5
+    assert np.abs(error).max() < 2.0
 
 
 @pytest.mark.parametrize("layout", ["i420", "bgr"])
@@ -40,7 +100,7 @@ def test_markers_are_told_where_the_camera_shows_them(frame, colors, lens, layou
     found = {marker.color: marker for marker in rectifying.step(frame(layout)).markers}
     assert set(found) == set(expected) == {"green", "blue"}
     for name, marker in found.items():
-        # Another sampling of the same picture; the seed's whole-pixel contours change more.
+        # Another sampling of the same picture; the paper's whole-pixel contours change more.
         assert (marker.x_px, marker.y_px) == pytest.approx(
             (expected[name].x_px, expected[name].y_px), abs=0.3 if method == "lut" else 1.0
         )
@@ -64,7 +124,7 @@ def test_the_rectified_picture_is_that_of_a_pinhole(frame, colors, lens):
     rectifier = Rectifier(lens)
     plain, rectified = (TrackerStep("left", colors, Tracker(), SIZE, ["blue"]) for _ in range(2))
     (shown,) = plain.step(frame()).markers
-    (moved,) = rectified.step(rectifier.frame(frame())).markers
+    (moved,) = rectified.step(rectifier.rectify(frame())).markers
     # The camera's model says where the distorted marker belongs; in a corner that is pixels away.
     ray = rectifier._camera.rays_from_pixels([(shown.x_px, shown.y_px)])[0]
     straight = (MATRIX[0][0] * ray[0] + MATRIX[0][2], MATRIX[1][1] * ray[1] + MATRIX[1][2])
@@ -81,8 +141,8 @@ def test_the_time_it_takes_is_told(frame, colors, lens):
 
 def test_another_size_than_the_lens_is_refused(studio, lens):
     with pytest.raises(SourceError, match="rectify = false"):
-        Rectifier(lens).frame(studio.frame([], size_px=(64, 64))[0])
+        Rectifier(lens).rectify(studio.frame([], size_px=(64, 64))[0])
 
 
 def test_no_markers_no_places(lens):
-    assert Rectifier(lens).back([]) == []
+    assert Rectifier(lens).to_camera_pixels([]) == []

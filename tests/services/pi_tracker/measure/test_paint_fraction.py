@@ -1,4 +1,4 @@
-"""Shares of paint in cells that show paint and what lies behind, mixed as light."""
+"""Paint fractions of cells that show paint and background, mixed as light."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from services.pi_tracker.detect.search_region import whole
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure import centroid
-from services.pi_tracker.measure.paint_fraction import Light, Mixture
+from services.pi_tracker.measure.paint_fraction import LinearLight, Mixture
 
 # BT.601 from R, G, B, as cameras have it, and full range to the power of 1.5 for light, as
-# mixture.py has it.
+# paint_fraction.py has it.
 YUV_FROM_RGB = np.linalg.inv([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]])
 SHAPE = (9, 2, 12)
 
@@ -26,65 +26,63 @@ def encoded(light):
 
 
 @pytest.fixture
-def shares():
+def fractions():
     """Bare to the left, painted to the right, and a slope between them."""
     ramp = np.clip((np.arange(SHAPE[2]) - 3) / 5.0, 0.0, 1.0)
     return np.broadcast_to(ramp, SHAPE).copy()
 
 
 @pytest.fixture
-def alone(shares):
-    """The cells that show one of both only."""
-    return np.stack([shares == 0.0, shares == 1.0]).astype(np.float32)
+def pure(fractions):
+    """Weights of the cells that show one of both only."""
+    return np.stack([fractions == 0.0, fractions == 1.0]).astype(np.float32)
 
 
 @pytest.fixture
-def mixed(shares):
+def mixed(fractions):
     """Blue paint before a wall four times brighter, once in full light and once in half of it."""
     paint, wall = np.array([20.0, 40.0, 90.0]), np.array([200.0, 190.0, 180.0])
-    return (shares[..., None] * paint + (1 - shares[..., None]) * wall) * np.array([1.0, 0.5])[
-        :, None, None
-    ]
+    full_and_half = np.array([1.0, 0.5])[:, None, None]
+    return (fractions[..., None] * paint + (1 - fractions[..., None]) * wall) * full_and_half
 
 
-def test_a_known_mixture_is_recovered(shares, alone, mixed):
-    mixture = Mixture(Light(encoded(mixed)), alone)
-    share, _, variance = mixture.share(Noise())
+def test_a_known_mixture_is_recovered(fractions, pure, mixed):
+    mixture = Mixture(LinearLight(encoded(mixed)), pure)
+    fraction, _, variance = mixture.fraction(Noise())
     # Cells of the slope that are in reach of both; further away there is no more than the mean of
     # all, which here is as good.
-    assert share == pytest.approx(shares, abs=2e-3)
-    assert mixture.ratio() == pytest.approx(shares, abs=2e-3)
+    assert fraction == pytest.approx(fractions, abs=2e-3)
+    assert mixture.shade_free_fraction() == pytest.approx(fractions, abs=2e-3)
     assert (variance > 0.0).all()
 
 
-def test_shade_on_paint_and_background_alike_leaves_the_ratio(shares, alone, mixed):
-    # In the slope it is darker than where either is seen alone.
-    between = ((shares > 0.0) & (shares < 1.0))[..., None]
+def test_shade_on_paint_and_background_alike_leaves_the_ratio(fractions, pure, mixed):
+    # In the slope it is darker than where either is pure.
+    between = ((fractions > 0.0) & (fractions < 1.0))[..., None]
     shaded = np.where(between, 0.6 * mixed, mixed)
-    assert Mixture(Light(encoded(shaded)), alone, rough=True).ratio() == pytest.approx(
-        shares, abs=5e-3
-    )
+    mixture = Mixture(LinearLight(encoded(shaded)), pure, rough=True)
+    assert mixture.shade_free_fraction() == pytest.approx(fractions, abs=5e-3)
 
 
 def test_slopes_are_the_derivatives_by_what_the_camera_says():
     rng = np.random.default_rng(1)
     cells = encoded(rng.uniform(20.0, 240.0, (*SHAPE, 3))).astype(np.float64)
     by_light = rng.normal(0.0, 1.0, (3, *SHAPE)).astype(np.float32)
-    slopes = Light(cells.astype(np.float32)).encoded(by_light)
+    slopes = LinearLight(cells.astype(np.float32)).derivative_by_encoded(by_light)
     for channel in range(3):
         step = np.zeros_like(cells)
         step[channel] = 0.5
         above, below = (
-            np.sum(by_light * Light((cells + sign * step).astype(np.float32)).cells[:3], axis=0)
-            for sign in (1, -1)
+            LinearLight((cells + sign * step).astype(np.float32)).cells[:3] for sign in (1, -1)
         )
-        assert slopes[channel] == pytest.approx(above - below, rel=0.01, abs=0.01)
+        expected = np.sum(by_light * above, axis=0) - np.sum(by_light * below, axis=0)
+        assert slopes[channel] == pytest.approx(expected, rel=0.01, abs=0.01)
 
 
-def test_noise_of_the_share_is_as_told(shares, alone, mixed):
+def test_noise_of_the_fraction_is_as_told(fractions, pure, mixed):
     rng, cells, noise = np.random.default_rng(2), encoded(mixed), Noise(1.0, 0.7)
-    clean = Mixture(Light(cells), alone)
-    told = np.sqrt(clean.share(noise)[2][:, :, 5:7])
+    clean = Mixture(LinearLight(cells), pure)
+    told = np.sqrt(clean.fraction(noise).variance[:, :, 5:7])
     seen = []
     for _ in range(200):
         noisy = cells.copy()
@@ -93,7 +91,7 @@ def test_noise_of_the_share_is_as_told(shares, alone, mixed):
             rng.normal(0.0, 1.0, (3, *SHAPE[:2], 2))
             * np.array([1.0, 0.7, 0.7])[:, None, None, None]
         )
-        seen.append(Mixture(Light(noisy), alone).share(noise)[0][:, :, 5:7])
+        seen.append(Mixture(LinearLight(noisy), pure).fraction(noise).fraction[:, :, 5:7])
     assert np.std(seen, axis=0).mean() == pytest.approx(told.mean(), rel=0.1)
 
 
@@ -105,15 +103,15 @@ class Grey:
         self.rows = np.ascontiguousarray(cells.swapaxes(0, 1))
 
     @staticmethod
-    def encoded(slopes):
+    def derivative_by_encoded(slopes):
         return slopes
 
 
-def test_a_wall_of_two_colours_biases_less_than_in_grey_levels(studio, tip, searcher, monkeypatch):
+def test_a_wall_of_two_colours_biases_less_than_in_grey_levels(studio, tip, detector, monkeypatch):
     # Bright to the left of every tip, dark to its right.
     wall = np.full((64, 64, 3), 60.0)
     wall[:, :32] = 205.0
-    errors = {Light: [], Grey: []}
+    errors = {LinearLight: [], Grey: []}
     for number, name in enumerate([*studio.paints] * 2):
         x = 31.6 + 0.07 * number
         frame, truth = studio.frame(
@@ -121,11 +119,11 @@ def test_a_wall_of_two_colours_biases_less_than_in_grey_levels(studio, tip, sear
         )
         image = picture(frame)
         for light, found in errors.items():
-            monkeypatch.setattr(centroid, "Light", light)
+            monkeypatch.setattr(centroid, "LinearLight", light)
             blobs = [
                 blob
-                for blob in searcher.blobs(image, whole(image.size))
-                if searcher.names[blob.color] == name
+                for blob in detector.detect(image, whole(image.size))
+                if detector.names[blob.color] == name
             ]
             (one,) = centroid.centroids(image, blobs, Noise(0.4, 0.4))
             found.append(one.x_px - truth[name][0])
@@ -141,8 +139,8 @@ def test_a_wall_of_two_colours_biases_less_than_in_grey_levels(studio, tip, sear
 def test_dark_and_saturated_cells_stay_finite(level, chroma, known):
     cells = np.ones((4, *SHAPE), np.float32)
     cells[0], cells[1:3] = level, chroma
-    mixture = Mixture(Light(cells), np.full((2, *SHAPE), known, np.float32))
-    for values in (*mixture.share(Noise()), mixture.contrast(), mixture.ratio()):
+    mixture = Mixture(LinearLight(cells), np.full((2, *SHAPE), known, np.float32))
+    for values in (*mixture.fraction(Noise()), mixture.contrast(), mixture.shade_free_fraction()):
         assert np.isfinite(values).all()
-    assert (mixture.ratio() >= 0.0).all()
-    assert (mixture.ratio() <= 1.0).all()
+    assert (mixture.shade_free_fraction() >= 0.0).all()
+    assert (mixture.shade_free_fraction() <= 1.0).all()

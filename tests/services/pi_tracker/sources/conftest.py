@@ -1,5 +1,6 @@
-"""Stand-ins of the cameras' libraries: what picamera2 and cv2.VideoCapture do and check, as far as
-the sources use it.
+"""Stand-ins of the cameras' libraries, as far as the sources use them.
+
+What picamera2 and cv2.VideoCapture do, and what they check.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import pytest
 
 
 class FakeRequest:
-    """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name, to be
-    released once.
+    """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name.
+
+    To be released once.
     """
 
     def __init__(self, camera):

@@ -11,7 +11,8 @@ import pytest
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
 from rhot.files.config import CameraTable
-from services.pi_tracker.sources.picamera import PiCamera, unpadded
+from services.pi_tracker.sources.picamera import PiCamera
+from services.pi_tracker.sources.picamera_settings import unpadded
 
 EXPOSURE = Exposure(exposure_us=8000.0, gain=2.5, red_gain=1.7, blue_gain=1.4)
 

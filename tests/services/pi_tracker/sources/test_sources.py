@@ -1,4 +1,4 @@
-"""Which source a word means, and the thread that makes a stream of a reader."""
+"""Which source a word in rig.toml means, and readers in a thread as asynchronous sources."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rhot.files.calibration import Exposure, save
 from rhot.files.config import CameraTable, RigConfig
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.sources import Threaded, is_file, open_reader
+from services.pi_tracker.sources import ThreadedSource, is_file, open_reader
 from services.pi_tracker.sources.simulator import SimulatorSource
 
 DEADLINE_S = 10.0
@@ -108,7 +108,7 @@ async def collect(source):
 
 async def test_every_frame_of_a_file_comes_and_no_more_are_read_than_needed():
     reader = Scripted((frame(n) for n in range(50)), live=False)
-    source = Threaded(reader)
+    source = ThreadedSource(reader)
     seen = []
     async with asyncio.timeout(DEADLINE_S):
         async for one in source.frames():
@@ -122,7 +122,7 @@ async def test_every_frame_of_a_file_comes_and_no_more_are_read_than_needed():
 
 async def test_the_latest_frame_of_a_camera_wins():
     reader = Scripted((frame(n) for n in range(20)), live=True, pause_after=1)
-    source = Threaded(reader)
+    source = ThreadedSource(reader)
     stream = source.frames()
     async with asyncio.timeout(DEADLINE_S):
         assert (await anext(stream)).seq == 0
@@ -133,17 +133,22 @@ async def test_the_latest_frame_of_a_camera_wins():
     assert source.dropped == 18
 
 
-async def test_a_file_can_be_played_at_its_own_pace():
+async def test_a_file_can_be_played_in_real_time():
     frames = [frame(n, 5_000_000_000 + n * 30_000_000) for n in range(4)]
     started_ns = clock.now_ns()
-    assert await collect(Threaded(Scripted(frames, live=False), paced=True)) == [0, 1, 2, 3]
+    assert await collect(ThreadedSource(Scripted(frames, live=False), real_time=True)) == [
+        0,
+        1,
+        2,
+        3,
+    ]
     assert clock.now_ns() - started_ns >= 85_000_000
 
 
 @pytest.mark.parametrize("frames", [0, 3])
 async def test_what_a_reader_raises_comes_out_of_the_stream(frames):
     reader = Scripted((frame(n) for n in range(frames)), live=False, error=SourceError("unplugged"))
-    stream = Threaded(reader).frames()
+    stream = ThreadedSource(reader).frames()
     assert [(await anext(stream)).seq for _ in range(frames)] == list(range(frames))
     with pytest.raises(SourceError, match="unplugged"):
         await anext(stream)
@@ -151,7 +156,7 @@ async def test_what_a_reader_raises_comes_out_of_the_stream(frames):
 
 async def test_leaving_the_stream_closes_the_reader():
     reader = Scripted((frame(n) for n in range(1000)), live=True)
-    stream = Threaded(reader).frames()
+    stream = ThreadedSource(reader).frames()
     async with asyncio.timeout(DEADLINE_S):
         await anext(stream)
         await stream.aclose()

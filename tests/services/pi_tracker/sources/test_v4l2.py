@@ -9,7 +9,7 @@ from rhot import clock
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
 from rhot.files.config import CameraTable
-from services.pi_tracker.sources.reader import Threaded
+from services.pi_tracker.sources.threaded import ThreadedSource
 from services.pi_tracker.sources.v4l2 import OpenCvCamera
 from services.pi_tracker.sources.video import VideoReader
 
@@ -27,7 +27,7 @@ def test_a_usb_camera_is_set_by_hand_and_stamped_by_its_driver(video_capture):
         made.append(video_capture(device, api, refused={cv2.CAP_PROP_WHITE_BALANCE_RED_V}))
         return made[0]
 
-    camera = OpenCvCamera(table(fps=25.0), 0, EXPOSURE, capture=capture)
+    camera = OpenCvCamera(table(fps=25.0), 0, EXPOSURE, open_capture=capture)
     camera.open()
     assert made[0].api == cv2.CAP_V4L2
     wanted = {
@@ -56,14 +56,14 @@ def test_a_usb_camera_is_set_by_hand_and_stamped_by_its_driver(video_capture):
 
 def test_a_usb_camera_that_is_not_there_is_named(video_capture):
     with pytest.raises(SourceError, match="camera 'left': 9 cannot be opened"):
-        OpenCvCamera(table(), 9, EXPOSURE, capture=video_capture).open()
+        OpenCvCamera(table(), 9, EXPOSURE, open_capture=video_capture).open()
     with pytest.raises(SourceError, match="needs GStreamer support"):
         OpenCvCamera(table(), 9, None, cv2.CAP_GSTREAMER, video_capture).open()
 
 
 def test_a_usb_camera_runs_its_automatics_and_freezes_them(video_capture):
     fake = video_capture()
-    camera = OpenCvCamera(table(), 0, EXPOSURE, capture=lambda *_: fake)
+    camera = OpenCvCamera(table(), 0, EXPOSURE, open_capture=lambda *_: fake)
     camera.open()
     camera.controls.adjust(None)
     fake.values[cv2.CAP_PROP_EXPOSURE] = 120.0
@@ -81,7 +81,7 @@ def test_a_usb_camera_runs_its_automatics_and_freezes_them(video_capture):
 def test_a_usb_driver_without_values_reports_nothing(video_capture):
     fake = video_capture()
     del fake.values[cv2.CAP_PROP_WHITE_BALANCE_RED_V]
-    camera = OpenCvCamera(table(), 0, None, capture=lambda *_: fake)
+    camera = OpenCvCamera(table(), 0, None, open_capture=lambda *_: fake)
     camera.open()
     camera.controls.adjust(None)
     camera.read()
@@ -89,6 +89,6 @@ def test_a_usb_driver_without_values_reports_nothing(video_capture):
 
 
 def test_sources_without_such_controls_have_none(tmp_path):
-    assert Threaded(VideoReader("left", tmp_path / "none.mp4", 30.0)).controls is None
+    assert ThreadedSource(VideoReader("left", tmp_path / "none.mp4", 30.0)).controls is None
     assert OpenCvCamera(table(), "videotestsrc ! appsink", None, cv2.CAP_GSTREAMER).controls is None
-    assert Threaded(OpenCvCamera(table(), 0, None)).controls is not None
+    assert ThreadedSource(OpenCvCamera(table(), 0, None)).controls is not None

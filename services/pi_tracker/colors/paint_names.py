@@ -1,0 +1,92 @@
+"""Names of paints by their hue, and which further paints would stand out best. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from services.pi_tracker.image.chroma import Cells, Mask
+from services.pi_tracker.image.hue import Array, hue_difference
+
+# Middle hues of acrylic paints by the names people give them, OpenCV 0..180: of colour charts, and
+# of the simulator's paints.
+PAINT_HUES: dict[str, float] = {
+    "red": 0.0,
+    "orange": 11.0,
+    "yellow": 25.0,
+    "lime": 39.0,
+    "green": 66.0,
+    "cyan": 92.0,
+    "blue": 112.0,
+    "violet": 134.0,
+    "magenta": 161.0,
+}
+# A name is not given to a hue further from it than this.
+_MAX_NAME_DISTANCE = 16.0
+# A marker's patch is at least this saturated and this bright, and stands out from the cells around
+# it.
+_MIN_SATURATION, _MIN_VALUE = 55.0, 35.0
+# Hues nearer than this to another paint, to skin or to much of the room are not suggested.
+_MIN_CLEARANCE = 12.0
+# Skin of any complexion in white light has OpenCV hues of 3 to 20.
+_SKIN_HUES = (4.0, 12.0, 19.0)
+# Bins of the room's hues, and the share of a picture's cells that a bin must hold to count.
+_BIN_HUES, _MIN_ROOM_SHARE = 5, 0.003
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A paint that is not in the pictures yet.
+
+    clearance is its distance in hue from skin, room and the paints in use.
+    """
+
+    color: str
+    clearance: float
+
+
+def paint_name(hue: float, preferred: Sequence[str], taken: set[str]) -> str:
+    """The nearest name, of the preferred ones first (rig.toml's colours).
+
+    A hue no name is near to, or a name twice, gets its number.
+    """
+    for names in (preferred, PAINT_HUES):
+        free = [name for name in names if name in PAINT_HUES and name not in taken]
+        nearest = min(free, key=lambda name: abs(hue_difference(hue, PAINT_HUES[name])), default="")
+        if nearest and abs(hue_difference(hue, PAINT_HUES[nearest])) <= _MAX_NAME_DISTANCE:
+            return nearest
+    return f"hue{round(hue) % 180}"
+
+
+def suggest(cells: Sequence[Cells], used_hues: Sequence[float]) -> list[Suggestion]:
+    """Paints whose hue is clear of skin, of much of the room and of the hues in use.
+
+    Clearest first.
+    """
+    avoided = [*used_hues, *_SKIN_HUES, *_room_hues(cells)]
+    found = []
+    for name, hue in PAINT_HUES.items():
+        clearance = min((abs(hue_difference(hue, other)) for other in avoided), default=90.0)
+        if clearance >= _MIN_CLEARANCE:
+            found.append(Suggestion(name, round(clearance, 1)))
+    return sorted(found, key=lambda suggestion: -suggestion.clearance)
+
+
+def _room_hues(cells: Sequence[Cells]) -> list[float]:
+    """Hues of which the pictures hold much."""
+    bins = 180 // _BIN_HUES
+    share = np.zeros(bins)
+    for part in cells:
+        hue, saturation, value = part.hsv()
+        vivid = hue[vivid_mask(saturation, value)]
+        counts = np.bincount((vivid // _BIN_HUES).astype(np.int64) % bins, minlength=bins)
+        share += counts / part.y.size
+    much = np.nonzero(share / max(len(cells), 1) >= _MIN_ROOM_SHARE)[0].tolist()
+    return [_BIN_HUES * number + _BIN_HUES / 2.0 for number in much]
+
+
+def vivid_mask(saturation: Array, value: Array) -> Mask:
+    """Which cells are saturated and bright enough to be paint."""
+    return (saturation >= _MIN_SATURATION) & (value >= _MIN_VALUE)
