@@ -8,6 +8,7 @@ answer, and boxes or clicks that show no paint, are errors that say so; warnings
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -27,6 +28,32 @@ from services.cli.router_session import rig_and_endpoints, router_session
 Name = Annotated[str, typer.Argument(help="the camera's name in rig.toml")]
 
 
+@dataclass(frozen=True)
+class ExposureOptions:
+    """Values of the exposure that are set by hand."""
+
+    exposure_us: Annotated[
+        float | None, typer.Option(min=1.0, max=1e6, help="exposure time in microseconds")
+    ] = None
+    gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="analogue gain")] = None
+    red_gain: Annotated[
+        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of red")
+    ] = None
+    blue_gain: Annotated[
+        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of blue")
+    ] = None
+
+    def control(self) -> ExposureControl:
+        """The same as a message, 0 where not given."""
+        return ExposureControl(
+            exposure_us=self.exposure_us or 0.0,
+            gain=self.gain or 0.0,
+            red_gain=self.red_gain or 0.0,
+            blue_gain=self.blue_gain or 0.0,
+        )
+
+
+@grouped
 def camera(
     name: Name,
     config: options.ConfigOption = None,
@@ -36,28 +63,15 @@ def camera(
             "--auto", help="run the camera's automatics once, on what it sees now, and freeze them"
         ),
     ] = False,
-    exposure_us: Annotated[
-        float | None, typer.Option(min=1.0, max=1e6, help="exposure time in microseconds")
-    ] = None,
-    gain: Annotated[float | None, typer.Option(min=0.01, max=64.0, help="analogue gain")] = None,
-    red_gain: Annotated[
-        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of red")
-    ] = None,
-    blue_gain: Annotated[
-        float | None, typer.Option(min=0.01, max=64.0, help="white balance: gain of blue")
-    ] = None,
+    *,
+    exposure: ExposureOptions,
     connect: ConnectOption = None,
 ) -> None:
     """Set exposure, gain and white balance of a running camera.
 
     Without options, show the exposure in use and what is wrong with the pictures.
     """
-    by_hand = ExposureControl(
-        exposure_us=exposure_us or 0.0,
-        gain=gain or 0.0,
-        red_gain=red_gain or 0.0,
-        blue_gain=blue_gain or 0.0,
-    )
+    by_hand = exposure.control()
     rig, endpoints = rig_and_endpoints(config, connect)
     rig.camera_named(name)
     # First what the camera finds, then what the person knows better.

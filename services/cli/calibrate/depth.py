@@ -5,7 +5,7 @@ From measured distances, or from the paper's bench, simulated.
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +16,9 @@ import typer
 from rhot.errors import CalibrationError
 from rhot.files.calibration import load_rig_cameras
 from rhot.files.config import load_rig
+from rhot.geometry.transforms import Array
 from services.cli.calibrate.options import JsonOption
+from services.cli.option_groups import grouped
 
 if TYPE_CHECKING:
     from services.calibrator.depth_law.fit import StereoPair
@@ -28,62 +30,66 @@ RigOption = Annotated[
     Path | None,
     typer.Option("--config", help="rig.toml, for focal length and baseline; default: the paper's"),
 ]
-SimulateOption = Annotated[
-    bool, typer.Option("--simulate", help="the paper's bench, simulated, instead of a CSV")
-]
-DivergenceOption = Annotated[
-    float, typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other")
-]
-ZeroOption = Annotated[
-    float,
-    typer.Option(min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras"),
-]
-NoiseOption = Annotated[
-    float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")
-]
-TapeOption = Annotated[
-    float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")
-]
-SeedOption = Annotated[int, typer.Option(min=0, help="random seed of the simulated noise")]
 
 
+@dataclass(frozen=True)
+class SimulationOptions:
+    """The paper's bench, simulated, and what is imperfect about it."""
+
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="the paper's bench, simulated, instead of a CSV")
+    ] = False
+    divergence_deg: Annotated[
+        float,
+        typer.Option(min=-10.0, max=10.0, help="simulated: cameras turned away from each other"),
+    ] = 0.0
+    zero_mm: Annotated[
+        float,
+        typer.Option(
+            min=-100.0, max=100.0, help="simulated: the tape begins in front of the cameras"
+        ),
+    ] = 0.0
+    noise_px: Annotated[
+        float, typer.Option(min=0.0, max=10.0, help="simulated: sigma of a disparity")
+    ] = 0.1
+    tape_mm: Annotated[
+        float, typer.Option(min=0.0, max=50.0, help="simulated: sigma of placing the target")
+    ] = 1.0
+    seed: Annotated[int, typer.Option(min=0, help="random seed of the simulated noise")] = 1
+
+    def measure(self, pair: StereoPair) -> tuple[Array, Array]:
+        """Distances cm and disparities px of the simulated bench with a pair of cameras."""
+        from services.calibrator.depth_law.bench import BenchErrors, simulate_bench
+
+        errors = BenchErrors(
+            divergence_rad=float(np.radians(self.divergence_deg)),
+            zero_cm=0.1 * self.zero_mm,
+            noise_px=self.noise_px,
+            tape_cm=0.1 * self.tape_mm,
+        )
+        return simulate_bench(errors, pair=pair, random_seed=self.seed)
+
+
+@grouped
 def depth(
     table: CsvArgument = None,
     config: RigOption = None,
-    simulate: SimulateOption = False,
-    divergence_deg: DivergenceOption = 0.0,
-    zero_mm: ZeroOption = 0.0,
-    noise_px: NoiseOption = 0.1,
-    tape_mm: TapeOption = 1.0,
-    seed: SeedOption = 1,
+    *,
+    simulation: SimulationOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Fit the depth law D = k x^z of the RHOT paper to a bench of measured distances."""
-    from services.calibrator.depth_law.bench import (
-        CSV_HEADER,
-        BenchErrors,
-        read_bench,
-        simulate_bench,
-    )
+    from services.calibrator.depth_law.bench import CSV_HEADER, read_bench
     from services.calibrator.depth_law.fit import fit_depth
     from services.calibrator.depth_law.report import depth_text
 
-    if (table is None) == (not simulate):
+    if (table is None) == (not simulation.simulate):
         raise CalibrationError(
             f"give either a CSV with the columns {','.join(CSV_HEADER)}, or --simulate for the "
             "paper's bench"
         )
     pair = _stereo_pair(config)
-    if table is not None:
-        distances, disparities = read_bench(table)
-    else:
-        errors = BenchErrors(
-            divergence_rad=float(np.radians(divergence_deg)),
-            zero_cm=0.1 * zero_mm,
-            noise_px=noise_px,
-            tape_cm=0.1 * tape_mm,
-        )
-        distances, disparities = simulate_bench(errors, pair=pair, random_seed=seed)
+    distances, disparities = simulation.measure(pair) if table is None else read_bench(table)
     law = fit_depth(distances, disparities, pair)
     typer.echo(msgspec.json.encode(asdict(law)).decode() if as_json else depth_text(law))
 
