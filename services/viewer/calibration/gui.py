@@ -29,7 +29,7 @@ _PANEL_PX, _FILL = 400.0, 0.94
 _JPEG_QUALITY = 90
 
 ActionKind = Literal[
-    "open", "close", "camera", "color", "click", "undo", "reset", "auto", "edit", "masks", "save"
+    "open", "close", "camera", "color", "click", "undo", "reset", "auto", "edit", "masks", "apply"
 ]
 _BUTTONS: dict[str, ActionKind] = {
     "take back": "undo",
@@ -100,7 +100,7 @@ class CalibrationControls:
         return (self._from, self._to, self._saturation, self._value)
 
     def _listen(self) -> None:
-        self._apply.on_click(self._reporting("save"))
+        self._apply.on_click(self._reporting("apply"))
         self._camera.on_update(self._reporting("camera"))
         self._color.on_update(self._reporting("color"))
         for slider in self._sliders:

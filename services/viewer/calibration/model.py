@@ -1,9 +1,9 @@
 """Calibrating one camera's colours in the page: what was clicked, what was fitted to it, what a
 person changed by hand. Pure.
 
-The ranges shown and saved are the applied ones, replaced by those fitted to the clicks, replaced by
-those set with the sliders. A click that shows no paint is forgotten again, with the reason. Nothing
-is applied before it is saved.
+The ranges shown are the applied ones, overridden by those fitted to the clicks, overridden by those
+set with the sliders. A click that shows no paint is forgotten again, with the reason. The tracker
+uses the ranges only once they are applied.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class ColorCalibration:
 
     @property
     def changed(self) -> bool:
-        """Whether there is anything to save."""
+        """Whether there is anything to apply."""
         return self.ranges != self.applied.colors
 
     @property

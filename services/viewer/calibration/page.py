@@ -98,8 +98,8 @@ class CalibrationPage:
                 await self._propose()
             case "edit":
                 self._calibration.edit(self._chosen, self._controls.span)
-            case "save":
-                await self._save()
+            case "apply":
+                await self._apply()
         self._draw()
 
     async def _start(self) -> None:
@@ -180,7 +180,7 @@ class CalibrationPage:
         )
         return answers[0] if answers else None
 
-    async def _save(self) -> None:
+    async def _apply(self) -> None:
         now = datetime.datetime.now().astimezone()
         made = self._calibration.as_file(now.isoformat(timespec="milliseconds"))
         try:
