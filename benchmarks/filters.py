@@ -44,7 +44,8 @@ def one_euro(path: Array, rate_hz: float, mincutoff_hz: float, beta: float) -> A
     return np.array([own(point, 1.0 / rate_hz) for point in path])
 
 
-def moving_average(path: Array, rate_hz: float, samples: float) -> Array:  # noqa: ARG001 - all filters are called alike
+# All filters are called alike.
+def moving_average(path: Array, rate_hz: float, samples: float) -> Array:  # noqa: ARG001
     """Mean of the last samples."""
     n = int(samples)
     padded = np.concatenate([np.repeat(path[:1], n - 1, axis=0), path])

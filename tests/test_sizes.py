@@ -58,7 +58,8 @@ def test_lines_of_pages_are_short():
     """Rows of tables may be longer: Markdown has no other way."""
     for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]:
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-            assert len(line) <= MAX_LINE or line.startswith("|"), f"{relative(path)}:{number}"
+            is_row = line.startswith("|") or line.endswith(("|", "\\"))
+            assert len(line) <= MAX_LINE or is_row, f"{relative(path)}:{number}"
 
 
 def test_folders_stay_small():

@@ -36,7 +36,8 @@ from docs.generate.markdown import COLUMNS, wrapped
 FOLDER = Path(__file__).parents[1] / "figures"
 REGION = re.compile(r"<!-- figures\n(?P<template>.*?)\n-->\n(?P<body>.*?)<!-- end -->", re.DOTALL)
 PLACEHOLDER = re.compile(
-    r"\{(?P<file>[a-z0-9_]+)/(?P<path>[^{}:*]+)(?:\*(?P<factor>[0-9.e+-]+))?(?::(?P<format>[^{}]+))?\}"
+    r"\{(?P<file>[a-z0-9_]+)/(?P<path>[^{}:*]+)"
+    r"(?:\*(?P<factor>[0-9.e+-]+))?(?::(?P<format>[^{}]+))?\}"
 )
 ALTERNATIVES = re.compile(r"\[([^\[\]{}]*;[^\[\]{}]*)\]")
 

@@ -64,8 +64,12 @@ def lens(camera: CameraTable, date: str) -> Lens:
         tool=TOOL,
         size_px=camera.size_px,
         matrix=tuple(tuple(row) for row in rows),  # type: ignore[arg-type]
-        distortion=tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0)),  # type: ignore[arg-type]
+        distortion=(_rounded(k1), _rounded(k2), _rounded(p1), _rounded(p2), 0.0),
     )
+
+
+def _rounded(number: float) -> float:
+    return round(float(number), 6)
 
 
 def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:

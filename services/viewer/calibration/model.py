@@ -153,7 +153,7 @@ class ColorCalibration:
         inputs = {"places": places, "by_hand": sorted(self.edited)}
         return Colors(
             date=date,
-            tool="rhot viewer",
+            tool="rhot-viewer",
             inputs=inputs,
             residuals=self.result.residuals,
             colors=self.ranges,

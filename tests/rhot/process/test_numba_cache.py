@@ -12,7 +12,10 @@ import pytest
 
 from rhot.process.numba_cache import cache_folder, clear_old, use_cache
 
-PACKAGE = "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\nuse_cache(Path(__file__).parent)\n"
+PACKAGE = (
+    "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\n"
+    "use_cache(Path(__file__).parent)\n"
+)
 KERNEL = "from numba import njit\n\n\n@njit(cache=True)\ndef {name}(x):\n    return {body}\n"
 
 

@@ -198,7 +198,8 @@ def test_a_disk_that_takes_nothing_more(tmp_path: Path, monkeypatch: pytest.Monk
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("no /dev/full on this system")
-    monkeypatch.setattr(Path, "open", lambda _, mode: io.open(full, mode.replace("x", "w")))  # noqa: SIM115, UP020
+    opened = lambda _, mode: io.open(full, mode.replace("x", "w"))  # noqa: E731, SIM115, UP020
+    monkeypatch.setattr(Path, "open", opened)
     with pytest.raises(CaptureError, match="No space left on device"):
         RecordingWriter(tmp_path / "a.mcap", "desk")
 

@@ -92,7 +92,7 @@ def test_what_is_saved_says_how_it_was_made(calibration: ColorCalibration) -> No
     click_and_fit(calibration, "blue")
     calibration.edit("green", NEW)
     made = calibration.as_file("2026-01-01")
-    assert (made.date, made.tool) == ("2026-01-01", "rhot viewer")
+    assert (made.date, made.tool) == ("2026-01-01", "rhot-viewer")
     assert made.inputs == {"places": ["blue=10,20"], "by_hand": ["green"]}
     calibration.was_applied(made)
     assert not calibration.changed

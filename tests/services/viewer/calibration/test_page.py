@@ -120,7 +120,7 @@ async def test_a_click_is_fitted_shown_and_applied(
         )
         await page.says("applied on camera left")
         assert tracker.colors.colors == {"violet": GREEN, "blue": GREEN}
-        assert tracker.colors.tool == "rhot viewer"
+        assert tracker.colors.tool == "rhot-viewer"
         assert tracker.colors.date
 
 
