@@ -6,13 +6,16 @@
     video:FILE  folder:DIR  capture:DIR     files; relative paths start at rig.toml's folder
     simulator                  the simulated rig on the bus
 
-A word that is none of these is a ConfigError with the list. A source that cannot be opened says so
+READERS is the table of them; docs/extend.md shows how to add one. A word that is none of these is a
+ConfigError with the list. A source that cannot be opened says so
 when it is opened, not here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 
@@ -29,12 +32,73 @@ from services.pi_tracker.sources.threaded import ThreadedSource
 from services.pi_tracker.sources.v4l2 import OpenCvCamera
 from services.pi_tracker.sources.video import VideoReader
 
-__all__ = ["Reader", "Source", "ThreadedSource", "open_reader", "open_source"]
+__all__ = ["READERS", "Reader", "Request", "Source", "SourceKind", "open_reader", "open_source"]
 
-FORMS = (
-    "picamera2, picamera2:N, v4l2:N, v4l2:/dev/..., gstreamer:PIPELINE, "
-    "video:FILE, folder:DIR, capture:DIR, simulator"
-)
+
+class Request(NamedTuple):
+    """What a reader is made from: the [[camera]] table, and what follows its source's colon."""
+
+    config: RigConfig
+    table: CameraTable
+    rest: str
+    # None keeps a capture's own stamps; others start at 0 then.
+    start_ns: int | None
+
+    @property
+    def path(self) -> Path:
+        """The rest as a path; a relative one starts at rig.toml's folder."""
+        return Path(self.config.folder) / Path(self.rest).expanduser()
+
+    @property
+    def exposure(self) -> Exposure | None:
+        """The exposure calibration; None before there is one, as it is made with the camera on."""
+        folder, camera = self.config.calibration_dir, self.table.name
+        exists = (folder / f"{camera}.exposure.json").exists()
+        return load_exposure(folder, camera) if exists else None
+
+
+class SourceKind(NamedTuple):
+    """A kind of source: how rig.toml writes it, and what makes its reader."""
+
+    forms: str
+    make: Callable[[Request], Reader]
+    takes: Callable[[str], bool] = bool
+    # A recording begins with the session and ends; a camera does neither.
+    is_file: bool = False
+
+
+def _v4l2(request: Request) -> Reader:
+    device = int(request.rest) if request.rest.isdigit() else request.rest
+    return OpenCvCamera(request.table, device, request.exposure)
+
+
+READERS: dict[str, SourceKind] = {
+    "picamera2": SourceKind(
+        "picamera2, picamera2:N",
+        lambda request: PiCamera(request.table, int(request.rest or 0), request.exposure),
+        lambda rest: not rest or rest.isdigit(),
+    ),
+    "v4l2": SourceKind("v4l2:N, v4l2:/dev/...", _v4l2),
+    "gstreamer": SourceKind(
+        "gstreamer:PIPELINE",
+        lambda request: OpenCvCamera(request.table, request.rest, None, cv2.CAP_GSTREAMER),
+    ),
+    "video": SourceKind(
+        "video:FILE",
+        lambda one: VideoReader(one.table.name, one.path, one.table.fps, one.start_ns or 0),
+        is_file=True,
+    ),
+    "folder": SourceKind(
+        "folder:DIR",
+        lambda one: FolderReader(one.table.name, one.path, one.table.fps, one.start_ns or 0),
+        is_file=True,
+    ),
+    "capture": SourceKind(
+        "capture:DIR",
+        lambda one: CaptureReader(one.table.name, one.path, one.start_ns),
+        is_file=True,
+    ),
+}
 
 
 def open_source(table: CameraTable, config: RigConfig, bus: Bus, start_ns: int = 0) -> Source:
@@ -49,7 +113,8 @@ def open_source(table: CameraTable, config: RigConfig, bus: Bus, start_ns: int =
 
 def is_file(table: CameraTable) -> bool:
     """Whether the source is a recording, which begins with the session and ends."""
-    return table.source.partition(":")[0] in ("video", "folder", "capture")
+    kind = READERS.get(table.source.partition(":")[0])
+    return kind is not None and kind.is_file
 
 
 def open_reader(table: CameraTable, config: RigConfig, start_ns: int | None = None) -> Reader:
@@ -58,26 +123,9 @@ def open_reader(table: CameraTable, config: RigConfig, start_ns: int | None = No
     start_ns None keeps a capture's own stamps (others start at 0). Raises ConfigError for an
     unknown form, and for the simulator, which is no file: write a capture with `rhot simulate`.
     """
-    kind, _, rest = table.source.partition(":")
-    path = Path(config.folder) / Path(rest).expanduser()
-    match kind, bool(rest):
-        case "video", True:
-            return VideoReader(table.name, path, table.fps, start_ns or 0)
-        case "folder", True:
-            return FolderReader(table.name, path, table.fps, start_ns or 0)
-        case "capture", True:
-            return CaptureReader(table.name, path, start_ns)
-        case "picamera2", _ if not rest or rest.isdigit():
-            return PiCamera(table, int(rest or 0), _exposure(config, table.name))
-        case "v4l2", True:
-            device = int(rest) if rest.isdigit() else rest
-            return OpenCvCamera(table, device, _exposure(config, table.name))
-        case "gstreamer", True:
-            return OpenCvCamera(table, rest, None, cv2.CAP_GSTREAMER)
-    raise ConfigError(f"camera {table.name!r}: unknown source {table.source!r}; valid: {FORMS}")
-
-
-def _exposure(config: RigConfig, camera: str) -> Exposure | None:
-    """The exposure calibration, or None before there is one: it is made with the camera running."""
-    exists = (config.calibration_dir / f"{camera}.exposure.json").exists()
-    return load_exposure(config.calibration_dir, camera) if exists else None
+    name, _, rest = table.source.partition(":")
+    kind = READERS.get(name)
+    if kind is None or not kind.takes(rest):
+        valid = ", ".join([*(one.forms for one in READERS.values()), "simulator"])
+        raise ConfigError(f"camera {table.name!r}: unknown source {table.source!r}; valid: {valid}")
+    return kind.make(Request(config, table, rest, start_ns))
