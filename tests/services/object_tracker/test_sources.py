@@ -166,7 +166,7 @@ async def test_steamvr_missing(fake_vr: SimpleNamespace, monkeypatch: pytest.Mon
     ):
         await take(SteamVr(90.0, print), 1)
     monkeypatch.setitem(sys.modules, "openvr", None)
-    with pytest.raises(SourceError, match=r"rhot\[bridges\]"):
+    with pytest.raises(SourceError, match=r"rhot\[openvr\]"):
         await take(SteamVr(90.0, print), 1)
 
 
