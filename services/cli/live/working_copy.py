@@ -46,8 +46,8 @@ def _copy(folder: Path) -> None:
                 "give --folder a new or empty folder, or one of an earlier `rhot demo --folder`"
             )
         (folder / _CALIBRATION).mkdir()
-        for source in sorted((shipped.parent / _CALIBRATION).iterdir()):
-            # The bytes alone: of a read-only installation the modes must not come along.
+        for source in sorted((shipped.parent / _CALIBRATION).glob("*.json")):
+            # The bytes alone: a read-only installation must not give a read-only copy.
             (folder / _CALIBRATION / source.name).write_bytes(source.read_bytes())
         # Last of all, as a folder with a rig.toml counts as complete.
         (folder / _RIG).write_bytes(shipped.read_bytes())
