@@ -206,18 +206,18 @@ ROOMS_TESTED_AS_A_WHOLE = {
     ("module", "forbidden"),
     [
         (
-            "services.pi_tracker.__main__",
+            "services.pi_tracker.service",
             {"scipy", "numba", "viser", "mcap", "typer", "matplotlib"},
         ),
         (
-            "services.object_tracker.__main__",
+            "services.object_tracker.service",
             {"scipy", "numba", "viser", "cv2", "mcap", "matplotlib"},
         ),
         (
             "rhot.client",
             {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib"},
         ),
-        ("services.cli.__main__", {"scipy", "numba", "viser", "cv2", "matplotlib"}),
+        ("services.cli.application", {"scipy", "numba", "viser", "cv2", "matplotlib"}),
     ],
 )
 def test_a_process_imports_only_what_it_needs(module, forbidden):

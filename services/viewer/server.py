@@ -67,8 +67,8 @@ def _own_pages_only() -> Iterator[None]:
     While its server starts, serve() is replaced by one that has them.
     """
     serve = websockets.asyncio.server.serve
-    only_ours = functools.partial(serve, origins=_ORIGINS)
-    websockets.asyncio.server.serve = only_ours  # type: ignore[assignment, misc]
+    own_pages_only = functools.partial(serve, origins=_ORIGINS)
+    websockets.asyncio.server.serve = own_pages_only  # type: ignore[assignment, misc]
     try:
         yield
     finally:

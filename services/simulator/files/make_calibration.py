@@ -59,17 +59,14 @@ def lens(camera: CameraTable, date: str) -> Lens:
     k2 = _K2 * rng.uniform(0.9, 1.1)
     p1, p2 = rng.uniform(-5e-4, 5e-4, 2)
     rows = np.round(matrix, 4).tolist()
+    distortion = tuple(round(float(d), 6) for d in (k1, k2, p1, p2, 0.0))
     return Lens(
         date=date,
         tool=TOOL,
         size_px=camera.size_px,
         matrix=tuple(tuple(row) for row in rows),  # type: ignore[arg-type]
-        distortion=(_rounded(k1), _rounded(k2), _rounded(p1), _rounded(p2), 0.0),
+        distortion=distortion,  # type: ignore[arg-type]
     )
-
-
-def _rounded(number: float) -> float:
-    return round(float(number), 6)
 
 
 def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:

@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import IO, Any
 
 import pytest
 from mcap.reader import make_reader
@@ -198,8 +199,11 @@ def test_a_disk_that_takes_nothing_more(tmp_path: Path, monkeypatch: pytest.Monk
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("no /dev/full on this system")
-    opened = lambda _, mode: io.open(full, mode.replace("x", "w"))  # noqa: E731, SIM115, UP020
-    monkeypatch.setattr(Path, "open", opened)
+
+    def open_full(_: Path, mode: str) -> IO[Any]:
+        return io.open(full, mode.replace("x", "w"))  # noqa: UP020
+
+    monkeypatch.setattr(Path, "open", open_full)
     with pytest.raises(CaptureError, match="No space left on device"):
         RecordingWriter(tmp_path / "a.mcap", "desk")
 
