@@ -21,6 +21,9 @@ TO_COME = {
     "deploy/": "#11 In the field",
 }
 
+# What docs/extend.md makes as an example, and tests/docs/test_extend.py runs.
+EXAMPLES = ("services/pi_tracker/sources/pattern.py", "services/pinch/")
+
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "Makefile"])
 # `rhot ...` in backticks, and the lines of code blocks that begin with it.
 QUOTED = re.compile(r"`(rhot [^`\n]+)`")

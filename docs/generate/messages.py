@@ -10,6 +10,7 @@ from msgspec import inspect
 
 import rhot.camera_messages
 import rhot.messages
+import rhot.simulator_messages
 from docs.generate.markdown import generated_from, paragraphs, table, wrapped
 from docs.generate.type_words import default_of, in_words
 from rhot.topics import TOPICS
@@ -19,6 +20,8 @@ are ignored; what does not decode is counted as rejected and dropped. The unit i
 name; `3 x number` is a list of three numbers. `stamp_ns` is CLOCK_REALTIME at the instant the
 content describes, `sent_ns` the instant of sending on the sender's own clock (0 in files). Frames
 and angles: [frames](frames.md). Keys and rates: [topics](topics.md)."""
+
+_MODULES = (rhot.messages, rhot.camera_messages, rhot.simulator_messages)
 
 # End of a field's name -> unit; the longest that fits counts.
 _UNITS = {
@@ -79,12 +82,14 @@ def _section(cls: type) -> str:
 
 def page() -> str:
     """The whole page."""
-    messages = [*_structs(rhot.messages), *_structs(rhot.camera_messages)]
+    messages = [cls for module in _MODULES for cls in _structs(module)]
     return (
         "\n\n".join(
             [
                 "# Messages",
-                generated_from("`rhot/messages.py` and `rhot/camera_messages.py`"),
+                generated_from(
+                    "`rhot/*messages.py`"
+                ),
                 wrapped(_ABOUT),
                 *map(_section, messages),
             ]

@@ -13,18 +13,14 @@ when it is opened, not here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple
-
 import cv2
 
 from rhot.bus.bus import Bus
 from rhot.errors import ConfigError
-from rhot.files.calibration import Exposure, load_exposure
 from rhot.files.config import CameraTable, RigConfig
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
+from services.pi_tracker.sources.kinds import Request, SourceKind
 from services.pi_tracker.sources.picamera import PiCamera
 from services.pi_tracker.sources.reader import Reader, Source
 from services.pi_tracker.sources.simulator import SimulatorSource
@@ -33,38 +29,6 @@ from services.pi_tracker.sources.v4l2 import OpenCvCamera
 from services.pi_tracker.sources.video import VideoReader
 
 __all__ = ["READERS", "Reader", "Request", "Source", "SourceKind", "open_reader", "open_source"]
-
-
-class Request(NamedTuple):
-    """What a reader is made from: the [[camera]] table, and what follows its source's colon."""
-
-    config: RigConfig
-    table: CameraTable
-    rest: str
-    # None keeps a capture's own stamps; others start at 0 then.
-    start_ns: int | None
-
-    @property
-    def path(self) -> Path:
-        """The rest as a path; a relative one starts at rig.toml's folder."""
-        return Path(self.config.folder) / Path(self.rest).expanduser()
-
-    @property
-    def exposure(self) -> Exposure | None:
-        """The exposure calibration; None before there is one, as it is made with the camera on."""
-        folder, camera = self.config.calibration_dir, self.table.name
-        exists = (folder / f"{camera}.exposure.json").exists()
-        return load_exposure(folder, camera) if exists else None
-
-
-class SourceKind(NamedTuple):
-    """A kind of source: how rig.toml writes it, and what makes its reader."""
-
-    forms: str
-    make: Callable[[Request], Reader]
-    takes: Callable[[str], bool] = bool
-    # A recording begins with the session and ends; a camera does neither.
-    is_file: bool = False
 
 
 def _v4l2(request: Request) -> Reader:
