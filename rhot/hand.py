@@ -211,7 +211,7 @@ def _default_paint(scale: float) -> dict[str, Paint]:
 def forward(
     model: HandModel, wrist_rotation: Array, wrist_m: Array, angles_rad: Array
 ) -> tuple[Array, Array]:
-    """Positions (26, 3) and rotations (26, 3, 3) of all joints, in the frame of the wrist's pose.
+    """Positions (26, 3) and rotations (26, 3, 3) of all joints, in the frame the wrist is given in.
 
     wrist_rotation (3, 3), wrist_m (3,) metres, angles_rad (5, 4) in the order of DIGITS and
     DIGIT_ANGLES. Equal to the D-H rows of the finger study (Appendix A1) with its axes renamed;

@@ -34,29 +34,21 @@ _DIGIT_OF = [next((row for row in range(5) if joint in CHAINS[row, 1:]), -1) for
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The 26 joints.
+    """The 26 joints, in the order of JOINTS."""
 
-    Positions (26, 3) m and rotations (26, 3, 3) in the rig frame, skin radii in m, where each comes
-    from.
-    """
-
-    positions_m: Array
-    rotations: Array
-    radii_m: list[float]
+    positions_m: Array  # (26, 3) rig frame
+    rotations: Array  # (26, 3, 3) rig frame
+    radii_m: list[float]  # of the skin
     sources: list[JointSource]
 
 
 @dataclass(frozen=True)
 class PoseUncertainty:
-    """One standard deviation of each part of the pose.
+    """One standard deviation of each part of the pose."""
 
-    Of the wrist's position (m) and rotation (rad) as lengths of vectors, of each digit's angles
-    (rad).
-    """
-
-    wrist_m: float
-    wrist_rad: float
-    fingers_rad: list[float]
+    wrist_m: float  # length of the position's error
+    wrist_rad: float  # length of the rotation vector's error
+    fingers_rad: list[float]  # (5,) of each digit's angles
 
 
 def hand_pose(

@@ -52,28 +52,22 @@ Form = Literal["normal", "svd"]
 
 @dataclass(frozen=True)
 class Options:
-    """How the print is read, and when to give up.
+    """How the print is read, and when to give up."""
 
-    form: normal equations or SVD; clip: bring the angles into the limits after each step.
-    """
-
-    form: Form = "normal"
-    clip: bool = True
+    form: Form = "normal"  # normal equations or SVD
+    clip: bool = True  # bring the angles into the limits after each step
     max_iterations: int = 200
     tolerance_m: float = 1e-4
 
 
 @dataclass(frozen=True)
 class Solution:
-    """One frame's end.
+    """One frame's end."""
 
-    Angles (4,) rad, iterations used, distance left in metres, SOLVED | UNREACHABLE | NOT_CONVERGED.
-    """
-
-    angles_rad: Array
+    angles_rad: Array  # (4,)
     iterations: int
-    residual_m: float
-    outcome: int
+    residual_m: float  # distance left
+    outcome: int  # SOLVED | UNREACHABLE | NOT_CONVERGED
 
 
 def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Options) -> Solution:

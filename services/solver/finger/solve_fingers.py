@@ -43,25 +43,19 @@ _MAX_RANGE_M = 1e3
 
 @dataclass(frozen=True)
 class TipObservation:
-    """A painted tip.
+    """A painted tip."""
 
-    Where it is (3,) in the wrist frame, one standard deviation (m), and whether a camera saw it.
-    """
-
-    point_m: Array
-    sigma_m: float
-    measured: bool
+    point_m: Array  # (3,) wrist frame
+    sigma_m: float  # one standard deviation
+    measured: bool  # whether a camera saw it; else fusion predicted it
 
 
 @dataclass(frozen=True)
 class FingerSolution:
-    """All digits: angles (5, 4) rad within limits, distance left (m), iterations, status.
+    """All digits, in the order of DIGITS."""
 
-    Lists in the order of DIGITS.
-    """
-
-    angles_rad: Array
-    residual_m: list[float]
+    angles_rad: Array  # (5, 4) within limits
+    residual_m: list[float]  # distance left between painted tip and where it was seen
     iterations: list[int]
     status: list[Status]
 

@@ -1,12 +1,13 @@
 """One hand followed over time: predict, fit, and compare with a restart when in doubt.
 
-The first pose needs the wrist and three tips in one message (initialise.py). From then on every
-message starts from the motion prior. A fit that is bad, or that sees a landmark which the last
-restart did not, or that comes three seconds after it, is challenged: the pose that a restart
-without history would give is compared with the one that is being followed, and wins when it
-explains the landmarks clearly better twice running; so a mirrored orientation cannot last. A gap in
-the stamps of more than a second, stamps that run backwards, or a second with fewer than three
-landmarks forget the hand.
+- The first pose needs the wrist and three tips in one message (initialise.py).
+- From then on every message is fitted from the motion prior.
+- A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
+  and every three seconds. It initialises the hand as if nothing were known, and its pose is taken
+  when it explains the landmarks clearly better twice running: so a mirrored orientation cannot
+  last.
+- The hand is forgotten after a gap in the stamps of more than a second, when stamps run backwards,
+  and after a second with fewer than three landmarks.
 """
 
 from __future__ import annotations
@@ -56,16 +57,13 @@ MIN_COST_GAIN, WINS_NEEDED = 12.0, 2
 
 @dataclass(frozen=True)
 class HandEstimate:
-    """The hand after one message.
+    """The hand after one message."""
 
-    Wrist in the rig frame, angles (5, 4) rad within limits, covariance (26, 26), cost, iterations.
-    """
-
-    rotation: Array
-    position_m: Array
-    angles_rad: Array
-    covariance: Array
-    cost: float
+    rotation: Array  # (3, 3) wrist in the rig frame
+    position_m: Array  # (3,)
+    angles_rad: Array  # (5, 4) within limits
+    covariance: Array  # (26, 26) of rotation, position and angles (rad, m)
+    cost: float  # squared standard deviations
     iterations: int
 
 

@@ -1,7 +1,4 @@
-"""Where painted landmarks sit on the hand, and what was measured of them.
-
-As arrays for the kernels, too.
-"""
+"""Where painted landmarks sit on the hand, and what was measured of them, as arrays."""
 
 from __future__ import annotations
 
@@ -31,15 +28,11 @@ class Landmark:
 
 @dataclass(frozen=True)
 class Observation:
-    """One measured landmark.
+    """One measured landmark."""
 
-    Where it is (3,) in the rig frame, 1 / sigma (3,) per metre along its axes, and whether a camera
-    saw it.
-    """
-
-    point_m: Array
-    inverse_sigma: Array
-    measured: bool
+    point_m: Array  # (3,) rig frame
+    inverse_sigma: Array  # (3,) 1/m along each rig axis
+    measured: bool  # whether a camera saw it; else fusion predicted it
 
 
 class Observations(NamedTuple):
@@ -78,7 +71,7 @@ def frames_in_wrist(chains: HandChains, angles: Array) -> tuple[Array, Array]:
 def observation_arrays(
     landmarks: Mapping[str, Landmark], observed: Mapping[str, Observation]
 ) -> Observations:
-    """What was observed, by landmark, with where each landmark sits."""
+    """What was observed, by landmark, joined with where each landmark sits."""
     where = [landmarks[name] for name in observed]
     return Observations(
         joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
@@ -91,7 +84,7 @@ def observation_arrays(
 
 
 def _landmark(model: HandModel, name: str, open_hand_m: Array) -> Landmark:
-    """open_hand_m (3,): where it is on the open hand, wrist frame."""
+    """One landmark; open_hand_m (3,): where it is on the open hand, wrist frame."""
     joint = JOINTS.index(name)
     reach = float(np.linalg.norm(open_hand_m))
     offset = np.array(model.paint[name].offset_m)
