@@ -1,9 +1,9 @@
-"""What one more painted knuckle brings, and which gestures wrist and tips cannot tell: `python
-benchmarks/solver_markers.py [--json FILE]`.
+"""What one more painted knuckle brings, and which gestures wrist and tips cannot tell.
 
-Simulated hands with 1 mm of noise on every marker; mean errors in degrees: flexion of the fingers,
-orientation, thumb, abduction. Gestures are formed from the open hand and left again by a hand at
-rest; hardly any of the solver's constants was tuned on them.
+`python benchmarks/solver_markers.py [--json FILE]`. Simulated hands with 1 mm of noise on every
+landmark; mean errors in degrees: flexion of the fingers, orientation, thumb, abduction. Gestures
+are formed from the open hand and left again by a hand at rest; hardly any of the solver's constants
+was tuned on them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from solver import errors_of, with_painted
-from solver_hands import FRAMES, RATE_HZ, Motion, moving
+from solver_hands import FRAMES, RATE_HZ, Motion, errors_of, moving, with_painted
 
 from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
@@ -61,14 +60,10 @@ _SWING_HZ, _GESTURE_S = 2.5, 2.4
 
 def gesture(model: HandModel, name: str, rng: np.random.Generator) -> Motion:
     """Five seconds of a gesture or a swing of GESTURES and SWINGS, at any orientation."""
-    start, fit, t = (
-        moving(model, rng, "fist").rotations[0],
-        LimitScaling(model),
-        np.arange(FRAMES) / RATE_HZ,
-    )
-    turns = np.outer(
-        np.sin(2.0 * np.pi * _SWING_HZ * t), np.deg2rad(SWINGS.get(name, (0.0, 0.0, 0.0)))
-    )
+    start, fit = moving(model, rng, "fist").rotations[0], LimitScaling(model)
+    t = np.arange(FRAMES) / RATE_HZ
+    swing = np.deg2rad(SWINGS.get(name, (0.0, 0.0, 0.0)))
+    turns = np.outer(np.sin(2.0 * np.pi * _SWING_HZ * t), swing)
     postures = [
         CURVED if name in SWINGS else OPEN + bump(s / _GESTURE_S % 1.0) * (GESTURES[name] - OPEN)
         for s in t
@@ -81,7 +76,7 @@ def gesture(model: HandModel, name: str, rng: np.random.Generator) -> Motion:
     )
 
 
-def on_the_other_side(name: str, believed: bool) -> tuple[float, ...]:
+def on_the_other_side(name: str, told: bool) -> tuple[float, ...]:
     """Errors when a dab sits on the palm side of a joint, and the hand file says so or not."""
     rows = []
     for seed in range(4):
@@ -91,9 +86,7 @@ def on_the_other_side(name: str, believed: bool) -> tuple[float, ...]:
         palm = msgspec.structs.replace(back, paint={**back.paint, name: turned})
         motion = moving(palm, rng, "random" if seed % 2 else "fist")
         rows.append(
-            errors_of(
-                palm if believed else back, motion, (*BASIC_LANDMARKS, name), rng, painted=palm
-            )
+            errors_of(palm if told else back, motion, (*BASIC_LANDMARKS, name), rng, painted=palm)
         )
     return tuple(np.mean(rows, axis=0).tolist())
 
@@ -118,9 +111,10 @@ def main() -> int:
             model, rng = default_hand(), np.random.default_rng([seed, 3])
             rows.append(errors_of(model, gesture(model, name, rng), BASIC_LANDMARKS, rng))
         found[name] = tuple(np.mean(rows, axis=0).tolist())
-    for name, values in found.items():
+    for name, (flexion, turn, thumb, abduction) in found.items():
         print(
-            f"{name:64s} flexion {values[0]:5.2f} orientation {values[1]:5.2f} thumb {values[2]:5.2f} abduction {values[3]:5.2f}"
+            f"{name:64s} flexion {flexion:5.2f} orientation {turn:5.2f} "
+            f"thumb {thumb:5.2f} abduction {abduction:5.2f}"
         )
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

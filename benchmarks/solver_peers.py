@@ -1,9 +1,8 @@
-"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py; what
-is absent is skipped and says why.
+"""Inverse kinematics of other people's packages on the index finger, for benchmarks/solver.py.
 
-Every peer gets the same chain (as URDF, or the functions of kinematics.py), the same goals (tip
-pose) and the same end: position within 1e-6 mm and orientation within 1e-8 rad, or 100 iterations.
-It starts each frame from its own last solution.
+What is absent is skipped and says why. Every peer gets the same chain (as URDF, or the functions of
+kinematics.py), the same goals (tip pose) and the same end: position within 1e-6 mm and orientation
+within 1e-8 rad, or 100 iterations. It starts each frame from its own last solution.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array, vector_from_rotation
-from services.solver.maths import kinematics as k
+from services.solver.maths.chains import Chain, max_reach, norm
+from services.solver.maths.kinematics import tip_jacobian, tip_position, tip_rotation
 from services.solver.maths.rotation_vectors import rotation_vector
 
 NEAR_M, NEAR_RAD, MOST = 1e-9, 1e-8, 100
@@ -25,10 +25,8 @@ Solve = Callable[[Array, Array], Array]
 _AXES = ("0 1 0", "-1 0 0", "-1 0 0", "-1 0 0")
 
 
-def peers(chain: k.Chain) -> tuple[dict[str, Solve], dict[str, str]]:
-    """The solvers of all peers that are installed, and why the others are not among them, both by
-    name.
-    """
+def peers(chain: Chain) -> tuple[dict[str, Solve], dict[str, str]]:
+    """The solvers of all peers that are installed, by name, and why the others are missing."""
     installed, skipped = {}, {}
     for name, make in PEERS.items():
         try:
@@ -38,17 +36,23 @@ def peers(chain: k.Chain) -> tuple[dict[str, Solve], dict[str, str]]:
     return installed, skipped
 
 
-def urdf(chain: k.Chain) -> Path:
+def urdf(chain: Chain) -> Path:
     """The chain as a URDF file: four revolute joints with limits, a link `tip`."""
     offsets = ("0 0 0", "0 0 0", f"0 0 {-chain.lengths[0]}", f"0 0 {-chain.lengths[1]}")
-    inertial = '<inertial><mass value="0.01"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
+    inertial = (
+        '<inertial><mass value="0.01"/>'
+        '<inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
     text = '<robot name="finger"><link name="base"/>'
     for j, (axis, offset) in enumerate(zip(_AXES, offsets, strict=True)):
         low, high = chain.limits[j]
-        text += f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute"><parent link="{"base" if j == 0 else f"l{j - 1}"}"/>'
+        parent = "base" if j == 0 else f"l{j - 1}"
+        text += f'<link name="l{j}">{inertial}</link><joint name="q{j}" type="revolute">'
+        text += f'<parent link="{parent}"/>'
         text += f'<child link="l{j}"/><origin xyz="{offset}"/><axis xyz="{axis}"/>'
         text += f'<limit lower="{low}" upper="{high}" effort="1e3" velocity="1e3"/></joint>'
-    text += f'<link name="tip">{inertial}</link><joint name="end" type="fixed"><parent link="l3"/><child link="tip"/>'
+    text += f'<link name="tip">{inertial}</link><joint name="end" type="fixed">'
+    text += '<parent link="l3"/><child link="tip"/>'
     text += f'<origin xyz="0 0 {chain.tool[2]}"/></joint></robot>'
     path = Path(tempfile.mkdtemp()) / "robot.urdf"
     path.write_text(text)
@@ -56,11 +60,12 @@ def urdf(chain: k.Chain) -> Path:
 
 
 class End:
-    """Whether to stop: compiled, and fed with plain arrays, so that asking costs a peer half a
-    microsecond an iteration.
+    """Whether to stop.
+
+    Compiled, and fed with plain arrays: asking costs a peer half a microsecond an iteration.
     """
 
-    def __init__(self, chain: k.Chain, point: Array, axes: Array) -> None:
+    def __init__(self, chain: Chain, point: Array, axes: Array) -> None:
         self._fixed = (chain.lengths, chain.tool, point, axes)
 
     def __call__(self, q: Array) -> bool:
@@ -69,9 +74,9 @@ class End:
 
 @njit(cache=True)
 def _there(q: Array, lengths: Array, tool: Array, point: Array, axes: Array) -> bool:
-    p = k.tip(k.Chain(lengths, tool, np.empty((4, 2)), np.empty(2)), q)
+    p = tip_position(Chain(lengths, tool, np.empty((4, 2)), np.empty(2)), q)
     near = (p[0] - point[0]) ** 2 + (p[1] - point[1]) ** 2 + (p[2] - point[2]) ** 2 <= NEAR_M**2
-    return near and k.length_of(rotation_vector(axes @ k.tip_rotation(q).T)) <= NEAR_RAD
+    return near and norm(rotation_vector(axes @ tip_rotation(q).T)) <= NEAR_RAD
 
 
 def _pose(point: Array, axes: Array) -> Array:
@@ -80,7 +85,7 @@ def _pose(point: Array, axes: Array) -> Array:
     return T
 
 
-def placo(chain: k.Chain) -> Solve:
+def placo(chain: Chain) -> Solve:
     """Rhoban's placo: a QP per step, joint limits on."""
     import placo as package
 
@@ -105,7 +110,7 @@ def placo(chain: k.Chain) -> Solve:
     return solve
 
 
-def mink(chain: k.Chain) -> Solve:
+def mink(chain: Chain) -> Solve:
     """Kevin Zakka's mink over MuJoCo: a QP per step, configuration limit on."""
     import mink as package
     import mujoco
@@ -119,6 +124,7 @@ def mink(chain: k.Chain) -> Solve:
     )
     limits = [package.ConfigurationLimit(model)]
 
+    # Alike in pink: two packages with one interface, of which either may be missing.
     def solve(point: Array, axes: Array) -> Array:
         task.set_target(package.SE3.from_matrix(_pose(point, axes)))
         end = End(chain, point, axes)
@@ -132,7 +138,7 @@ def mink(chain: k.Chain) -> Solve:
     return solve
 
 
-def pink(chain: k.Chain) -> Solve:
+def pink(chain: Chain) -> Solve:
     """Stephane Caron's pink over Pinocchio: a QP per step, configuration and velocity limits on."""
     import pink as package
     import pinocchio
@@ -141,6 +147,7 @@ def pink(chain: k.Chain) -> Solve:
     configuration = package.Configuration(model, model.createData(), np.zeros(4))
     task = package.FrameTask("tip", position_cost=1.0, orientation_cost=0.05, lm_damping=1e-6)
 
+    # Alike in mink: see there.
     def solve(point: Array, axes: Array) -> Array:
         task.set_target(pinocchio.SE3(axes, point))
         end = End(chain, point, axes)
@@ -156,7 +163,7 @@ def pink(chain: k.Chain) -> Solve:
     return solve
 
 
-def ikpy(chain: k.Chain) -> Solve:
+def ikpy(chain: Chain) -> Solve:
     """Phylliade's ikpy: scipy's bounded least squares over its own chains."""
     from ikpy.chain import Chain as Package
 
@@ -176,23 +183,23 @@ def ikpy(chain: k.Chain) -> Solve:
     return solve
 
 
-def scipy(chain: k.Chain) -> Solve:
+def scipy(chain: Chain) -> Solve:
     """scipy's bounded least squares with our Jacobian.
 
     Lengths relative to the finger's, as for ours.
     """
     from scipy.optimize import least_squares
 
-    scale, last = 1.0 / k.reach_of(chain), np.zeros(4)
+    scale, last = 1.0 / max_reach(chain), np.zeros(4)
     p, J = np.empty(3), np.empty((6, 4))
 
     def solve(point: Array, axes: Array) -> Array:
         def residual(q: Array) -> Array:
-            turn = vector_from_rotation(k.tip_rotation(q) @ axes.T)
-            return np.concatenate([scale * (k.tip(chain, q) - point), turn])
+            turn = vector_from_rotation(tip_rotation(q) @ axes.T)
+            return np.concatenate([scale * (tip_position(chain, q) - point), turn])
 
         def slope(q: Array) -> Array:
-            k.jacobian(chain, q, p, J)
+            tip_jacobian(chain, q, p, J)
             return J * np.array([[scale]] * 3 + [[1.0]] * 3)
 
         start = np.clip(last, chain.limits[:, 0] + 1e-9, chain.limits[:, 1] - 1e-9)
@@ -204,7 +211,7 @@ def scipy(chain: k.Chain) -> Solve:
     return solve
 
 
-def roboticstoolbox(chain: k.Chain) -> Solve:
+def roboticstoolbox(chain: Chain) -> Solve:
     """Peter Corke's toolbox: its compiled Levenberg-Marquardt.
 
     Limits are not part of its problem.

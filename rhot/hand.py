@@ -1,5 +1,7 @@
-"""The one description of a hand: joints, bones, limits, painted landmarks, and where they all are
-for given angles.
+"""The one description of a hand: joints, bones, limits, painted landmarks, and where they all are.
+
+`forward` is the plain forward kinematics; the solver and the simulator have compiled kernels of it,
+and their tests prove that they agree with it.
 
 Frames (docs/reference/frames.md): the wrist frame is OpenXR's: -z towards the finger tips, +y out
 of the back of the hand, +x right. Each joint frame has -z along the bone that starts there. Angles
@@ -11,16 +13,18 @@ Each digit is one chain of four degrees of freedom, DIGIT_ANGLES: abduction, the
 The chain of a finger starts at its MCP joint (mcp, pip, dip), that of the thumb at its CMC joint
 (cmc, mcp, dip): the thumb has no middle phalanx, its interphalangeal joint is called `dip` as its
 bone is the distal one, and its MCP abduction is fixed at zero, RHOT eq. (3). Pure data and maths; a
-hand that was never measured uses the tables below and says so in HandModel.origin.
+hand that was never measured uses the tables of rhot/hand_tables.py and says so in HandModel.origin.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
 
+from rhot import hand_tables
 from rhot.geometry.transforms import (
     Array,
     quaternion_from_rotation,
@@ -70,9 +74,7 @@ Range = tuple[float, float]
 
 
 class Digit(msgspec.Struct, frozen=True, kw_only=True):
-    """One digit: where its chain starts in the wrist frame, its three bones, radii, limits and
-    couplings.
-    """
+    """One digit: where its chain starts in the wrist frame, its bones, radii, limits, coupling."""
 
     name: Literal["thumb", "index", "middle", "ring", "little"]
     # Start of the metacarpal (equal to base_m for the thumb), for the OpenXR metacarpal joint only.
@@ -95,8 +97,7 @@ class Digit(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Paint(msgspec.Struct, frozen=True, kw_only=True):
-    """A painted landmark: the point that stands for it, fixed to its joint's frame, and how the
-    paint surrounds it.
+    """A painted landmark: the point that stands for it, in its joint's frame, and the paint's size.
 
     What cameras see is skin, yet two of them locate the centre of paint all round a finger
     (radius_m > 0) on the bone axis, within .3 radii: its outline is what counts. A dab on one side
@@ -138,80 +139,37 @@ class HandModel(msgspec.Struct, frozen=True, kw_only=True):
         return 1.0 if self.hand == "right" else -1.0
 
 
-# Phalanx lengths in mm, Buryanov & Kotiuk, "Proportions of Hand Segments", Int. J. Morphol. 28(3),
-# 2010, n = 66: metacarpal, proximal, middle, distal + pulp.
-_BONES_MM = {
-    "thumb": (46.2, 31.6, 0.0, 21.7 + 5.7),
-    "index": (68.1, 39.8, 22.4, 15.8 + 3.8),
-    "middle": (64.6, 44.6, 26.3, 17.4 + 4.0),
-    "ring": (58.0, 41.4, 25.7, 17.3 + 4.0),
-    "little": (53.7, 32.7, 18.1, 16.0 + 3.7),
-}
-# Start of the metacarpals (mm) and their directions (deg: towards the thumb, about the bone) for a
-# right hand, fitted by eye to the three recorded OpenXR poses of the npm package iwer 2.5.0
-# (relaxed, point, pinch), mirrored.
-_CARPUS_MM = {
-    "thumb": (-25.0, -14.0, -27.0),
-    "index": (-17.0, -6.0, -30.0),
-    "middle": (-3.0, -4.0, -31.0),
-    "ring": (10.0, -5.0, -30.0),
-    "little": (20.0, -8.0, -28.0),
-}
-_METACARPAL_DEG = {"index": 5.0, "middle": 1.0, "ring": -5.0, "little": -13.0}
-_SPLAY_DEG = {
-    "index": (6.0, 3.0),
-    "middle": (0.0, 0.0),
-    "ring": (-6.0, -7.0),
-    "little": (-13.0, -16.0),
-}
-# Skin radii in mm at the four chain joints, rounded from the same recordings.
-_RADII_MM = {
-    "thumb": (17.0, 12.0, 9.8, 8.8),
-    "index": (10.5, 8.8, 7.8, 6.8),
-    "middle": (11.0, 8.8, 7.8, 6.8),
-    "ring": (10.2, 8.2, 7.4, 6.4),
-    "little": (9.0, 7.2, 6.6, 5.6),
-}
-# Type I limits, RHOT eq. (1) and (2); the thumb's from the ranges of motion of the AAOS handbook
-# (CMC 53 deg of flexion-extension and 42 deg of palmar abduction about the resting pose, MCP 0..55,
-# IP 0..80).
-_FINGER_LIMITS_DEG = ((-15.0, 15.0), (0.0, 90.0), (0.0, 110.0), (0.0, 90.0))
-_MIDDLE_LIMITS_DEG = ((0.0, 0.0), (0.0, 90.0), (0.0, 110.0), (0.0, 90.0))
-_THUMB_LIMITS_DEG = ((-17.0, 25.0), (-23.0, 30.0), (0.0, 55.0), (0.0, 80.0))
 # Painted length of a finger tip: a dip into paint about as deep as the nail is long.
 _TIP_PAINT_M = 0.014
+# Diameter of a dab of paint.
 _KNUCKLE_DAB_M = 0.010
 _WRIST_DAB_M = 0.016
 
 
 def default_hand(hand: HandName = "right", scale: float = 1.0) -> HandModel:
     """A hand from the anthropometric tables, `scale` times the average adult's."""
-    digits = tuple(_default_digit(name, hand, scale) for name in DIGITS)
     return HandModel(
-        hand=hand, digits=digits, paint=_default_paint(scale), wrist_radius_m=0.021 * scale
-    )  # type: ignore[arg-type]
+        hand=hand,
+        digits=tuple(_default_digit(name, hand, scale) for name in DIGITS),  # type: ignore[arg-type]
+        paint=_default_paint(scale),
+        wrist_radius_m=0.021 * scale,
+    )
 
 
 def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
-    bones = np.array(_BONES_MM[name]) * 1e-3 * scale
-    carpus = np.array(_CARPUS_MM[name]) * 1e-3 * scale
+    bones = np.array(hand_tables.BONES_MM[name]) * 1e-3 * scale
+    carpus = np.array(hand_tables.CARPUS_MM[name]) * 1e-3 * scale
     if name == "thumb":
-        base, lengths, limits = carpus, (bones[0], bones[1], bones[3]), _THUMB_LIMITS_DEG
-        # -z and x of the thumb's metacarpal frame at rest, from the same recordings, made
-        # orthonormal.
-        z = -np.array([-0.675, -0.250, -0.690])
-        x = np.array([0.115, 0.887, -0.442])
-        z /= np.linalg.norm(z)
-        y = np.cross(z, x) / np.linalg.norm(np.cross(z, x))
-        rotation = np.stack([np.cross(y, z), y, z], axis=1)
+        base, rotation = carpus, _thumb_rotation()
+        lengths, limits = (bones[0], bones[1], bones[3]), hand_tables.THUMB_LIMITS_DEG
     else:
-        base = carpus + rotation_y(np.deg2rad(_METACARPAL_DEG[name])) @ np.array(
-            [0.0, 0.0, -bones[0]]
-        )
-        lengths = (bones[1], bones[2], bones[3])
-        limits = _MIDDLE_LIMITS_DEG if name == "middle" else _FINGER_LIMITS_DEG
-        splay, roll = np.deg2rad(_SPLAY_DEG[name])
+        direction = rotation_y(np.deg2rad(hand_tables.METACARPAL_DEG[name]))
+        base = carpus + direction @ np.array([0.0, 0.0, -bones[0]])
+        splay, roll = np.deg2rad(hand_tables.SPLAY_DEG[name])
         rotation = rotation_y(splay) @ rotation_z(roll)
+        lengths, limits = (bones[1], bones[2], bones[3]), hand_tables.FINGER_LIMITS_DEG
+        if name == "middle":
+            limits = hand_tables.MIDDLE_LIMITS_DEG
     if hand == "left":
         mirror = np.diag([-1.0, 1.0, 1.0])
         carpus, base, rotation = mirror @ carpus, mirror @ base, mirror @ rotation @ mirror
@@ -221,39 +179,40 @@ def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
         base_m=tuple(base.tolist()),
         base_wxyz=tuple(quaternion_from_rotation(rotation).tolist()),
         lengths_m=tuple(float(length) for length in lengths),  # type: ignore[arg-type]
-        radii_m=tuple(float(r) * 1e-3 * scale for r in _RADII_MM[name]),  # type: ignore[arg-type]
+        radii_m=tuple(float(r) * 1e-3 * scale for r in hand_tables.RADII_MM[name]),  # type: ignore[arg-type]
         limits_rad=tuple((float(np.deg2rad(low)), float(np.deg2rad(high))) for low, high in limits),  # type: ignore[arg-type]
     )
 
 
+def _thumb_rotation() -> Array:
+    """Axes of a right thumb's metacarpal at zero angles, in the wrist frame; (3, 3)."""
+    z = -np.array(hand_tables.THUMB_FORWARD)
+    x = np.array(hand_tables.THUMB_RIGHT)
+    z /= np.linalg.norm(z)
+    y = np.cross(z, x) / np.linalg.norm(np.cross(z, x))
+    return np.stack([np.cross(y, z), y, z], axis=1)
+
+
 def _default_paint(scale: float) -> dict[str, Paint]:
-    """Painted tips all round, dabs of paint on the palm side of the wrist and on the back of every
-    other joint.
-    """
+    """Tips painted all round, a dab on the palm side of the wrist, on the back of other joints."""
     paint = {}
     for name in LANDMARKS:
         if name == "wrist":
-            paint[name] = Paint(
-                offset_m=(0.0, -0.021 * scale, 0.0), radius_m=0.0, extent_m=_WRIST_DAB_M
-            )
+            offset_m, radius_m, extent_m = (0.0, -0.021 * scale, 0.0), 0.0, _WRIST_DAB_M
         elif name in TIPS:
-            radius = _RADII_MM[name.removesuffix("_tip")][3] * 1e-3 * scale
-            paint[name] = Paint(
-                offset_m=(0.0, 0.0, 0.5 * _TIP_PAINT_M), radius_m=radius, extent_m=_TIP_PAINT_M
-            )
+            offset_m, extent_m = (0.0, 0.0, 0.5 * _TIP_PAINT_M), _TIP_PAINT_M
+            radius_m = hand_tables.RADII_MM[name.removesuffix("_tip")][3] * 1e-3 * scale
         else:
             height = 0.018 if name == "palm" or name.endswith("metacarpal") else 0.009
-            paint[name] = Paint(
-                offset_m=(0.0, height * scale, 0.0), radius_m=0.0, extent_m=_KNUCKLE_DAB_M
-            )
+            offset_m, radius_m, extent_m = (0.0, height * scale, 0.0), 0.0, _KNUCKLE_DAB_M
+        paint[name] = Paint(offset_m=offset_m, radius_m=radius_m, extent_m=extent_m)
     return paint
 
 
 def forward(
     model: HandModel, wrist_rotation: Array, wrist_m: Array, angles_rad: Array
 ) -> tuple[Array, Array]:
-    """All 26 joints of the hand: positions (26, 3) and rotations (26, 3, 3) in the frame of
-    wrist_rotation and wrist_m.
+    """Positions (26, 3) and rotations (26, 3, 3) of all joints, in the frame the wrist is given in.
 
     wrist_rotation (3, 3), wrist_m (3,) metres, angles_rad (5, 4) in the order of DIGITS and
     DIGIT_ANGLES. Equal to the D-H rows of the finger study (Appendix A1) with its axes renamed;
@@ -262,27 +221,42 @@ def forward(
     positions, rotations = np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1))
     for row, digit in enumerate(model.digits):
         joints = CHAIN_JOINTS[row]
-        rotation = rotation_from_quaternion(digit.base_wxyz)
         if row > 0:
             metacarpal = joints[0] - 1
             positions[metacarpal] = digit.metacarpal_m
         abduction, *flexions = angles_rad[row]
-        rotation = rotation @ rotation_y(model.side * abduction)
-        position = np.array(digit.base_m)
-        for joint, flexion, length in zip(joints[:3], flexions, digit.lengths_m, strict=True):
-            rotation = rotation @ rotation_x(-flexion)
-            positions[joint], rotations[joint] = position, rotation
-            position = position - length * rotation[:, 2]
-        positions[joints[3]], rotations[joints[3]] = position, rotation
+        positions[joints], rotations[joints] = chain_forward(
+            rotation_from_quaternion(digit.base_wxyz),
+            np.array(digit.base_m),
+            digit.lengths_m,
+            (model.side * abduction, *flexions),
+        )
     middle = JOINT_INDEX["middle_proximal"]
     positions[JOINT_INDEX["palm"]] = 0.5 * (positions[middle - 1] + positions[middle])
     return positions @ wrist_rotation.T + wrist_m, wrist_rotation @ rotations
 
 
-def landmark_point(model: HandModel, name: str, positions: Array, rotations: Array) -> Array:
-    """The point that stands for a painted landmark, (3,), given all joints as `forward` returns
-    them.
+def chain_forward(
+    base_rotation: Array, base_m: Array, lengths_m: Sequence[float], angles_rad: Sequence[float]
+) -> tuple[Array, Array]:
+    """Positions (4, 3) and rotations (4, 3, 3) of one digit's joints, root to tip.
+
+    In the frame of base_rotation (3, 3), the first bone's axes at zero angles, and base_m (3,), the
+    root. lengths_m (3,); angles_rad (4,): about +y, then three flexions.
     """
+    turn, *flexions = angles_rad
+    positions, rotations = np.empty((4, 3)), np.empty((4, 3, 3))
+    rotation, position = base_rotation @ rotation_y(turn), base_m
+    for k, (flexion, length) in enumerate(zip(flexions, lengths_m, strict=True)):
+        rotation = rotation @ rotation_x(-flexion)
+        positions[k], rotations[k] = position, rotation
+        position = position - length * rotation[:, 2]
+    positions[3], rotations[3] = position, rotation
+    return positions, rotations
+
+
+def landmark_point(model: HandModel, name: str, positions: Array, rotations: Array) -> Array:
+    """The point (3,) that stands for a painted landmark, given all joints as `forward` has them."""
     joint = JOINT_INDEX[name]
     return positions[joint] + rotations[joint] @ np.array(model.paint[name].offset_m)
 

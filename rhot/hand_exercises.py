@@ -1,7 +1,7 @@
-"""The guided recording of a hand: which exercises, in which order, how long. One table for
-`rhot calibrate hand` and the simulator's scene `guided`.
+"""The guided recording of a hand: which exercises, in which order, how long.
 
-Each exercise takes EXERCISE_S; the hand is open at its beginning and at its end. Pure data.
+One table for `rhot calibrate hand` and the simulator's scene `guided`. Each exercise takes
+EXERCISE_S; the hand is open at its beginning and at its end. Pure data.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ EXERCISES: tuple[Exercise, ...] = (
                 f"{digit}_hook",
                 "hook",
                 row,
-                f"{digit} finger: roll in its two last joints, knuckle straight, twice; hold the others",
+                f"{digit} finger: roll in its two last joints, knuckle straight, twice; "
+                "hold the others",
             ),
         )
     ),

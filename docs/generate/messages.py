@@ -87,9 +87,7 @@ def page() -> str:
         "\n\n".join(
             [
                 "# Messages",
-                generated_from(
-                    "`rhot/*messages.py`"
-                ),
+                generated_from("`rhot/*messages.py`"),
                 wrapped(_ABOUT),
                 *map(_section, messages),
             ]

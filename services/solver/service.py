@@ -20,8 +20,8 @@ from rhot.process.service import Service
 from services.solver.step import SolverStep
 from services.solver.warm import warm_up
 
-# Share of the newest time in the running mean: a second or so at 30 poses a second.
-_SMOOTH = 0.05
+# Weight of the newest time in the running mean: a second or so at 30 poses a second.
+_MEAN_WEIGHT = 0.05
 
 
 async def serve(service: Service) -> None:
@@ -36,7 +36,7 @@ async def serve(service: Service) -> None:
         for name, table in config.hand.items()
     }
     step = SolverStep(config, hands)
-    # Compiling (a minute without a cache) must not stop the heart beat.
+    # Compiling (a minute without a cache) must not stop the heartbeat.
     await asyncio.get_running_loop().run_in_executor(None, warm_up, config, hands)
     streams = {
         name: (
@@ -50,22 +50,22 @@ async def serve(service: Service) -> None:
     service.ready()
     async with asyncio.TaskGroup() as tasks:
         for name, (points, poses) in streams.items():
-            tasks.create_task(_follow(service, step, name, points, poses))
+            tasks.create_task(_solve_hand(service, step, name, points, poses))
 
 
-async def _follow(
+async def _solve_hand(
     service: Service,
     step: SolverStep,
     hand: HandName,
     points: Subscription[HandPoints],
     poses: Publisher[HandPose],
 ) -> None:
-    """One hand, for ever."""
+    """Solve one hand's points as they come, for ever."""
     mean_ms = 0.0
     async for message in points:
-        began_s = time.perf_counter()
+        start_s = time.perf_counter()
         pose = step.step(message)
-        mean_ms += _SMOOTH * ((time.perf_counter() - began_s) * 1e3 - mean_ms)
+        mean_ms += _MEAN_WEIGHT * ((time.perf_counter() - start_s) * 1e3 - mean_ms)
         service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
         if pose is not None:
             poses.put(pose)

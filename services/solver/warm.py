@@ -18,7 +18,7 @@ from services.solver.step import SolverStep
 
 
 def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
-    """Solve three looks at a made-up hand with the configured method."""
+    """Solve four messages of a made-up hand with the configured method."""
     for name, model in hands.items():
         step = SolverStep(config, {name: model})
         angles = model.limits_rad.mean(axis=2)
@@ -38,5 +38,5 @@ def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
                 for landmark in BASIC_LANDMARKS
             ],
         )
-        for look in range(4):
-            step.step(msgspec.structs.replace(points, seq=look, stamp_ns=look * 33_000_000))
+        for seq in range(4):
+            step.step(msgspec.structs.replace(points, seq=seq, stamp_ns=seq * 33_000_000))

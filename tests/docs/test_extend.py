@@ -119,9 +119,8 @@ async def test_a_topic_and_a_service(module, running):
 
 
 def test_a_solver_method(module, monkeypatch):
-    from services.solver.maths.chains import digit_chain, hand_chains
-
     from services.solver.finger import solve_fingers as fingers
+    from services.solver.maths.chains import digit_chain, hand_chains
 
     monkeypatch.setattr(fingers, "METHODS", dict(fingers.METHODS))
     module.METHODS = fingers.METHODS

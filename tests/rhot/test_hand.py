@@ -69,8 +69,9 @@ def test_the_whole_hand_moves_rigidly(model):
 
 
 def test_equals_the_denavit_hartenberg_rows_of_the_finger_study():
-    """Standard D-H rows (theta1, 0, 0, 90 deg), (theta2, 0, l1, 0), (theta3, 0, l2, 0), (theta4, 0,
-    l3, 0); Appendix A1.
+    """The finger study's Appendix A1, four standard D-H rows (theta, d, a, alpha).
+
+    (theta1, 0, 0, 90 deg), (theta2, 0, l1, 0), (theta3, 0, l2, 0), (theta4, 0, l3, 0).
     """
 
     def row(theta, a, alpha):

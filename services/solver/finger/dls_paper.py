@@ -1,11 +1,13 @@
-"""Damped least squares as the index-finger study implements it (Chatterjee et al., "Trajectory
-based Recovery of Index Finger Articulated Pose during Palmar Grasp", sections 3 and appendix A1,
-A3). For comparison; the product's own is dls.py.
+"""Damped least squares as the index-finger study implements it, for comparison.
+
+Chatterjee et al., "Trajectory based Recovery of Index Finger Articulated Pose during Palmar Grasp",
+section 3 and appendix A1, A3. The product's own is dls.py.
 
 Each step is dq = J^T [J J^T + diag(l1..l4, .7, .7)^2]^-1 e, with e = (position, orientation) of the
 tip and the damping of eq. (1), l_i = eta [(2 q_i - max_i - min_i) / (max_i - min_i)]^p, eta = 1, p
 = 6, which grows as a joint nears its limit. Each frame starts from the last one's angles, the first
-from q = [0, pi/2, 0, 0]; a frame ends when |dq| < 1e-6.
+from q = [0, pi/2, 0, 0]; a frame ends when |dq| < 1e-6. The study's D-H rows are our chain with its
+axes renamed (kinematics.tip_jacobian), so its kinematics are not repeated here.
 
 Where the print is inconsistent, and what is done here:
 - A3 prints J^T [J^T J + l^2 I]^-1, a (4x6)(4x4) product that does not conform. "A 6x6 diagonal
@@ -34,39 +36,72 @@ from typing import Literal
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.solver.finger.dls import NOT_CONVERGED, SOLVED, UNREACHABLE
-from services.solver.maths.kinematics import Chain, jacobian, tip, tip_rotation
-from services.solver.whole_hand.posture_prior import clamp
+from services.solver.finger.outcome import NOT_CONVERGED, SOLVED, UNREACHABLE
+from services.solver.maths.chains import Chain
+from services.solver.maths.joint_limits import clamp_to_limits
+from services.solver.maths.kinematics import tip_jacobian, tip_position, tip_rotation
 
-# The study's constants: eq. (1), "a fixed value of l5 = l6 = 0.7", tolerance 1E-06, first posture.
-ETA, POWER, FIXED, TOLERANCE = 1.0, 6, 0.7, 1e-6
-FIRST = (0.0, np.pi / 2, 0.0, 0.0)
-_MM = 1e3
-
+# The study's constants: eta and p of eq. (1), "a fixed value of l5 = l6 = 0.7", tolerance 1E-06,
+# first posture.
+ETA, POWER, FIXED_DAMPING, MIN_STEP_RAD = 1.0, 6, 0.7, 1e-6
+INITIAL_ANGLES_RAD = (0.0, np.pi / 2, 0.0, 0.0)
+_MM_PER_M = 1e3
 
 Form = Literal["normal", "svd"]
 
 
 @dataclass(frozen=True)
-class Reading:
+class Options:
     """How the print is read, and when to give up."""
 
-    form: Form = "normal"
-    clip: bool = True
-    most: int = 200
+    form: Form = "normal"  # normal equations or SVD
+    clip: bool = True  # bring the angles into the limits after each step
+    max_iterations: int = 200
     tolerance_m: float = 1e-4
 
 
 @dataclass(frozen=True)
-class Frame:
-    """One frame's end: angles (4,) rad, iterations used, distance left in metres, SOLVED |
-    UNREACHABLE | NOT_CONVERGED.
-    """
+class Solution:
+    """One frame's end."""
 
-    angles_rad: Array
+    angles_rad: Array  # (4,)
     iterations: int
-    residual_m: float
-    state: int
+    residual_m: float  # distance left
+    outcome: int  # SOLVED | UNREACHABLE | NOT_CONVERGED
+
+
+def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Options) -> Solution:
+    """One frame: tip to point (3,), metres, and last bone to rotation (3, 3).
+
+    Canonical frame; starts from q0 (4,) (feed-forward).
+    """
+    limits = chain.limits
+    q = np.array(q0, dtype=np.float64)
+    if options.clip or not np.all(np.isfinite(q)):
+        clamp_to_limits(q, limits)
+    # A target that far cannot be squared in double precision, and no hand is a kilometre wide; a
+    # rotation's elements are within 1.
+    if not (np.all(np.abs(point) < 1e3) and np.all(np.abs(rotation) < 2.0)):
+        return Solution(q, 0, 0.0, NOT_CONVERGED)
+    p, J = np.empty(3), np.empty((6, 4))
+    used, moved = 0, np.inf
+    while used < options.max_iterations and moved >= MIN_STEP_RAD:
+        used += 1
+        tip_jacobian(chain, q, p, J)
+        J[:3] *= _MM_PER_M
+        e = pose_error(p, tip_rotation(q), point, rotation)
+        new = q + step(J, e, damping(q, limits), options.form)
+        # Without clipping, angles that wind up have a damping beyond all numbers.
+        if not np.all(np.isfinite(new)):
+            break
+        if options.clip:
+            new = np.clip(new, limits[:, 0], limits[:, 1])
+        moved, q = float(np.linalg.norm(new - q)), new
+    residual = float(np.linalg.norm(tip_position(chain, q) - point))
+    if residual <= options.tolerance_m:
+        return Solution(q, used, residual, SOLVED)
+    gave_up = used == options.max_iterations
+    return Solution(q, used, residual, NOT_CONVERGED if gave_up else UNREACHABLE)
 
 
 def damping(q: Array, limits: Array) -> Array:
@@ -76,16 +111,13 @@ def damping(q: Array, limits: Array) -> Array:
     share = np.divide(
         2.0 * q - limits[:, 1] - limits[:, 0], span, out=np.zeros(4), where=span > 0.0
     )
-    return np.append(ETA * share**POWER, (FIXED, FIXED))
+    return np.append(ETA * share**POWER, (FIXED_DAMPING, FIXED_DAMPING))
 
 
-def differential(p: Array, R: Array, goal: Array, goal_R: Array) -> Array:
-    """de of A3: position in mm and half the sum of the axes' cross products (rad near the goal).
-
-    (6,).
-    """
+def pose_error(p: Array, R: Array, goal: Array, goal_R: Array) -> Array:
+    """de of A3, (6,): position in mm, half the sum of the axes' cross products (rad near 0)."""
     turn = 0.5 * sum(np.cross(R[:, k], goal_R[:, k]) for k in range(3))
-    return np.concatenate([_MM * (goal - p), turn])
+    return np.concatenate([_MM_PER_M * (goal - p), turn])
 
 
 def step(J: Array, e: Array, factors: Array, form: Form) -> Array:
@@ -100,37 +132,3 @@ def step(J: Array, e: Array, factors: Array, form: Form) -> Array:
     U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
     gain = np.divide(sigma, sigma**2 + factors[:4] ** 2, out=np.zeros(4), where=sigma > 1e-12)
     return Vt.T @ (gain * (U.T @ e))
-
-
-def solve(chain: Chain, point: Array, rotation: Array, q0: Array, options: Reading) -> Frame:
-    """One frame: tip to point (3,), metres, and last bone to rotation (3, 3), canonical frame, from
-    q0 (4,) (feed-forward).
-    """
-    limits = chain.limits
-    q = np.array(q0, dtype=np.float64)
-    if options.clip or not np.all(np.isfinite(q)):
-        clamp(q, limits)
-    # A target that far cannot be squared in double precision, and no hand is a kilometre wide; a
-    # rotation's elements are within 1.
-    if not (np.all(np.abs(point) < 1e3) and np.all(np.abs(rotation) < 2.0)):
-        return Frame(q, 0, 0.0, NOT_CONVERGED)
-    p, J, used, moved = np.empty(3), np.empty((6, 4)), 0, np.inf
-    while used < options.most and moved >= TOLERANCE:
-        used += 1
-        jacobian(chain, q, p, J)
-        J[:3] *= _MM
-        e = differential(p, tip_rotation(q), point, rotation)
-        new = q + step(J, e, damping(q, limits), options.form)
-        # Without clipping, angles that wind up have a damping beyond all numbers.
-        if not np.all(np.isfinite(new)):
-            break
-        if options.clip:
-            new = np.clip(new, limits[:, 0], limits[:, 1])
-        moved, q = float(np.linalg.norm(new - q)), new
-    residual = float(np.linalg.norm(tip(chain, q) - point))
-    state = (
-        SOLVED
-        if residual <= options.tolerance_m
-        else (NOT_CONVERGED if used == options.most else UNREACHABLE)
-    )
-    return Frame(q, used, residual, state)

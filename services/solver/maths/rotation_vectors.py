@@ -1,5 +1,7 @@
-"""Small turns as rotation vectors, for the kernels (rhot/geometry/transforms.py has the same maths
-for everybody else).
+"""Rotation vectors for the kernels: exponential and logarithm of SO(3).
+
+rhot/geometry/transforms.py has the same maths for plain code; numba cannot call it. Kept apart, and
+proven to agree by tests/services/solver/maths/test_rotation_vectors.py.
 """
 
 from __future__ import annotations
@@ -13,8 +15,11 @@ from rhot.geometry.transforms import Array
 
 
 @njit(cache=True)
-def turned(R: Array, v: Array) -> Array:
-    """exp(v) R for a rotation vector v (3,)."""
+def apply_rotation_vector(R: Array, v: Array) -> Array:
+    """exp(v) R for a rotation vector v (3,) rad in the frame that R (3, 3) leads to; (3, 3).
+
+    Rodrigues' formula, with its series below 1e-4 rad.
+    """
     angle = math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
     a = 1.0 - angle * angle / 6.0 if angle < 1e-4 else math.sin(angle) / angle
     b = 0.5 - angle * angle / 24.0 if angle < 1e-4 else (1.0 - math.cos(angle)) / (angle * angle)
@@ -31,9 +36,9 @@ def turned(R: Array, v: Array) -> Array:
 
 @njit(cache=True)
 def rotation_vector(R: Array) -> Array:
-    """The rotation vector of R (3, 3), from its skew part.
+    """The rotation vector (3,) rad of R (3, 3), from its skew part.
 
-    Near 180 deg only its length is reliable, which is all LM needs.
+    Near 180 deg only its length is reliable, which is all that Levenberg-Marquardt needs.
     """
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)

@@ -20,8 +20,10 @@ def rig(tmp_path):
     [
         (
             '[[camera]]\nname = "l"\nsorce = "x"',
-            r"\[camera\[0\]\]: unknown key `sorce`, did you mean `source`\?"
-            ".*Valid keys: name, source",
+            (
+                r"\[camera\[0\]\]: unknown key `sorce`, did you mean `source`\?"
+                ".*Valid keys: name, source"
+            ),
         ),
         ("[rig]\nname = 3", "`rig.name`: expected `str`, got `int`"),
         ("[fusion.one_euro]\nbta = 1", "did you mean `beta`"),

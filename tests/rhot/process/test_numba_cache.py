@@ -27,7 +27,8 @@ def package(tmp_path, monkeypatch):
     folder = tmp_path / "kernels"
     folder.mkdir()
     (folder / "__init__.py").write_text(
-        "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\nuse_cache(Path(__file__).parent)\n"
+        "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\n"
+        "use_cache(Path(__file__).parent)\n"
     )
     (folder / "inner.py").write_text(KERNEL.format(name="inner", body="x + 1"))
     outer = KERNEL.format(name="outer", body="inner(x)").replace(

@@ -1,6 +1,4 @@
-"""Helpers of the solver's tests: hands in motion, what a camera would measure of them, random
-angles within limits.
-"""
+"""Helpers of the solver's tests: hands in motion, what cameras measure of them, random angles."""
 
 from __future__ import annotations
 
@@ -11,8 +9,23 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import Array, rotation_from_quaternion, rotation_from_vector
-from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand, forward, landmark_point
+from rhot.hand import (
+    BASIC_LANDMARKS,
+    HandModel,
+    HandName,
+    chain_forward,
+    default_hand,
+    forward,
+    landmark_point,
+)
 from rhot.messages import HandPoint, HandPoints, HandPose
+from services.solver.maths.chains import Chain
+from services.solver.whole_hand.landmarks import (
+    Observation,
+    Observations,
+    hand_landmarks,
+    observation_arrays,
+)
 
 FRAME_NS = 33_333_333
 
@@ -106,6 +119,34 @@ def world() -> Callable[[HandName], World]:
 def angles_of() -> Callable[[HandPose], Array]:
     """(5, 4) angles of a pose message, in the order of DIGITS and DIGIT_ANGLES."""
     return _angles_of
+
+
+@pytest.fixture(scope="session")
+def observe() -> Callable[..., Observations]:
+    """Points (rig frame) of a hand model, by landmark, as the arrays that the fit takes."""
+
+    def make(model: HandModel, points: dict[str, Array], sigma_m: float = 1e-3) -> Observations:
+        observed = {
+            name: Observation(point, np.full(3, 1.0 / sigma_m), True)
+            for name, point in points.items()
+        }
+        return observation_arrays(hand_landmarks(model), observed)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def tip_pose() -> Callable[[Chain, Array], tuple[Array, Array]]:
+    """The painted point (3,) and the last bone's axes (3, 3) of a chain at angles (4,).
+
+    By the plain kinematics of rhot.hand, in the canonical frame.
+    """
+
+    def make(chain: Chain, q: Array) -> tuple[Array, Array]:
+        positions, rotations = chain_forward(np.eye(3), np.zeros(3), chain.lengths, q)
+        return positions[2] + rotations[2] @ chain.tool, rotations[2]
+
+    return make
 
 
 @pytest.fixture(scope="session")

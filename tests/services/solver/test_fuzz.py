@@ -17,19 +17,25 @@ from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, HandModel, default_hand
 from rhot.messages import HandPoint, HandPoints
 from services.solver.finger import dls, dls_paper
-from services.solver.finger.solve_fingers import Tip, solve_fingers
-from services.solver.maths import kinematics as k
-from services.solver.maths.box_qp import box_qp
+from services.solver.finger.dls_equations import COUPLED, tip_goal
+from services.solver.finger.outcome import SOLVED
+from services.solver.finger.solve_fingers import TipObservation, solve_fingers
+from services.solver.maths.box_qp import box_qp, workspace
+from services.solver.maths.chains import digit_chain, hand_chains
+from services.solver.maths.kinematics import tip_distance
 from services.solver.step import SolverStep
-from services.solver.whole_hand.fit import Marks, place_of
 from services.solver.whole_hand.hand_tracker import HandTracker
-from services.solver.whole_hand.initialise import begin
-from services.solver.whole_hand.motion_prior import unknown
-from services.solver.whole_hand.point_check import Seen, places
-from services.solver.whole_hand.posture_prior import habit
+from services.solver.whole_hand.initialise import initialise
+from services.solver.whole_hand.landmarks import (
+    Observation,
+    hand_landmarks,
+    observation_arrays,
+)
+from services.solver.whole_hand.motion_prior import uninformed_prior
+from services.solver.whole_hand.posture_prior import posture_prior
 
 MODEL = default_hand()
-CHAINS = k.hand_chains(MODEL)
+CHAINS = hand_chains(MODEL)
 LOW, HIGH = MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]
 METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-paper")
 few = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -37,7 +43,7 @@ wild = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),
     st.sampled_from([0.0, -0.0, 1e300, -1e300, 1e-300, 0.05, -0.05]),
 )
-# What screen.py lets through: within ten metres, sigma from 0.3 mm to 0.15 m.
+# What point_check.py lets through: within ten metres, sigma from 0.3 mm to 0.15 m.
 near = st.one_of(st.floats(-10.0, 10.0), st.floats(-0.2, 0.2), st.just(0.0))
 inverse = st.floats(1.0 / 0.45, 1.0 / 3e-4)
 
@@ -55,7 +61,8 @@ def _inside(angles: Array) -> bool:
 )
 def test_all_fingers(points: list, start: list[float], sigma: float, method: str) -> None:
     tips = {
-        name: Tip(np.array(p), abs(sigma), True) for name, p in zip(DIGITS, points, strict=True)
+        name: TipObservation(np.array(p), abs(sigma), True)
+        for name, p in zip(DIGITS, points, strict=True)
     }
     found = solve_fingers(Solver(method=method), CHAINS, np.array(start).reshape(5, 4), tips)
     assert _inside(found.angles_rad)
@@ -75,10 +82,10 @@ def test_all_fingers(points: list, start: list[float], sigma: float, method: str
 def test_the_study_algorithm(
     point: list[float], rotation: list[float], start: list[float], svd: bool
 ) -> None:
-    chain = k.chain_of(CHAINS, 1)
-    reading = dls_paper.Reading(form="svd" if svd else "normal", most=50)
+    chain = digit_chain(CHAINS, 1)
+    options = dls_paper.Options(form="svd" if svd else "normal", max_iterations=50)
     q = np.clip(np.nan_to_num(start, nan=0.5), LOW[1], HIGH[1])
-    end = dls_paper.solve(chain, np.array(point), np.array(rotation).reshape(3, 3), q, reading)
+    end = dls_paper.solve(chain, np.array(point), np.array(rotation).reshape(3, 3), q, options)
     assert np.all(end.angles_rad >= LOW[1])
     assert np.all(end.angles_rad <= HIGH[1])
     assert end.iterations <= 50
@@ -95,18 +102,21 @@ def test_a_box_keeps_its_solution(seed: int, decades: float, broken: bool) -> No
         H[rng.integers(4), rng.integers(4)] = rng.choice([np.nan, np.inf, -1.0])
     low = rng.uniform(-1.0, 0.0, 4)
     high = low + rng.choice([0.0, 1.0], 4)
-    box_qp(H, g, low, high, x, np.empty((5, 4)), np.empty((2, 4), np.int64))
+    box_qp(H, g, low, high, x, workspace(4))
     assert np.all(x >= low)
     assert np.all(x <= high)
 
 
 @few
 @given(st.lists(st.tuples(st.tuples(near, near, near), inverse), min_size=6, max_size=6))
-def test_a_start_from_nonsense(found: list) -> None:
-    where = [place_of(MODEL, name) for name in BASIC_LANDMARKS]
-    columns = [np.array([place[i] for place in where]) for i in range(4)]
-    marks = Marks(*columns, np.array([p for p, _ in found]), np.array([(s,) * 3 for _, s in found]))
-    cost, R, t, q, information = begin(CHAINS, unknown(habit(MODEL)), marks)
+def test_an_initialisation_from_nonsense(found: list) -> None:
+    observed = {
+        name: Observation(np.array(p), np.full(3, s), True)
+        for name, (p, s) in zip(BASIC_LANDMARKS, found, strict=True)
+    }
+    observations = observation_arrays(hand_landmarks(MODEL), observed)
+    prior = uninformed_prior(posture_prior(MODEL))
+    cost, (R, t, q), information = initialise(CHAINS, prior, observations)
     assert _inside(q)
     assert np.isfinite(cost)
     assert np.all(np.isfinite(t))
@@ -114,7 +124,7 @@ def test_a_start_from_nonsense(found: list) -> None:
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
 
 
-looks = st.lists(
+messages = st.lists(
     st.tuples(
         st.integers(0, 2 * 10**9),
         st.dictionaries(st.sampled_from(BASIC_LANDMARKS), st.tuples(near, near, near, inverse)),
@@ -124,23 +134,26 @@ looks = st.lists(
 
 
 @few
-@given(looks)
-def test_a_hand_followed_through_nonsense(looks: list) -> None:
-    tracker, stamp = HandTracker(MODEL, places(MODEL)), 0
+@given(messages)
+def test_a_hand_followed_through_nonsense(messages: list) -> None:
+    tracker, stamp = HandTracker(MODEL, hand_landmarks(MODEL)), 0
     start = {
         name: (0.01 * i, 0.05 if i else 0.0, 0.5, 1e3) for i, name in enumerate(BASIC_LANDMARKS)
     }
-    for wait, seen in [(0, start), *looks]:
+    for wait, points in [(0, start), *messages]:
         stamp += wait
-        look = tracker.look(
-            stamp, {name: Seen(np.array(v[:3]), np.full(3, v[3]), True) for name, v in seen.items()}
-        )
-        if look is not None:
-            assert _inside(look.angles_rad)
-            assert np.all(np.isfinite(look.covariance))
-            assert np.all(np.diag(look.covariance) > 0.0)
-            assert np.all(np.isfinite(look.position_m))
-            np.testing.assert_allclose(look.rotation @ look.rotation.T, np.eye(3), atol=1e-6)
+        observed = {
+            name: Observation(np.array(v[:3]), np.full(3, v[3]), True) for name, v in points.items()
+        }
+        estimate = tracker.track(stamp, observed)
+        if estimate is not None:
+            assert _inside(estimate.angles_rad)
+            assert np.all(np.isfinite(estimate.covariance))
+            assert np.all(np.diag(estimate.covariance) > 0.0)
+            assert np.all(np.isfinite(estimate.position_m))
+            np.testing.assert_allclose(
+                estimate.rotation @ estimate.rotation.T, np.eye(3), atol=1e-6
+            )
 
 
 number = st.one_of(st.floats(-0.2, 0.2), st.sampled_from([0.0, 1e-12]))
@@ -207,14 +220,12 @@ def test_any_hand_that_a_file_may_describe(model: HandModel, found: list, method
 def test_targets_at_the_root_of_bones_without_length(
     bones: tuple[float, ...], point: tuple[float, ...]
 ) -> None:
-    chain = k.chain_of(CHAINS, 1)._replace(
+    chain = digit_chain(CHAINS, 1)._replace(
         lengths=np.array(bones), tool=np.array([0.0, 0.0, -bones[2]])
     )
     q = np.array([0.0, 0.3, 0.3, 0.2])
-    used, left, state = dls.solve(chain, dls.goal(dls.COUPLED, np.array(point)), q, 60, 1e-4)
+    used, left, state = dls.solve(chain, tip_goal(COUPLED, np.array(point)), q, 60, 1e-4)
     assert np.all((q >= chain.limits[:, 0]) & (q <= chain.limits[:, 1]))
     assert used <= 60
     assert np.isfinite(left)
-    assert state != dls.SOLVED or (
-        left <= 1e-4 and k.distance_to(chain, q, np.array(point)) <= 1e-4
-    )
+    assert state != SOLVED or (left <= 1e-4 and tip_distance(chain, q, np.array(point)) <= 1e-4)

@@ -1,25 +1,12 @@
-"""Message building: quaternions, rounding, sources."""
+"""Building the message: rounding, and where joints come from."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_quaternion
 from rhot.hand import JOINT_INDEX
-from services.solver.pose_message import quaternions, rounded, rounded_inside, sources
-
-
-def test_quaternions_are_those_of_transforms() -> None:
-    rng = np.random.default_rng(1)
-    wild = rng.normal(size=(200, 4))
-    # Half turns have w = 0, where careless formulas divide by it.
-    wild[:60, 0] = 0.0
-    wild[:20, 1] = 0.0
-    R = np.array([rotation_from_quaternion(q) for q in wild])
-    ours, theirs = quaternions(R), np.array([quaternion_from_rotation(r) for r in R])
-    assert np.all(ours[:, 0] >= 0.0)
-    np.testing.assert_allclose(np.abs(np.sum(ours * theirs, axis=1)), 1.0, atol=1e-12)
+from services.solver.pose_message import joint_sources, rounded, rounded_within_limits
 
 
 def test_rounding_has_no_negative_zero() -> None:
@@ -28,13 +15,15 @@ def test_rounding_has_no_negative_zero() -> None:
 
 def test_rounding_does_not_leave_the_limits() -> None:
     limits = np.tile([-1.0 / 3.0, 1.0 / 3.0], (5, 4, 1))
-    inside = rounded_inside(np.full((5, 4), 1.0 / 3.0), limits)
+    inside = rounded_within_limits(np.full((5, 4), 1.0 / 3.0), limits)
     assert np.all(inside <= limits[..., 1])
-    assert rounded_inside(np.full((5, 4), 0.1234567), limits)[0, 0] == pytest.approx(0.123457)
+    assert rounded_within_limits(np.full((5, 4), 0.1234567), limits)[0, 0] == pytest.approx(
+        0.123457
+    )
 
 
 def test_sources() -> None:
-    found = sources(
+    found = joint_sources(
         {"wrist", "index_tip", "middle_proximal"}, True, [False, True, True, False, False]
     )
     at = {name: found[JOINT_INDEX[name]] for name in JOINT_INDEX}
@@ -48,4 +37,4 @@ def test_sources() -> None:
         == "solved"
     )
     assert at["ring_distal"] == at["thumb_tip"] == "predicted"
-    assert set(sources(set(), False, [True] * 5)) == {"predicted"}
+    assert set(joint_sources(set(), False, [True] * 5)) == {"predicted"}

@@ -1,5 +1,4 @@
-"""Real hands: a Leap recording of a closing fist, followed finger by finger and as a whole; three
-OpenXR poses as a test of frames.
+"""A real hand: a Leap recording of a closing fist, followed finger by finger and as a whole.
 
 `pytest -rP tests/services/solver/test_real_motion.py` prints the table of docs/notes/solver.md.
 """
@@ -7,8 +6,6 @@ OpenXR poses as a test of frames.
 from __future__ import annotations
 
 import csv
-import itertools
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,14 +19,13 @@ from rhot.geometry.transforms import (
     Array,
     quaternion_from_rotation,
     rotation_from_quaternion,
-    rotation_x,
-    rotation_y,
 )
-from rhot.hand import CHAIN_JOINTS, DIGITS, JOINTS, Digit, HandModel, Paint, default_hand
+from rhot.hand import DIGITS, HandModel, Paint, chain_forward, default_hand
 from rhot.messages import HandPoint, HandPoints
 from services.solver.finger import analytic, dls, fabrik
+from services.solver.finger.dls_equations import COUPLED, tip_goal
 from services.solver.finger.swing_limits import BOX
-from services.solver.maths import kinematics as k
+from services.solver.maths.chains import Chain
 from services.solver.step import SolverStep
 
 FINGERS = ("index", "middle", "ring", "little")
@@ -44,8 +40,9 @@ SAME = 1.0
 
 @dataclass(frozen=True)
 class Recording:
-    """Joints (frames, 5, 4, 3) in metres, palm (frames, 3), wrist frame axes (frames, 3, 3),
-    stamps.
+    """A recorded hand.
+
+    Joints (frames, 5, 4, 3) in metres, palm (frames, 3), wrist frame axes (frames, 3, 3), stamps.
     """
 
     joints_m: Array
@@ -82,8 +79,9 @@ def fist(rhot_data: Path) -> Recording:
 
 
 def _own_angles(rec: Recording, row: int, base: Array) -> Array:
-    """The recording's own angles (frames, 4) in a base frame fixed to the palm: what our chain
-    would call them.
+    """The recording's own angles (frames, 4): what our chain would call them.
+
+    In a base frame fixed to the palm.
     """
     bones = np.diff(rec.joints_m[:, row], axis=1)
     bones = np.einsum(
@@ -100,8 +98,9 @@ def _own_angles(rec: Recording, row: int, base: Array) -> Array:
 
 
 def _base(rec: Recording, row: int) -> Array:
-    """The finger's axes at zero angles in the palm: y, the axis of abduction, is what all its axes
-    of flexion are square to.
+    """The finger's axes at zero angles in the palm; (3, 3).
+
+    y, the axis of abduction, is what all its axes of flexion are square to.
     """
     bones = np.einsum(
         "nij,nkj->nki", np.swapaxes(rec.axes, 1, 2), np.diff(rec.joints_m[:, row], axis=1)
@@ -116,11 +115,9 @@ def _base(rec: Recording, row: int) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _chain(rec: Recording, row: int) -> k.Chain:
+def _chain(rec: Recording, row: int) -> Chain:
     lengths = np.linalg.norm(np.diff(rec.joints_m[:, row], axis=1), axis=2).mean(axis=0)
-    return k.Chain(
-        lengths, np.array([0.0, 0.0, -lengths[2]]), np.array(WIDE), np.array([SAME, 1.0])
-    )
+    return Chain(lengths, np.array([0.0, 0.0, -lengths[2]]), np.array(WIDE), np.array([SAME, 1.0]))
 
 
 def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
@@ -136,7 +133,8 @@ def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
     share = 100.0 * np.mean(left_m <= 1e-4)
     print(
         f"{what:16s} tips within 0.1 mm {share:5.1f} %, worst {1e3 * np.max(left_m):.3f} mm; "
-        f"MCP {off[0]:4.1f} PIP {off[1]:4.1f} DIP {off[2]:4.1f} deg; jumps {int((jumps & ~theirs).sum())} (recording: {int(theirs.sum())})"
+        f"MCP {off[0]:4.1f} PIP {off[1]:4.1f} DIP {off[2]:4.1f} deg; "
+        f"jumps {int((jumps & ~theirs).sum())} (recording: {int(theirs.sum())})"
     )
     assert not np.any(jumps & ~theirs)
     return off
@@ -145,8 +143,9 @@ def _compare(what: str, found: Array, own: Array, left_m: Array) -> Array:
 @pytest.mark.parametrize("name", FINGERS)
 @pytest.mark.parametrize("method", ["dls", "fabrik", "analytic"])
 def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, method: str) -> None:
-    """Tip within 0.1 mm, joints within 1.5 mm of the sensor's, no jump that the recording does not
-    have.
+    """Tip within 0.1 mm, joints within 1.5 mm of the sensor's.
+
+    And no jump that the recording does not have.
     """
     row = DIGITS.index(name)
     chain, base = _chain(fist, row), _base(fist, row)
@@ -154,7 +153,7 @@ def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, metho
     for frame, joints in enumerate(fist.joints_m[:, row]):
         point = (fist.axes[frame] @ base).T @ (joints[3] - joints[0])
         if method == "dls":
-            _, left, _ = dls.solve(chain, dls.goal(dls.COUPLED, point), q, 60, 1e-4)
+            _, left, _ = dls.solve(chain, tip_goal(COUPLED, point), q, 60, 1e-4)
         elif method == "fabrik":
             _, left, _ = fabrik.solve(chain, point, q, BOX, 1000, 5e-5)
         else:
@@ -165,14 +164,8 @@ def test_the_fist_is_followed_from_mcp_and_tip(fist: Recording, name: str, metho
         lefts.append(left)
         assert np.all((q >= chain.limits[:, 0]) & (q <= chain.limits[:, 1]))
         found.append(q.copy())
-        elbow = (
-            fist.axes[frame]
-            @ base
-            @ rotation_y(q[0])
-            @ rotation_x(-q[1])
-            @ np.array([0.0, 0.0, -chain.lengths[0]])
-        )
-        gaps.append(np.linalg.norm(joints[0] + elbow - joints[1]))
+        positions, _ = chain_forward(fist.axes[frame] @ base, joints[0], chain.lengths, q)
+        gaps.append(np.linalg.norm(positions[1] - joints[1]))
     off = _compare(
         f"{method} {name}",
         np.array(found)[:, None],
@@ -252,90 +245,3 @@ def test_the_fist_is_followed_from_wrist_and_tips(fist: Recording, angles_of: Ca
     assert np.max(gaps) < 3e-4
     assert np.rad2deg(np.mean(turns)) < 18.0
     assert off.mean() < 9.0
-
-
-def _openxr_poses(folder: Path) -> dict[str, dict[str, Array]]:
-    """Joint name -> 4x4 in the wrist's frame, for each recorded pose."""
-    bones = {
-        "metacarpal": "metacarpal",
-        "tip": "tip",
-        **{b: f"phalanx-{b}" for b in ("proximal", "intermediate", "distal")},
-    }
-    poses = {}
-    for path in sorted((folder / "hand_motion/openxr_poses").glob("*.json")):
-        read = json.loads(path.read_text())["jointTransforms"]
-        found = {"wrist": read["wrist"]}
-        for name in JOINTS[2:]:
-            digit, bone = name.split("_")
-            digit = {"thumb": "thumb", "little": "pinky-finger"}.get(digit, f"{digit}-finger")
-            found[name] = read[f"{digit}-{bones[bone]}"]
-        matrices = {
-            name: np.array(joint["offsetMatrix"]).reshape(4, 4).T for name, joint in found.items()
-        }
-        back = np.linalg.inv(matrices["wrist"])
-        poses[path.stem] = {name: back @ T for name, T in matrices.items()}
-    return poses
-
-
-def test_recorded_poses_are_of_a_left_hand_in_our_frames(rhot_data: Path) -> None:
-    """Thumb on +x, -z along every bone, +y out of the back, flexion about -x: what rhot/hand.py
-    says of frames.
-    """
-    table = default_hand("left")
-    for pose in _openxr_poses(rhot_data).values():
-        assert pose["thumb_tip"][0, 3] > pose["little_tip"][0, 3]
-        assert pose["index_proximal"][0, 3] > pose["little_proximal"][0, 3]
-        for row, digit in enumerate(table.digits):
-            names = [JOINTS[joint] for joint in CHAIN_JOINTS[row]]
-            for near, far in itertools.pairwise(names[:3]):
-                bone = pose[far][:3, 3] - pose[near][:3, 3]
-                np.testing.assert_allclose(
-                    -pose[near][:3, 2], bone / np.linalg.norm(bone), atol=1e-3
-                )
-            # The table's knuckles are where a real hand has them, to the width of a finger.
-            assert np.linalg.norm(pose[names[0]][:3, 3] - digit.base_m) < 0.02
-
-
-def _openxr_digit(
-    pose: dict[str, Array], row: int, digit: Digit
-) -> tuple[k.Chain, Array, Array, Array]:
-    """Chain with the pose's own bone lengths, its base, the tip and the last bone's axes in the
-    canonical frame.
-    """
-    joints = [pose[JOINTS[joint]] for joint in CHAIN_JOINTS[row]]
-    base = rotation_from_quaternion(digit.base_wxyz)
-    lengths = np.array([np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in itertools.pairwise(joints)])
-    limits = np.array(digit.limits_rad) + np.deg2rad(
-        [[-25.0, 25.0], [-25.0, 15.0], [-15.0, 10.0], [-35.0, 10.0]]
-    )
-    chain = k.Chain(lengths, np.array([0.0, 0.0, -lengths[2]]), limits, np.array([2 / 3, 1.0]))
-    target = k.to_canonical(joints[0][:3, 3], base, -1.0, joints[3][:3, 3])
-    mirror = np.diag([-1.0, 1.0, 1.0])
-    return chain, base, target, mirror @ base.T @ joints[2][:3, :3] @ mirror
-
-
-@pytest.mark.parametrize("name", FINGERS)
-def test_recorded_poses_are_reproduced(rhot_data: Path, name: str) -> None:
-    """From knuckle and tip pose: tip within 0.1 mm, joints within 5 mm.
-
-    Real fingers twist by some degrees, ours do not.
-    """
-    row = DIGITS.index(name)
-    for stem, pose in _openxr_poses(rhot_data).items():
-        digit = default_hand("left").digits[row]
-        chain, base, target, axes = _openxr_digit(pose, row, digit)
-        q = np.zeros(4)
-        dls.solve(chain, dls.goal(dls.POSE, target, axes), q, 60, 1e-4)
-        dls.solve(chain, dls.goal(dls.POSITION, target), q, 60, 1e-4)
-        tip_off = np.linalg.norm(k.tip(chain, q) - target)
-        assert tip_off < 1e-4
-        joint_off = []
-        R, p = base @ rotation_y(-q[0]), pose[JOINTS[CHAIN_JOINTS[row][0]]][:3, 3]
-        for flexion, length, joint in zip(q[1:], chain.lengths, CHAIN_JOINTS[row][1:], strict=True):
-            R = R @ rotation_x(-flexion)
-            p = p - length * R[:, 2]
-            joint_off.append(np.linalg.norm(p - pose[JOINTS[joint]][:3, 3]))
-        assert max(joint_off) < 5e-3
-        print(
-            f"{stem:8s} {name:7s} tip {1e3 * tip_off:.2f} mm, joints within {1e3 * max(joint_off):.1f} mm"
-        )

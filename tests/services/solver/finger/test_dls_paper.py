@@ -1,6 +1,4 @@
-"""The finger study's damped least squares: its order of iterations under our reading, and what the
-other readings do.
-"""
+"""The finger study's damped least squares, as we read it, and what the other readings do."""
 
 from __future__ import annotations
 
@@ -12,15 +10,18 @@ import pytest
 from rhot.hand import default_hand
 from services.solver.finger import dls_paper as paper
 from services.solver.finger.dls import NOT_CONVERGED
-from services.solver.maths import kinematics as k
+from services.solver.maths.chains import digit_chain, hand_chains, scale_chain
+from services.solver.maths.kinematics import tip_jacobian
 
-INDEX = k.chain_of(k.hand_chains(default_hand()), 1)
+INDEX = digit_chain(hand_chains(default_hand()), 1)
 
 
-def _follow(grasp: np.ndarray, reading: paper.Reading) -> tuple[list[paper.Frame], float]:
-    q, frames, last = np.array(paper.FIRST), [], 0.0
+def _follow(
+    grasp: np.ndarray, options: paper.Options, tip_pose: Callable
+) -> tuple[list[paper.Solution], float]:
+    q, frames, last = np.array(paper.INITIAL_ANGLES_RAD), [], 0.0
     for angles in grasp:
-        frame = paper.solve(INDEX, *k.tip_reference(INDEX, angles), q, reading)
+        frame = paper.solve(INDEX, *tip_pose(INDEX, angles), q, options)
         q = frame.angles_rad
         frames.append(frame)
         last = float(np.abs(q - angles).max())
@@ -28,11 +29,13 @@ def _follow(grasp: np.ndarray, reading: paper.Reading) -> tuple[list[paper.Frame
 
 
 @pytest.mark.parametrize("form", ["normal", "svd"])
-def test_the_studys_order_of_iterations(form: paper.Form, grasp: Callable) -> None:
+def test_the_studys_order_of_iterations(
+    form: paper.Form, grasp: Callable, tip_pose: Callable
+) -> None:
     rng = np.random.default_rng(1)
     first, later, worst = [], [], []
     for _ in range(20):
-        frames, error = _follow(grasp(rng), paper.Reading(form=form))
+        frames, error = _follow(grasp(rng), paper.Options(form=form), tip_pose)
         first.append(frames[0].iterations)
         later.extend(frame.iterations for frame in frames[1:])
         worst.append(error)
@@ -43,23 +46,20 @@ def test_the_studys_order_of_iterations(form: paper.Form, grasp: Callable) -> No
     assert np.median(worst) < np.deg2rad(0.1)
 
 
-def test_taken_literally_it_does_not_stay_in_the_limits(grasp: Callable) -> None:
-    """Nothing but the damping keeps the angles in their range, and from the study's start it does
-    not.
-    """
+def test_taken_literally_it_does_not_stay_in_the_limits(
+    grasp: Callable, tip_pose: Callable
+) -> None:
+    """Only the damping keeps the angles in their range, and from the study's start it does not."""
     rng = np.random.default_rng(2)
     for _ in range(5):
-        frames, _ = _follow(grasp(rng), paper.Reading(clip=False))
+        frames, _ = _follow(grasp(rng), paper.Options(clip=False), tip_pose)
         assert frames[-1].angles_rad[2] < -0.01 or np.abs(frames[-1].angles_rad).max() > np.pi
 
 
 def test_the_printed_filter_diverges_near_a_singularity() -> None:
-    """sigma / (sigma + lambda^2), as printed, tends to 1 and not to 1 / sigma: steps come out in
-    the wrong unit.
-    """
+    """sigma / (sigma + lambda^2), as printed, tends to 1, not to 1 / sigma: the unit is wrong."""
     p, J = np.empty(3), np.empty((6, 4))
-    jac = k.scaled(INDEX, 1e3)
-    k.jacobian(jac, np.array([0.0, 0.5, 0.5, 0.3]), p, J)
+    tip_jacobian(scale_chain(INDEX, 1e3), np.array([0.0, 0.5, 0.5, 0.3]), p, J)
     e = J @ np.array([0.0, 1e-3, 1e-3, 1e-3])
     U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
     printed = Vt.T @ (sigma / (sigma + 0.01) * (U.T @ e))
@@ -71,7 +71,7 @@ def test_the_printed_filter_diverges_near_a_singularity() -> None:
 def test_both_forms_agree_far_from_limits() -> None:
     p, J = np.empty(3), np.empty((6, 4))
     q = INDEX.limits.mean(axis=1)
-    k.jacobian(k.scaled(INDEX, 1e3), q, p, J)
+    tip_jacobian(scale_chain(INDEX, 1e3), q, p, J)
     factors = paper.damping(q, INDEX.limits)
     np.testing.assert_allclose(factors, [0.0, 0.0, 0.0, 0.0, 0.7, 0.7], atol=1e-12)
     e = J @ np.array([0.01, 0.02, -0.01, 0.01])
@@ -95,7 +95,7 @@ def test_damping_grows_at_the_limits() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_absurd_targets(bad: float) -> None:
     frame = paper.solve(
-        INDEX, np.full(3, bad), np.eye(3), np.array([9.0, 0.1, 0.1, 0.1]), paper.Reading()
+        INDEX, np.full(3, bad), np.eye(3), np.array([9.0, 0.1, 0.1, 0.1]), paper.Options()
     )
-    assert frame.state == NOT_CONVERGED
+    assert frame.outcome == NOT_CONVERGED
     assert np.all(frame.angles_rad <= INDEX.limits[:, 1])

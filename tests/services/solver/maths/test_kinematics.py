@@ -1,23 +1,43 @@
-"""Kinematics: kernels against their plain twins, finite differences, the finger study's printed
-Jacobian, rhot.hand.forward.
-"""
+"""Compiled kinematics: against rhot.hand, finite differences, the finger study's Jacobian."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from rhot.geometry.transforms import rotation_from_quaternion
-from rhot.hand import DIGITS, HandName, default_hand, forward, landmark_point
-from services.solver.maths import kinematics as k
+from rhot.geometry.transforms import (
+    rotation_from_quaternion,
+    rotation_from_vector,
+    rotation_x,
+    rotation_z,
+    transform,
+)
+from rhot.hand import (
+    CHAIN_JOINTS,
+    DIGITS,
+    HANDS,
+    HandName,
+    chain_forward,
+    default_hand,
+    forward,
+    landmark_point,
+)
+from services.solver.maths.chains import Chain, canonical_from_wrist, digit_chain, hand_chains
+from services.solver.maths.kinematics import (
+    digit_frames,
+    hand_frames,
+    tip_jacobian,
+    tip_position,
+    tip_rotation,
+)
 
-NAMES: tuple[HandName, ...] = ("right", "left")
 
-
-def _random(seed: int) -> tuple[k.Chain, np.ndarray]:
+def _random(seed: int) -> tuple[Chain, np.ndarray]:
     rng = np.random.default_rng(seed)
     limits = np.array([[-0.3, 0.3], [-0.4, 1.6], [0.0, 1.9], [-0.5, 1.6]])
-    chain = k.Chain(
+    chain = Chain(
         rng.uniform(0.02, 0.05, 3),
         np.array([*rng.normal(0.0, 0.003, 2), -0.013]),
         limits,
@@ -26,30 +46,40 @@ def _random(seed: int) -> tuple[k.Chain, np.ndarray]:
     return chain, rng.uniform(limits[:, 0], limits[:, 1])
 
 
+def _geometric_jacobian(chain: Chain, q: np.ndarray) -> np.ndarray:
+    """From axes and lever arms (axis x arm), by the plain kinematics of rhot.hand; (6, 4)."""
+    roots, frames = chain_forward(np.eye(3), np.zeros(3), chain.lengths, q)
+    point = roots[2] + frames[2] @ chain.tool
+    # Abduction turns about y, the flexions about -x of their joints; two share the root.
+    axes = np.array([[0.0, 1.0, 0.0], *(-frames[:3, :, 0])])
+    arms = point - roots[[0, 0, 1, 2]]
+    return np.vstack([np.cross(axes, arms).T, axes.T])
+
+
 @pytest.mark.parametrize("seed", range(20))
-def test_kernels_equal_their_plain_twins(seed: int) -> None:
+def test_one_digit_agrees_with_the_hand_model(seed: int, tip_pose: Callable) -> None:
     chain, q = _random(seed)
-    point, axes = k.tip_reference(chain, q)
+    point, axes = tip_pose(chain, q)
     p, J = np.empty(3), np.empty((6, 4))
-    k.jacobian(chain, q, p, J)
-    np.testing.assert_allclose(k.tip(chain, q), point, atol=1e-15)
+    tip_jacobian(chain, q, p, J)
+    np.testing.assert_allclose(tip_position(chain, q), point, atol=1e-15)
     np.testing.assert_allclose(p, point, atol=1e-15)
-    np.testing.assert_allclose(k.tip_rotation(q), axes, atol=1e-15)
-    np.testing.assert_allclose(J, k.jacobian_reference(chain, q), atol=1e-15)
+    np.testing.assert_allclose(tip_rotation(q), axes, atol=1e-15)
+    np.testing.assert_allclose(J, _geometric_jacobian(chain, q), atol=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_jacobian_is_the_derivative(seed: int) -> None:
     chain, q = _random(seed)
     p, J = np.empty(3), np.empty((6, 4))
-    k.jacobian(chain, q, p, J)
+    tip_jacobian(chain, q, p, J)
     for j in range(4):
         h = np.zeros(4)
         h[j] = 1e-6
-        linear = (k.tip(chain, q + h) - k.tip(chain, q - h)) / 2e-6
+        linear = (tip_position(chain, q + h) - tip_position(chain, q - h)) / 2e-6
         np.testing.assert_allclose(J[:3, j], linear, atol=1e-9)
         # R' R^T is the cross product matrix of the axis.
-        spin = (k.tip_rotation(q + h) - k.tip_rotation(q - h)) / 2e-6 @ k.tip_rotation(q).T
+        spin = (tip_rotation(q + h) - tip_rotation(q - h)) / 2e-6 @ tip_rotation(q).T
         np.testing.assert_allclose(J[3:, j], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-9)
 
 
@@ -75,15 +105,8 @@ def _study_a1(theta: np.ndarray, length: np.ndarray) -> np.ndarray:
 
 def _dh(theta: float, a: float, alpha: float) -> np.ndarray:
     """One standard Denavit-Hartenberg row, R_z(theta) T_x(a) R_x(alpha)."""
-    c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-    return np.array(
-        [
-            [c, -s * ca, s * sa, a * c],
-            [s, c * ca, -c * sa, a * s],
-            [0.0, sa, ca, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    turn = transform(rotation_z(theta), np.zeros(3))
+    return turn @ transform(rotation_x(alpha), (a, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -99,41 +122,69 @@ def test_the_studys_jacobian_is_ours_with_its_axes_renamed(seed: int) -> None:
     T = np.eye(4)
     for angle, a, alpha in rows:
         T = T @ _dh(angle, a, alpha)
-    np.testing.assert_allclose(rename @ k.tip(chain, q), T[:3, 3], atol=1e-15)
+    np.testing.assert_allclose(rename @ tip_position(chain, q), T[:3, 3], atol=1e-15)
     p, J = np.empty(3), np.empty((6, 4))
-    k.jacobian(chain, q, p, J)
+    tip_jacobian(chain, q, p, J)
     ours = np.vstack([rename @ J[:3], rename @ J[3:]]) * [-1.0, 1.0, 1.0, 1.0]
     np.testing.assert_allclose(ours, _study_a1(theta, chain.lengths), atol=1e-15)
 
 
-@pytest.mark.parametrize("hand", NAMES)
+@pytest.mark.parametrize("hand", HANDS)
 def test_hand_frames_equal_the_hand_model(hand: HandName) -> None:
     model = default_hand(hand)
-    chains = k.hand_chains(model)
+    chains = hand_chains(model)
     rng = np.random.default_rng(3)
     for _ in range(20):
         R, t = rotation_from_quaternion(rng.normal(size=4)), rng.normal(size=3)
         angles = rng.uniform(model.limits_rad[..., 0], model.limits_rad[..., 1])
         positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
-        k.hand_frames(chains, R, t, angles, positions, rotations)
+        hand_frames(chains, R, t, angles, positions, rotations)
         expected = forward(model, R, t, angles)
         np.testing.assert_allclose(positions, expected[0], atol=1e-14)
         np.testing.assert_allclose(rotations, expected[1], atol=1e-14)
 
 
-@pytest.mark.parametrize("hand", NAMES)
+@pytest.mark.parametrize("hand", HANDS)
+def test_digit_frames_agree_with_the_hand_model(hand: HandName) -> None:
+    model, rng = default_hand(hand), np.random.default_rng(5)
+    chains = hand_chains(model)
+    for _ in range(20):
+        angles = rng.uniform(model.limits_rad[..., 0], model.limits_rad[..., 1])
+        frames = digit_frames(chains, angles)
+        positions, rotations = forward(model, np.eye(3), np.zeros(3), angles)
+        np.testing.assert_allclose(frames.roots_m, positions[CHAIN_JOINTS], atol=1e-12)
+        np.testing.assert_allclose(frames.rotations, rotations[CHAIN_JOINTS], atol=1e-12)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+def test_digit_frames_have_the_axes_of_the_angles(hand: HandName) -> None:
+    """Turning a digit about an axis is what its angle does, by finite differences."""
+    model, h = default_hand(hand), 1e-6
+    angles = np.random.default_rng(6).uniform(model.limits_rad[..., 0], model.limits_rad[..., 1])
+    axes = digit_frames(hand_chains(model), angles).axes
+    _, before = forward(model, np.eye(3), np.zeros(3), angles)
+    for row, tip in enumerate(CHAIN_JOINTS[:, 3]):
+        for a in range(4):
+            moved = angles.copy()
+            moved[row, a] += h
+            _, after = forward(model, np.eye(3), np.zeros(3), moved)
+            turned = rotation_from_vector(h * axes[row, a]) @ before[tip]
+            np.testing.assert_allclose(after[tip], turned, atol=1e-11)
+
+
+@pytest.mark.parametrize("hand", HANDS)
 def test_a_chain_ends_in_the_painted_tip(hand: HandName) -> None:
     model = default_hand(hand)
-    chains = k.hand_chains(model)
+    chains = hand_chains(model)
     angles = np.random.default_rng(4).uniform(model.limits_rad[..., 0], model.limits_rad[..., 1])
     joints = forward(model, np.eye(3), np.zeros(3), angles)
     for row, name in enumerate(DIGITS):
         point = landmark_point(model, f"{name}_tip", *joints)
-        canonical = k.to_canonical(
+        canonical = canonical_from_wrist(
             chains.base_m[row], chains.base_rotation[row], chains.side, point
         )
         np.testing.assert_allclose(
-            k.tip(k.chain_of(chains, row), angles[row]), canonical, atol=1e-14
+            tip_position(digit_chain(chains, row), angles[row]), canonical, atol=1e-14
         )
 
 

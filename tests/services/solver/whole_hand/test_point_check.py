@@ -1,4 +1,4 @@
-"""Which points are let in."""
+"""Which points of a message are used."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import pytest
 
 from rhot.hand import LANDMARKS, forward, landmark_point
 from rhot.messages import HandPoints
-from services.solver.whole_hand.point_check import places, usable
+from services.solver.whole_hand.landmarks import Landmark, hand_landmarks
+from services.solver.whole_hand.point_check import usable_points
 
 
 @pytest.fixture
@@ -19,49 +20,54 @@ def message(world: Callable) -> HandPoints:
     return ours.message(ours.points(ours.motion(1, 1)[0]), 0)
 
 
+@pytest.fixture
+def landmarks(world: Callable) -> dict[str, Landmark]:
+    return hand_landmarks(world("right").model)
+
+
 def _replaced(message: HandPoints, index: int, **fields: object) -> HandPoints:
     points = list(message.points)
     points[index] = msgspec.structs.replace(points[index], **fields)
     return msgspec.structs.replace(message, points=points)
 
 
-def test_good_points_pass(message: HandPoints, world: Callable) -> None:
-    seen = usable(message, places(world("right").model))
-    assert list(seen) == [point.name for point in message.points]
-    assert all(landmark.measured for landmark in seen.values())
-    np.testing.assert_allclose(seen["wrist"].inverse_sigma, 1e3)
+def test_good_points_pass(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
+    observed = usable_points(message, landmarks)
+    assert list(observed) == [point.name for point in message.points]
+    assert all(observation.measured for observation in observed.values())
+    np.testing.assert_allclose(observed["wrist"].inverse_sigma, 1e3)
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, np.nan, np.inf, 11.0])
-def test_absurd_places_are_dropped(message: HandPoints, world: Callable, value: float) -> None:
-    seen = usable(_replaced(message, 2, position_m=(0.0, value, 0.5)), places(world("right").model))
-    assert list(seen) == [point.name for i, point in enumerate(message.points) if i != 2]
+def test_absurd_positions_are_dropped(
+    message: HandPoints, landmarks: dict[str, Landmark], value: float
+) -> None:
+    observed = usable_points(_replaced(message, 2, position_m=(0.0, value, 0.5)), landmarks)
+    assert list(observed) == [point.name for i, point in enumerate(message.points) if i != 2]
 
 
 @pytest.mark.parametrize("sigma", [np.nan, np.inf, 1e300, 0.2])
 def test_points_that_know_nothing_are_dropped(
-    message: HandPoints, world: Callable, sigma: float
+    message: HandPoints, landmarks: dict[str, Landmark], sigma: float
 ) -> None:
-    assert (
-        len(
-            usable(_replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3)), places(world("right").model))
-        )
-        == 5
-    )
+    vague = _replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3))
+    assert len(usable_points(vague, landmarks)) == 5
 
 
-def test_too_good_a_sigma_is_not_believed(message: HandPoints, world: Callable) -> None:
-    seen = usable(_replaced(message, 1, sigma_m=(0.0, 0.0, 0.0)), places(world("right").model))
-    assert np.all(seen["thumb_tip"].inverse_sigma < 1e4)
+def test_too_good_a_sigma_is_not_believed(
+    message: HandPoints, landmarks: dict[str, Landmark]
+) -> None:
+    observed = usable_points(_replaced(message, 1, sigma_m=(0.0, 0.0, 0.0)), landmarks)
+    assert np.all(observed["thumb_tip"].inverse_sigma < 1e4)
 
 
-def test_predicted_points_weigh_less(message: HandPoints, world: Callable) -> None:
-    seen = usable(_replaced(message, 1, source="predicted"), places(world("right").model))
-    assert not seen["thumb_tip"].measured
-    np.testing.assert_allclose(seen["thumb_tip"].inverse_sigma, 1e3 / 3.0)
+def test_predicted_points_weigh_less(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
+    observed = usable_points(_replaced(message, 1, source="predicted"), landmarks)
+    assert not observed["thumb_tip"].measured
+    np.testing.assert_allclose(observed["thumb_tip"].inverse_sigma, 1e3 / 3.0)
 
 
-def test_unknown_names_and_repetitions(message: HandPoints, world: Callable) -> None:
+def test_unknown_names_and_repetitions(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
     twice = msgspec.structs.replace(
         message,
         points=[
@@ -70,29 +76,29 @@ def test_unknown_names_and_repetitions(message: HandPoints, world: Callable) -> 
         ],
     )
     nose = _replaced(twice, 3, name="nose")
-    seen = usable(nose, places(world("right").model))
-    assert set(seen) == {point.name for point in message.points} - {message.points[3].name}
-    np.testing.assert_array_equal(seen["wrist"].point_m, message.points[0].position_m)
+    observed = usable_points(nose, landmarks)
+    assert set(observed) == {point.name for point in message.points} - {message.points[3].name}
+    np.testing.assert_array_equal(observed["wrist"].point_m, message.points[0].position_m)
 
 
 @pytest.mark.parametrize("index", [0, 1, 4])
 def test_a_point_of_another_hand_is_dropped(
-    message: HandPoints, world: Callable, index: int
+    message: HandPoints, landmarks: dict[str, Landmark], index: int
 ) -> None:
-    place = np.array(message.points[index].position_m) + np.array([0.6, 0.0, 0.0])
-    seen = usable(_replaced(message, index, position_m=tuple(place)), places(world("right").model))
-    assert message.points[index].name not in seen
-    assert len(seen) == 5
+    moved = np.array(message.points[index].position_m) + np.array([0.6, 0.0, 0.0])
+    observed = usable_points(_replaced(message, index, position_m=tuple(moved)), landmarks)
+    assert message.points[index].name not in observed
+    assert len(observed) == 5
 
 
 def test_no_posture_of_a_hand_is_taken_for_two_hands(world: Callable) -> None:
     ours = world("right")
-    known = places(ours.model)
+    landmarks = hand_landmarks(ours.model)
     for instant in ours.motion(2, 60):
         joints = forward(ours.model, instant.rotation, instant.position_m, instant.angles_rad)
         everything = {name: landmark_point(ours.model, name, *joints) for name in LANDMARKS}
-        assert len(usable(ours.message(everything, 0), known)) == len(LANDMARKS)
+        assert len(usable_points(ours.message(everything, 0), landmarks)) == len(LANDMARKS)
 
 
-def test_nothing_is_no_error(message: HandPoints, world: Callable) -> None:
-    assert usable(msgspec.structs.replace(message, points=[]), places(world("right").model)) == {}
+def test_nothing_is_no_error(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
+    assert usable_points(msgspec.structs.replace(message, points=[]), landmarks) == {}

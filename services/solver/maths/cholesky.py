@@ -1,0 +1,83 @@
+"""Cholesky factorisations for the kernels: a 4x4 Newton step and the inverse of a covariance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rhot.geometry.transforms import Array
+
+
+@njit(cache=True)
+def newton_step4(H: Array, g: Array, x: Array) -> bool:
+    """Solve H x = -g for H (4, 4), g (4,) into x (4,): the minimum of 1/2 x'Hx + g'x.
+
+    LDL' written out, in a third of the time of loops. False, and x undefined, where H is not
+    positive definite.
+    """
+    d0 = H[0, 0]
+    if not d0 > 0.0:
+        return False
+    r0 = 1.0 / d0
+    l10, l20, l30 = H[1, 0] * r0, H[2, 0] * r0, H[3, 0] * r0
+    d1 = H[1, 1] - l10 * H[1, 0]
+    if not d1 > 0.0:
+        return False
+    r1 = 1.0 / d1
+    c21, c31 = H[2, 1] - l20 * H[1, 0], H[3, 1] - l30 * H[1, 0]
+    l21, l31 = c21 * r1, c31 * r1
+    d2 = H[2, 2] - l20 * H[2, 0] - l21 * c21
+    if not d2 > 0.0:
+        return False
+    r2 = 1.0 / d2
+    c32 = H[3, 2] - l30 * H[2, 0] - l31 * c21
+    l32 = c32 * r2
+    d3 = H[3, 3] - l30 * H[3, 0] - l31 * c31 - l32 * c32
+    if not d3 > 0.0:
+        return False
+    y0 = -g[0]
+    y1 = -g[1] - l10 * y0
+    y2 = -g[2] - l20 * y0 - l21 * y1
+    y3 = -g[3] - l30 * y0 - l31 * y1 - l32 * y2
+    x[3] = y3 / d3
+    x[2] = y2 * r2 - l32 * x[3]
+    x[1] = y1 * r1 - l21 * x[2] - l31 * x[3]
+    x[0] = y0 * r0 - l10 * x[1] - l20 * x[2] - l30 * x[3]
+    return True
+
+
+@njit(cache=True)
+def spd_inverse(A: Array) -> Array:
+    """Inverse of a symmetric positive definite matrix (n, n).
+
+    A matrix that is not definite is treated as barely so.
+    """
+    n = A.shape[0]
+    L = np.zeros((n, n))
+    for a in range(n):
+        for b in range(a + 1):
+            total = A[a, b]
+            for k in range(b):
+                total -= L[a, k] * L[b, k]
+            if a == b:
+                L[a, a] = math.sqrt(total) if total > 1e-12 else 1e-6
+            else:
+                L[a, b] = total / L[b, b]
+    M = np.zeros((n, n))  # L^-1
+    for a in range(n):
+        M[a, a] = 1.0 / L[a, a]
+        for b in range(a):
+            total = 0.0
+            for k in range(b, a):
+                total -= L[a, k] * M[k, b]
+            M[a, b] = total / L[a, a]
+    inverse = np.empty((n, n))  # M'M
+    for a in range(n):
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(a, n):
+                total += M[k, a] * M[k, b]
+            inverse[a, b] = inverse[b, a] = total
+    return inverse

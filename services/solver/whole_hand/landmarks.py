@@ -1,0 +1,105 @@
+"""Where painted landmarks sit on the hand, and what was measured of them, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from rhot.hand import JOINTS, HandModel, landmark_point
+from services.solver.maths.box_qp import Integers
+from services.solver.maths.chains import CHAINS, HandChains, hand_chains
+from services.solver.maths.kinematics import hand_frames
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """Where a painted landmark is fixed to the hand."""
+
+    joint: int  # index into JOINTS
+    digit: int  # row of its chain; -1: fixed to the wrist frame
+    depth: int  # how many of the chain's four angles move it
+    offset_m: Array  # (3,) in the joint's frame; in the wrist frame where digit is -1
+    reach_m: float  # the furthest that it can be from the wrist joint
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One measured landmark."""
+
+    point_m: Array  # (3,) rig frame
+    inverse_sigma: Array  # (3,) 1/m along each rig axis
+    measured: bool  # whether a camera saw it; else fusion predicted it
+
+
+class Observations(NamedTuple):
+    """m measured landmarks as arrays; the fields are those of Landmark and Observation."""
+
+    joint: Integers  # (m,)
+    digit: Integers  # (m,)
+    depth: Integers  # (m,)
+    offset_m: Array  # (m, 3)
+    point_m: Array  # (m, 3) rig frame
+    inverse_sigma: Array  # (m, 3) 1/m along each rig axis
+
+
+def hand_landmarks(model: HandModel) -> dict[str, Landmark]:
+    """Every landmark that the model has paint for, by name."""
+    chains = hand_chains(model)
+    # An open hand is at its longest.
+    angles = np.clip(np.zeros((5, 4)), chains.limits_rad[:, :, 0], chains.limits_rad[:, :, 1])
+    positions, rotations = frames_in_wrist(chains, angles)
+    return {
+        name: _landmark(model, name, landmark_point(model, name, positions, rotations))
+        for name in model.paint
+    }
+
+
+def frames_in_wrist(chains: HandChains, angles: Array) -> tuple[Array, Array]:
+    """Positions (26, 3) m and rotations (26, 3, 3) of all joints in the wrist frame.
+
+    At angles (5, 4) rad.
+    """
+    positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
+    hand_frames(chains, np.eye(3), np.zeros(3), angles, positions, rotations)
+    return positions, rotations
+
+
+def observation_arrays(
+    landmarks: Mapping[str, Landmark], observed: Mapping[str, Observation]
+) -> Observations:
+    """What was observed, by landmark, joined with where each landmark sits."""
+    where = [landmarks[name] for name in observed]
+    return Observations(
+        joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
+        digit=np.array([landmark.digit for landmark in where], dtype=np.int64),
+        depth=np.array([landmark.depth for landmark in where], dtype=np.int64),
+        offset_m=_rows([landmark.offset_m for landmark in where]),
+        point_m=_rows([observation.point_m for observation in observed.values()]),
+        inverse_sigma=_rows([observation.inverse_sigma for observation in observed.values()]),
+    )
+
+
+def _landmark(model: HandModel, name: str, open_hand_m: Array) -> Landmark:
+    """One landmark; open_hand_m (3,): where it is on the open hand, wrist frame."""
+    joint = JOINTS.index(name)
+    reach = float(np.linalg.norm(open_hand_m))
+    offset = np.array(model.paint[name].offset_m)
+    found = np.argwhere(joint == CHAINS)
+    if len(found):
+        row, k = (int(v) for v in found[0])
+        return Landmark(joint, row, min(k + 2, 4), offset, reach)
+    metacarpal_m = {digit.name: np.array(digit.metacarpal_m) for digit in model.digits}
+    if name == "palm":
+        offset = offset + 0.5 * (metacarpal_m["middle"] + np.array(model.digits[2].base_m))
+    elif name != "wrist":
+        offset = offset + metacarpal_m[name.removesuffix("_metacarpal")]  # type: ignore[index]
+    return Landmark(joint, -1, 0, offset, reach)
+
+
+def _rows(vectors: list[Array]) -> Array:
+    """(m, 3), also of none."""
+    return np.array(vectors, dtype=np.float64).reshape(-1, 3)
