@@ -52,7 +52,7 @@ PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offli
 # The floors of rhot/, from the lowest: each uses only what is named, and what lies below it.
 FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry"},
-    {"rhot/hand", "rhot/hand_exercises"},
+    {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises"},
     {"rhot/messages", "rhot/camera_messages", "rhot/simulator_messages"},
     {"rhot/topics"},
     {"rhot/files", "rhot/bus"},

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from rhot import topics
 from rhot.bus.bus import open_bus
-from rhot.errors import BusError, CalibrationError, CaptureError
+from rhot.errors import BusError, CalibrationError, CaptureError, RefusedError
 from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import load_rig
 from rhot.messages import Session
@@ -241,7 +241,7 @@ def test_exposure_of_a_camera_without_controls(tracker):
     result = rhot("camera", "left", "--config", tracker)
     assert "source 'simulator' has no exposure to set" in result.stdout
     assert "median brightness" in result.stdout
-    with pytest.raises(CalibrationError, match="has no exposure to set"):
+    with pytest.raises(RefusedError, match="has no exposure to set"):
         rhot("camera", "left", "--config", tracker, "--gain", "2")
 
 
