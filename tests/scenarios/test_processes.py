@@ -17,13 +17,13 @@ import pytest_asyncio
 
 from rhot import clock, topics
 from rhot.bus.bus import open_bus
-from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from rhot.files.calibration import Lens, save
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
 pytestmark = pytest.mark.integration
 # numba's first compilation on a loaded machine takes most of it.
 START_S, RECOVERY_S = 120.0, 0.5
-SETUP = Setup(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, loss=0.0)
+SETUP = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, loss=0.0)
 FUSION = File(sys.executable).parent / "rhot-fusion"
 
 
@@ -34,18 +34,7 @@ def rows(matrix):
 @pytest.fixture
 def rig_toml(tmp_path, router) -> File:
     """The synthetic rig on disk, calibrated."""
-    for camera in SETUP.rig().values():
-        lens = Lens(
-            size_px=camera.size_px,
-            matrix=rows(camera.matrix),
-            distortion=tuple(camera.distortion.tolist()),
-        )
-        save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
-    places = {
-        camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera))
-        for camera in SETUP.rig().values()
-    }
-    save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
+    SETUP.save_calibration(tmp_path / "calibration")
     markers = "\n".join(
         f'{name} = "{color}"' for name, color in SETUP.config().hand["right"].markers.items()
     )
@@ -89,7 +78,7 @@ class Feed:
         publishers = {
             name: self._bus.publisher(topics.MARKERS, camera=name) for name in SETUP.names
         }
-        given = frames(SETUP, Path(), 30.0)
+        given = frames(SETUP, MovingHand(), 30.0)
         begin_ns = clock.now_ns()
         for frame in given:
             late_ns = (frame.stamp_ns - START_NS) - (clock.now_ns() - begin_ns)

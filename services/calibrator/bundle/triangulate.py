@@ -1,7 +1,6 @@
-"""Points from rays of several calibrated cameras, and how well they form a rigid board. Pure.
+"""How well measured points form a rigid board, and rays an epipolar geometry. Pure.
 
-Rays that are NaN (pixels outside the lens model) give NaN points; a point behind a camera comes
-back as it is, and its residual shows it.
+The points are those of rhot.geometry.triangulation.
 """
 
 from __future__ import annotations
@@ -11,39 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rhot.geometry.transforms import Array
-
-
-def triangulate(T_camera_from_rig: Array, rays: Array, focals_px: Array) -> Array:
-    """Points (n, 3) in the rig frame from rays (c, n, 2) of cameras at T (c, 4, 4), weighted by
-    their focal lengths (c,) px.
-
-    Focal lengths may be given for every ray (c, n); 0 leaves one out.
-
-    Iterated linear triangulation (Hartley & Sturm, "Triangulation", 1997, section 5): each round
-    divides an equation by the depth it had before, so that what is minimised are pixels.
-    """
-    focals = np.broadcast_to(
-        focals_px if focals_px.ndim == 2 else focals_px[:, None], rays.shape[:2]
-    )
-    weight = focals
-    points = np.zeros((rays.shape[1], 3))
-    # The second round has the depths; the third changes less than rounding.
-    for _ in range(3):
-        A = (
-            rays[..., None] * T_camera_from_rig[:, None, None, 2, :]
-            - T_camera_from_rig[:, None, :2, :]
-        )  # (c, n, 2, 4)
-        A = A * weight[:, :, None, None]
-        equations = A.transpose(1, 0, 2, 3).reshape(rays.shape[1], 2 * len(rays), 4)
-        normal = np.einsum("nij,nik->njk", equations[..., :3], equations[..., :3])
-        right = -np.einsum("nij,ni->nj", equations[..., :3], equations[..., 3])
-        points = np.linalg.solve(normal, right[..., None])[..., 0]
-        depth = (
-            np.einsum("cj,nj->cn", T_camera_from_rig[:, 2, :3], points)
-            + T_camera_from_rig[:, None, 2, 3]
-        )
-        weight = focals / np.maximum(np.abs(depth), 1e-6)
-    return points
 
 
 @dataclass(frozen=True, eq=False)

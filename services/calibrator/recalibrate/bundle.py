@@ -16,7 +16,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rhot.geometry.transforms import Array, inverse, rotation_from_vector, transform
-from services.calibrator.bundle.triangulate import epipolar_px, triangulate
+from rhot.geometry.triangulation import triangulate
+from services.calibrator.bundle.triangulate import epipolar_px
 from services.calibrator.recalibrate.marker_tracks import Looks, Recording, looks
 
 # A bumped camera is off by less: three degrees, two centimetres.

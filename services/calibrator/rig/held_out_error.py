@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.geometry.transforms import Array, inverse, transform
+from rhot.geometry.triangulation import triangulate
 from services.calibrator.board.board import Board
 from services.calibrator.bundle.adjust import Free, adjust
 from services.calibrator.bundle.lens_model import FX, FY, rays
 from services.calibrator.bundle.residuals import State, View, rms
-from services.calibrator.bundle.triangulate import RigidFit, epipolar_px, rigid_fit, triangulate
+from services.calibrator.bundle.triangulate import RigidFit, epipolar_px, rigid_fit
 
 
 @dataclass(frozen=True)

@@ -49,10 +49,10 @@ def tune_filter(
 ) -> None:
     """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
     # Not above: numba and scipy take longer to import than other commands take to run.
-    from services.fusion.paired import one_euro_tuning
+    from services.fusion.paired import one_euro_tuning, recorded_tracks
 
     proposal = one_euro_tuning.propose(
-        one_euro_tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter
+        recorded_tracks.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter
     )
     typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
 

@@ -17,7 +17,7 @@ from rhot.files.capture import write_lines
 from rhot.geometry.transforms import rotation_x, transform
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
-from testing.synthetic_points import Path, Setup, frames
+from testing.synthetic_points import MovingHand, SyntheticRig, frames
 
 RIG_TOML = '[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
 
@@ -183,7 +183,7 @@ def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
 
     The report says so, and services read the new file.
     """
-    setup = Setup(sigma_px=0.15)
+    setup = SyntheticRig(sigma_px=0.15)
     true = setup.rig()
     (tmp_path / "rig.toml").write_text(RIG_TOML)
     turn = transform(rotation_x(np.radians(0.5)), (0.0, 0.002, 0.0))
@@ -199,7 +199,7 @@ def test_refine_writes_the_places_that_a_hand_tells(run, tmp_path):
     save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
     write_lines(
         tmp_path / "markers.jsonl",
-        frames(setup, Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6)), 8.0),
+        frames(setup, MovingHand(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6)), 8.0),
     )
     result = run("refine", tmp_path, "--config", tmp_path / "rig.toml")
     assert result.exit_code == 0
