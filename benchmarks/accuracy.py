@@ -1,23 +1,26 @@
-"""How exact fusion is, how honest, and what it costs: `python benchmarks/accuracy.py
-[--synthetic-only] [--json FILE]`.
+"""How exact fusion is, how consistent its sigmas are, and what it costs.
 
-The figures under the names of issue 4 are from pictures: hands as the simulator's cameras see them
-(sensor noise of 5 grey levels), through the tracker and fusion, with the solver's finger directions
-fed back, against the landmarks of the truth; four seeds each. Those under `synthetic` are from
-points (testing/synthetic_points.py) with 0.06 px of white noise: fusion's own errors. In mm;
-*_rms_mm is about the truth, *_precision_mm about each landmark's own mean, *_bias_mm that mean's.
-nees is squared error over predicted variance: 1 if sigma is honest. *_over_crb is the precision
-against one frame of each camera at the detector's measured noise.
+`python benchmarks/accuracy.py [--synthetic-only] [--json FILE]`
+
+The figures at the top are from pictures: hands as the simulator's cameras see them (sensor noise of
+5 grey levels), through the tracker and fusion, with the solver's finger directions fed back,
+against the landmarks of the truth; four random seeds each. Those under `synthetic` are from points
+(testing/synthetic_points.py) with 0.06 px of white noise: fusion's own errors. In mm; *_rms_mm is
+about the truth, *_precision_mm about each landmark's own mean, *_bias_mm that mean's. nees is the
+normalised estimation error squared, squared error over predicted variance: 1 if sigma is right.
+*_over_crb is the precision against the Cramer-Rao bound of one frame of each camera at the
+detector's measured noise.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path as File
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -25,14 +28,27 @@ import numpy as np
 from accuracy_pictures import RENDERED_SEEDS, Pictures, Score
 
 from rhot.files.config import Fusion, HandTable, RigConfig, load_rig
+from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
-from rhot.messages import Marker
-from services.fusion.geometry.triangulation import extrinsics, triangulate
+from rhot.messages import MarkerFrame
+from services.fusion.geometry.projection import extrinsics
+from services.fusion.geometry.triangulation import triangulate
 from services.fusion.step import FusionStep
-from testing.synthetic_points import Motion, Path, Setup, Sway, frames, point_hands
+from testing.synthetic_points import (
+    Motion,
+    MovingHand,
+    RestingHand,
+    SyntheticRig,
+    frames,
+    point_hands,
+)
 
 SEEDS = (1, 2, 3)
 SECONDS = 15.0
+# Frames left out of the timing.
+WARM_FRAMES = 100
+# Landmarks and colours beyond the six of a synthetic hand.
+KNUCKLES = {"index_proximal": "yellow", "middle_proximal": "orange"}
 # Methods beside the asynchronous filter, without 1-Euro: what the pairing itself costs.
 OTHERS = {
     "nearest": Fusion(method="triangulate", pairing="nearest", filter="none"),
@@ -44,89 +60,74 @@ OTHERS = {
 
 
 def synthetic(
-    fusion: Fusion, path: Callable[[int], Motion] = lambda seed: Path(seed=seed), **setup: Any
+    fusion: Fusion,
+    motion_of: Callable[[int], Motion] = lambda seed: MovingHand(seed=seed),
+    **setup: Any,
 ) -> dict[str, float]:
-    """Figures of one method over all seeds; path makes the motion of a seed."""
+    """Figures of one method over all seeds; motion_of makes the motion of a seed."""
     found = Score()
     for seed in SEEDS:
-        rig, motion = Setup(seed=seed, **setup), path(seed)
+        rig = SyntheticRig(seed=seed, **setup)
+        motion = motion_of(seed)
         step = FusionStep(rig.config(fusion), rig.rig(), point_hands())
-        told = [
-            points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)
-        ] + step.flush()
-        found.add(
-            told,
-            lambda at_s, motion=motion: dict(
-                zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True)
-            ),
-        )  # type: ignore[misc]
+        messages = [points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)]
+        found.add(messages + step.flush(), functools.partial(truth, motion))
     return found.figures()
 
 
+def truth(motion: Motion, at_s: float) -> dict[str, Array]:
+    """Every landmark's place (3,) at an instant."""
+    return dict(zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True))
+
+
 def depth_bound_mm(distance_m: float, sigma_px: float) -> float:
-    """Cramer-Rao bound of the depth from one frame of each camera: the covariance of the
-    triangulation.
-    """
-    cameras = tuple(Setup().rig().values())
-    R, t = extrinsics(cameras)
-    seen = np.einsum("nij,j->ni", R, [0.0375, 0.0, distance_m]) + t
-    sigma = sigma_px / cameras[0].focal_px[0]
-    return 1e3 * float(
-        np.sqrt(
-            triangulate(seen[:, :2] / seen[:, 2:], np.full(2, sigma), R, t, 3.0).covariance_m2[2, 2]
-        )
-    )
+    """Cramer-Rao bound of the depth from one frame of each camera: the triangulation's sigma."""
+    cameras = tuple(SyntheticRig().rig().values())
+    poses = extrinsics(cameras)
+    p_cameras = np.einsum("nij,j->ni", poses.R, [0.0375, 0.0, distance_m]) + poses.t  # (2, 3)
+    rays = p_cameras[:, :2] / p_cameras[:, 2:]
+    sigmas = np.full(2, sigma_px / cameras[0].focal_px[0])
+    return 1e3 * float(np.sqrt(triangulate(rays, sigmas, poses, 3.0).covariance_m2[2, 2]))
 
 
 def cost(cameras: int = 2, fps: float = 30.0, markers: int = 6) -> dict[str, float]:
-    """Microseconds of one frame: all of it, with and without telling points, and the share of a
-    core.
-    """
-    setup = Setup(cameras=cameras, fps=fps, phase_s=1.0 / (fps * cameras))
-    given, config = frames(setup, Path(), 8.0), setup.config()
-    # Further markers are knuckles that move as the first ones do, some pixels beside them.
-    more = (
-        dict(zip(("index_proximal", "middle_proximal"), ("yellow", "orange"), strict=True))
-        if markers > 6
-        else {}
-    )
-    given = [
-        msgspec.structs.replace(
-            f,
-            markers=f.markers
-            + [_beside(m, c) for m, c in zip(f.markers, more.values(), strict=False)],
-        )
-        for f in given
-    ]
+    """Microseconds of one frame, with and without output of points, and the share of a core."""
+    setup = SyntheticRig(cameras=cameras, fps=fps, phase_s=1.0 / (fps * cameras))
+    more = KNUCKLES if markers > 6 else {}
+    given = [_with_knuckles(frame, more) for frame in frames(setup, MovingHand(), 8.0)]
+    config = setup.config()
     config = msgspec.structs.replace(
         config, hand={"right": HandTable(markers=config.hand["right"].markers | more)}
     )
     step = FusionStep(config, setup.rig(), point_hands())
-    quiet, telling, total = [], [], 0.0
+    without_output, with_output = [], []
     for number, frame in enumerate(given):
         begin_s = time.perf_counter()
-        told = step.step(frame)
+        messages = step.step(frame)
         took_s = time.perf_counter() - begin_s
         # Compiling, or loading what was compiled, is over by then.
-        if number >= 100:
-            (telling if told else quiet).append(took_s)
-            total += took_s
-    share = total / (8.0 * (len(given) - 100) / len(given))
+        if number >= WARM_FRAMES:
+            (with_output if messages else without_output).append(took_s)
+    total_s = sum(without_output) + sum(with_output)
+    share = total_s / (8.0 * (len(given) - WARM_FRAMES) / len(given))
     return {
-        "update_us": round(1e6 * float(np.median(quiet)), 1),
-        "update_and_tell_us": round(1e6 * float(np.median(telling)), 1),
+        "update_us": round(1e6 * float(np.median(without_output)), 1),
+        "update_and_tell_us": round(1e6 * float(np.median(with_output)), 1),
         "core_percent": round(100.0 * share, 1),
     }
 
 
-def _beside(marker: Marker, color: str) -> Marker:
-    return msgspec.structs.replace(marker, color=color, y_px=marker.y_px + 12.0)
+def _with_knuckles(frame: MarkerFrame, knuckles: dict[str, str]) -> MarkerFrame:
+    """A frame with further markers: knuckles that move as the first ones do, some pixels off."""
+    more = [
+        msgspec.structs.replace(marker, color=color, y_px=marker.y_px + 12.0)
+        for marker, color in zip(frame.markers, knuckles.values(), strict=False)
+    ]
+    return msgspec.structs.replace(frame, markers=frame.markers + more)
 
 
 def still_figures(scenes: list[Pictures]) -> dict[str, Any]:
-    """Depth of a still hand: about the truth, about its own mean, against the bound, and how
-    honest.
-    """
+    """Depth of a still hand: about the truth, about its own mean, against the bound; NEES."""
     scores = {str(scene.distance_m): scene.score(Fusion()) for scene in scenes}
     noise = {str(scene.distance_m): scene.detector_noise_px() for scene in scenes}
     precision = {distance: score.precision_z_mm() for distance, score in scores.items()}
@@ -186,8 +187,9 @@ def moving_figures(scene: Pictures) -> dict[str, Any]:
 
 
 def rendered_figures(config: RigConfig, seconds: float, seeds: tuple[int, ...]) -> dict[str, Any]:
-    """Issue 4's figures on pictures: still at two distances, moving at about 0.5 m/s RMS at 0.7 m,
-    and fingers that play at 0.5 m.
+    """Figures on pictures: a hand still at two distances, moving, and with fingers that play.
+
+    It moves at about 0.5 m/s RMS at 0.7 m; the fingers play at 0.5 m.
     """
     still = [
         Pictures(config, "still", distance_m, (0.0, 0.0, 0.0), seconds, seeds)
@@ -203,11 +205,8 @@ def rendered_figures(config: RigConfig, seconds: float, seeds: tuple[int, ...]) 
 
 
 def synthetic_figures() -> dict[str, Any]:
-    """Everything from synthetic observations, under the names of the requirements."""
-    still = {
-        str(z_m): synthetic(Fusion(), lambda seed, z_m=z_m: Sway(distance_m=z_m, seed=seed))
-        for z_m in (0.5, 1.0)
-    }  # type: ignore[misc]
+    """The same from synthetic observations."""
+    still = {str(z_m): synthetic(Fusion(), functools.partial(_resting, z_m)) for z_m in (0.5, 1.0)}
     moving = {str(lag): synthetic(Fusion(lag_frames=lag)) for lag in (0, 1, 2)}
     others = {name: synthetic(fusion) for name, fusion in OTHERS.items()}
     noisy = {str(lag): synthetic(Fusion(lag_frames=lag), sigma_px=0.2) for lag in (0, 1, 2)}
@@ -231,10 +230,14 @@ def synthetic_figures() -> dict[str, Any]:
     }
 
 
+def _resting(distance_m: float, seed: int) -> RestingHand:
+    return RestingHand(distance_m=distance_m, seed=seed)
+
+
 def main() -> int:
     """Run, print, and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=File, help="write the figures to this file")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
     parser.add_argument(
         "--synthetic-only",
         action="store_true",
@@ -251,7 +254,7 @@ def main() -> int:
     seeds = tuple(int(seed) for seed in options.seeds.split(","))
     if not options.synthetic_only:
         figures |= rendered_figures(
-            load_rig(File(__file__).parents[1] / "config" / "sim.toml"), options.seconds, seeds
+            load_rig(Path(__file__).parents[1] / "config" / "sim.toml"), options.seconds, seeds
         )
     figures |= cost()
     figures["load_8_markers_4_cameras_90_fps"] = cost(4, 90.0, markers=8)

@@ -1,10 +1,9 @@
-"""Hands in pictures for the benchmarks of accuracy: rendered, detected, fused, and compared with
-the truth. See accuracy.py.
-"""
+"""Hands in pictures for accuracy.py: rendered, detected, fused, and compared with the truth."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,28 +11,26 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rhot.files.calibration import load_colors, load_hand
+from rhot.files.calibration import load_hand
 from rhot.files.config import Fusion, RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName, landmark_point
-from rhot.messages import HandPoints, MarkerFrame
+from rhot.messages import HandPoints
 from services.fusion.step import FusionStep
-from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.step import TrackerStep
-from services.simulator.camera.frame_source import FrameSource
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import Scene, build_scene
 from services.solver.step import SolverStep
+from testing.rendered_markers import detect
 from testing.synthetic_points import START_NS
 
 RENDERED_SEEDS = (1, 2, 3, 4)
-# Tracks have begun and clocks are learned by then.
+# Tracks have started and clock offsets are estimated by then.
 WARM_S = 1.0
 Truth = Callable[[float], dict[str, Array]]
 
 
 class Score:
-    """Errors and sigmas of all points told, against truth."""
+    """Errors and sigmas of all points, against truth."""
 
     def __init__(self) -> None:
         self._errors: list[Array] = []
@@ -42,10 +39,10 @@ class Score:
         self._depths: dict[tuple[int, str], list[float]] = defaultdict(list)
         self._runs = 0
 
-    def add(self, told: Iterable[HandPoints], truth: Truth, start_ns: int = START_NS) -> None:
+    def add(self, messages: Iterable[HandPoints], truth: Truth, start_ns: int = START_NS) -> None:
         """Points after WARM_S; truth gives every landmark at seconds after start_ns."""
         self._runs += 1
-        for message in told:
+        for message in messages:
             at_s = (message.stamp_ns - start_ns) * 1e-9
             if at_s >= WARM_S and message.points:
                 places = truth(at_s)
@@ -60,16 +57,8 @@ class Score:
 
     def precision_z_mm(self) -> float:
         """RMS of the depth errors about the mean of each landmark in each run."""
-        return 1e3 * float(
-            np.sqrt(
-                np.mean(
-                    np.concatenate(
-                        [np.array(errors) - np.mean(errors) for errors in self._depths.values()]
-                    )
-                    ** 2
-                )
-            )
-        )
+        centred = [np.array(errors) - np.mean(errors) for errors in self._depths.values()]
+        return 1e3 * float(np.sqrt(np.mean(np.concatenate(centred) ** 2)))
 
     def bias_z_mm(self) -> float:
         """RMS of these means."""
@@ -102,39 +91,10 @@ def make_scene(
     seed: int,
 ) -> Scene:
     """A scene of that motion with sensor noise of 5 grey levels."""
-    return build_scene(
-        config,
-        dataclasses.replace(
-            SCENES[motion], distance_m=distance_m, travel_m=travel_m, travel_hz=0.9, noise=5.0
-        ),
-        motion,
-        seed,
+    recipe = dataclasses.replace(
+        SCENES[motion], distance_m=distance_m, travel_m=travel_m, travel_hz=0.9, noise=5.0
     )
-
-
-def detect(config: RigConfig, scene: Scene, seconds: float) -> list[MarkerFrame]:
-    """Every camera's pictures through the tracker, in order of exposure.
-
-    Clocks as well known as synchronisation leaves them.
-    """
-    found: list[tuple[float, MarkerFrame]] = []
-    for name in scene.cameras:
-        source = FrameSource(scene, name, recorded=True)
-        tracker = TrackerStep(
-            name,
-            load_colors(config.calibration_dir, name),
-            config.tracker,
-            source.camera.size_px,
-            config.colors,
-        )
-        for seq in range(int(seconds * config.camera_named(name).fps)):
-            taken = source.take(seq, START_NS)
-            if taken.image is not None:
-                frame = Frame(
-                    name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420"
-                )
-                found.append((taken.time_s, tracker.step(frame, 0, 500_000)))
-    return [frame for _, frame in sorted(found, key=lambda entry: entry[0])]
+    return build_scene(config, recipe, motion, seed)
 
 
 class Pictures:
@@ -170,18 +130,16 @@ class Pictures:
         """
         config, found = msgspec.structs.replace(self._config, fusion=fusion), Score()
         for number, scene in enumerate(self._scenes):
-            step, solver, told = (
-                FusionStep(config, scene.cameras, self._hands),
-                SolverStep(config, self._hands),
-                [],
-            )
+            step = FusionStep(config, scene.cameras, self._hands)
+            solver = SolverStep(config, self._hands)
+            messages = []
             for frame in self._given[number]:
                 for points in step.step(frame):
-                    told.append(points)
+                    messages.append(points)
                     pose = solver.step(points) if feedback else None
                     if pose is not None:
                         step.note_pose(pose)
-            found.add(told + step.flush(), lambda at_s, number=number: self._truth(number, at_s))  # type: ignore[misc]
+            found.add(messages + step.flush(), functools.partial(self._truth, number))
         return found
 
     def _truth(self, number: int, at_s: float) -> dict[str, Array]:
@@ -196,8 +154,9 @@ class Pictures:
         return known[at_s]
 
     def detector_noise_px(self) -> float:
-        """How much a resting marker's x scatters from frame to frame (second differences: motion of
-        a still hand cancels), RMS of all.
+        """How much a resting marker's x scatters from frame to frame, RMS of all.
+
+        By second differences, in which the motion of a still hand cancels.
         """
         squares = []
         for given in self._given:

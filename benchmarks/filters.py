@@ -8,7 +8,7 @@ if absent). Reported: error in motion (mm RMS in space), lag (ms: the shift at w
 path fits best), and the jitter at rest.
 
 Found: at equal rest, 1-Euro beats every filter with fixed gains, also a Kalman filter with a fixed
-model; the seed was right in that. A Kalman filter that weighs several models, as fusion does, has
+model; the paper was right in that. A Kalman filter that weighs several models, as fusion does, has
 the least error and no lag.
 """
 
@@ -23,19 +23,21 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path as File
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.kalman.motion_model import transition, unit_noise
+from services.fusion.kalman.motion_model import transition, unit_process_noise
 from services.fusion.paired.one_euro import OneEuroFilter
-from testing.synthetic_points import Path
+from testing.synthetic_points import MovingHand
 
 NOISE_M = 1e-3
 # Jitter at rest that each filter must reach, as a share of the noise.
 TARGETS = (0.7, 0.5, 0.35)
+# Covariance of one axis when a Kalman filter starts: position as measured, m/s, m/s^2.
+START_COV = np.diag([NOISE_M**2, 0.25, 25.0])
 
 
 def one_euro(path: Array, rate_hz: float, mincutoff_hz: float, beta: float) -> Array:
@@ -71,46 +73,59 @@ def double_exponential(path: Array, rate_hz: float, alpha: float, trend: float) 
 
 
 def kalman(path: Array, rate_hz: float, density: float) -> Array:
-    """Fusion's motion model (services/fusion/kalman/motion_model.py) with one jerk density,
-    position measured; its gain is the same for all axes.
+    """Fusion's motion model with one jerk density; positions are measured.
+
+    services/fusion/kalman/motion_model.py. The gain is the same for all axes.
     """
-    f01, f02, f12, f22 = transition(1.0 / rate_hz)
-    F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))
-    unit_noise(1.0 / rate_hz, Q)
-    state, P, out = np.zeros((3, 3)), np.diag([NOISE_M**2, 0.25, 25.0]), [path[0]]
+    F, unit_Q = motion_model(rate_hz)
+    state = np.zeros((3, 3))  # position, velocity, acceleration; each of the three axes
     state[0] = path[0]
+    P = START_COV
+    filtered = [path[0]]
     for point in path[1:]:
-        state, P = F @ state, F @ P @ F.T + density * Q
+        state = F @ state
+        P = F @ P @ F.T + density * unit_Q
+        innovation = point - state[0]
         gain = P[:, 0] / (P[0, 0] + NOISE_M**2)
-        state = state + np.outer(gain, point - state[0])
+        state = state + np.outer(gain, innovation)
         P = P - np.outer(gain, P[0])
-        out.append(state[0])
-    return np.array(out)
+        filtered.append(state[0])
+    return np.array(filtered)
+
+
+def motion_model(rate_hz: float) -> tuple[Array, Array]:
+    """F (3, 3) and the process noise (3, 3) of one axis for a jerk density of 1."""
+    f01, f02, f12, f22 = transition(1.0 / rate_hz)
+    unit_Q = np.empty((3, 3))
+    unit_process_noise(1.0 / rate_hz, unit_Q)
+    return np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), unit_Q
 
 
 def adaptive_kalman(path: Array, rate_hz: float, calmest: float) -> Array:
-    """Four of these side by side, weighed by their likelihoods as in
-    services/fusion/kalman/track_history.py; densities from `calmest` to 5000.
+    """Four of these side by side, weighted by their likelihoods; densities from `calmest` to 5000.
+
+    As in services/fusion/kalman/multiple_models.py.
     """
     densities = np.geomspace(calmest, 5000.0, 4)
-    f01, f02, f12, f22 = transition(1.0 / rate_hz)
-    F, Q = np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.empty((3, 3))
-    unit_noise(1.0 / rate_hz, Q)
-    states, covs = np.zeros((4, 3, 3)), np.tile(np.diag([NOISE_M**2, 0.25, 25.0]), (4, 1, 1))
+    F, unit_Q = motion_model(rate_hz)
+    states = np.zeros((4, 3, 3))
     states[:, 0] = path[0]
-    belief, out = np.full(4, 0.25), [path[0]]
+    covs = np.tile(START_COV, (4, 1, 1))
+    probability = np.full(4, 0.25)
+    filtered = [path[0]]
     for point in path[1:]:
-        states, covs = F @ states, F @ covs @ F.T + densities[:, None, None] * Q
-        variance = covs[:, 0, 0] + NOISE_M**2
-        left = point - states[:, 0]
-        gains = covs[:, :, 0] / variance[:, None]
-        states = states + gains[:, :, None] * left[:, None, :]
+        states = F @ states
+        covs = F @ covs @ F.T + densities[:, None, None] * unit_Q
+        innovations = point - states[:, 0]  # (4, 3)
+        variances = covs[:, 0, 0] + NOISE_M**2  # (4,)
+        gains = covs[:, :, 0] / variances[:, None]  # (4, 3)
+        states = states + gains[:, :, None] * innovations[:, None, :]
         covs = covs - gains[:, :, None] * covs[:, None, 0]
-        log = -0.5 * np.sum(left**2, axis=1) / variance - 1.5 * np.log(variance)
-        belief = (0.997 * belief + 0.003 / 4) * np.exp(log - log.max())
-        belief /= belief.sum()
-        out.append(belief @ states[:, 0])
-    return np.array(out)
+        log = -0.5 * np.sum(innovations**2, axis=1) / variances - 1.5 * np.log(variances)
+        probability = (0.997 * probability + 0.003 / 4) * np.exp(log - log.max())
+        probability /= probability.sum()
+        filtered.append(probability @ states[:, 0])
+    return np.array(filtered)
 
 
 def unfiltered(path: Array, rate_hz: float) -> Array:  # noqa: ARG001
@@ -147,14 +162,14 @@ class Motion:
     path: Array
 
 
-def motions(data: File) -> Iterator[Motion]:
+def motions(data: Path) -> Iterator[Motion]:
     """Synthetic ones, and the real ones that are there."""
     for rate_hz, speed in ((30.0, 0.5), (60.0, 0.5), (30.0, 0.15)):
         instants = np.arange(0.0, 12.0, 1.0 / rate_hz)
         yield Motion(
             f"synthetic {speed} m/s {rate_hz:.0f} Hz",
             rate_hz,
-            Path(speed_m_s=speed)(instants)[:, 2],
+            MovingHand(speed_m_s=speed)(instants)[:, 2],
         )
     for name in ("grab", "pinch", "wave"):
         file = data / "leap" / f"{name}.csv"
@@ -229,7 +244,7 @@ def compare(motion: Motion, every: int = 1) -> dict[str, Any]:
 def main() -> int:
     """Run, print a table, and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=File, help="write the figures to this file")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
     parser.add_argument(
         "--quick",
         action="store_true",
@@ -237,7 +252,7 @@ def main() -> int:
     )
     options = parser.parse_args()
     data = (
-        File(os.environ.get("RHOT_DATA", File(__file__).parents[2] / "shared" / "data"))
+        Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
         / "hand_motion"
     )
     results = {}
@@ -246,8 +261,11 @@ def main() -> int:
         print(f"\n{motion.name}: noise {1e3 * NOISE_M:.0f} mm on each axis")
         for target, filters in results[motion.name].items():
             for name, entry in filters.items():
-                figures = f"error {entry['error_mm']:6.2f} mm  lag {entry['lag_ms']:5.1f} ms  jitter {entry['jitter']:.2f}"
-                print(f"  jitter <= {target}: {name:18s} {figures}  {entry['values']}")
+                print(
+                    f"  jitter <= {target}: {name:18s} error {entry['error_mm']:6.2f} mm  "
+                    f"lag {entry['lag_ms']:5.1f} ms  jitter {entry['jitter']:.2f}  "
+                    f"{entry['values']}"
+                )
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -1,5 +1,4 @@
-"""What every method of fusion offers: take in one camera's observations, and tell where the
-landmarks are at an instant.
+"""What every method of fusion offers: observations of one camera in, landmarks at an instant out.
 
 FusionStep owns one of the three (kalman, triangulate, disparity) and knows no more of it than this.
 """
@@ -9,26 +8,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools
 from services.fusion.intake.observations import View
-
-Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """All S landmarks at one instant, rig frame; rows whose `found` is false hold nothing."""
+    """All L landmarks at one instant, rig frame; rows whose `found` is false hold nothing."""
 
-    found: Bools  # (S,)
-    positions_m: Array  # (S, 3)
-    covariances_m2: Array  # (S, 3, 3)
-    cameras: Bools  # (S, C) which cameras saw it about then
-    measured: Bools  # (S,) two or more did; else it is predicted
-    wanted: Bools  # (S,) two or more looked at something of its colour then, believed or not
+    found: Bools  # (L,)
+    positions_m: Array  # (L, 3)
+    covariances_m2: Array  # (L, 3, 3)
+    seen_by: Bools  # (L, C) which cameras saw it about then
+    measured: Bools  # (L,) two or more did; else it is predicted
+    detected: Bools  # (L,) two or more detected something of its colour then, gated or not
 
 
 @dataclass
@@ -58,6 +52,7 @@ class Method(Protocol):
         """Take in a frame.
 
         times_s (n,) are the observations' own instants, in any order from frame to frame.
+        clock_sigma_s is how far the camera's clock may be off the other cameras'.
         """
         ...
 

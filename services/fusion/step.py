@@ -1,12 +1,11 @@
-"""Fusion as one pure step: MarkerFrames in, HandPoints out. Live, offline, replayed and tested
-alike.
+"""Fusion as one pure step: MarkerFrames in, HandPoints out; the same live, offline and in tests.
 
 One output per hand for each frame of the reference camera, the fastest one that delivers; if it
 falls silent another carries on. Frames that come late, twice, out of order, from an unknown camera,
 in another size than the calibration's, or with a clock that has jumped are counted in `refusals`
-and otherwise have no effect; see timeline.py for when time is taken to have moved for all. Missing
-cameras or markers make landmarks `predicted`, then absent; a hand of which nothing is seen gives
-HandPoints without points.
+and otherwise have no effect; intake/admission.py says when time is taken to have moved for all.
+Missing cameras or markers make landmarks `predicted`, then absent; a hand of which nothing is seen
+gives HandPoints without points.
 """
 
 from __future__ import annotations
@@ -20,21 +19,23 @@ import numpy as np
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
+from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
-from services.fusion.intake.admission import Timeline, Verdict
-from services.fusion.intake.observations import Observer, Refusal
+from services.fusion.arrays import Bools
+from services.fusion.intake.admission import FrameAdmission, Verdict
+from services.fusion.intake.observations import ObservationBuilder, Refusal
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
-from services.fusion.monitors.clock_offsets import ClockTuner
-from services.fusion.monitors.mirrored_view import MirrorWatch
-from services.fusion.output.hand_plausibility import coherent, reach_m
-from services.fusion.output.paint_to_bone import Surface
-from services.fusion.output.schedule import Pace
-from services.fusion.output.systematic_error import Bias
+from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
+from services.fusion.monitors.mirrored_view import MirrorMonitor
+from services.fusion.output.hand_plausibility import coherent, hand_reach_m
+from services.fusion.output.paint_to_bone import PaintToBone
+from services.fusion.output.schedule import OutputSchedule
+from services.fusion.output.systematic_error import SystematicError
 from services.fusion.paired.estimator import PairedMethod
 
-# Positions and sigmas are told to a micrometre: a hundredth of the smallest sigma of a hand at
+# Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
 _DIGITS = 6
 
@@ -45,81 +46,74 @@ class FusionStep:
     def __init__(
         self, config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]
     ) -> None:
-        """cameras by name as rhot.files.calibration.load_cameras gives them; a model for every
-        [hand.*] table of the rig.
+        """cameras by name as rhot.files.calibration.load_cameras gives them.
 
-        Raises CalibrationError if there are fewer than two cameras or a hand's model is missing.
+        hands: a model for every [hand.*] table of the rig. Raises CalibrationError if there are
+        fewer than two cameras or a hand's model is missing.
         """
-        if len(cameras) < 2:
-            raise CalibrationError(
-                f"fusion needs two calibrated cameras or more, it has {sorted(cameras)}; add [[camera]] tables to rig.toml"
-            )
-        missing = [hand for hand in config.hand if hand not in hands]
-        if missing:
-            raise CalibrationError(
-                f"no model of the {missing[0]} hand was given to fusion; it has {sorted(hands)}"
-            )
+        _check(config, cameras, hands)
         self.refusals: Counter[str] = Counter()
-        self._observer = Observer(config, cameras)
-        self._slots = self._observer.slots
-        self._fps = np.array([config.camera_named(name).fps for name in cameras])
-        self._surface = Surface(self._slots, hands, self._observer.cameras)
-        self._bias = Bias(self._surface.extended, self._observer.cameras)
-        self._hands = [hand for hand in HANDS if hand in config.hand]
-        self._reach_m = {hand: reach_m(hands[hand]) for hand in self._hands}
+        self._builder = ObservationBuilder(config, cameras)
+        self._cameras = self._builder.cameras
+        self._landmarks = self._builder.landmarks
+        # Indices (n,) of each hand's landmarks.
+        of_hand = np.array([landmark.hand for landmark in self._landmarks])
         self._rows = {
-            hand: np.array([row for row, slot in enumerate(self._slots) if slot.hand == hand])
-            for hand in self._hands
+            hand: np.flatnonzero(of_hand == hand) for hand in HANDS if hand in config.hand
         }
-        all_cameras = self._observer.cameras
+        self._reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
+        self._fps = np.array([config.camera_named(name).fps for name in cameras])
+        self._paint = PaintToBone(self._landmarks, hands, self._cameras)
+        self._systematic = SystematicError(self._paint.extended, self._cameras)
         periods_s = 1.0 / self._fps
         self.method: Method = (
-            KalmanMethod(list(self._rows.values()), all_cameras, periods_s, config.fusion)
+            KalmanMethod(list(self._rows.values()), self._cameras, periods_s, config.fusion)
             if config.fusion.method == "kalman"
-            else PairedMethod(len(self._slots), all_cameras, periods_s, config.fusion)
+            else PairedMethod(len(self._landmarks), self._cameras, periods_s, config.fusion)
         )
-        self.clocks = ClockTuner(
-            all_cameras, len(self._slots), 1.0 / self._fps, enabled=config.fusion.tune_clocks
+        self.clocks = ClockOffsetEstimator(
+            self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
         )
-        self.mirrors = MirrorWatch(all_cameras)
-        self._wait = max(config.fusion.lag_frames, self.method.frames_after)
-        self._timeline = Timeline(len(all_cameras))
-        self._pace = Pace(self._fps, self._wait)
-        self._epoch_ns = self._told_ns = 0
+        self.mirrors = MirrorMonitor(self._cameras)
+        self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
+        self._admission = FrameAdmission(len(self._cameras))
+        self._schedule = OutputSchedule(self._fps, self._lag_frames)
+        self._epoch_ns = 0
         self._seq = 0
 
     def step(self, frame: MarkerFrame) -> list[HandPoints]:
         """Take in one frame; the points that are due with it, one message per hand, or none."""
-        view = self._observer.view(frame)
+        view = self._builder.build(frame)
         if isinstance(view, Refusal):
             self.refusals[view.value] += 1
             return []
         self.refusals["marker"] += view.ignored
-        verdict = self._timeline.judge(view.camera, view.instant_ns)
+        verdict = self._admission.admit(view.camera, view.instant_ns)
         if verdict in (Verdict.TWICE, Verdict.ASTRAY):
             self.refusals[verdict.value] += 1
             return []
         if verdict is Verdict.RESTART:
             self._restart(view.instant_ns)
         self.mirrors.observe(view)
-        times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s
+        times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.observe(view, times_s)
-        self.method.observe(
-            dataclasses.replace(view, sigma=self._bias.note(view)), times_s - late_s, clock_sigma_s
-        )
-        due_ns = self._pace.frame(view.camera, view.instant_ns - round(late_s * 1e9))
-        return [] if due_ns is None else self._tell(due_ns)
+        white = dataclasses.replace(view, sigmas=self._systematic.white_sigmas(view))
+        self.method.observe(white, times_s - late_s, clock_sigma_s)
+        due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
+        return [] if due_ns is None else self._points_at(due_ns)
 
     def note_pose(self, pose: HandPose) -> None:
-        """Learn from the solver which way the fingers point, which tells where in its paint a tip
-        is; optional, and worth a millimetre.
+        """Learn from the solver which way the fingers point: where in its paint a tip is.
+
+        Optional, and worth a millimetre.
         """
         if pose.hand in self._rows:
-            self._surface.note(pose)
+            self._paint.note_pose(pose)
 
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
-        return [points for instant_ns in self._pace.rest() for points in self._tell(instant_ns)]
+        waiting_ns = self._schedule.take_waiting()
+        return [points for instant_ns in waiting_ns for points in self._points_at(instant_ns)]
 
     def _restart(self, instant_ns: int) -> None:
         """Forget everything.
@@ -127,55 +121,77 @@ class FusionStep:
         Seconds count from this instant, as float64 cannot hold nanoseconds since 1970.
         """
         self._epoch_ns = instant_ns
-        self._pace = Pace(self._fps, self._wait)
+        self._schedule = OutputSchedule(self._fps, self._lag_frames)
         self.method.reset()
         self.clocks.reset()
-        self._surface.forget()
+        self._paint.reset()
 
-    def _tell(self, instant_ns: int) -> list[HandPoints]:
+    def _points_at(self, instant_ns: int) -> list[HandPoints]:
         """One message per hand for an instant (master clock)."""
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
-        positions, covariances = self._surface.to_axis(
-            estimates.positions_m, estimates.covariances_m2, estimates.cameras, instant_ns
+        positions, covariances = self._paint.correct(
+            estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
         )
-        covariances = covariances + self._bias.covariances(positions, estimates.cameras)
-        sigmas = np.sqrt(np.maximum(np.einsum("nii->ni", covariances), 0.0))
-        usable = (
-            estimates.found & np.isfinite(positions).all(axis=1) & np.isfinite(sigmas).all(axis=1)
-        )
-        self._seq += 1
+        covariances = covariances + self._systematic.covariances(positions, estimates.seen_by)
+        variances = np.einsum("nii->ni", covariances)  # (L, 3)
+        sigmas = np.sqrt(np.maximum(variances, 0.0))
+        usable = estimates.found & np.isfinite(positions).all(axis=1)
+        usable &= np.isfinite(sigmas).all(axis=1)
+        kept = self._coherent(positions, covariances, usable, estimates.detected)
         stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
-        told = []
+        messages = []
         for hand, rows in self._rows.items():
-            believed = coherent(
+            points = [
+                self._point(row, positions[row].tolist(), sigmas[row].tolist(), estimates)
+                for row in rows[kept[rows]].tolist()
+            ]
+            messages.append(HandPoints(hand=hand, seq=self._seq, stamp_ns=stamp_ns, points=points))
+        self._seq += 1
+        return messages
+
+    def _coherent(
+        self, positions: Array, covariances: Array, usable: Bools, detected: Bools
+    ) -> Bools:
+        """Which of the usable points (L,) can belong to their hand; the others are counted."""
+        kept = np.zeros_like(usable)
+        for hand, rows in self._rows.items():
+            kept[rows] = coherent(
                 positions[rows],
                 covariances[rows],
                 usable[rows],
-                estimates.wanted[rows],
+                detected[rows],
                 self._reach_m[hand],
             )
-            self.method.counts.incoherent += int(np.count_nonzero(usable[rows] & ~believed))
-            points = [
-                self._point(row, positions[row].tolist(), sigmas[row].tolist(), estimates)
-                for row in rows[believed].tolist()
-            ]
-            told.append(HandPoints(hand=hand, seq=self._seq - 1, stamp_ns=stamp_ns, points=points))
-        return told
+        self.method.counts.incoherent += int(np.count_nonzero(usable & ~kept))
+        return kept
 
     def _point(
-        self, row: int, position: list[float], sigma: list[float], estimates: Estimates
+        self, row: int, position: list[float], sigmas: list[float], estimates: Estimates
     ) -> HandPoint:
         x, y, z = (round(value, _DIGITS) for value in position)
-        sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigma)
-        cameras = [
-            camera.name
-            for camera, seen in zip(
-                self._observer.cameras, estimates.cameras[row].tolist(), strict=True
-            )
-            if seen
-        ]
+        sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigmas)
+        seen_by = zip(self._cameras, estimates.seen_by[row].tolist(), strict=True)
         source: PointSource = "measured" if estimates.measured[row] else "predicted"
-        name = self._slots[row].landmark
         return HandPoint(
-            name=name, position_m=(x, y, z), sigma_m=(sx, sy, sz), cameras=cameras, source=source
+            name=self._landmarks[row].name,
+            position_m=(x, y, z),
+            sigma_m=(sx, sy, sz),
+            cameras=[camera.name for camera, seen in seen_by if seen],
+            source=source,
+        )
+
+
+def _check(
+    config: RigConfig, cameras: Mapping[str, Camera], hands: Mapping[HandName, HandModel]
+) -> None:
+    """Raise CalibrationError if there are fewer than two cameras or a hand's model is missing."""
+    if len(cameras) < 2:
+        raise CalibrationError(
+            f"fusion needs two calibrated cameras or more, it has {sorted(cameras)}; "
+            f"add [[camera]] tables to rig.toml"
+        )
+    missing = [hand for hand in config.hand if hand not in hands]
+    if missing:
+        raise CalibrationError(
+            f"no model of the {missing[0]} hand was given to fusion; it has {sorted(hands)}"
         )

@@ -13,7 +13,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import MarkerFrame
 from services.fusion.step import FusionStep
-from testing.synthetic_points import START_NS, Path, Setup, point_hands
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, point_hands
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,10 @@ def run_fusion() -> Callable[..., tuple[FusionStep, Reported]]:
     """Frames -> FusionStep -> all points it reported, against the truth."""
 
     def run(
-        setup: Setup, given: Iterable[MarkerFrame], path: Path, fusion: Fusion | None = None
+        setup: SyntheticRig,
+        given: Iterable[MarkerFrame],
+        path: MovingHand,
+        fusion: Fusion | None = None,
     ) -> tuple[FusionStep, Reported]:
         step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
         messages = [message for frame in given for message in step.step(frame)] + step.flush()

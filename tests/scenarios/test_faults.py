@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from rhot.messages import MarkerFrame
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
 BEGIN_S, RECOVERY_S, AFTER_S = 2.0, 0.5, 2.0
 # Clocks as well known as a LAN allows, so that errors are the fault's.
-SETUP, MOVING = Setup(clock_error_s=0.0, clock_sigma_s=1e-4), Path()
+SETUP, MOVING = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4), MovingHand()
 
 Change = Callable[[MarkerFrame], MarkerFrame | None]
 replace = msgspec.structs.replace

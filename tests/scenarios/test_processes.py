@@ -8,7 +8,7 @@ import dataclasses
 import signal
 import sys
 from collections.abc import AsyncIterator
-from pathlib import Path as File
+from pathlib import MovingHand as File
 
 import msgspec
 import pytest
@@ -18,12 +18,12 @@ from rhot import clock, topics
 from rhot.bus.bus import open_bus
 from rhot.files.calibration import save
 from testing.calibration_files import lens_of, save_calibration
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
 pytestmark = pytest.mark.integration
 # numba's first compilation on a loaded machine takes most of it.
 START_S, RECOVERY_S = 120.0, 0.5
-SETUP = Setup(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, loss=0.0)
+SETUP = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, loss=0.0)
 FUSION = File(sys.executable).parent / "rhot-fusion"
 
 
@@ -72,7 +72,7 @@ class Feed:
         publishers = {
             name: self._bus.publisher(topics.MARKERS, camera=name) for name in SETUP.names
         }
-        given = frames(SETUP, Path(), 30.0)
+        given = frames(SETUP, MovingHand(), 30.0)
         begin_ns = clock.now_ns()
         for frame in given:
             late_ns = (frame.stamp_ns - START_NS) - (clock.now_ns() - begin_ns)

@@ -13,19 +13,17 @@ import pytest
 from rhot.files.calibration import load_hand
 from rhot.files.config import Fusion, HandTable, load_rig
 from rhot.hand import BASIC_LANDMARKS, landmark_point
-from services.cli.offline.run import tracker_step
 from services.fusion.step import FusionStep
-from services.pi_tracker.image.frame import Frame
-from services.simulator.camera.frame_source import FrameSource
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene
-from testing.synthetic_points import COLORS, START_NS, Path, Setup, frames, point_hands
+from testing.rendered_markers import detect
+from testing.synthetic_points import COLORS, START_NS, MovingHand, SyntheticRig, frames, point_hands
 
 OTHERS = ("yellow", "orange", "red", "pink", "white", "black")
 
 
 @dataclasses.dataclass(frozen=True)
-class Shifted(Path):
+class Shifted(MovingHand):
     """The same hand elsewhere."""
 
     shift_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -40,22 +38,22 @@ def test_one_of_many_cameras_may_stop_unnoticed(cameras, run_fusion):
 
     With it again they are as exact as before.
     """
-    setup = Setup(
+    setup = SyntheticRig(
         cameras=cameras, phase_s=1.0 / (30.0 * cameras), clock_error_s=0.0, clock_sigma_s=1e-4
     )
     gone = setup.names[-1]
     arriving = [
         f
-        for f in frames(setup, Path(), 6.0)
+        for f in frames(setup, MovingHand(), 6.0)
         if f.camera != gone or not 2e9 <= f.stamp_ns - f.clock_offset_ns - START_NS < 4e9
     ]
-    _, reported = run_fusion(setup, arriving, Path(), Fusion(lag_frames=1))
+    _, reported = run_fusion(setup, arriving, MovingHand(), Fusion(lag_frames=1))
     assert reported.share(2.0, 4.0, measured=True) > 0.95
     assert reported.rms_mm(4.2, 6.0) < 1.1 * reported.rms_mm(1.0, 2.0) + 0.2
     assert reported.outlier_share() < 0.005
 
 
-def two_hands(setup: Setup, right: Path, left: Path, seconds: float):
+def two_hands(setup: SyntheticRig, right: MovingHand, left: MovingHand, seconds: float):
     """Both hands before one rig: frames of equal seeds, markers of both."""
     rename = dict(zip(COLORS, OTHERS, strict=True))
     for a, b in zip(frames(setup, right, seconds), frames(setup, left, seconds), strict=True):
@@ -67,7 +65,7 @@ def two_hands(setup: Setup, right: Path, left: Path, seconds: float):
 
 
 def test_two_hands_side_by_side_are_kept_apart():
-    setup = Setup(clock_error_s=0.0, clock_sigma_s=1e-4)
+    setup = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4)
     right, left = (
         Shifted(speed_m_s=0.25, shift_m=(-0.13, 0.0, 0.0)),
         Shifted(speed_m_s=0.25, shift_m=(0.13, 0.0, 0.05), seed=2),
@@ -112,18 +110,8 @@ def test_two_hands_in_pictures(repository):
         config, dataclasses.replace(SCENES["two_hands"], distance_m=0.6), "two_hands", 1
     )
     hands = {hand: load_hand(config.calibration_dir, hand, 1.0) for hand in tables}
-    step, found, errors = FusionStep(config, scene.cameras, hands), [], defaultdict(list)
-    for name in scene.cameras:
-        source = FrameSource(scene, name, recorded=True)
-        tracker = tracker_step(config, name)
-        for seq in range(45):
-            taken = source.take(seq, START_NS)
-            if taken.image is not None:
-                frame = Frame(
-                    name, seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.image, "i420"
-                )
-                found.append((taken.time_s, tracker.step(frame, 0, 500_000)))
-    for _, frame in sorted(found, key=lambda entry: entry[0]):
+    step, errors = FusionStep(config, scene.cameras, hands), defaultdict(list)
+    for frame in detect(config, scene, 1.5):
         for message in step.step(frame):
             at_s = (message.stamp_ns - START_NS) * 1e-9
             if at_s < 0.3:
@@ -143,9 +131,9 @@ def test_four_cameras_at_90_fps_leave_most_of_a_core_free():
 
     The limit here leaves room for a machine that is busy with other tests.
     """
-    setup = Setup(cameras=4, fps=90.0, phase_s=1.0 / 360.0)
+    setup = SyntheticRig(cameras=4, fps=90.0, phase_s=1.0 / 360.0)
     step = FusionStep(setup.config(), setup.rig(), point_hands())
-    given, took_s = frames(setup, Path(), 3.0), 0.0
+    given, took_s = frames(setup, MovingHand(), 3.0), 0.0
     for number, frame in enumerate(given):
         begin_s = time.process_time()
         step.step(frame)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.geometry.transforms import Array, inverse
-from services.calibrator.bundle.triangulate import epipolar_px
+from services.calibrator.bundle.rigid_fit import epipolar_px
 from services.calibrator.recalibrate.bundle import ExtrinsicsSolution, solve
 from services.calibrator.recalibrate.marker_tracks import sample_rays
 from services.calibrator.recalibrate.residuals import (

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array, inverse, rotation_from_vector, transform
-from services.calibrator.bundle.triangulate import triangulate
+from rhot.geometry.triangulation import triangulate
 from services.calibrator.recalibrate.marker_tracks import MarkerTracks, SampledRays
 
 # A bumped camera is off by less: three degrees, two centimetres.

@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array, inverse, transform
+from rhot.geometry.triangulation import triangulate
 from services.calibrator.board.board import Board
 from services.calibrator.bundle.adjust import FreeUnknowns, adjust
 from services.calibrator.bundle.lens_model import FX, FY, rays_from_pixels
 from services.calibrator.bundle.residuals import State, View, rms
-from services.calibrator.bundle.triangulate import RigidFit, epipolar_px, rigid_fit, triangulate
+from services.calibrator.bundle.rigid_fit import RigidFit, epipolar_px, rigid_fit
 
 # A rigid fit through fewer corners would follow their noise.
 _MIN_CORNERS = 6

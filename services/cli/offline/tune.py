@@ -50,10 +50,10 @@ def tune_filter(
     """Propose mincutoff and beta of the 1-Euro filter: still hand first, then fast hand."""
     # Not above: importing the package fusion prepares numba's cache, which other commands do not
     # need.
-    from services.fusion.paired import one_euro_tuning
+    from services.fusion.paired import one_euro_tuning, recorded_tracks
 
     proposal = one_euro_tuning.propose(
-        one_euro_tuning.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter
+        recorded_tracks.tracks(messages(recording, topics.POINTS, HandPoints, "points")), jitter
     )
     typer.echo(msgspec.json.encode(proposal).decode() if as_json else _text(proposal))
 

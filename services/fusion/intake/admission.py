@@ -1,11 +1,11 @@
-"""Which frames belong to the present: a clock that jumps, a stamp from another year, a frame that
-comes twice or too late.
+"""Which frames are admitted by their instant: not duplicates, nor those of a clock that jumped.
 
-Cameras' clocks are only as good as their estimates, and a wrong stamp must cost that camera's
-frames, not the tracking. A frame near the newest accepted instant is accepted. Frames far from it
-wait outside: while others carry on they are refused; when nobody else does for a few frames, or two
-cameras agree on the new time, time itself has moved (a pause, a clock set everywhere) and starts
-anew there.
+Cameras' clocks are only as good as their estimates. A wrong stamp must cost that camera's frames,
+not the tracking.
+
+A frame near the newest admitted instant is admitted. Frames far from it are held against it: while
+others carry on they are refused. When nobody else does for a few frames, or when two cameras agree
+on the new time, time itself has moved (a pause, a clock set everywhere): it starts anew there.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from enum import Enum
 # Frames this far from the newest instant are not of the same time. Longer than any hold, shorter
 # than a second's jump of a clock.
 WINDOW_NS = 500_000_000
-# Frames of one camera in a row, with no others accepted meanwhile, that move time: 3 are a tenth of
-# a second at 30 fps.
-_INSIST = 3
+# Frames of one camera in a row, with no others admitted meanwhile, that restart time: 3 are a tenth
+# of a second at 30 fps.
+_FRAMES_TO_RESTART = 3
 # Instants remembered for each camera to know a frame that comes twice: more than any queue holds.
 _REMEMBERED = 64
 
@@ -28,21 +28,22 @@ class Verdict(Enum):
 
     ACCEPT = "accepted"
     RESTART = "restart"  # accept it, and forget everything before
-    TWICE = "twice"
+    TWICE = "twice"  # a duplicate
     ASTRAY = "astray"  # its clock is off, or it is far too late
 
 
-class Timeline:
-    """Judges the instants (ns, master clock) of all cameras' frames; holds no frames."""
+class FrameAdmission:
+    """Decides on all cameras' frames by their instants (ns, master clock); holds no frames."""
 
     def __init__(self, cameras: int) -> None:
         self.newest_ns: int | None = None
         self._known: list[deque[int]] = [deque(maxlen=_REMEMBERED) for _ in range(cameras)]
-        # Last stray instant of each camera since somebody was accepted, and how many in a row.
-        self._stray: dict[int, tuple[int, int]] = {}
+        # By camera, since a frame was last admitted: its latest instant astray, and how many such
+        # frames came in a row.
+        self._astray: dict[int, tuple[int, int]] = {}
 
-    def judge(self, camera: int, instant_ns: int) -> Verdict:
-        """The verdict on one frame; only accepted ones move time."""
+    def admit(self, camera: int, instant_ns: int) -> Verdict:
+        """The verdict on one frame; only admitted ones move time."""
         if instant_ns in self._known[camera]:
             return Verdict.TWICE
         if self.newest_ns is None:
@@ -50,20 +51,28 @@ class Timeline:
         if abs(instant_ns - self.newest_ns) <= WINDOW_NS:
             self.newest_ns = max(self.newest_ns, instant_ns)
             self._known[camera].append(instant_ns)
-            self._stray.clear()
+            self._astray.clear()
             return Verdict.ACCEPT
-        last_ns, run = self._stray.get(camera, (instant_ns, 0))
+        run = self._count_astray(camera, instant_ns)
+        if run >= _FRAMES_TO_RESTART or self._another_agrees(camera, instant_ns):
+            return self._restart(camera, instant_ns)
+        return Verdict.ASTRAY
+
+    def _count_astray(self, camera: int, instant_ns: int) -> int:
+        """Note a frame far from the present; how many consistent ones its camera sent in a row."""
+        last_ns, run = self._astray.get(camera, (instant_ns, 0))
         run = run + 1 if 0 < instant_ns - last_ns <= WINDOW_NS else 1
-        self._stray[camera] = (instant_ns, run)
-        agreed = any(
-            abs(other_ns - instant_ns) <= WINDOW_NS
-            for c, (other_ns, _) in self._stray.items()
-            if c != camera
+        self._astray[camera] = (instant_ns, run)
+        return run
+
+    def _another_agrees(self, camera: int, instant_ns: int) -> bool:
+        return any(
+            other != camera and abs(other_ns - instant_ns) <= WINDOW_NS
+            for other, (other_ns, _) in self._astray.items()
         )
-        return self._restart(camera, instant_ns) if agreed or run >= _INSIST else Verdict.ASTRAY
 
     def _restart(self, camera: int, instant_ns: int) -> Verdict:
         self.newest_ns = instant_ns
         self._known[camera].append(instant_ns)
-        self._stray.clear()
+        self._astray.clear()
         return Verdict.RESTART

@@ -1,11 +1,10 @@
-"""From a camera's MarkerFrame to observations: colours become landmarks, pixels become rays, every
-marker gets its own instant.
+"""From a camera's MarkerFrame to observations: colours become landmarks, pixels become rays.
 
-A rolling shutter reads row by row, so a marker's instant on the master's clock is stamp_ns + y_px *
-row_time_ns - clock_offset_ns. Frames that cannot be used (a camera that is not in the rig, another
-image size than the calibration's, an instant outside the range of stamps) give a Refusal instead of
-a View; markers that cannot (unknown colour, outside the image, absurd numbers) are left out and
-counted.
+Every marker gets its own instant: a rolling shutter reads row by row, so it is stamp_ns + y_px *
+row_time_ns - clock_offset_ns on the master's clock. Frames that cannot be used (a camera that is
+not in the rig, another image size than the calibration's, an instant outside the range of stamps)
+give a Refusal instead of a View. Markers that cannot be used (unknown colour, outside the image,
+absurd numbers) are left out and counted.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-import numpy.typing as npt
 
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandName
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.intake import undistortion
+from services.fusion.arrays import Ints
+from services.fusion.intake.undistortion import undistort
 
 # No blob's centre is known better than this (measured: .036 px is the best method's noise in the
 # best picture) nor useful beyond 20 px.
@@ -43,50 +42,44 @@ class Refusal(Enum):
 
 
 @dataclass(frozen=True)
-class Slot:
-    """One landmark of one hand: the unit every method of fusion works on."""
+class Landmark:
+    """One landmark of one hand: the unit every method of fusion works on, known by its index."""
 
     hand: HandName
-    landmark: str
+    name: str
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """What one camera saw in one frame: n observations, each with its own instant."""
 
-    camera: int  # index into Observer.cameras
-    seq: int
+    camera: int  # index into ObservationBuilder.cameras
     instant_ns: int  # master clock, middle row: the frame's own instant
-    slots: npt.NDArray[np.int64]  # (n,) index into Observer.slots, ascending
+    landmarks: Ints  # (n,) index into ObservationBuilder.landmarks, ascending
     delay_s: Array  # (n,) of each observation after instant_ns
     rays: Array  # (n, 2) undistorted x/z, y/z
-    sigma: Array  # (n,) of each ray coordinate
+    sigmas: Array  # (n,) of each ray coordinate
     clock_offset_ns: int  # as announced, already taken off
     clock_sigma_s: float
     ignored: int  # markers left out
 
 
-class Observer:
+class ObservationBuilder:
     """Turns the frames of a rig's cameras into Views; holds which colour is which landmark."""
 
     def __init__(self, config: RigConfig, cameras: Mapping[str, Camera]) -> None:
         self.cameras = tuple(cameras.values())
-        self.slots: tuple[Slot, ...] = tuple(
-            Slot(hand, name)
-            for hand in HANDS
-            if hand in config.hand
-            for name in config.hand[hand].markers
-        )
         self._camera_index = {camera.name: index for index, camera in enumerate(self.cameras)}
-        colors = [
-            color
-            for hand in HANDS
-            if hand in config.hand
-            for color in config.hand[hand].markers.values()
-        ]
-        self._slot_of = {color: index for index, color in enumerate(colors)}
+        landmarks: list[Landmark] = []
+        self._landmark_of: dict[str, int] = {}  # colour -> index
+        for hand in HANDS:
+            if hand in config.hand:
+                for name, color in config.hand[hand].markers.items():
+                    self._landmark_of[color] = len(landmarks)
+                    landmarks.append(Landmark(hand, name))
+        self.landmarks = tuple(landmarks)
 
-    def view(self, frame: MarkerFrame) -> View | Refusal:
+    def build(self, frame: MarkerFrame) -> View | Refusal:
         """The observations of one frame, or why there can be none."""
         index = self._camera_index.get(frame.camera)
         if index is None:
@@ -98,40 +91,38 @@ class Observer:
         instant_ns = frame.stamp_ns + round(middle_row * frame.row_time_ns) - frame.clock_offset_ns
         if not 0 <= instant_ns <= _STAMP_MAX:
             return Refusal.ABSURD_STAMP
-        markers = self._usable(frame, camera)
-        slots = np.array(sorted(markers), dtype=np.int64)
-        pixels = np.array([(markers[s].x_px, markers[s].y_px) for s in slots.tolist()]).reshape(
-            -1, 2
+        best = self._best_markers(frame, camera)
+        landmarks = np.array(sorted(best), dtype=np.int64)
+        markers = [best[landmark] for landmark in landmarks.tolist()]
+        pixels = np.array([(marker.x_px, marker.y_px) for marker in markers]).reshape(-1, 2)
+        sigmas_px = np.array(
+            [min(max(marker.sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for marker in markers]
         )
-        sigma_px = np.array(
-            [min(max(markers[s].sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for s in slots.tolist()]
-        )
-        rays, scale, valid = undistortion.rays(camera, pixels)
+        rays, scale, valid = undistort(camera, pixels)
         return View(
             camera=index,
-            seq=frame.seq,
             instant_ns=instant_ns,
-            slots=slots[valid],
+            landmarks=landmarks[valid],
             delay_s=((pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9)[valid],
             rays=rays[valid],
-            sigma=(sigma_px * scale)[valid],
+            sigmas=(sigmas_px * scale)[valid],
             clock_offset_ns=frame.clock_offset_ns,
             clock_sigma_s=clock_sigma_s(frame.clock_sigma_ns),
             ignored=len(frame.markers) - int(np.count_nonzero(valid)),
         )
 
-    def _usable(self, frame: MarkerFrame, camera: Camera) -> dict[int, Marker]:
-        """The best marker of each landmark that lies in the image."""
+    def _best_markers(self, frame: MarkerFrame, camera: Camera) -> dict[int, Marker]:
+        """The best usable marker of each landmark (by index) that is in the frame."""
         width, height = camera.size_px
-        found: dict[int, Marker] = {}
+        best: dict[int, Marker] = {}
         for marker in frame.markers:
-            slot = self._slot_of.get(marker.color)
+            landmark = self._landmark_of.get(marker.color)
             inside = -0.5 <= marker.x_px <= width - 0.5 and -0.5 <= marker.y_px <= height - 0.5
-            if slot is None or not inside or not math.isfinite(marker.sigma_px):
+            if landmark is None or not inside or not math.isfinite(marker.sigma_px):
                 continue
-            if slot not in found or marker.quality > found[slot].quality:
-                found[slot] = marker
-        return found
+            if landmark not in best or marker.quality > best[landmark].quality:
+                best[landmark] = marker
+        return best
 
 
 def clock_sigma_s(clock_sigma_ns: int) -> float:
@@ -139,6 +130,6 @@ def clock_sigma_s(clock_sigma_ns: int) -> float:
 
     An unknown offset counts as the most that is still of use.
     """
-    return (
-        CLOCK_SIGMA_MAX_S if clock_sigma_ns < 0 else min(clock_sigma_ns * 1e-9, CLOCK_SIGMA_MAX_S)
-    )
+    if clock_sigma_ns < 0:
+        return CLOCK_SIGMA_MAX_S
+    return min(clock_sigma_ns * 1e-9, CLOCK_SIGMA_MAX_S)

@@ -1,12 +1,13 @@
-"""Bringing views to one instant: nearest frame, straight line, or the 4-point Hermite cubic through
-a camera's track of a landmark.
+"""A camera's ray to a landmark at any instant, interpolated between its frames.
 
-Two free-running cameras see a moving hand up to half a frame apart, which nearest-frame pairing
-turns into tens of millimetres of depth (depth error = Z * v * dt / B). Interpolation between frames
-needs later frames: it waits. An instant that the track does not enclose yet, or across a gap in the
-track, gives None: the caller decides whether to wait or to do without. Where one of the four points
-is missing, at the end of a track or as a frame was lost, the parabola through three takes the
-cubic's place.
+Two free-running cameras see a moving hand up to half a frame apart. Pairing nearest frames turns
+that into tens of millimetres of depth (depth error = Z * v * dt / B). So rays are interpolated:
+nearest frame, straight line, or the 4-point Hermite cubic.
+
+Interpolation needs later frames: it waits. An instant that the track does not enclose yet, or
+across a gap in the track, gives None: the caller decides whether to wait or to do without. Where
+one of the four points is missing, at the end of a track or as a frame was lost, the parabola
+through three takes the cubic's place.
 """
 
 from __future__ import annotations
@@ -26,24 +27,21 @@ FRAMES_AFTER: dict[Pairing, int] = {"nearest": 0, "linear": 1, "hermite": 2}
 # Samples kept for each landmark and camera: four points, two frames of lag, and room for frames
 # that come out of order.
 SAMPLES = 16
-# Between samples further apart than this many frames the path is anybody's guess.
+# Samples further apart than this many frames are not interpolated: the motion between is unknown.
 _GAP_FRAMES = 3.5
 
 
 @dataclass(frozen=True, eq=False)
-class Ray:
-    """A camera's ray (2,) to a landmark at the wanted instant, the sigma of each coordinate, and
-    how many samples it is made from.
-    """
+class InterpolatedRay:
+    """A camera's ray to a landmark at the wanted instant."""
 
-    ray: Array
-    sigma: float
-    samples: int
+    ray: Array  # (2,)
+    sigma: float  # of each coordinate
+    samples: int  # from how many it is interpolated
 
 
 def polynomial_weights(times_s: Array, at_s: float) -> Array:
-    """Weights (n,) of n samples at times (n,) in the value at at_s of the polynomial through them
-    (Lagrange).
+    """Weights (n,) of n samples at times (n,) in the polynomial through them at at_s (Lagrange).
 
     Of four: the Hermite cubic between the middle two whose tangents are those of the cubic through
     all four, hence exact on cubics; at the middle of even spacing the familiar (-1, 9, 9, -1) / 16,
@@ -67,64 +65,67 @@ class RayTrack:
         self._sigmas: list[float] = []
 
     def add(self, time_s: float, ray: Array, sigma: float) -> None:
-        """Put a sample in its place in time.
+        """Insert a sample in order of time.
 
         One at an instant already known, or older than all of a full track, is ignored.
         """
-        place = bisect_right(self._times, time_s)
-        known = place > 0 and self._times[place - 1] == time_s
-        if known or (place == 0 and len(self._times) >= SAMPLES):
+        index = bisect_right(self._times, time_s)
+        known = index > 0 and self._times[index - 1] == time_s
+        if known or (index == 0 and len(self._times) >= SAMPLES):
             return
-        self._times.insert(place, time_s)
-        self._rays.insert(place, np.asarray(ray, dtype=np.float64))
-        self._sigmas.insert(place, sigma)
+        self._times.insert(index, time_s)
+        self._rays.insert(index, np.asarray(ray, dtype=np.float64))
+        self._sigmas.insert(index, sigma)
         if len(self._times) > SAMPLES:
             del self._times[0], self._rays[0], self._sigmas[0]
 
     def newest(self, n: int) -> list[tuple[float, Array, float]]:
         """The last n samples, newest first: time, ray (2,), sigma."""
+        newest_first = slice(None, -n - 1, -1)
         return list(
             zip(
-                self._times[: -n - 1 : -1],
-                self._rays[: -n - 1 : -1],
-                self._sigmas[: -n - 1 : -1],
+                self._times[newest_first],
+                self._rays[newest_first],
+                self._sigmas[newest_first],
                 strict=True,
             )
         )
 
-    def at(self, time_s: float, pairing: Pairing, period_s: float) -> Ray | None:
+    def at(self, time_s: float, pairing: Pairing, period_s: float) -> InterpolatedRay | None:
         """The ray at an instant; period_s is the camera's frame time, which tells a gap.
 
         None if the samples do not give it.
         """
         if not self._times:
             return None
-        place = bisect_right(self._times, time_s)
-        around = [k for k in (place - 1, place) if 0 <= k < len(self._times)]
-        nearest = min(around, key=lambda k: abs(self._times[k] - time_s))
+        after = bisect_right(self._times, time_s)
+        around = [k for k in (after - 1, after) if 0 <= k < len(self._times)]
         if pairing == "nearest":
-            return self._nearest(nearest, abs(self._times[nearest] - time_s), period_s)
-        if len(around) < 2 or self._times[place] - self._times[place - 1] > _GAP_FRAMES * period_s:
+            return self._nearest(around, time_s, period_s)
+        if len(around) < 2 or self._times[after] - self._times[after - 1] > _GAP_FRAMES * period_s:
             return None
         if pairing == "hermite":
-            around = [k for k in range(place - 2, place + 2) if 0 <= k < len(self._times)]
+            around = [k for k in range(after - 2, after + 2) if 0 <= k < len(self._times)]
         weights = polynomial_weights(np.array([self._times[k] for k in around]), time_s)
-        ray = weights @ np.array([self._rays[k] for k in around])
-        sigma = float(np.sqrt(np.sum((weights * np.array([self._sigmas[k] for k in around])) ** 2)))
-        return Ray(ray, sigma, len(around))
+        rays = np.array([self._rays[k] for k in around])
+        sigmas = np.array([self._sigmas[k] for k in around])
+        sigma = float(np.sqrt(np.sum((weights * sigmas) ** 2)))
+        return InterpolatedRay(weights @ rays, sigma, len(around))
 
-    def _nearest(self, k: int, away_s: float, period_s: float) -> Ray | None:
-        """Sample k as it is.
+    def _nearest(self, around: list[int], time_s: float, period_s: float) -> InterpolatedRay | None:
+        """The nearest of the samples `around` an instant, as it is.
 
         Its sigma grows by how far it may have moved, judging by its neighbour.
         """
+        k = min(around, key=lambda k: abs(self._times[k] - time_s))
+        away_s = abs(self._times[k] - time_s)
         if away_s > 0.75 * period_s:
             return None
         other = k - 1 if k > 0 else min(1, len(self._times) - 1)
         elapsed_s = abs(self._times[k] - self._times[other])
-        speed = (
-            float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s
-            if elapsed_s > 0.0
-            else 0.0
+        speed = 0.0
+        if elapsed_s > 0.0:
+            speed = float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s
+        return InterpolatedRay(
+            self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), samples=1
         )
-        return Ray(self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), 1)

@@ -1,68 +1,29 @@
-"""The seed's depth law: distance from the disparity of two cameras alone, D = k * x^z, RHOT eq.
-(9), or with k of eq. (10).
+"""The RHOT paper's depth law: distance from the disparity of two cameras alone.
 
-The disparity is taken between rays turned into the common rectified frame of the two cameras (x
-along the baseline), so that the cameras need not be parallel; pictures are never rectified. The
-lateral position follows from the ray. The law is a fit: k and z belong to one rig (`rhot calibrate
-depth`), and the seed's k = 4543.3, z = -1.035 only to 75 mm and 527.3 px. No disparity, or a
-negative one, gives the status of rays that do not meet.
+D = k * x^z, RHOT eq. (9), or with k of eq. (10). The disparity x is taken in the rectified frame of
+the two cameras (rectified_pair.py), so that they need not be parallel; the lateral position follows
+from the ray. The law is a fit: k and z belong to one rig (`rhot calibrate depth`), and the paper's
+k = 4543.3, z = -1.035 only to 75 mm and 527.3 px. No disparity, or a negative one, gives the status
+of rays that do not meet.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rhot.files.config import Disparity
-from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
 from services.fusion.geometry.triangulation import Triangulation, TriangulationStatus
 
-
-@dataclass(frozen=True, eq=False)
-class RectifiedPair:
-    """Two cameras brought to a common frame: origin in the first one's centre, x towards the
-    second, z ahead.
-    """
-
-    R_rectified_from_first: Array  # (3, 3)
-    R_rectified_from_second: Array  # (3, 3)
-    R_rig_from_rectified: Array  # (3, 3)
-    origin_rig: Array  # (3,) optical centre of the first camera
-    baseline_m: float
-    focal_px: float
-    width_px: int
-
-
-def rectified_pair(a: Camera, b: Camera) -> RectifiedPair | None:
-    """The rectified frame of two cameras; None if they stand in one place or look along their
-    baseline.
-
-    If the second camera stands left of the first, the frame is turned by 180 deg about z: the
-    disparity is positive all the same.
-    """
-    forward = a.T_rig_from_camera[:3, 2] + b.T_rig_from_camera[:3, 2]
-    x = b.centre_rig - a.centre_rig
-    y = np.cross(forward, x)
-    baseline, height = float(np.linalg.norm(x)), float(np.linalg.norm(y))
-    # Below a tenth of a millimetre of baseline, or half a degree off its direction, there is no
-    # disparity to speak of.
-    if baseline < 1e-4 or height < 0.01 * baseline * float(np.linalg.norm(forward)):
-        return None
-    x, y = x / baseline, y / height
-    R = np.stack([x, y, np.cross(x, y)], axis=1)  # R_rig_from_rectified
-    focal = 0.25 * (sum(a.focal_px) + sum(b.focal_px))
-    R_a, R_b = a.T_rig_from_camera[:3, :3], b.T_rig_from_camera[:3, :3]
-    return RectifiedPair(
-        R.T @ R_a, R.T @ R_b, R, a.centre_rig.copy(), baseline, focal, a.size_px[0]
-    )
+# A tenth of a pixel of disparity is beyond any reach, and the power law would overflow near zero.
+_MIN_DISPARITY_PX = 0.1
 
 
 def depth_law(settings: Disparity, pair: RectifiedPair) -> tuple[float, float]:
-    """k (cm px^-z) and z of D = k * x^z: the fitted law, or the geometry of eq.
+    """k (cm px^-z) and z of D = k * x^z.
 
-    (10) with its alignment angle phi.
+    The fitted law, or the geometry of eq. (10) with its alignment angle phi.
     """
     if settings.law == "power":
         return settings.k, settings.z
@@ -74,45 +35,55 @@ def depth_law(settings: Disparity, pair: RectifiedPair) -> tuple[float, float]:
 def locate(
     pair: RectifiedPair, rays: Array, sigmas: Array, law: tuple[float, float], max_distance_m: float
 ) -> Triangulation:
-    """The point seen along the rays (2, 2) of the pair's first and second camera with sigmas (2,),
-    by the law (k, z).
+    """The point seen along the rays (2, 2) of a pair of cameras, by the law (k, z).
 
-    residual_sigma is the epipolar error: how far the two rays' heights differ, in sigmas.
+    sigmas (2,) are those of the rays, the first camera's first. residual_sigma is the epipolar
+    error: how far the two rays' heights differ, in sigmas.
     """
-    first, second = (
-        pair.R_rectified_from_first @ [*rays[0], 1.0],
-        pair.R_rectified_from_second @ [*rays[1], 1.0],
-    )
     nothing = Triangulation(TriangulationStatus.BEHIND, np.zeros(3), np.zeros((3, 3)), float("inf"))
-    if first[2] <= 0.0 or second[2] <= 0.0:
+    first = rectify_ray(pair.R_rectified_from_first, rays[0])
+    second = rectify_ray(pair.R_rectified_from_second, rays[1])
+    if first is None or second is None:
         return nothing
-    (x1, y1), (x2, y2) = first[:2] / first[2], second[:2] / second[2]
+    x1, y1 = first
+    x2, y2 = second
     disparity_px = pair.focal_px * (x1 - x2)
-    k, z = law
-    # A tenth of a pixel is beyond any reach, and the power law would overflow near zero.
-    if disparity_px < 0.1:
+    if disparity_px < _MIN_DISPARITY_PX:
         return nothing
+    k, z = law
     depth = 0.01 * k * disparity_px**z
+    # The height is the mean of both rays', weighted by their variances.
     height_sigma = float(np.hypot(sigmas[0], sigmas[1]))
     share = sigmas[1] ** 2 / height_sigma**2
     y = share * y1 + (1.0 - share) * y2
     p_rectified = depth * np.array([x1, y, 1.0])
-    slope = z * depth / disparity_px * pair.focal_px
+    cov = _covariance(p_rectified, (x1, y), z * depth / disparity_px * pair.focal_px, sigmas, share)
+    R = pair.R_rig_from_rectified
+    within_reach = np.linalg.norm(p_rectified) <= max_distance_m
+    return Triangulation(
+        TriangulationStatus.OK if within_reach else TriangulationStatus.BEYOND,
+        R @ p_rectified + pair.origin_rig,
+        R @ cov @ R.T,
+        float(abs(y1 - y2) / height_sigma),
+    )
+
+
+def _covariance(
+    p_rectified: Array, ray: tuple[float, float], slope: float, sigmas: Array, share: float
+) -> Array:
+    """Covariance (3, 3) of a point at depth p_rectified[2] along a ray (x, y).
+
+    slope: derivative of the depth by x of the first ray. share: weight of the first ray's height.
+    """
+    depth = p_rectified[2]
+    x, y = ray
+    # Jacobian of the point by x of both rays and their mean height.
     J = np.array(
         [
-            [depth + slope * x1, -slope * x1, 0.0],
+            [depth + slope * x, -slope * x, 0.0],
             [slope * y, -slope * y, depth],
             [slope, -slope, 0.0],
         ]
     )
     height_variance = (share * sigmas[0]) ** 2 + ((1.0 - share) * sigmas[1]) ** 2
-    cov = J @ np.diag([sigmas[0] ** 2, sigmas[1] ** 2, height_variance]) @ J.T
-    R = pair.R_rig_from_rectified
-    status = (
-        TriangulationStatus.OK
-        if np.linalg.norm(p_rectified) <= max_distance_m
-        else TriangulationStatus.BEYOND
-    )
-    return Triangulation(
-        status, R @ p_rectified + pair.origin_rig, R @ cov @ R.T, float(abs(y1 - y2) / height_sigma)
-    )
+    return J @ np.diag([sigmas[0] ** 2, sigmas[1] ** 2, height_variance]) @ J.T

@@ -1,9 +1,10 @@
-"""The 1-Euro filter: a low-pass filter whose cutoff rises with speed, so that rest is calm and
-motion is prompt.
+"""The 1-Euro filter: a low-pass filter whose cutoff rises with speed.
+
+So rest is calm and motion is prompt.
 
 Casiez, Roussel, Vogel, "1 Euro Filter: A Simple Speed-based Low-pass Filter for Noisy Input in
 Interactive Systems", CHI 2012, algorithm 1; RHOT section 10. Input that comes late or twice (time
-does not advance) returns the last output unchanged; after a gap the filter simply sees a long step,
+does not advance) returns the last output unchanged. After a gap the filter simply sees a long step,
 whose smoothing factor is near 1, so it jumps to the new value rather than sliding there.
 """
 
@@ -16,7 +17,8 @@ from rhot.geometry.transforms import Array
 
 
 def smoothing_factor(cutoff_hz: float | Array, dt_s: float) -> float | Array:
-    """alpha of an exponential filter with that cutoff: 1 / (1 + tau / dt), tau = 1 / (2 pi cutoff);
+    """alpha of an exponential filter with that cutoff: 1 / (1 + tau / dt), tau = 1 / (2 pi cutoff).
+
     Casiez 2012, eq. (4) and (5).
     """
     tau = 1.0 / (2.0 * np.pi * cutoff_hz)
@@ -47,10 +49,11 @@ class OneEuroFilter:
         self._value = None
 
     def __call__(self, value: npt.ArrayLike, dt_s: float) -> Array:
-        """The filtered value, same shape, dt_s seconds after the last one (ignored for the first)."""
+        """The filtered value, same shape, dt_s seconds after the last (ignored for the first)."""
         x = np.asarray(value, dtype=np.float64)
         if self._value is None:
-            self._value, self._speed = x.copy(), np.zeros_like(x)
+            self._value = x.copy()
+            self._speed = np.zeros_like(x)
             return self._value.copy()
         if dt_s <= 0.0:
             return self._value.copy()

@@ -1,6 +1,4 @@
-"""What the tests of fusion share: a pair of cameras, and how well a run did against the synthetic
-truth.
-"""
+"""What the tests of fusion share: a pair of cameras, and the errors of a run against the truth."""
 
 from __future__ import annotations
 
@@ -15,17 +13,17 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoints, MarkerFrame
-from services.fusion.intake.observations import Observer
+from services.fusion.intake.observations import ObservationBuilder
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.step import FusionStep
-from testing.synthetic_points import START_NS, Path, Setup, frames, point_hands
+from testing.synthetic_points import START_NS, Motion, SyntheticRig, frames, point_hands
 
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Errors of told points against truth, after `warm_s`."""
+    """Errors of points against truth, after `warm_s`."""
 
-    told: int
+    messages: int
     errors_m: Array  # (n, 3)
     sigmas_m: Array  # (n, 3)
     instants_s: Array  # (n,)
@@ -45,25 +43,25 @@ class Score:
         return float(np.mean((self.errors_m / self.sigmas_m) ** 2))
 
 
-def score(told: Iterable[HandPoints], path: Path, warm_s: float = 1.0) -> Score:
-    told = [message for message in told if (message.stamp_ns - START_NS) * 1e-9 >= warm_s]
+def score(messages: Iterable[HandPoints], path: Motion, warm_s: float = 1.0) -> Score:
+    messages = [m for m in messages if (m.stamp_ns - START_NS) * 1e-9 >= warm_s]
     rows = []
-    for message in told:
+    for message in messages:
         instant_s = (message.stamp_ns - START_NS) * 1e-9
         truth = path(np.array([instant_s]))[0]
         for point in message.points:
             error = np.array(point.position_m) - truth[BASIC_LANDMARKS.index(point.name)]
             rows.append([*error, *point.sigma_m, instant_s, float(point.source == "measured")])
     table = np.array(rows).reshape(-1, 8)
-    return Score(len(told), table[:, :3], table[:, 3:6], table[:, 6], table[:, 7])
+    return Score(len(messages), table[:, :3], table[:, 3:6], table[:, 6], table[:, 7])
 
 
 def track(
-    setup: Setup, given: Iterable[MarkerFrame], fusion: Fusion | None = None
+    setup: SyntheticRig, given: Iterable[MarkerFrame], fusion: Fusion | None = None
 ) -> tuple[FusionStep, list[HandPoints]]:
     step = FusionStep(setup.config(fusion), setup.rig(), point_hands())
-    told = [points for frame in given for points in step.step(frame)]
-    return step, told + step.flush()
+    messages = [points for frame in given for points in step.step(frame)]
+    return step, messages + step.flush()
 
 
 Run = Callable[..., tuple[FusionStep, Score]]
@@ -74,30 +72,24 @@ def run() -> Run:
     """Synthetic hand -> FusionStep -> score."""
 
     def simulate(
-        setup: Setup, path: Path, fusion: Fusion | None = None, seconds: float = 6.0
+        setup: SyntheticRig, path: Motion, fusion: Fusion | None = None, seconds: float = 6.0
     ) -> tuple[FusionStep, Score]:
-        step, told = track(setup, frames(setup, path, seconds), fusion)
-        return step, score(told, path)
+        step, messages = track(setup, frames(setup, path, seconds), fusion)
+        return step, score(messages, path)
 
     return simulate
 
 
 @pytest.fixture(scope="session")
 def fuse() -> Callable[..., tuple[FusionStep, list[HandPoints]]]:
-    """Frames -> FusionStep -> everything it told."""
+    """Frames -> FusionStep -> all its messages."""
     return track
-
-
-@pytest.fixture(scope="session")
-def judge() -> Callable[..., Score]:
-    """What was told -> score."""
-    return score
 
 
 @pytest.fixture
 def pair() -> tuple[Camera, Camera]:
     """Two cameras that are neither parallel nor level nor of one focal length."""
-    left, right = Setup(toe_in_rad=0.05).rig().values()
+    left, right = SyntheticRig(toe_in_rad=0.05).rig().values()
     tilted = right.T_rig_from_camera.copy()
     tilted[:3, 3] += [0.0, 0.004, -0.01]
     return left, Camera(
@@ -114,12 +106,12 @@ class Bench:
 
     def __init__(
         self,
-        setup: Setup,
+        setup: SyntheticRig,
         fusion: Fusion | None = None,
         hands: Iterable[Iterable[int]] = (range(6),),
     ) -> None:
         self.cameras = setup.rig()
-        self.observer = Observer(setup.config(), self.cameras)
+        self.builder = ObservationBuilder(setup.config(), self.cameras)
         periods_s = np.full(len(self.cameras), 1.0 / setup.fps)
         groups = [np.array(list(hand), dtype=np.int64) for hand in hands]
         self.method = KalmanMethod(
@@ -127,8 +119,8 @@ class Bench:
         )
 
     def see(self, frame: MarkerFrame) -> float:
-        """Take in a frame; its instant in s."""
-        view = self.observer.view(frame)
+        """Take in a frame; its instant in s, as synthetic_points counts."""
+        view = self.builder.build(frame)
         instant_s = (view.instant_ns - START_NS) * 1e-9
         self.method.observe(view, instant_s + view.delay_s, view.clock_sigma_s)
         return instant_s

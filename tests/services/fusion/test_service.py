@@ -11,12 +11,11 @@ import pytest
 from rhot import clock, topics
 from rhot.bus.bus import open_bus
 from rhot.errors import CalibrationError
-from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
 from rhot.files.config import RigConfig
 from rhot.messages import Session
 from rhot.process.service import Service
 from services.fusion.service import serve
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
 RIG = "bench"
 DEADLINE_S = 20.0
@@ -25,19 +24,8 @@ DEADLINE_S = 20.0
 @pytest.fixture
 def config(tmp_path) -> RigConfig:
     """The synthetic rig with its calibration on disk."""
-    setup = Setup()
-    for camera in setup.rig().values():
-        lens = Lens(
-            size_px=camera.size_px,
-            matrix=rows(camera.matrix),
-            distortion=tuple(camera.distortion.tolist()),
-        )
-        save(tmp_path / "calibration" / f"{camera.name}.lens.json", lens)
-    places = {
-        camera.name: CameraPlace(T_rig_from_camera=rows(camera.T_rig_from_camera))
-        for camera in setup.rig().values()
-    }
-    save(tmp_path / "calibration" / "rig.json", RigGeometry(cameras=places))
+    setup = SyntheticRig()
+    setup.save_calibration(tmp_path / "calibration")
     return msgspec.structs.replace(setup.config(), folder=str(tmp_path))
 
 
@@ -59,12 +47,8 @@ async def running(config, bus):
         await task
 
 
-def rows(matrix):
-    return tuple(tuple(row) for row in matrix.tolist())
-
-
 async def test_without_calibration_it_says_what_makes_it(router, tmp_path):
-    config = msgspec.structs.replace(Setup().config(), folder=str(tmp_path))
+    config = msgspec.structs.replace(SyntheticRig().config(), folder=str(tmp_path))
     async with open_bus(RIG, [router]) as bus, asyncio.TaskGroup() as tasks:
         with pytest.raises(CalibrationError, match="rhot calibrate"):
             await serve(Service("fusion", "main", config, bus, tasks))
@@ -92,8 +76,10 @@ async def test_leads_the_rig_and_turns_markers_into_points(router, config):
 
 async def feed(client, points):
     """Two seconds of frames; points arrive and are where the hand is."""
-    publishers = {name: client.publisher(topics.MARKERS, camera=name) for name in Setup().names}
-    path, setup = Path(), Setup(clock_error_s=0.0, loss=0.0)
+    publishers = {
+        name: client.publisher(topics.MARKERS, camera=name) for name in SyntheticRig().names
+    }
+    path, setup = MovingHand(), SyntheticRig(clock_error_s=0.0, loss=0.0)
     while not all(publisher.wanted for publisher in publishers.values()):
         await asyncio.sleep(0.01)
     for frame in frames(setup, path, 1.0):
@@ -118,7 +104,7 @@ async def stop(client):
 async def one_unknown_camera(client, service):
     """A camera that is not in the rig is mentioned once, and nothing ends."""
     stranger = client.publisher(topics.MARKERS, camera="door")
-    frame = msgspec.structs.replace(frames(Setup(), Path(), 0.1)[0], camera="door")
+    frame = msgspec.structs.replace(frames(SyntheticRig(), MovingHand(), 0.1)[0], camera="door")
     while not service.errors:
         stranger.put(frame)
         await asyncio.sleep(0.01)

@@ -16,9 +16,16 @@ from rhot.files.config import Fusion
 from rhot.geometry.transforms import apply, rotation_from_vector, transform
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.step import FusionStep
-from testing.synthetic_points import START_NS, Path, Setup, Sway, frames, point_hands
+from testing.synthetic_points import (
+    START_NS,
+    MovingHand,
+    RestingHand,
+    SyntheticRig,
+    frames,
+    point_hands,
+)
 
-MOVING, SETUP = Path(), Setup()
+MOVING, SETUP = MovingHand(), SyntheticRig()
 
 
 def replace(frame, **fields):
@@ -38,18 +45,18 @@ def test_moving_hand_is_accurate_and_sigma_honest(run, lag, limit_mm):
 # Issue 4's bounds are .6 and 2 mm; measured .27 and .65.
 @pytest.mark.parametrize(("distance_m", "limit_mm"), [(0.5, 0.35), (1.0, 0.9)])
 def test_still_hand_is_accurate_and_sigma_honest(run, distance_m, limit_mm):
-    _, found = run(SETUP, Sway(distance_m=distance_m), seconds=10.0)
+    _, found = run(SETUP, RestingHand(distance_m=distance_m), seconds=10.0)
     assert found.depth_rms_mm < limit_mm
     assert 0.7 < found.nees < 1.2
 
 
-def test_a_plaster_hand_is_known_better_than_is_told(run):
+def test_a_hand_without_any_motion_is_known_better_than_sigma_says(run):
     """Test: no motion at all.
 
     Expected: a smaller error than of a hand that sways, within a sigma that allows for sway.
     """
-    _, plaster = run(SETUP, Path(distance_m=1.0, speed_m_s=0.0), seconds=10.0)
-    _, alive = run(SETUP, Sway(), seconds=10.0)
+    _, plaster = run(SETUP, MovingHand(distance_m=1.0, speed_m_s=0.0), seconds=10.0)
+    _, alive = run(SETUP, RestingHand(), seconds=10.0)
     assert plaster.depth_rms_mm < alive.depth_rms_mm
     assert 0.5 < plaster.nees < 1.0
 
@@ -58,7 +65,7 @@ def test_a_plaster_hand_is_known_better_than_is_told(run):
 def test_more_cameras_are_better(run, cameras):
     _, two = run(SETUP, MOVING, Fusion(lag_frames=1))
     _, more = run(
-        Setup(cameras=cameras, phase_s=1.0 / (30.0 * cameras)), MOVING, Fusion(lag_frames=1)
+        SyntheticRig(cameras=cameras, phase_s=1.0 / (30.0 * cameras)), MOVING, Fusion(lag_frames=1)
     )
     assert more.rms_mm < 0.7 * two.rms_mm
     assert 0.75 < more.nees < 1.25
@@ -76,22 +83,22 @@ def test_paired_methods_rank_as_they_should(run):
 
 def test_disparity_law_is_off_by_its_fit_only(run):
     _, found = run(
-        SETUP, Path(speed_m_s=0.0, distance_m=0.6), Fusion(method="disparity", filter="none")
+        SETUP, MovingHand(speed_m_s=0.0, distance_m=0.6), Fusion(method="disparity", filter="none")
     )
     # 4543.3 * 65.9 ** -1.035 is 59.5 cm for 60.
     assert 2.0 < found.rms_mm < 8.0
     law = msgspec.convert(
         {"method": "disparity", "filter": "none", "disparity": {"law": "geometry"}}, Fusion
     )
-    assert run(SETUP, Path(speed_m_s=0.0, distance_m=0.6), law)[1].rms_mm < 1.5
+    assert run(SETUP, MovingHand(speed_m_s=0.0, distance_m=0.6), law)[1].rms_mm < 1.5
 
 
 def test_one_message_per_reference_frame_with_rising_stamps(fuse):
-    step, told = fuse(SETUP, frames(SETUP, MOVING, 5.0), Fusion(lag_frames=1))
-    stamps = [message.stamp_ns for message in told]
+    step, messages = fuse(SETUP, frames(SETUP, MOVING, 5.0), Fusion(lag_frames=1))
+    stamps = [message.stamp_ns for message in messages]
     assert stamps == sorted(set(stamps))
-    assert [message.seq for message in told] == list(range(len(told)))
-    assert len(told) == pytest.approx(150, abs=3)
+    assert [message.seq for message in messages] == list(range(len(messages)))
+    assert len(messages) == pytest.approx(150, abs=3)
     assert step.flush() == []
 
 
@@ -156,18 +163,18 @@ def between(
     return edit
 
 
-def test_a_marker_seen_by_one_camera_is_predicted_with_growing_sigma_then_dropped(fuse, judge):
-    setup = Setup(clock_error_s=0.0, clock_sigma_s=1e-4, loss=0.0)
+def test_a_marker_seen_by_one_camera_is_predicted_with_growing_sigma_then_dropped(fuse):
+    setup = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4, loss=0.0)
     hide = between(
         2.0,
         9.0,
         "right",
         lambda frame: replace(frame, markers=[m for m in frame.markers if m.color != "blue"]),
     )
-    _, told = fuse(setup, hide(frames(setup, MOVING, 3.0)))
+    _, messages = fuse(setup, hide(frames(setup, MOVING, 3.0)))
     index = [
         (seen.stamp_ns, point)
-        for seen in told
+        for seen in messages
         for point in seen.points
         if point.name == "index_tip" and seen.stamp_ns > START_NS + 2 * 10**9
     ]
@@ -177,7 +184,7 @@ def test_a_marker_seen_by_one_camera_is_predicted_with_growing_sigma_then_droppe
     assert depths == sorted(depths)
     assert all(point.cameras == ["left"] for point in predicted)
     assert index[-1][0] < START_NS + 2.25e9
-    assert len(told[-1].points) == 5
+    assert len(messages[-1].points) == 5
 
 
 number = st.one_of(st.floats(-10, 700), st.floats(allow_nan=True, allow_infinity=True))

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from services.fusion.kalman import frame_update, rest_detection, track_history
+from services.fusion.kalman import frame_update, rest_mixing, smoother, track_history
 from services.fusion.output import paint_centroid
 from services.fusion.warm import warm_up
-from testing.synthetic_points import Path, Setup, frames, point_hands
+from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
-    frame_update.take_in,
-    frame_update.drop,
-    rest_detection.blend,
-    track_history.query_all,
-    track_history.start,
+    frame_update.update_frame,
+    frame_update.drop_lost_tracks,
+    rest_mixing.mix_rest,
+    smoother.smooth_all,
+    track_history.start_track,
 )
 
 
 def test_warming_up_exercises_the_whole_of_fusion():
-    setup = Setup(cameras=3)
+    setup = SyntheticRig(cameras=3)
     assert warm_up(setup.config(), setup.rig(), point_hands()) == 8
-    for compiled in (*LIVE, paint_centroid.located_shift, paint_centroid._fill):
+    for compiled in (*LIVE, paint_centroid.located_shift, paint_centroid._fill_table):
         assert compiled.signatures, compiled
 
 
 def test_after_warming_up_nothing_new_is_compiled(fuse):
-    setup = Setup()
+    setup = SyntheticRig()
     warm_up(setup.config(), setup.rig(), point_hands())
     before = [len(compiled.signatures) for compiled in LIVE]
-    fuse(setup, frames(setup, Path(), 0.5))
+    fuse(setup, frames(setup, MovingHand(), 0.5))
     assert before == [len(compiled.signatures) for compiled in LIVE]

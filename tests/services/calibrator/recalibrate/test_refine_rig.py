@@ -17,13 +17,13 @@ from rhot.messages import Marker
 from services.calibrator.output.report import refined_text
 from services.calibrator.recalibrate.marker_tracks import build_tracks
 from services.calibrator.recalibrate.refine_rig import Wand, refine_rig
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
 # The right camera's clock is 6 ms off the left one's beyond what it announces; noise as of painted
 # blobs.
-SETUP = Setup(sigma_px=0.15, clock_error_s=0.003)
+SETUP = SyntheticRig(sigma_px=0.15, clock_error_s=0.003)
 TURN_DEG, SHIFT_M = np.array([0.6, -0.8, 0.5]), np.array([0.003, -0.002, 0.002])
-EVERYWHERE = Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6))
+EVERYWHERE = MovingHand(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6))
 LENGTH_M = 0.2
 
 
@@ -35,7 +35,7 @@ def bumped(cameras, name="right"):
     return cameras | {name: dataclasses.replace(cameras[name], T_rig_from_camera=moved)}
 
 
-def waved(seconds: float, setup: Setup = SETUP, random_seed: int = 1):
+def waved(seconds: float, setup: SyntheticRig = SETUP, random_seed: int = 1):
     """Frames of a wand of two colours, rotated and moved before the cameras."""
     random = np.random.default_rng(random_seed)
     path = dataclasses.replace(EVERYWHERE, seed=random_seed)
@@ -61,7 +61,7 @@ def waved(seconds: float, setup: Setup = SETUP, random_seed: int = 1):
     return sorted(found, key=lambda frame: frame.stamp_ns)
 
 
-def end_px(camera, setup: Setup, path: Path, time_s: float, end: float):
+def end_px(camera, setup: SyntheticRig, path: MovingHand, time_s: float, end: float):
     """Where a rolling shutter sees one end (-.5 or .5) of the wand; its row tells the time."""
     at_s, pixel = time_s + 0.008, np.zeros(2)
     for _ in range(4):
@@ -118,7 +118,7 @@ def test_a_wand_gives_the_scale_too():
 
 
 def test_three_cameras_of_which_one_was_bumped():
-    setup = Setup(cameras=3, sigma_px=0.15)
+    setup = SyntheticRig(cameras=3, sigma_px=0.15)
     old = bumped(setup.rig(), "camera3")
     result = refine_rig(build_tracks(frames(setup, EVERYWHERE, 12.0), old), old)
     np.testing.assert_allclose(result.changes["camera3"].rotation_deg, -TURN_DEG, atol=0.03)
@@ -149,7 +149,7 @@ def test_wrong_markers_now_and_then_do_not_matter():
     ("path", "seconds", "reason"),
     [
         (EVERYWHERE, 2.0, "half a minute"),
-        (Path(distance_m=0.6, speed_m_s=0.02), 8.0, "near and far"),
+        (MovingHand(distance_m=0.6, speed_m_s=0.02), 8.0, "near and far"),
     ],
 )
 def test_recordings_that_cannot_tell_are_refused(path, seconds, reason):

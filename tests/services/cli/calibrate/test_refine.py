@@ -11,7 +11,7 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import CameraPlace, Lens, Matrix4, RigGeometry, load_cameras, save
 from rhot.files.capture import write_lines
 from rhot.geometry.transforms import Array, rotation_x, transform
-from testing.synthetic_points import Path, Setup, frames
+from testing.synthetic_points import MovingHand, SyntheticRig, frames
 
 
 def rows(matrix: Array) -> Matrix4:
@@ -23,7 +23,7 @@ def test_refine_writes_the_places_that_a_hand_tells(run_calibrate, rig_toml, tmp
 
     The report says so, and services read the new file.
     """
-    setup = Setup(sigma_px=0.15)
+    setup = SyntheticRig(sigma_px=0.15)
     true = setup.rig()
     off = transform(rotation_x(np.radians(0.5)), (0.0, 0.002, 0.0))
     calibration = tmp_path / "calibration"
@@ -35,7 +35,7 @@ def test_refine_writes_the_places_that_a_hand_tells(run_calibrate, rig_toml, tmp
         T = camera.T_rig_from_camera @ off if name == "right" else camera.T_rig_from_camera
         places[name] = CameraPlace(T_rig_from_camera=rows(T))
     save(calibration / "rig.json", RigGeometry(cameras=places))
-    path = Path(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6))
+    path = MovingHand(distance_m=0.6, speed_m_s=0.6, hand_hz=(0.2, 0.6))
     write_lines(tmp_path / "markers.jsonl", frames(setup, path, 8.0))
     result = run_calibrate("refine", tmp_path, "--config", rig_toml)
     assert result.exit_code == 0

@@ -16,12 +16,12 @@ from rhot.messages import HandPoint, HandPoints
 from services.cli import recorded_messages
 from services.cli.offline.tune import tune
 from services.recorder.writer import RecordingWriter
-from testing.synthetic_points import START_NS, Path
+from testing.synthetic_points import START_NS, MovingHand
 
 
 def messages() -> list[HandPoints]:
     """Four seconds still, four fast, 1 mm of noise."""
-    random, path, found = np.random.default_rng(0), Path(), []
+    random, path, found = np.random.default_rng(0), MovingHand(), []
     for k in range(240):
         place = path(np.array([max(0.0, k / 30.0 - 4.0)]))[0, 2] + random.normal(0.0, 1e-3, 3)
         point = HandPoint(

@@ -11,13 +11,13 @@ from services.fusion.intake.observations import (
     CLOCK_SIGMA_MAX_S,
     SIGMA_MAX_PX,
     SIGMA_MIN_PX,
-    Observer,
+    ObservationBuilder,
     Refusal,
     View,
 )
-from testing.synthetic_points import START_NS, Setup
+from testing.synthetic_points import START_NS, SyntheticRig
 
-SETUP = Setup()
+SETUP = SyntheticRig()
 
 
 def marker(color="blue", x=320.0, y=240.0, sigma=0.1, quality=1.0) -> Marker:
@@ -39,29 +39,29 @@ def frame(*markers, **fields) -> MarkerFrame:
 
 
 @pytest.fixture
-def observer() -> Observer:
-    return Observer(SETUP.config(), SETUP.rig())
+def builder() -> ObservationBuilder:
+    return ObservationBuilder(SETUP.config(), SETUP.rig())
 
 
-def test_each_marker_has_its_own_instant(observer):
-    view = observer.view(
+def test_each_marker_has_its_own_instant(builder):
+    view = builder.build(
         frame(marker("blue", y=0.0), marker("violet", y=479.0), clock_offset_ns=5_000_000)
     )
     assert isinstance(view, View)
-    assert [observer.slots[slot].landmark for slot in view.slots] == ["wrist", "index_tip"]
+    assert [builder.landmarks[index].name for index in view.landmarks] == ["wrist", "index_tip"]
     absolute_ns = (view.instant_ns - START_NS + 5_000_000) + 1e9 * view.delay_s
     np.testing.assert_allclose(absolute_ns, [479.0 * 30_000.0, 0.0], atol=1.0)
 
 
-def test_rays_are_undistorted_and_sigma_is_per_ray(observer):
-    view = observer.view(frame(marker(x=100.0, y=50.0, sigma=0.2)))
+def test_rays_are_undistorted_and_sigma_is_per_ray(builder):
+    view = builder.build(frame(marker(x=100.0, y=50.0, sigma=0.2)))
     camera = SETUP.rig()["left"]
     np.testing.assert_allclose(camera.pixels_from_rays(view.rays)[0], [100.0, 50.0], atol=1e-6)
-    assert view.sigma[0] == pytest.approx(0.2 / camera.focal_px[0], rel=0.05)
+    assert view.sigmas[0] == pytest.approx(0.2 / camera.focal_px[0], rel=0.05)
 
 
-def test_of_two_blobs_of_one_colour_the_better_counts(observer):
-    view = observer.view(
+def test_of_two_blobs_of_one_colour_the_better_counts(builder):
+    view = builder.build(
         frame(
             marker(x=10.0, quality=0.2), marker(x=400.0, quality=0.9), marker(x=20.0, quality=0.5)
         )
@@ -70,7 +70,7 @@ def test_of_two_blobs_of_one_colour_the_better_counts(observer):
     assert view.ignored == 2
 
 
-def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(observer):
+def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(builder):
     absurd = [
         marker(x=1e300),
         marker("cyan", y=-5.0),
@@ -78,38 +78,38 @@ def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(observer):
         marker("beige"),
         marker("lime", sigma=float("inf")),
     ]
-    view = observer.view(frame(*absurd))
-    assert len(view.slots) == 0
+    view = builder.build(frame(*absurd))
+    assert len(view.landmarks) == 0
     assert view.ignored == 5
     sigmas = (
-        observer.view(frame(marker(sigma=0.0), marker("cyan", sigma=1e9))).sigma
+        builder.build(frame(marker(sigma=0.0), marker("cyan", sigma=1e9))).sigmas
         * SETUP.rig()["left"].focal_px[0]
     )
     np.testing.assert_allclose(sigmas, [SIGMA_MIN_PX, SIGMA_MAX_PX], rtol=0.02)
 
 
-def test_frames_of_no_use_say_why(observer):
-    assert observer.view(frame(camera="door")) is Refusal.UNKNOWN_CAMERA
-    assert observer.view(frame(size_px=(1280, 960))) is Refusal.WRONG_SIZE
-    assert observer.view(frame(stamp_ns=0, clock_offset_ns=2**61)) is Refusal.ABSURD_STAMP
+def test_frames_of_no_use_say_why(builder):
+    assert builder.build(frame(camera="door")) is Refusal.UNKNOWN_CAMERA
+    assert builder.build(frame(size_px=(1280, 960))) is Refusal.WRONG_SIZE
+    assert builder.build(frame(stamp_ns=0, clock_offset_ns=2**61)) is Refusal.ABSURD_STAMP
     assert (
-        observer.view(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62))) is Refusal.ABSURD_STAMP
+        builder.build(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62))) is Refusal.ABSURD_STAMP
     )
 
 
-def test_an_unknown_clock_is_as_bad_as_can_be(observer):
-    assert observer.view(frame(clock_sigma_ns=-1)).clock_sigma_s == CLOCK_SIGMA_MAX_S
-    assert observer.view(frame(clock_sigma_ns=2**62)).clock_sigma_s == CLOCK_SIGMA_MAX_S
-    assert observer.view(frame(clock_sigma_ns=2000)).clock_sigma_s == pytest.approx(2e-6)
+def test_an_unknown_clock_is_as_bad_as_can_be(builder):
+    assert builder.build(frame(clock_sigma_ns=-1)).clock_sigma_s == CLOCK_SIGMA_MAX_S
+    assert builder.build(frame(clock_sigma_ns=2**62)).clock_sigma_s == CLOCK_SIGMA_MAX_S
+    assert builder.build(frame(clock_sigma_ns=2000)).clock_sigma_s == pytest.approx(2e-6)
 
 
-def test_two_hands_have_their_own_slots():
+def test_two_hands_have_their_own_landmarks():
     config = SETUP.config()
     left = {"index_tip": "orange"}
     hands = {**config.hand, "left": type(config.hand["right"])(markers=left)}
-    observer = Observer(msgspec.structs.replace(config, hand=hands), SETUP.rig())
-    view = observer.view(frame(marker("orange", x=50.0), marker("blue", x=500.0)))
-    assert [(observer.slots[s].hand, observer.slots[s].landmark) for s in view.slots] == [
+    builder = ObservationBuilder(msgspec.structs.replace(config, hand=hands), SETUP.rig())
+    view = builder.build(frame(marker("orange", x=50.0), marker("blue", x=500.0)))
+    assert [(builder.landmarks[n].hand, builder.landmarks[n].name) for n in view.landmarks] == [
         ("left", "index_tip"),
         ("right", "index_tip"),
     ]

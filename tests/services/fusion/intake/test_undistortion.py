@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.camera import Camera, pinhole
-from services.fusion.intake import undistortion
+from services.fusion.intake.undistortion import undistort
 
 
 def camera(distortion) -> Camera:
@@ -18,30 +18,22 @@ def test_equals_the_camera_and_inverts_the_projection():
     pixels = np.random.default_rng(0).uniform([0, 0], [639, 479], (200, 2))
     for distortion in ([0.0] * 5, [-0.3, 0.1, 1e-3, -2e-3, 0.0], [0.2, -0.05, 0.0, 1e-3, 0.01]):
         model = camera(distortion)
-        rays, scale, valid = undistortion.rays(model, pixels)
+        rays, scale, valid = undistort(model, pixels)
         assert valid.all()
         np.testing.assert_allclose(model.pixels_from_rays(rays), pixels, atol=1e-6)
         np.testing.assert_allclose(rays, model.rays_from_pixels(pixels), atol=2e-5)
         # The scale is the ray's change per pixel, by finite differences in both directions.
         half_x, half_y = np.array([0.5, 0.0]), np.array([0.0, 0.5])
-        right = (
-            undistortion.rays(model, pixels + half_x)[0]
-            - undistortion.rays(model, pixels - half_x)[0]
-        )
-        down = (
-            undistortion.rays(model, pixels + half_y)[0]
-            - undistortion.rays(model, pixels - half_y)[0]
-        )
+        right = undistort(model, pixels + half_x)[0] - undistort(model, pixels - half_x)[0]
+        down = undistort(model, pixels + half_y)[0] - undistort(model, pixels - half_y)[0]
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
         np.testing.assert_allclose(scale, np.sqrt(area), rtol=1e-4)
 
 
 def test_pixels_beyond_the_lens_are_not_valid():
     model = camera([-0.8, 0.0, 0.0, 0.0, 0.0])
-    rays, scale, valid = undistortion.rays(
-        model, np.array([[320.0, 240.0], [1e6, 240.0], [1e300, 0.0]])
-    )
+    rays, scale, valid = undistort(model, np.array([[320.0, 240.0], [1e6, 240.0], [1e300, 0.0]]))
     assert valid.tolist() == [True, False, False]
     assert scale[1] == 0.0
-    assert undistortion.rays(model, np.zeros((0, 2)))[0].shape == (0, 2)
+    assert undistort(model, np.zeros((0, 2)))[0].shape == (0, 2)
     assert np.isfinite(rays[0]).all()

@@ -8,9 +8,9 @@ import pytest
 
 from rhot.files.config import Fusion
 from services.fusion.kalman.estimator import SHOW_SIGMA_M
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
-EXACT = Setup(clock_error_s=0.0, clock_sigma_s=2e-5, loss=0.0)
+EXACT = SyntheticRig(clock_error_s=0.0, clock_sigma_s=2e-5, loss=0.0)
 
 
 def test_the_first_points_of_a_track_are_honest(bench_of):
@@ -21,10 +21,12 @@ def test_the_first_points_of_a_track_are_honest(bench_of):
     squared = []
     for seed in range(30):
         path, bench = (
-            Path(seed=seed),
-            bench_of(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5)),
+            MovingHand(seed=seed),
+            bench_of(SyntheticRig(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5)),
         )
-        for frame in frames(Setup(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5), path, 0.4):
+        for frame in frames(
+            SyntheticRig(seed=seed, clock_error_s=0.0, clock_sigma_s=2e-5), path, 0.4
+        ):
             instant_s = bench.see(frame)
             found = bench.method.estimate(instant_s)
             error = (found.positions_m - path(np.array([instant_s]))[0])[found.found]
@@ -34,7 +36,7 @@ def test_the_first_points_of_a_track_are_honest(bench_of):
 
 
 def test_nothing_is_shown_before_it_is_of_use(bench_of):
-    bench, path = bench_of(EXACT), Path()
+    bench, path = bench_of(EXACT), MovingHand()
     shown = []
     for frame in frames(EXACT, path, 0.2):
         found = bench.method.estimate(bench.see(frame))
@@ -47,14 +49,14 @@ def test_nothing_is_shown_before_it_is_of_use(bench_of):
 
 def test_one_camera_alone_begins_nothing(bench_of):
     bench = bench_of(EXACT)
-    for frame in frames(EXACT, Path(), 1.0):
+    for frame in frames(EXACT, MovingHand(), 1.0):
         if frame.camera == "left":
             assert not bench.method.estimate(bench.see(frame)).found.any()
     assert bench.method.counts.started == 0
 
 
 def test_a_wild_observation_is_gated_and_the_track_goes_on(bench_of):
-    bench, path = bench_of(EXACT), Path()
+    bench, path = bench_of(EXACT), MovingHand()
     given = frames(EXACT, path, 2.0)
     given[100] = msgspec.structs.replace(
         given[100],
@@ -70,9 +72,9 @@ def test_a_wild_observation_is_gated_and_the_track_goes_on(bench_of):
 
 def test_a_marker_that_jumps_for_good_is_found_again(bench_of):
     bench = bench_of(EXACT)
-    for frame in frames(EXACT, Path(), 1.0):
+    for frame in frames(EXACT, MovingHand(), 1.0):
         bench.see(frame)
-    elsewhere = Path(distance_m=0.5, seed=9)
+    elsewhere = MovingHand(distance_m=0.5, seed=9)
     for frame in frames(EXACT, elsewhere, 1.5):
         if (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 > 1.0:
             instant_s = bench.see(frame)
@@ -84,32 +86,37 @@ def test_a_marker_that_jumps_for_good_is_found_again(bench_of):
 def test_hold_is_at_least_the_gap_between_two_frames(bench_of):
     bench = bench_of(EXACT, Fusion(hold_s=0.0))
     found = [
-        bench.method.estimate(bench.see(frame)).found.all() for frame in frames(EXACT, Path(), 1.0)
+        bench.method.estimate(bench.see(frame)).found.all()
+        for frame in frames(EXACT, MovingHand(), 1.0)
     ]
     assert all(found[10:])
 
 
 def test_cameras_that_were_never_there_do_not_matter(bench_of):
-    bench = bench_of(Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5))
+    bench = bench_of(
+        SyntheticRig(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5)
+    )
     for frame in frames(
-        Setup(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5), Path(), 1.0
+        SyntheticRig(cameras=4, phase_s=1 / 120, clock_error_s=0.0, clock_sigma_s=2e-5),
+        MovingHand(),
+        1.0,
     ):
         if frame.camera in ("right", "camera4"):
             instant_s = bench.see(frame)
     found = bench.method.estimate(instant_s)
     assert found.measured.all()
-    assert found.cameras.sum(axis=0).tolist() == [0, 6, 0, 6]
+    assert found.seen_by.sum(axis=0).tolist() == [0, 6, 0, 6]
     assert found.positions_m[:, 2] == pytest.approx(
-        Path()(np.array([instant_s]))[0][:, 2], abs=0.01
+        MovingHand()(np.array([instant_s]))[0][:, 2], abs=0.01
     )
 
 
 def test_a_camera_far_later_than_the_other_takes_part(bench_of):
     """Test: one camera's frames arrive .2 s after the other's.
 
-    Expected: tracks begin, and where both have looked, they are as exact.
+    Expected: tracks start, and where both have seen the hand, they are as exact.
     """
-    bench, path = bench_of(EXACT, Fusion(hold_s=0.5)), Path()
+    bench, path = bench_of(EXACT, Fusion(hold_s=0.5)), MovingHand()
     late_s, errors = {"left": 0.0, "right": 0.2}, []
     given = frames(EXACT, path, 3.0)
     given.sort(

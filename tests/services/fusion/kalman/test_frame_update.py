@@ -1,17 +1,28 @@
-"""One frame's observations: where they go, and what is told of each."""
+"""One frame's observations: where they go, and what becomes of each."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from services.fusion.geometry.triangulation import extrinsics
-from services.fusion.kalman.frame_update import KEPT, NO_TRACK, drop, no_looks, take_in
-from services.fusion.kalman.rigid_body import empty_rest
-from services.fusion.kalman.track_history import ACCEPTED, GATED, empty_ring, start
-from testing.synthetic_points import Setup
+from services.fusion.geometry.projection import extrinsics
+from services.fusion.kalman.frame_rays import FrameRays
+from services.fusion.kalman.frame_update import (
+    NO_TRACK,
+    drop_lost_tracks,
+    empty_state,
+    update_frame,
+)
+from services.fusion.kalman.track_history import start_track
+from services.fusion.kalman.track_insertion import ACCEPTED, GATED
+from testing.synthetic_points import SyntheticRig
 
 PLACES = np.array([[0.0, 0.0, 0.6], [0.05, 0.02, 0.6], [0.02, -0.05, 0.6]])
+CAMERAS = extrinsics(tuple(SyntheticRig().rig().values()))
 DENSITIES = np.array([1.0, 100.0])
+
+
+def update(state, frame, *, new=True):
+    return update_frame(state, frame, CAMERAS, DENSITIES, 30.0, new).tolist()
 
 
 def test_every_observation_is_remembered_and_told_of():
@@ -19,70 +30,40 @@ def test_every_observation_is_remembered_and_told_of():
 
     Expected: three codes; only what fits counts as seen.
     """
-    R, t = extrinsics(tuple(Setup().rig().values()))
-    ring, rest, looks = empty_ring(3, 2), empty_rest([np.arange(3)]), no_looks(3, 2)
-    for slot in (0, 1):
-        start(ring, slot, 0.0, PLACES[slot], np.array([0.01, 0.1, 1.0]))
-    q = PLACES @ R[1].T + t[1]
+    state = empty_state([np.arange(3)], 2, 2)
+    for landmark in (0, 1):
+        start_track(state.history, landmark, 0.0, PLACES[landmark], np.array([0.01, 0.1, 1.0]))
+    q = PLACES @ CAMERAS.R[1].T + CAMERAS.t[1]
     rays = q[:, :2] / q[:, 2:]
     rays[1] += 0.3
     times_s, sigmas = np.array([0.010, 0.011, 0.012]), np.array([1e-4, 2e-4, 3e-4])
-    codes = take_in(
-        ring, rest, looks, np.arange(3), times_s, 1, rays, sigmas, 1e-4, 30.0, R, t, DENSITIES, True
-    )
-    assert codes.tolist() == [ACCEPTED, GATED, NO_TRACK]
-    np.testing.assert_array_equal(looks.look_s[:, 1, 0], times_s)
-    np.testing.assert_array_equal(looks.looked_s[:, 1], times_s)
-    np.testing.assert_array_equal(looks.look[:, 1, 0], np.column_stack([rays, sigmas]))
-    assert looks.number.tolist() == [[0, 1]] * 3
-    np.testing.assert_array_equal(looks.seen_s[:, 1], [0.010, -np.inf, -np.inf])
-    assert np.isinf(looks.seen_s[:, 0]).all()
-    assert (rest.belief > 0.0).tolist() == [True, False, False]
+    codes = update(state, FrameRays(1, np.arange(3), times_s, rays, sigmas, 1e-4))
+    assert codes == [ACCEPTED, GATED, NO_TRACK]
+    recent = state.recent
+    np.testing.assert_array_equal(recent.time_s[:, 1, 0], times_s)
+    np.testing.assert_array_equal(recent.observed_s[:, 1], times_s)
+    np.testing.assert_array_equal(recent.ray[:, 1, 0], rays)
+    np.testing.assert_array_equal(recent.sigma[:, 1, 0], sigmas)
+    assert recent.number.tolist() == [[0, 1]] * 3
+    np.testing.assert_array_equal(recent.accepted_s[:, 1], [0.010, -np.inf, -np.inf])
+    assert np.isinf(recent.accepted_s[:, 0]).all()
+    assert (state.rest.probability > 0.0).tolist() == [True, False, False]
 
 
 def test_a_track_that_two_cameras_have_not_seen_lately_ends():
-    filled, belief = np.array([3, 3, 0, 5]), np.array([0.9, 0.9, 0.0, 0.9])
-    seen_s = np.array([[1.0, 1.1, 0.0], [1.0, 0.3, 0.2], [0.0, 0.0, 0.0], [0.2, 1.0, 0.9]])
-    assert drop(filled, belief, seen_s, 0.5) == 1
-    assert filled.tolist() == [3, 0, 0, 5]
-    assert belief.tolist() == [0.9, 0.0, 0.0, 0.9]
+    size, probability = np.array([3, 3, 0, 5]), np.array([0.9, 0.9, 0.0, 0.9])
+    accepted_s = np.array([[1.0, 1.1, 0.0], [1.0, 0.3, 0.2], [0.0, 0.0, 0.0], [0.2, 1.0, 0.9]])
+    assert drop_lost_tracks(size, probability, accepted_s, 0.5) == 1
+    assert size.tolist() == [3, 0, 0, 5]
+    assert probability.tolist() == [0.9, 0.0, 0.0, 0.9]
 
 
-def test_the_latest_looks_are_kept_and_remembered_ones_are_not_kept_twice():
-    R, t = extrinsics(tuple(Setup().rig().values()))
-    ring, rest, looks = empty_ring(1, 2), empty_rest([np.arange(1)]), no_looks(1, 2)
-    for k in range(KEPT + 3):
-        take_in(
-            ring,
-            rest,
-            looks,
-            np.zeros(1, int),
-            np.array([k / 30]),
-            0,
-            np.zeros((1, 2)),
-            np.full(1, 1e-4),
-            0.0,
-            30.0,
-            R,
-            t,
-            DENSITIES,
-            True,
+def test_remembered_observations_are_not_remembered_twice():
+    state = empty_state([np.arange(1)], 2, 2)
+    for time_s, new in ((0.1, True), (9.0, False)):
+        frame = FrameRays(
+            0, np.zeros(1, int), np.array([time_s]), np.zeros((1, 2)), np.full(1, 1e-4), 0.0
         )
-    take_in(
-        ring,
-        rest,
-        looks,
-        np.zeros(1, int),
-        np.array([9.0]),
-        0,
-        np.zeros((1, 2)),
-        np.full(1, 1e-4),
-        0.0,
-        30.0,
-        R,
-        t,
-        DENSITIES,
-        False,
-    )
-    np.testing.assert_allclose(np.sort(looks.look_s[0, 0]), np.arange(3, KEPT + 3) / 30)
-    assert looks.looked_s[0, 0] == (KEPT + 2) / 30
+        update(state, frame, new=new)
+    assert state.recent.number[0, 0] == 1
+    assert state.recent.observed_s[0, 0] == 0.1

@@ -1,11 +1,18 @@
-"""The motion model: exact over any split of time, and adjoint to its own retreat."""
+"""The motion model: exact over any split of time, and the adjoint step is its transpose."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from services.fusion.kalman.motion_model import FADE_S, predict, retreat, transition, unit_noise
+from services.fusion.kalman.motion_model import (
+    ACCELERATION_TIME_S,
+    Gaussian,
+    predict,
+    transition,
+    transpose_predict,
+    unit_process_noise,
+)
 
 
 def matrix(dt_s: float) -> np.ndarray:
@@ -14,10 +21,10 @@ def matrix(dt_s: float) -> np.ndarray:
 
 
 def advance(state, cov, dt_s, density):
-    noise, new_state, new_cov = np.empty((3, 3)), np.empty(9), np.empty((9, 9))
-    unit_noise(dt_s, noise)
-    predict(state, cov, dt_s, density, noise, new_state, new_cov)
-    return new_state, new_cov
+    unit_Q, predicted = np.empty((3, 3)), Gaussian(np.empty(9), np.empty((9, 9)))
+    unit_process_noise(dt_s, unit_Q)
+    predict(Gaussian(state, cov), dt_s, density, unit_Q, predicted)
+    return predicted
 
 
 @pytest.fixture
@@ -29,7 +36,7 @@ def estimate() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("dt_s", [1e-6, 2.9e-4, 3.1e-4, 0.0166, 0.15])
 def test_transition_is_the_matrix_exponential(dt_s):
-    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / FADE_S]])
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / ACCELERATION_TIME_S]])
     exponential, term = np.eye(3), np.eye(3)
     for k in range(1, 20):
         term = term @ A * dt_s / k
@@ -39,11 +46,13 @@ def test_transition_is_the_matrix_exponential(dt_s):
 
 def test_prediction_is_the_textbook_formula(estimate):
     state, cov = estimate
-    F, noise = matrix(0.02), np.empty((3, 3))
-    unit_noise(0.02, noise)
+    F, unit_Q = matrix(0.02), np.empty((3, 3))
+    unit_process_noise(0.02, unit_Q)
     new_state, new_cov = advance(state, cov, 0.02, 7.0)
     np.testing.assert_allclose(new_state, F @ state, atol=1e-12)
-    np.testing.assert_allclose(new_cov, F @ cov @ F.T + 7.0 * np.kron(noise, np.eye(3)), atol=1e-12)
+    np.testing.assert_allclose(
+        new_cov, F @ cov @ F.T + 7.0 * np.kron(unit_Q, np.eye(3)), atol=1e-12
+    )
 
 
 def test_two_short_steps_equal_a_long_one(estimate):
@@ -59,9 +68,9 @@ def test_no_time_changes_nothing(estimate):
     np.testing.assert_array_equal(cov, estimate[1])
 
 
-def test_retreat_is_the_transpose(estimate):
-    adjoint, curvature = estimate[0].copy(), estimate[1].copy()
-    retreat(adjoint, curvature, 0.05)
+def test_the_step_back_is_the_transpose(estimate):
+    adjoint, information = estimate[0].copy(), estimate[1].copy()
+    transpose_predict(adjoint, information, 0.05)
     F = matrix(0.05)
     np.testing.assert_allclose(adjoint, F.T @ estimate[0], atol=1e-12)
-    np.testing.assert_allclose(curvature, F.T @ estimate[1] @ F, atol=1e-12)
+    np.testing.assert_allclose(information, F.T @ estimate[1] @ F, atol=1e-12)

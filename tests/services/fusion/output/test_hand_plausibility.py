@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.hand import default_hand
-from services.fusion.output.hand_plausibility import coherent, reach_m
+from services.fusion.output.hand_plausibility import coherent, hand_reach_m
 
 HAND_M = np.array(
     [
@@ -23,12 +23,12 @@ ALL = np.ones(6, dtype=bool)
 
 
 def test_reach_is_that_of_an_adult_hand_and_scales():
-    reach = reach_m(default_hand("right"))
+    reach = hand_reach_m(default_hand("right"))
     assert 0.17 < reach < 0.21
-    assert reach_m(default_hand("left", 0.5)) == pytest.approx(0.5 * reach, rel=0.05)
+    assert hand_reach_m(default_hand("left", 0.5)) == pytest.approx(0.5 * reach, rel=0.05)
 
 
-def test_a_hand_is_believed_and_one_stray_is_left_out():
+def test_a_hand_is_kept_and_one_stray_is_left_out():
     assert coherent(HAND_M, SURE, ALL, ALL, 0.19).all()
     stray = HAND_M.copy()
     stray[2] = [0.3, 0.2, 1.1]
@@ -42,7 +42,7 @@ def test_an_uncertain_point_gets_the_benefit_of_its_sigma():
     assert coherent(far, unsure, ALL, ALL, 0.19).all()
 
 
-def test_if_most_are_strays_none_is_believed():
+def test_if_most_are_strays_all_are_left_out():
     scattered = HAND_M + np.array([[0, 0, d] for d in (0.0, 0.5, 1.0, 1.5, -0.3, 0.9)])
     assert not coherent(scattered, SURE, ALL, ALL, 0.19).any()
 

@@ -1,4 +1,4 @@
-"""The seed's depth law."""
+"""The RHOT paper's depth law."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rhot.files.config import Disparity
+from services.fusion.geometry.rectified_pair import rectified_pair
 from services.fusion.geometry.triangulation import TriangulationStatus
-from services.fusion.paired.depth_law import depth_law, locate, rectified_pair
-from testing.synthetic_points import Setup
+from services.fusion.paired.depth_law import depth_law, locate
+from testing.synthetic_points import SyntheticRig
 
 GEOMETRY = Disparity(law="geometry")
 
@@ -20,9 +21,9 @@ def rays_of(cameras, p):
 
 
 def test_eq_10_without_alignment_error_is_the_pinhole_law():
-    left, right = Setup().rig().values()
+    left, right = SyntheticRig().rig().values()
     k, z = depth_law(GEOMETRY, rectified_pair(left, right))
-    # B x0 / (2 tan(phi0 / 2)) with 7.5 cm, 640 px, 62.5 deg; the seed's fit is 4543.3 with z =
+    # B x0 / (2 tan(phi0 / 2)) with 7.5 cm, 640 px, 62.5 deg; the paper's fit is 4543.3 with z =
     # -1.035.
     assert (k, z) == (pytest.approx(7.5 * 640 / (2 * np.tan(np.deg2rad(31.25)))), -1.0)
     assert (
@@ -32,8 +33,8 @@ def test_eq_10_without_alignment_error_is_the_pinhole_law():
     assert depth_law(Disparity(), rectified_pair(left, right)) == (4543.3, -1.035)
 
 
-def test_seed_law_is_right_to_4_percent_on_an_ideal_pair():
-    left, right = Setup().rig().values()
+def test_the_papers_law_is_right_to_4_percent_on_an_ideal_pair():
+    left, right = SyntheticRig().rig().values()
     pair = rectified_pair(left, right)
     for distance in np.arange(0.3, 1.01, 0.05):
         p = np.array([0.0375, 0.0, distance])
@@ -45,7 +46,7 @@ def test_seed_law_is_right_to_4_percent_on_an_ideal_pair():
 
 @pytest.mark.parametrize("swap", [False, True])
 def test_geometry_places_points_of_turned_and_swapped_cameras(swap):
-    cameras = tuple(Setup(toe_in_rad=0.06).rig().values())
+    cameras = tuple(SyntheticRig(toe_in_rad=0.06).rig().values())
     cameras = cameras[::-1] if swap else cameras
     pair = rectified_pair(*cameras)
     law = (100.0 * pair.baseline_m * pair.focal_px, -1.0)
@@ -57,13 +58,10 @@ def test_geometry_places_points_of_turned_and_swapped_cameras(swap):
 
 
 def test_covariance_tells_the_scatter():
-    cameras = tuple(Setup(toe_in_rad=0.03).rig().values())
+    cameras = tuple(SyntheticRig(toe_in_rad=0.03).rig().values())
     pair, random = rectified_pair(*cameras), np.random.default_rng(2)
-    law, sigmas, p = (
-        depth_law(Disparity(), pair),
-        np.array([1e-4, 2e-4]),
-        np.array([0.1, -0.08, 0.6]),
-    )
+    law, sigmas = depth_law(Disparity(), pair), np.array([1e-4, 2e-4])
+    p = np.array([0.1, -0.08, 0.6])
     rays = rays_of(cameras, p)
     found = [
         locate(pair, rays + random.normal(size=(2, 2)) * sigmas[:, None], sigmas, law, 2.0)
@@ -74,7 +72,7 @@ def test_covariance_tells_the_scatter():
 
 
 def test_refuses_what_has_no_disparity():
-    left, right = Setup().rig().values()
+    left, right = SyntheticRig().rig().values()
     pair, sigmas = rectified_pair(left, right), np.full(2, 1e-4)
     law = depth_law(Disparity(), pair)
     assert (
@@ -85,4 +83,3 @@ def test_refuses_what_has_no_disparity():
         locate(pair, np.array([[0.1, 0.0], [0.1 - 1e-3, 0.0]]), sigmas, law, 2.0).status
         is TriangulationStatus.BEYOND
     )
-    assert rectified_pair(left, left) is None

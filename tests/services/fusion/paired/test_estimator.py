@@ -1,4 +1,4 @@
-"""The simple methods: hold, drop, filter."""
+"""The paired methods: hold, drop, filter."""
 
 from __future__ import annotations
 
@@ -6,30 +6,28 @@ import numpy as np
 import pytest
 
 from rhot.files.config import Fusion
-from services.fusion.intake.observations import Observer
+from services.fusion.intake.observations import ObservationBuilder
 from services.fusion.paired.estimator import SPEED_SIGMA, PairedMethod
-from testing.synthetic_points import START_NS, Path, Setup, frames
+from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 
-EXACT = Setup(sigma_px=0.03, clock_error_s=0.0, loss=0.0)
+EXACT = SyntheticRig(sigma_px=0.03, clock_error_s=0.0, loss=0.0)
 
 
-def seen(fusion: Fusion, path: Path, seconds: float = 1.0) -> tuple[PairedMethod, float]:
+def seen(fusion: Fusion, path: MovingHand, seconds: float = 1.0) -> tuple[PairedMethod, float]:
     """A method that has seen a hand, and the newest instant its views enclose."""
     cameras = EXACT.rig()
-    observer, method = (
-        Observer(EXACT.config(), cameras),
-        PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), fusion),
-    )
+    builder = ObservationBuilder(EXACT.config(), cameras)
+    method = PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), fusion)
     instant_s = 0.0
     for frame in frames(EXACT, path, seconds):
-        view = observer.view(frame)
+        view = builder.build(frame)
         instant_s = (view.instant_ns - START_NS) * 1e-9
         method.observe(view, instant_s + view.delay_s, 0.0)
     return method, instant_s - 0.1
 
 
 def test_points_are_where_the_hand_is():
-    path = Path(speed_m_s=0.2)
+    path = MovingHand(speed_m_s=0.2)
     method, instant_s = seen(Fusion(method="triangulate", filter="none"), path)
     found = method.estimate(instant_s)
     assert found.measured.all()
@@ -38,7 +36,7 @@ def test_points_are_where_the_hand_is():
 
 def test_what_is_no_longer_seen_is_held_with_growing_sigma_then_dropped():
     method, instant_s = seen(
-        Fusion(method="triangulate", filter="none", hold_s=0.3), Path(speed_m_s=0.0)
+        Fusion(method="triangulate", filter="none", hold_s=0.3), MovingHand(speed_m_s=0.0)
     )
     before = method.estimate(instant_s)
     later = method.estimate(instant_s + 0.25)
@@ -57,9 +55,9 @@ def test_one_euro_calms_a_resting_hand():
         cameras = EXACT.rig()
         settings = Fusion(method="triangulate", filter=name)
         method = PairedMethod(6, tuple(cameras.values()), np.full(2, 1 / 30), settings)
-        observer, depths = Observer(EXACT.config(), cameras), []
-        for frame in frames(EXACT, Path(speed_m_s=0.0), 4.0):
-            view = observer.view(frame)
+        builder, depths = ObservationBuilder(EXACT.config(), cameras), []
+        for frame in frames(EXACT, MovingHand(speed_m_s=0.0), 4.0):
+            view = builder.build(frame)
             instant_s = (view.instant_ns - START_NS) * 1e-9
             method.observe(view, instant_s + view.delay_s, 0.0)
             if frame.camera == "left" and instant_s > 1.0:
@@ -69,7 +67,7 @@ def test_one_euro_calms_a_resting_hand():
 
 
 def test_forgetting_forgets():
-    method, instant_s = seen(Fusion(method="disparity"), Path())
+    method, instant_s = seen(Fusion(method="disparity"), MovingHand())
     assert method.estimate(instant_s).found.any()
     method.reset()
     assert not method.estimate(instant_s).found.any()

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import apply, rotation_from_vector, transform
+from rhot.geometry.triangulation import triangulate
 from services.calibrator.board.board import Board
 from services.calibrator.bundle.lens_model import lens_vector, rays_from_pixels
-from services.calibrator.bundle.triangulate import epipolar_px, rigid_fit, triangulate
+from services.calibrator.bundle.rigid_fit import epipolar_px, rigid_fit
 
 
 @pytest.mark.parametrize("cameras", [2, 4])

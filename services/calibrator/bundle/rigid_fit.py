@@ -1,7 +1,6 @@
-"""Points from the rays of several calibrated cameras, and how well they fit a rigid board. Pure.
+"""How well measured points form a rigid board, and rays an epipolar geometry. Pure.
 
-A NaN ray (a pixel outside the lens model) gives a NaN point. A point behind a camera comes back as
-it is: its residual shows it.
+The points are those of rhot.geometry.triangulation.
 """
 
 from __future__ import annotations
@@ -11,43 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rhot.geometry.transforms import Array
-
-# The second round has the depths; the third changes less than rounding.
-_ROUNDS = 3
-# Depths nearer than this count as this: a micrometre from the camera's centre no pixel is certain.
-_MIN_DEPTH_M = 1e-6
-
-
-def triangulate(T_camera_from_rig: Array, rays: Array, focals_px: Array) -> Array:
-    """Points (n, 3) in the rig frame from rays (c, n, 2) of cameras at T (c, 4, 4).
-
-    Residuals are weighted by focal lengths in px: one for each camera (c,), or one for each ray
-    (c, n), where 0 leaves a ray out.
-
-    Iterated linear triangulation (Hartley & Sturm, "Triangulation", 1997, section 5): each round
-    divides an equation by the depth it had before, so that what is minimised are pixels.
-    """
-    cameras, count = rays.shape[:2]
-    focals = focals_px if focals_px.ndim == 2 else focals_px[:, None]
-    focals = np.broadcast_to(focals, (cameras, count))
-    # Two equations for each ray, (x P3 - P1) X = 0 and (y P3 - P2) X = 0.
-    rows = T_camera_from_rig[:, None, :2, :]
-    third = T_camera_from_rig[:, None, None, 2, :]
-    equations = rays[..., None] * third - rows  # (c, n, 2, 4)
-    weight = focals
-    points = np.zeros((count, 3))
-    for _ in range(_ROUNDS):
-        weighted = equations * weight[:, :, None, None]
-        A = weighted.transpose(1, 0, 2, 3).reshape(count, 2 * cameras, 4)
-        normal = np.einsum("nij,nik->njk", A[..., :3], A[..., :3])
-        right = -np.einsum("nij,ni->nj", A[..., :3], A[..., 3])
-        points = np.linalg.solve(normal, right[..., None])[..., 0]
-        depth = (
-            np.einsum("cj,nj->cn", T_camera_from_rig[:, 2, :3], points)
-            + T_camera_from_rig[:, None, 2, 3]
-        )
-        weight = focals / np.maximum(np.abs(depth), _MIN_DEPTH_M)
-    return points
 
 
 @dataclass(frozen=True, eq=False)
