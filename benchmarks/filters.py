@@ -61,7 +61,12 @@ def exponential(path: Array, rate_hz: float, cutoff_hz: float) -> Array:
     return one_euro(path, rate_hz, cutoff_hz, 0.0)
 
 
-def double_exponential(path: Array, rate_hz: float, alpha: float, trend: float) -> Array:  # noqa: ARG001
+def double_exponential(
+    path: Array,
+    rate_hz: float,  # noqa: ARG001
+    alpha: float,
+    trend: float,
+) -> Array:
     """Holt's: level and trend."""
     level, slope, out = path[0], np.zeros(3), [path[0]]
     for point in path[1:]:

@@ -148,9 +148,10 @@ _WRIST_DAB_M = 0.016
 
 def default_hand(hand: HandName = "right", scale: float = 1.0) -> HandModel:
     """A hand from the anthropometric tables, `scale` times the average adult's."""
+    thumb, index, middle, ring, little = (_default_digit(name, hand, scale) for name in DIGITS)
     return HandModel(
         hand=hand,
-        digits=tuple(_default_digit(name, hand, scale) for name in DIGITS),  # type: ignore[arg-type]
+        digits=(thumb, index, middle, ring, little),
         paint=_default_paint(scale),
         wrist_radius_m=0.021 * scale,
     )

@@ -77,7 +77,7 @@ class HealthFigures:
         self._busy_s.clear()
 
     def _report_pairs(self, name: str, errors: dict[Pair, str]) -> None:
-        """Report pairs of cameras when they show an error, and again when they show it once more."""
+        """Report pairs of cameras when they show an error, and again when it comes back."""
         for pair in errors.keys() - self._reported_pairs[name]:
             self._error(errors[pair])
         self._reported_pairs[name] = set(errors)

@@ -70,7 +70,8 @@ class PairedMethod:
         ]
         self._held: list[_Held | None] = [None] * landmarks
 
-    def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:  # noqa: ARG002 - clocks are taken at their word here
+    # Clocks are taken at their word here.
+    def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:  # noqa: ARG002
         """Take in one camera's frame."""
         for landmark, time_s, ray, sigma in zip(
             view.landmarks.tolist(), times_s.tolist(), view.rays, view.sigmas.tolist(), strict=True
