@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # What a machine can check of the house without running it.
 HOUSE := tests/test_architecture.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
+QUICK := not browser and not wheel and not integration
 SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
@@ -14,9 +15,12 @@ unexport PYTHONPATH PYTHONHOME
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
 
-# Everything but the suites that need more than Python: `make browser`, `make wheel`.
+# Everything but the suites that need more than Python: `make browser`, `make wheel`. What starts
+# processes and watches their rates has the machine to itself; the rest shares two cores. (5: of
+# the tests that ARGS names, none is of that kind.)
 test: $(STAMP)
-	$(BIN)/pytest --durations=10 -m "not browser and not wheel" $(ARGS)
+	$(BIN)/pytest -n 2 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS) || [ $$? -eq 5 ]
+	$(BIN)/pytest --durations=10 -m integration $(ARGS) || [ $$? -eq 5 ]
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -93,7 +93,7 @@ def _moved_text(pair: Pair, height_px: float) -> str:
 
 def _mirrored_text(pair: Pair, axis: str) -> str:
     return (
-        f"the views of cameras {pair[0]} and {pair[1]} are mirror images of each other, {axis}: one "
-        f"of them has hflip or vflip set, or lost it, since the calibration; set both as they were "
-        f"then"
+        f"the views of cameras {pair[0]} and {pair[1]} are mirror images of each other, {axis}: "
+        "one of them has hflip or vflip set, or lost it, since the calibration; "
+        "set both as they were then"
     )
