@@ -174,14 +174,16 @@ def _default_digit(name: str, hand: HandName, scale: float) -> Digit:
     if hand == "left":
         mirror = np.diag([-1.0, 1.0, 1.0])
         carpus, base, rotation = mirror @ carpus, mirror @ base, mirror @ rotation @ mirror
+    radii_m = tuple(float(r) * 1e-3 * scale for r in hand_tables.RADII_MM[name])
+    limits_rad = tuple((float(np.deg2rad(low)), float(np.deg2rad(high))) for low, high in limits)
     return Digit(
         name=name,  # type: ignore[arg-type]
         metacarpal_m=tuple(carpus.tolist()),
         base_m=tuple(base.tolist()),
         base_wxyz=tuple(quaternion_from_rotation(rotation).tolist()),
         lengths_m=tuple(float(length) for length in lengths),  # type: ignore[arg-type]
-        radii_m=tuple(float(r) * 1e-3 * scale for r in hand_tables.RADII_MM[name]),  # type: ignore[arg-type]
-        limits_rad=tuple((float(np.deg2rad(low)), float(np.deg2rad(high))) for low, high in limits),  # type: ignore[arg-type]
+        radii_m=radii_m,  # type: ignore[arg-type]
+        limits_rad=limits_rad,  # type: ignore[arg-type]
     )
 
 

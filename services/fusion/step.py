@@ -57,7 +57,7 @@ class FusionStep:
         self._cameras = self._builder.cameras
         self._landmarks = self._builder.landmarks
         # Indices (n,) of each hand's landmarks.
-        of_hand = np.array([landmark.hand for landmark in self._landmarks])
+        of_hand = np.array([landmark.hand for landmark in self._landmarks], dtype=str)
         self._rows = {
             hand: np.flatnonzero(of_hand == hand) for hand in HANDS if hand in config.hand
         }

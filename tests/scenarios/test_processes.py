@@ -8,7 +8,7 @@ import dataclasses
 import signal
 import sys
 from collections.abc import AsyncIterator
-from pathlib import MovingHand as File
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -24,11 +24,11 @@ pytestmark = pytest.mark.integration
 # numba's first compilation on a loaded machine takes most of it.
 START_S, RECOVERY_S = 120.0, 0.5
 SETUP = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4, skew_s=0.0, drift_ppm=0.0, loss=0.0)
-FUSION = File(sys.executable).parent / "rhot-fusion"
+FUSION = Path(sys.executable).parent / "rhot-fusion"
 
 
 @pytest.fixture
-def rig_toml(tmp_path, router) -> File:
+def rig_toml(tmp_path, router) -> Path:
     """The synthetic rig on disk, calibrated."""
     save_calibration(tmp_path / "calibration", SETUP.rig().values())
     markers = "\n".join(
@@ -42,7 +42,7 @@ def rig_toml(tmp_path, router) -> File:
 
 
 @contextlib.asynccontextmanager
-async def fusion(rig_toml: File) -> AsyncIterator[asyncio.subprocess.Process]:
+async def fusion(rig_toml: Path) -> AsyncIterator[asyncio.subprocess.Process]:
     """The process; killed at the end if a test left it."""
     process = await asyncio.create_subprocess_exec(
         str(FUSION),

@@ -45,7 +45,7 @@ def update_body(
     H = np.empty((2, 3))
     if not project(place, measured.R, measured.t, predicted_ray, H):
         return NOT_VISIBLE
-    HJ = _product(H, J)  # (2, 6)
+    HJ = _image_jacobian(H, J)  # (2, 6)
     # Innovation, and its covariance.
     nu = measured.ray - predicted_ray  # (2,)
     anchor_PHt = _anchor_cross_cov(anchor.cov, H)  # (3, 2)
@@ -58,6 +58,8 @@ def update_body(
     if not determinant > 0.0:
         return NOT_VISIBLE
     S_inverse = np.array([[S[1, 1], -S[0, 1]], [-S[1, 0], S[0, 0]]]) / determinant
+    # The order of terms is another than in measurement.mahalanobis_squared: S is symmetric here
+    # only to rounding.
     mahalanobis_squared = nu[0] * (S_inverse[0, 0] * nu[0] + S_inverse[0, 1] * nu[1]) + nu[1] * (
         S_inverse[1, 0] * nu[0] + S_inverse[1, 1] * nu[1]
     )
@@ -69,7 +71,7 @@ def update_body(
 
 
 @njit(cache=True)
-def _product(H: Array, J: Array) -> Array:
+def _image_jacobian(H: Array, J: Array) -> Array:
     """H J (2, 6): the Jacobian of a ray by translation and rotation of the body."""
     HJ = np.empty((2, 6))
     for k in range(2):

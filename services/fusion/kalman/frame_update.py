@@ -25,7 +25,7 @@ from services.fusion.kalman.rigid_body import RestState, empty_rest
 from services.fusion.kalman.track_history import TrackHistory, empty_history
 from services.fusion.kalman.track_insertion import ACCEPTED, insert
 
-# What `update_frame` tells of a landmark without a track, beside the codes of
+# What `update_frame` returns for a landmark without a track, beside the codes of
 # track_insertion.insert.
 NO_TRACK = -1
 
@@ -57,7 +57,7 @@ def update_frame(
     gate: float,
     new: bool,
 ) -> Ints:
-    """Update all with a frame: what became of its observations (n,), NO_TRACK where there is none.
+    """Take in a frame; returns what became of its observations (n,), NO_TRACK where there is none.
 
     densities (M,): the jerk densities of the motion models. gate: the largest squared Mahalanobis
     distance that a track accepts. new: observations to remember, not remembered ones.

@@ -85,21 +85,9 @@ def _invert_innovation_cov(
     # Velocity of the ray (1/s): what a clock error of one second would shift it by.
     du = H[0, 0] * state[3] + H[0, 1] * state[4] + H[0, 2] * state[5]
     dv = H[1, 0] * state[3] + H[1, 1] * state[4] + H[1, 2] * state[5]
-    S00 = (
-        H[0, 0] * PHt[0, 0]
-        + H[0, 1] * PHt[1, 0]
-        + H[0, 2] * PHt[2, 0]
-        + ray_variance
-        + clock_variance * du * du
-    )
-    S01 = H[0, 0] * PHt[0, 1] + H[0, 1] * PHt[1, 1] + H[0, 2] * PHt[2, 1] + clock_variance * du * dv
-    S11 = (
-        H[1, 0] * PHt[0, 1]
-        + H[1, 1] * PHt[1, 1]
-        + H[1, 2] * PHt[2, 1]
-        + ray_variance
-        + clock_variance * dv * dv
-    )
+    S00 = _row_times_column(H, PHt, 0, 0) + ray_variance + clock_variance * du * du
+    S01 = _row_times_column(H, PHt, 0, 1) + clock_variance * du * dv
+    S11 = _row_times_column(H, PHt, 1, 1) + ray_variance + clock_variance * dv * dv
     determinant = S00 * S11 - S01 * S01
     if determinant > 0.0:
         S_inverse[0, 0] = S11 / determinant

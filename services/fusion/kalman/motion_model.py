@@ -118,7 +118,7 @@ def propagate_cov(P: Array, axes: int, dt_s: float, out: Array) -> None:
 
 
 @njit(cache=True)
-def transpose_predict(adjoint: Array, information: Array, dt_s: float) -> None:
+def adjoint_predict(adjoint: Array, information: Array, dt_s: float) -> None:
     """The smoother's step back over dt_s, in place: F^T adjoint (9,), F^T information F (9, 9)."""
     f01, f02, f12, f22 = transition(dt_s)
     for i in range(3):

@@ -49,8 +49,9 @@ PRIOR, LEAK = 0.1, 0.003
 MAX_EVIDENCE_AGAINST = 2.0
 # Probability of rest counts once it has lasted: a hand that turns back rests for an instant.
 RISE_S = 0.3
-# Squared Mahalanobis distance (2 degrees of freedom) beyond which a ray does not update the body.
-GATE = 30.0
+# Squared Mahalanobis distance (2 degrees of freedom) beyond which a ray updates neither body nor
+# anchor.
+BODY_GATE = 30.0
 # Motion is extrapolated over this much at most.
 REACH_S = 0.1
 # Without an observation of a marker for longer than the first, its share of the body's estimate
@@ -64,7 +65,7 @@ def update_rest(
 ) -> None:
     """Take in those of a frame's observations that their tracks have just ACCEPTED (codes (n,))."""
     for hand in range(rest.time_s.shape[0]):
-        if _bring_to_frame(rest, history, hand, frame, codes):
+        if _advance_to_frame(rest, history, hand, frame, codes):
             _update_hand(rest, history, hand, frame, codes, cameras)
         else:
             # What comes too late for the body is in the tracks, which then know better.
@@ -74,7 +75,7 @@ def update_rest(
 
 
 @njit(cache=True)
-def _bring_to_frame(
+def _advance_to_frame(
     rest: RestState, history: TrackHistory, hand: int, frame: FrameRays, codes: Ints
 ) -> bool:
     """Predict a hand's body to the mean instant of a frame's observations.
@@ -165,7 +166,7 @@ def _update_rest_probability(
 ) -> None:
     """Bayes' rule for one marker: does this observation fit the body, or rather its own track?"""
     if rest.probability[landmark] == 0.0:
-        _anchor(rest, history, landmark)
+        _place_anchor(rest, history, landmark)
         rest.probability[landmark] = PRIOR
         rest.sustained[landmark] = 0.0
     else:
@@ -177,7 +178,7 @@ def _update_rest_probability(
             observed.clock_variance,
         )
         dt_s = observed.time_s - rest.time_s[rest.hand[landmark]]
-        log_likelihood = update_body(rest, landmark, dt_s, measured, updates_body, GATE)
+        log_likelihood = update_body(rest, landmark, dt_s, measured, updates_body, BODY_GATE)
         log_ratio = log_likelihood - history.log_likelihood[landmark]
         prior = (1.0 - LEAK) * rest.probability[landmark] + LEAK * PRIOR
         odds = prior / (1.0 - prior) * math.exp(min(max(log_ratio, -MAX_EVIDENCE_AGAINST), 50.0))
@@ -190,7 +191,7 @@ def _update_rest_probability(
 
 
 @njit(cache=True)
-def _anchor(rest: RestState, history: TrackHistory, landmark: int) -> None:
+def _place_anchor(rest: RestState, history: TrackHistory, landmark: int) -> None:
     """Place a marker in its body where the likeliest model of its track has it."""
     node = newest_node(history, landmark)
     m = int(np.argmax(history.probability[landmark, node]))

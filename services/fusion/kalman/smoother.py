@@ -16,8 +16,8 @@ from services.fusion.arrays import Bools
 from services.fusion.kalman.measurement import Innovation
 from services.fusion.kalman.motion_model import (
     Gaussian,
+    adjoint_predict,
     predict,
-    transpose_predict,
     unit_process_noise,
 )
 from services.fusion.kalman.track_history import (
@@ -35,8 +35,8 @@ def smooth_landmark(
 ) -> bool:
     """Position and velocity (6,), (6, 6) of a landmark at an instant; written in place.
 
-    densities (M,): the jerk densities of the motion models.
-    False if its track does not reach back that far, or there is none.
+    densities (M,): the jerk densities of the motion models. False if its track does not reach back
+    that far, or there is none.
     """
     index = nodes_until(history, landmark, time_s)
     if index == 0:
@@ -98,13 +98,13 @@ def _smooth(
         before_s = time_s
         if k > index:
             before_s = history.time_s[landmark, history.order[landmark, k - 1]]
-        transpose_update(adjoint, information, innovation_of(history, landmark, node, m))
-        transpose_predict(adjoint, information, history.time_s[landmark, node] - before_s)
-    _apply(adjoint, information, state)
+        adjoint_update(adjoint, information, innovation_of(history, landmark, node, m))
+        adjoint_predict(adjoint, information, history.time_s[landmark, node] - before_s)
+    _apply_adjoint(adjoint, information, state)
 
 
 @njit(cache=True)
-def _apply(adjoint: Array, information: Array, state: Gaussian) -> None:
+def _apply_adjoint(adjoint: Array, information: Array, state: Gaussian) -> None:
     """x -= P adjoint, P -= P information P, kept symmetric; in place."""
     P = state.cov
     P_information = np.zeros((9, 9))
@@ -124,7 +124,7 @@ def _apply(adjoint: Array, information: Array, state: Gaussian) -> None:
 
 
 @njit(cache=True)
-def transpose_update(adjoint: Array, information: Array, innovation: Innovation) -> None:
+def adjoint_update(adjoint: Array, information: Array, innovation: Innovation) -> None:
     """The step back over one measurement, in place: from after its update to before it.
 
     adjoint (9,): (I - K H)^T adjoint - H^T S^-1 nu.

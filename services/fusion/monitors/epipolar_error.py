@@ -51,8 +51,8 @@ def epipolar_error(
             continue
         before, now, after = (_height(pair.R_rectified_from_second, other.ray) for other in full)
         speed = (after - before) / (2.0 * _STEP_S)
-        # Speed that is but noise shares that noise with the height, and would teach a clock error
-        # of about half a frame.
+        # Speed that is but noise shares that noise with the height, and would look like a clock
+        # error of about half a frame.
         moving = abs(speed) > _MOVING * full[1].sigma / period_s
         return EpipolarError(
             height=_height(pair.R_rectified_from_first, ray) - now,

@@ -39,7 +39,7 @@ class Score:
 
     @property
     def nees(self) -> float:
-        """Squared error over variance, mean of all axes: 1 if sigma is honest."""
+        """Squared error over variance, mean of all axes: 1 if sigma is consistent."""
         return float(np.mean((self.errors_m / self.sigmas_m) ** 2))
 
 

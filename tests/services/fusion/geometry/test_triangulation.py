@@ -49,8 +49,8 @@ def test_covariance_tells_the_scatter(pair):
         for _ in range(3000)
     ]
     errors = np.array([f.position_m - p for f in found])
-    scatter, told = np.cov(errors.T), found[0].covariance_m2
-    np.testing.assert_allclose(np.sqrt(np.diag(scatter)), np.sqrt(np.diag(told)), rtol=0.06)
+    scatter, stated = np.cov(errors.T), found[0].covariance_m2
+    np.testing.assert_allclose(np.sqrt(np.diag(scatter)), np.sqrt(np.diag(stated)), rtol=0.06)
     nees = (
         np.mean(
             [e @ np.linalg.solve(f.covariance_m2, e) for e, f in zip(errors, found, strict=True)]

@@ -13,7 +13,7 @@ from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 EXACT = SyntheticRig(clock_error_s=0.0, clock_sigma_s=2e-5, loss=0.0)
 
 
-def test_the_first_points_of_a_track_are_honest(bench_of):
+def test_sigmas_of_the_first_points_of_a_track_are_consistent(bench_of):
     """Test: 30 hands come into view at 0.5 m/s.
 
     Expected: the second to tenth instants are within their sigmas, bar a little.

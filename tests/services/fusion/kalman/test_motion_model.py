@@ -8,9 +8,9 @@ import pytest
 from services.fusion.kalman.motion_model import (
     ACCELERATION_TIME_S,
     Gaussian,
+    adjoint_predict,
     predict,
     transition,
-    transpose_predict,
     unit_process_noise,
 )
 
@@ -70,7 +70,7 @@ def test_no_time_changes_nothing(estimate):
 
 def test_the_step_back_is_the_transpose(estimate):
     adjoint, information = estimate[0].copy(), estimate[1].copy()
-    transpose_predict(adjoint, information, 0.05)
+    adjoint_predict(adjoint, information, 0.05)
     F = matrix(0.05)
     np.testing.assert_allclose(adjoint, F.T @ estimate[0], atol=1e-12)
     np.testing.assert_allclose(information, F.T @ estimate[1] @ F, atol=1e-12)

@@ -62,6 +62,6 @@ def test_a_body_that_nobody_knows_or_that_flies_off_is_lost(rest):
     rest.cov[0, 4, 4] = 1.1 * LOST_SIGMA[1] ** 2
     assert is_lost(rest, 0)
     start_body(rest, 0, 2.0, np.array([0.03, 0.01, 0.7]))
-    for mad in (np.nan, np.inf, -100.0):
-        rest.motion[0, 1, 2] = mad
+    for diverged in (np.nan, np.inf, -100.0):
+        rest.motion[0, 1, 2] = diverged
         assert is_lost(rest, 0)

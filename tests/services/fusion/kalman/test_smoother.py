@@ -8,9 +8,7 @@ from services.fusion.kalman.motion_model import transition, unit_process_noise
 
 
 def rts(track):
-    """Smoothed states of all nodes from the stored filtered ones, by Rauch, Tung and Striebel's
-    recursion.
-    """
+    """Smoothed states of all nodes from the filtered ones, by Rauch, Tung and Striebel."""
     history = track.history
     nodes = history.order[0, : history.size[0]]
     x, P, times = history.state[0, nodes, 0], history.cov[0, nodes, 0], history.time_s[0, nodes]

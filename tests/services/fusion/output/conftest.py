@@ -8,20 +8,21 @@ import numpy as np
 import pytest
 
 RADIUS_M, PAINT_M, BASELINE_M, DISTANCE_M = 0.0068, 0.014, 0.075, 0.5
-EYES = np.array([[0.0, 0.0, 0.0], [BASELINE_M, 0.0, 0.0]])
+CAMERA_CENTRES = np.array([[0.0, 0.0, 0.0], [BASELINE_M, 0.0, 0.0]])
 
 
-def visible_centroid(eye, tip, direction):
-    """Centroid (x/z, y/z) of the painted part of a capsule that ends at tip, as seen from eye
-    looking along +z.
+def visible_centroid(centre, tip, direction):
+    """Centroid (x/z, y/z) of the painted part of a capsule that ends at tip.
+
+    As a camera at centre sees it, looking along +z.
     """
-    middle = tip - 0.5 * PAINT_M * direction - eye
+    middle = tip - 0.5 * PAINT_M * direction - centre
     half = 1.3 * (PAINT_M + RADIUS_M) / middle[2]
     grid = np.linspace(-half, half, 160)
     rays = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2) + middle[:2] / middle[2]
     D = np.column_stack([rays, np.ones(len(rays))])
     D /= np.linalg.norm(D, axis=1, keepdims=True)
-    w = eye - (tip - RADIUS_M * direction)  # from the centre of the end's sphere
+    w = centre - (tip - RADIUS_M * direction)  # from the centre of the end's sphere
     along, w_along = D @ direction, w @ direction
     a, b, c = 1.0 - along**2, D @ w - along * w_along, w @ w - w_along**2 - RADIUS_M**2
     t = (-b - np.sqrt(np.maximum(b**2 - a * c, 0.0))) / a
@@ -50,7 +51,10 @@ def _random_fingers(
         if direction[2] > hidden:  # the finger hides its own tip
             continue
         point = np.array([random.uniform(-0.06, 0.14), random.uniform(-0.1, 0.1), DISTANCE_M])
-        seen = [visible_centroid(eye, point + 0.5 * PAINT_M * direction, direction) for eye in EYES]
+        seen = [
+            visible_centroid(centre, point + 0.5 * PAINT_M * direction, direction)
+            for centre in CAMERA_CENTRES
+        ]
         if seen[0] is None or seen[1] is None:
             continue
         found += 1
@@ -60,7 +64,7 @@ def _random_fingers(
 
 def _split(error, point):
     """An error along the mean viewing ray, and its length across it."""
-    away = point - EYES.mean(axis=0)
+    away = point - CAMERA_CENTRES.mean(axis=0)
     away /= np.linalg.norm(away)
     return error @ away, np.linalg.norm(error - (error @ away) * away)
 

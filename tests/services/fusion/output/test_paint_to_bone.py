@@ -84,8 +84,9 @@ def is_untouched(positions) -> bool:
 
 
 def located_depth_m(normals, weights, places):
-    """How deep below the top two cameras 9 degrees apart locate skin, each by the middle of what it
-    sees, weighed by how it faces it.
+    """How deep below the top two cameras 9 degrees apart locate skin.
+
+    Each by the middle of what it sees, weighted by how the skin faces it.
     """
     shifts = []
     for angle in (-0.08, 0.08):
@@ -159,7 +160,7 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
 @pytest.mark.parametrize(
     "wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)]
 )
-def test_absurd_or_predicted_poses_are_not_believed(paint, wxyz):
+def test_absurd_or_predicted_poses_are_ignored(paint, wxyz):
     paint.note_pose(pose(10**18, wxyz))
     paint.note_pose(pose(10**18, TOWARDS, source="predicted"))
     assert is_untouched(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
