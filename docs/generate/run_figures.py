@@ -61,10 +61,10 @@ RUNS = {
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
-    "hard": _script("hard", "", "--frames 8 --seeds 1", 20),
+    "hard": _script("hard", "--seeds 2", "--frames 8 --seeds 1", 8),
     "hard_other_rooms": _script(
         "hard",
-        "--first-seed 11 --seeds 3 --frames 2700",
+        "--first-seed 11 --seeds 1 --frames 1000",
         "--first-seed 11 --seeds 1 --frames 8",
         6,
     ),
