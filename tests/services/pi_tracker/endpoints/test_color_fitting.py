@@ -37,7 +37,7 @@ async def test_clicks_on_two_pictures_give_ranges_that_work(
         assert set(result.colors) == {"green", "blue"}
         assert {patch.color for patch in result.patches} == {"green", "blue"}
         assert result.residuals["colors"]["green"]["inside"] > 0.9
-        # Nothing is in force by asking.
+        # Asking alone changes nothing.
         assert await client.colors("left") == colors
         await client.set_colors(
             "left",

@@ -86,7 +86,7 @@ async def test_what_cannot_be_is_refused_with_the_reason(
         await seen(client, "blue", "green")
 
 
-async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_in_force(
+async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_used(
     config, tracking, seen, colors
 ):
     async with tracking(config) as (service, client):
@@ -145,7 +145,7 @@ async def test_garbage_in_a_request_is_refused_with_a_typed_reply(config, tracki
         assert await client.colors("left") == colors
 
 
-async def test_a_file_that_cannot_be_written_leaves_the_old_in_force(
+async def test_a_file_that_cannot_be_written_keeps_the_old(
     config, tracking, seen, colors, monkeypatch
 ):
     def full(path, calibration):

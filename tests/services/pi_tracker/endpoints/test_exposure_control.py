@@ -63,7 +63,7 @@ def exposing(running, config):
     return run
 
 
-async def test_values_set_by_hand_are_in_force_and_written(exposing, tmp_path):
+async def test_values_set_by_hand_hold_and_are_written(exposing, tmp_path):
     camera = Camera(Controls())
     async with exposing(camera) as (_, client):
         before = await client.exposure("left")
