@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
@@ -17,10 +18,20 @@ def add_equation(row: Array, value: float, A: Array, b: Array) -> None:
 
 
 @njit(cache=True)
-def multiply(A: Array, b: Array, out: Array) -> None:
-    """A b (3,) to out; of the inverse of A it is the solution."""
+def solve_symmetric(A: Array, b: Array, x: Array) -> bool:
+    """The solution (3,) to x; False if A is singular to working precision."""
+    A_inverse = np.empty((3, 3))
+    if not invert_symmetric(A, A_inverse):
+        return False
+    multiply(A_inverse, b, x)
+    return True
+
+
+@njit(cache=True)
+def multiply(A_inverse: Array, b: Array, x: Array) -> None:
+    """A^-1 b (3,) to x: the solution where the inverse is needed as well, for the covariance."""
     for i in range(3):
-        out[i] = A[i, 0] * b[0] + A[i, 1] * b[1] + A[i, 2] * b[2]
+        x[i] = A_inverse[i, 0] * b[0] + A_inverse[i, 1] * b[1] + A_inverse[i, 2] * b[2]
 
 
 @njit(cache=True)

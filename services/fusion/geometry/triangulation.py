@@ -19,7 +19,12 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.normal_equations import add_equation, invert_symmetric, multiply
+from services.fusion.geometry.normal_equations import (
+    add_equation,
+    invert_symmetric,
+    multiply,
+    solve_symmetric,
+)
 from services.fusion.geometry.projection import Extrinsics, project
 
 # Gauss-Newton from the linear solution is at rounding error after 3 rounds for rays within 20 sigma
@@ -103,7 +108,6 @@ def _linear_point(rays: Array, cameras: Extrinsics, position: Array) -> bool:
     """
     R, t = cameras.R, cameras.t
     A = np.zeros((3, 3))
-    A_inverse = np.empty((3, 3))
     b = np.zeros(3)
     row = np.empty(3)
     for c in range(rays.shape[0]):
@@ -112,10 +116,7 @@ def _linear_point(rays: Array, cameras: Extrinsics, position: Array) -> bool:
                 row[j] = R[c, k, j] - rays[c, k] * R[c, 2, j]
             value = rays[c, k] * t[c, 2] - t[c, k]
             add_equation(row, value, A, b)
-    if not invert_symmetric(A, A_inverse):
-        return False
-    multiply(A_inverse, b, position)
-    return True
+    return solve_symmetric(A, b, position)
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.normal_equations import add_equation, invert_symmetric, multiply
+from services.fusion.geometry.normal_equations import add_equation, solve_symmetric
 from services.fusion.geometry.projection import Extrinsics, project
 
 # Angles of the table, 0 to 180 deg: 3 deg apart, linear between them is right to 20 um for a 7 mm
@@ -114,7 +114,6 @@ def located_shift(
     """
     R, t = cameras
     A = np.zeros((3, 3))  # H^T H, summed
-    A_inverse = np.zeros((3, 3))
     b = np.zeros(3)  # H^T (shift of the ray), summed
     ray = np.empty(2)
     H = np.empty((2, 3))
@@ -126,10 +125,7 @@ def located_shift(
         for k in range(2):
             ray_shift = H[k, 0] * seen_shift[0] + H[k, 1] * seen_shift[1] + H[k, 2] * seen_shift[2]
             add_equation(H[k], ray_shift, A, b)
-    if not invert_symmetric(A, A_inverse):
-        return False
-    multiply(A_inverse, b, shift)
-    return True
+    return solve_symmetric(A, b, shift)
 
 
 @njit(cache=True)

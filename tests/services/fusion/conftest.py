@@ -3,57 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from rhot.files.config import Fusion
 from rhot.geometry.camera import Camera
-from rhot.geometry.transforms import Array
-from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.intake.observations import ObservationBuilder
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.step import FusionStep
+from testing.point_errors import PointErrors, point_errors
 from testing.synthetic_points import START_NS, Motion, SyntheticRig, frames, point_hands
 
-
-@dataclass(frozen=True, eq=False)
-class Score:
-    """Errors of points against truth, after `warm_s`."""
-
-    messages: int
-    errors_m: Array  # (n, 3)
-    sigmas_m: Array  # (n, 3)
-    instants_s: Array  # (n,)
-    measured: Array  # (n,)
-
-    @property
-    def rms_mm(self) -> float:
-        return 1e3 * float(np.sqrt(np.mean(np.sum(self.errors_m**2, axis=1))))
-
-    @property
-    def depth_rms_mm(self) -> float:
-        return 1e3 * float(np.sqrt(np.mean(self.errors_m[:, 2] ** 2)))
-
-    @property
-    def nees(self) -> float:
-        """Squared error over variance, mean of all axes: 1 if sigma is consistent."""
-        return float(np.mean((self.errors_m / self.sigmas_m) ** 2))
-
-
-def score(messages: Iterable[HandPoints], path: Motion, warm_s: float = 1.0) -> Score:
-    messages = [m for m in messages if (m.stamp_ns - START_NS) * 1e-9 >= warm_s]
-    rows = []
-    for message in messages:
-        instant_s = (message.stamp_ns - START_NS) * 1e-9
-        truth = path(np.array([instant_s]))[0]
-        for point in message.points:
-            error = np.array(point.position_m) - truth[BASIC_LANDMARKS.index(point.name)]
-            rows.append([*error, *point.sigma_m, instant_s, float(point.source == "measured")])
-    table = np.array(rows).reshape(-1, 8)
-    return Score(len(messages), table[:, :3], table[:, 3:6], table[:, 6], table[:, 7])
+# Tracks have started and clock offsets are estimated by then.
+WARM_S = 1.0
 
 
 def track(
@@ -64,18 +28,18 @@ def track(
     return step, messages + step.flush()
 
 
-Run = Callable[..., tuple[FusionStep, Score]]
+Run = Callable[..., tuple[FusionStep, PointErrors]]
 
 
 @pytest.fixture(scope="session")
 def run() -> Run:
-    """Synthetic hand -> FusionStep -> score."""
+    """Synthetic hand -> FusionStep -> errors after WARM_S."""
 
     def simulate(
         setup: SyntheticRig, path: Motion, fusion: Fusion | None = None, seconds: float = 6.0
-    ) -> tuple[FusionStep, Score]:
+    ) -> tuple[FusionStep, PointErrors]:
         step, messages = track(setup, frames(setup, path, seconds), fusion)
-        return step, score(messages, path)
+        return step, point_errors(messages, path).within(WARM_S)
 
     return simulate
 

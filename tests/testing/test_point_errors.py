@@ -1,0 +1,40 @@
+"""Errors of points: against the truth at their own instants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rhot.hand import BASIC_LANDMARKS
+from rhot.messages import HandPoint, HandPoints
+from testing.point_errors import point_errors
+from testing.synthetic_points import START_NS, MovingHand
+
+
+def message(at_s: float, offset_m: float, source: str) -> HandPoints:
+    """All points of a moving hand, off by so much along z."""
+    points = [
+        HandPoint(
+            name=name,
+            position_m=tuple(np.add(place, [0.0, 0.0, offset_m]).tolist()),
+            sigma_m=(1e-3, 1e-3, 2e-3),
+            cameras=["left", "right"],
+            source=source,
+        )
+        for name, place in zip(BASIC_LANDMARKS, MovingHand()(np.array([at_s]))[0], strict=True)
+    ]
+    return HandPoints(hand="right", seq=0, stamp_ns=START_NS + round(at_s * 1e9), points=points)
+
+
+def test_errors_are_those_of_every_point_at_its_own_instant():
+    found = point_errors(
+        [message(0.5, 3e-3, "measured"), message(1.5, -4e-3, "predicted")], MovingHand()
+    )
+    np.testing.assert_allclose(found.errors_m[:, :2], 0.0, atol=1e-9)
+    assert found.measured.tolist() == [True] * 6 + [False] * 6
+    assert found.rms_mm == pytest.approx(np.sqrt(12.5))
+    assert found.depth_rms_mm == pytest.approx(np.sqrt(12.5))
+    assert found.nees == pytest.approx(12.5 / 4.0 / 3.0)
+    early = found.within(0.0, 1.0)
+    assert early.rms_mm == pytest.approx(3.0)
+    assert len(found.within(1.0).instants_s) == 6
