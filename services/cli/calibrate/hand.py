@@ -32,7 +32,7 @@ from services.cli.router_session import rig_and_endpoints, router_session
 from services.cli.terminal import Terminal
 
 if TYPE_CHECKING:
-    from services.calibrator.hand.hand_file import HandFile
+    from services.calibrator.output.hand_file import HandFile
 
 _BONES = {"proximal": 0, "middle": 1, "distal": 2}
 _THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
@@ -95,8 +95,8 @@ def _fit(
     source: str,
 ) -> HandFile:
     from services.calibrator.hand.fit import fit_hand
-    from services.calibrator.hand.hand_file import hand_file
     from services.calibrator.hand.recording import sort_exercises
+    from services.calibrator.output.hand_file import hand_file
 
     if not messages:
         raise CalibrationError(
@@ -109,7 +109,7 @@ def _fit(
 
 
 def _report(made: HandFile, written: Path | None) -> None:
-    from services.calibrator.hand.report import report_text
+    from services.calibrator.output.hand_report import report_text
 
     typer.echo(report_text(made))
     if written is not None:

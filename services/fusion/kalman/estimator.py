@@ -18,8 +18,8 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.geometry.triangulation import TriangulationStatus, triangulate
+from services.fusion.intake.frame_rays import FrameRays
 from services.fusion.intake.observations import View
-from services.fusion.kalman.frame_rays import FrameRays
 from services.fusion.kalman.frame_update import (
     NO_TRACK,
     drop_lost_tracks,

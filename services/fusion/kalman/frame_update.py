@@ -14,7 +14,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.frame_rays import FrameRays, observation
+from services.fusion.intake.frame_rays import FrameRays, observation
 from services.fusion.kalman.recent_observations import (
     RecentObservations,
     no_observations,

@@ -9,7 +9,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
-from services.fusion.kalman.frame_rays import FrameRays
+from services.fusion.intake.frame_rays import FrameRays
 
 # Observations of each camera that are kept for starting a track: half a second at 30 fps, so that a
 # camera may be that much later than another.

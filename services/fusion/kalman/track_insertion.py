@@ -12,7 +12,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.frame_rays import Observation
+from services.fusion.intake.frame_rays import Observation
 from services.fusion.kalman.motion_model import Gaussian
 from services.fusion.kalman.multiple_models import filter_node
 from services.fusion.kalman.smoother import smooth_landmark

@@ -22,6 +22,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, rotation_x, rotation_z, transform
 from rhot.hand import HANDS, HandName
 from rhot.simulator_messages import Truth
+from services.simulator.camera_clock import CameraClock, camera_clock
 from services.simulator.scene.actors import (
     GRIP_M,
     Hand,
@@ -34,7 +35,6 @@ from services.simulator.scene.actors import (
     place_hand,
 )
 from services.simulator.scene.calibration_exercises import guided
-from services.simulator.scene.camera_clock import CameraClock, camera_clock
 from services.simulator.scene.catalog import SceneSpec, scene_spec
 from services.simulator.scene.gestures import MOTIONS
 from services.simulator.scene.hand_kinematics import Skeleton

@@ -14,12 +14,12 @@ from rhot.files.config import RigConfig
 from rhot.hand import BASIC_LANDMARKS, TIPS, default_hand
 from services.calibrator.hand.adjust import adjust
 from services.calibrator.hand.fit import fit_hand
-from services.calibrator.hand.hand_file import hand_file
 from services.calibrator.hand.initial_poses import initial_poses
 from services.calibrator.hand.landmark_jacobian import landmarks_of
 from services.calibrator.hand.normal_equations import normal_equations
 from services.calibrator.hand.recording import find_start, sort_exercises
-from services.calibrator.hand.report import report_text
+from services.calibrator.output.hand_file import hand_file
+from services.calibrator.output.hand_report import report_text
 from services.solver.step import SolverStep
 
 FACTORS = (0.9, 1.1, 0.9, 1.1, 0.9)

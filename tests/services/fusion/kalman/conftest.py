@@ -9,7 +9,7 @@ import pytest
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import extrinsics
-from services.fusion.kalman.frame_rays import Observation
+from services.fusion.intake.frame_rays import Observation
 from services.fusion.kalman.rigid_body import RestState, empty_rest, start_body
 from services.fusion.kalman.smoother import smooth_all
 from services.fusion.kalman.track_history import empty_history, start_track

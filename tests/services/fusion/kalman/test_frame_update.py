@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.geometry.projection import extrinsics
-from services.fusion.kalman.frame_rays import FrameRays
+from services.fusion.intake.frame_rays import FrameRays
 from services.fusion.kalman.frame_update import (
     NO_TRACK,
     drop_lost_tracks,

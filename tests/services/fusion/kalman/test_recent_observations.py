@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.fusion.kalman.frame_rays import FrameRays, observation
+from services.fusion.intake.frame_rays import FrameRays, observation
 from services.fusion.kalman.recent_observations import KEPT, no_observations, remember
 
 

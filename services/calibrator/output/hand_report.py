@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rhot.hand import TIPS
 from services.calibrator.hand.fit import FRAMES
-from services.calibrator.hand.hand_file import HandFile
+from services.calibrator.output.hand_file import HandFile
 
 _SOURCES = {
     "data": "determined by the data",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.files.config import CameraTable
-from services.simulator.scene.camera_clock import CameraClock, camera_clock
+from services.simulator.camera_clock import CameraClock, camera_clock
 
 
 def pair(seed: int = 1, fps: float = 30.0) -> tuple[CameraClock, CameraClock]:
