@@ -24,7 +24,7 @@ from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
-from services.fusion.intake.observations import ObservationBuilder, Refusal
+from services.fusion.intake.observations import FrameRejection, ObservationBuilder
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
@@ -84,7 +84,7 @@ class FusionStep:
     def step(self, frame: MarkerFrame) -> list[HandPoints]:
         """Take in one frame; the points that are due with it, one message per hand, or none."""
         view = self._builder.build(frame)
-        if isinstance(view, Refusal):
+        if isinstance(view, FrameRejection):
             self.refusals[view.value] += 1
             return []
         self.refusals["marker"] += view.ignored

@@ -116,10 +116,9 @@ def test_services_without_their_extra_say_so_in_one_line(environment, tmp_path):
         assert done.returncode == 2, said
 
 
+@pytest.mark.parametrize("environment", ["pi"], indirect=True, scope="module")
 def test_a_pi_gets_what_a_pi_needs(environment):
-    extra, commands = environment
-    if extra != "pi":
-        pytest.skip("this is about the extra for Raspberry Pis")
+    _, commands = environment
     listed = run(commands / "python", "-m", "pip", "list", "--format=freeze", cwd=commands).stdout
     versions = dict(line.split("==") for line in listed.split())
     assert not {"scipy", "numba", "viser", "mcap", "typer", "matplotlib"} & set(versions)
@@ -136,12 +135,11 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.parametrize("environment", ["master"], indirect=True, scope="module")
 def test_the_demo_runs_from_an_empty_folder_and_leaves_the_installation_as_it_is(
     environment, tmp_path
 ):
-    extra, commands = environment
-    if extra != "master":
-        pytest.skip("the demo needs the extra for the master")
+    _, commands = environment
     (packages,) = (commands.parent / "lib").glob("python3*/site-packages")
     config = packages / "services" / "cli" / "config"
     before = digests(config)

@@ -3,8 +3,8 @@
 Every marker gets its own instant: a rolling shutter reads row by row, so it is stamp_ns + y_px *
 row_time_ns - clock_offset_ns on the master's clock. Frames that cannot be used (a camera that is
 not in the rig, another image size than the calibration's, an instant outside the range of stamps)
-give a Refusal instead of a View. Markers that cannot be used (unknown colour, outside the image,
-absurd numbers) are left out and counted.
+give a FrameRejection instead of a View. Markers that cannot be used (unknown colour, outside the
+image, absurd numbers) are left out and counted.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ CLOCK_SIGMA_MAX_S = 0.02
 _STAMP_MAX = 2**63 - 1
 
 
-class Refusal(Enum):
+class FrameRejection(Enum):
     """Why a whole frame is of no use."""
 
     UNKNOWN_CAMERA = "unknown_camera"
     WRONG_SIZE = "wrong_size"
-    ABSURD_STAMP = "absurd_stamp"
+    IMPLAUSIBLE_STAMP = "absurd_stamp"
 
 
 @dataclass(frozen=True)
@@ -79,18 +79,18 @@ class ObservationBuilder:
                     landmarks.append(Landmark(hand, name))
         self.landmarks = tuple(landmarks)
 
-    def build(self, frame: MarkerFrame) -> View | Refusal:
+    def build(self, frame: MarkerFrame) -> View | FrameRejection:
         """The observations of one frame, or why there can be none."""
         index = self._camera_index.get(frame.camera)
         if index is None:
-            return Refusal.UNKNOWN_CAMERA
+            return FrameRejection.UNKNOWN_CAMERA
         camera = self.cameras[index]
         if tuple(frame.size_px) != tuple(camera.size_px):
-            return Refusal.WRONG_SIZE
+            return FrameRejection.WRONG_SIZE
         middle_row = 0.5 * (camera.size_px[1] - 1)
         instant_ns = frame.stamp_ns + round(middle_row * frame.row_time_ns) - frame.clock_offset_ns
         if not 0 <= instant_ns <= _STAMP_MAX:
-            return Refusal.ABSURD_STAMP
+            return FrameRejection.IMPLAUSIBLE_STAMP
         best = self._best_markers(frame, camera)
         landmarks = np.array(sorted(best), dtype=np.int64)
         markers = [best[landmark] for landmark in landmarks.tolist()]

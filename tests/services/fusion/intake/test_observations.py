@@ -11,8 +11,8 @@ from services.fusion.intake.observations import (
     CLOCK_SIGMA_MAX_S,
     SIGMA_MAX_PX,
     SIGMA_MIN_PX,
+    FrameRejection,
     ObservationBuilder,
-    Refusal,
     View,
 )
 from testing.synthetic_points import START_NS, SyntheticRig
@@ -89,11 +89,14 @@ def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(builder):
 
 
 def test_frames_of_no_use_say_why(builder):
-    assert builder.build(frame(camera="door")) is Refusal.UNKNOWN_CAMERA
-    assert builder.build(frame(size_px=(1280, 960))) is Refusal.WRONG_SIZE
-    assert builder.build(frame(stamp_ns=0, clock_offset_ns=2**61)) is Refusal.ABSURD_STAMP
+    assert builder.build(frame(camera="door")) is FrameRejection.UNKNOWN_CAMERA
+    assert builder.build(frame(size_px=(1280, 960))) is FrameRejection.WRONG_SIZE
     assert (
-        builder.build(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62))) is Refusal.ABSURD_STAMP
+        builder.build(frame(stamp_ns=0, clock_offset_ns=2**61)) is FrameRejection.IMPLAUSIBLE_STAMP
+    )
+    assert (
+        builder.build(frame(stamp_ns=2**63 - 1, clock_offset_ns=-(2**62)))
+        is FrameRejection.IMPLAUSIBLE_STAMP
     )
 
 
