@@ -27,7 +27,8 @@ import msgspec
 import numpy as np
 from accuracy_pictures import RENDERED_SEEDS, Pictures, Score
 
-from rhot.files.config import Fusion, HandTable, RigConfig, load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import Fusion, HandTable
 from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import MarkerFrame

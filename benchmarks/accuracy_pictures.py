@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 
 from rhot.files.calibration import load_hand
-from rhot.files.config import Fusion, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName, landmark_point
 from rhot.messages import HandPoints

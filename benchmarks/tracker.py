@@ -42,7 +42,8 @@ import numpy as np
 from tracker_speed import TURN, Times, keep_memory, ratios, speed, summarised, timed
 
 from rhot.files.calibration import ColorRange, Colors, load_colors
-from rhot.files.config import RigConfig, Tracker, load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.image.frame import Frame

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rhot.files.calibration import Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors

@@ -22,7 +22,8 @@ from rhot.bus.subscription import Subscription
 from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
 from rhot.hand import HandName
-from rhot.messages import HandPoints, HandPose, Health, MarkerFrame, ObjectPose, Session
+from rhot.health_messages import Health
+from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose, Session
 from rhot.topics import Topic
 
 T = TypeVar("T")

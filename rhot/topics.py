@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Generic, TypeVar
 
 import rhot.camera_messages as c
+import rhot.health_messages as h
 import rhot.messages as m
 import rhot.simulator_messages as s
 from rhot.errors import BusError
@@ -206,7 +207,7 @@ SESSION = Topic(
 CLOCK = _query("control/clock", m.ClockEcho, Priority.REAL_TIME, "the master's clock")
 HEALTH = Topic(
     "service/{service}/{instance}/health",
-    m.Health,
+    h.Health,
     Kind.STREAM,
     Rate.BEAT,
     Priority.DATA,

@@ -17,7 +17,8 @@ import msgspec
 import numpy as np
 
 from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
-from rhot.files.config import CameraTable, Fusion, HandTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, Fusion, HandTable
 from rhot.geometry.camera import Camera, pinhole
 from rhot.geometry.transforms import Array, rotation_y, transform
 from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand

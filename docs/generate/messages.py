@@ -9,6 +9,7 @@ import msgspec
 from msgspec import inspect
 
 import rhot.camera_messages
+import rhot.health_messages
 import rhot.messages
 import rhot.simulator_messages
 from docs.generate.markdown import generated_from, paragraphs, table, wrapped
@@ -21,7 +22,7 @@ name; `3 x number` is a list of three numbers. `stamp_ns` is CLOCK_REALTIME at t
 content describes, `sent_ns` the instant of sending on the sender's own clock (0 in files). Frames
 and angles: [frames](frames.md). Keys and rates: [topics](topics.md)."""
 
-_MODULES = (rhot.messages, rhot.camera_messages, rhot.simulator_messages)
+_MODULES = (rhot.messages, rhot.health_messages, rhot.camera_messages, rhot.simulator_messages)
 
 # End of a field's name -> unit; the longest that fits counts.
 _UNITS = {

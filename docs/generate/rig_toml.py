@@ -1,4 +1,4 @@
-"""docs/reference/rig-toml.md, from the types and comments of rhot/files/config.py."""
+"""docs/reference/rig-toml.md, from the types and comments of rhot/files/rig_tables.py."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def page() -> str:
     sections = list(_tables(RigConfig, "", ""))
     return (
         "\n\n".join(
-            ["# rig.toml", generated_from("`rhot/files/config.py`"), wrapped(_ABOUT), *sections]
+            ["# rig.toml", generated_from("`rhot/files/rig_tables.py`"), wrapped(_ABOUT), *sections]
         )
         + "\n"
     )

@@ -15,8 +15,9 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.bus.stats import StreamStats
 from rhot.files.config import RigConfig
-from rhot.messages import Health, StreamHealth
+from rhot.health_messages import Health, StreamHealth
 from rhot.process import systemd
+from rhot.process.fault_log import FaultLog
 
 log = logging.getLogger("rhot.service")
 
@@ -48,9 +49,8 @@ class Service:
     state: str = "starting"
     values: dict[str, float] = field(default_factory=dict)
     errors: int = 0
-    last_error: str = ""
+    faults: FaultLog = field(default_factory=lambda: FaultLog(clock.now_ns))
     _started_s: float = field(default_factory=time.monotonic)
-    _logged_s: float = float("-inf")
     _ready_s: float = float("inf")
     _slow_beats: dict[str, int] = field(default_factory=dict)
 
@@ -62,17 +62,21 @@ class Service:
         systemd.notify(f"READY=1\nSTATUS={self.state}")
         log.info("%s %s ready", self.name, self.instance)
 
-    def error(self, text: str) -> None:
-        """Count an error that the service survives.
+    @property
+    def last_error(self) -> str:
+        """Text of the newest standing fault, "" if all is well."""
+        standing = self.faults.standing()
+        return max(standing, key=lambda fault: fault.since_ns).text if standing else ""
 
-        The journal gets at most one such line a second.
+    def error(self, text: str, code: str = "event", subject: str | None = None) -> None:
+        """Count an error that the service survives: something that happened, of any fault's code.
+
+        It stands in health for half a minute after the last time (by its text, without a subject),
+        and is one line in the journal however often it comes meanwhile. What lasts until it is
+        mended is reported to `faults`.
         """
         self.errors += 1
-        self.last_error = text[:500]
-        now_s = time.monotonic()
-        if now_s - self._logged_s >= 1.0:
-            self._logged_s = now_s
-            log.warning("%s", self.last_error)
+        self.faults.event(code, text, text if subject is None else subject)
 
     async def beat(self) -> None:
         """Publish Health once a second, and log when a stream falls below its expected rate or
@@ -105,6 +109,7 @@ class Service:
             streams=streams,
             errors=self.errors,
             last_error=self.last_error,
+            faults=self.faults.standing(),
             cpu_percent=round(cpu_percent, 1),
             rss_mb=round(_rss_mb(), 1),
             values={

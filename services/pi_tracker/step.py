@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 
 from rhot.files.calibration import Colors, Lens
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker, MarkerFrame
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.marker_finder import MarkerFinder

@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 from rhot.clock import Offset
 from rhot.files.calibration import Colors, load_lens
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from rhot.messages import MarkerFrame
 from services.pi_tracker.colors.light_drift import Drifted, DriftMonitor
 from services.pi_tracker.image.frame import Frame

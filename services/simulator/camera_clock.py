@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 
 # The time from the first row to the last: 30 us a row at 480 rows, between an imx219 and an ov5647
 # (18.9 and 33.7 us).

@@ -12,7 +12,8 @@ import pytest
 
 from rhot import topics
 from rhot.errors import ConfigError
-from rhot.files.config import CameraTable, HandTable, RigConfig, Solver
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, HandTable, Solver
 from rhot.hand import default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from testing.source_tree import ROOT

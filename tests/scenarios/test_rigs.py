@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rhot.files.calibration import load_hand
-from rhot.files.config import Fusion, HandTable, load_rig
+from rhot.files.config import load_rig
+from rhot.files.rig_tables import Fusion, HandTable
 from rhot.hand import BASIC_LANDMARKS, landmark_point
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES

@@ -19,7 +19,8 @@ from rhot.files.calibration import (
     load_lens,
     load_objects,
 )
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from rhot.geometry.camera import Camera
 from services.cli.check.colors import check_colors, check_exposure
 from services.cli.check.problems import Problem, error, load_or_report, note, warning

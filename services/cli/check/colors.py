@@ -6,7 +6,8 @@ from functools import partial
 from itertools import combinations
 
 from rhot.files.calibration import ColorRange, load_colors, load_exposure
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from services.cli.check.problems import Problem, error, load_or_report, warning
 
 # Sources that are cameras with controls, which want a fixed exposure.

@@ -10,7 +10,7 @@ import msgspec
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.messages import Health
+from rhot.health_messages import Health
 
 # Three beats: one may be late, two may be lost.
 _SILENT_NS = 3_000_000_000

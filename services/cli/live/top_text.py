@@ -6,7 +6,7 @@ is published (`age`), or the time since it was sent where it is received (`hop`)
 
 from __future__ import annotations
 
-from rhot.messages import StreamHealth
+from rhot.health_messages import StreamHealth
 from services.cli.live.top_table import ServiceRow, TopTable
 
 

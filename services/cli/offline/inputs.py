@@ -14,7 +14,8 @@ import msgspec
 
 from rhot.errors import CaptureError, ConfigError, RhotError
 from rhot.files.capture import CSV_HEADER, Capture, read_stamps
-from rhot.files.config import CameraTable, RigConfig, load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import CameraTable
 from services.cli.offline.camera_input import CameraInput, StampedReader
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader

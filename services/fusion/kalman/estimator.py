@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rhot.files.config import Disparity
+from rhot.files.rig_tables import Disparity
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
 from services.fusion.geometry.triangulation import Triangulation, TriangulationStatus

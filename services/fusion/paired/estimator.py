@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import extrinsics

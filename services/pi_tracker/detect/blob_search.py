@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.detect.morphology import opening
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours, make_blob

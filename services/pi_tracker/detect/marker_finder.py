@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector

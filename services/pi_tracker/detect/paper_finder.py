@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from rhot.files.calibration import Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect.hsv_range import hsv_mask
 from services.pi_tracker.image.frame import Frame, Image

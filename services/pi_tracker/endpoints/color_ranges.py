@@ -44,7 +44,6 @@ class ColorRanges:
         self._camera, self._path = tracker.camera.name, tracker.colors_path
         self._drift_told_ns: dict[str, int] = {}
         # What health was last told of colours: with new ones it is no longer so.
-        self._problem = ""
         self._file_ns = _modified_ns(self._path)
         # One change at a time: the file and the tracker must agree on the last.
         self._lock = asyncio.Lock()
@@ -64,7 +63,12 @@ class ColorRanges:
             # A clock that was set back counts as due.
             if not 0 <= since_ns < _DRIFT_EVERY_NS:
                 self._drift_told_ns[one.color] = now_ns
-                self._report(one.text(self._camera))
+                self._service.faults.report(
+                    "color_drifted",
+                    one.text(self._camera),
+                    one.color,
+                    f"run `rhot calibrate colors {self._camera}`",
+                )
 
     async def follow_file(self) -> None:
         """Use what is saved by hand, for ever."""
@@ -84,7 +88,7 @@ class ColorRanges:
             try:
                 await self._change(sample.payload)
             except RefusedError as error:
-                self._report(str(error))
+                self._service.error(str(error), "request_refused", self._camera)
 
     async def _answer(self, payload: bytes) -> Colors:
         """The ranges in use, after the change that the payload asks for."""
@@ -154,16 +158,16 @@ class ColorRanges:
     def _forget_problems(self) -> None:
         """Other ranges are used: what was said of the old ones no longer holds."""
         self._drift_told_ns.clear()
-        if self._service.last_error == self._problem:
-            self._service.last_error = ""
+        self._service.faults.clear("colors_missing", self._camera)
+        self._service.faults.replace("color_drifted", {})
+        self._service.faults.clear("request_refused", self._camera)
         values = self._service.values
         for name in [name for name in values if name.endswith(("_hue_off", "_outside"))]:
             del values[name]
 
     def _report(self, text: str) -> None:
         """Say in health what is wrong, until other ranges are used."""
-        self._service.error(text)
-        self._problem = self._service.last_error
+        self._service.faults.report("colors_missing", text, self._camera)
 
 
 def _dated(colors: Colors) -> Colors:

@@ -17,7 +17,8 @@ import cv2
 
 from rhot.bus.bus import Bus
 from rhot.errors import ConfigError
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.kinds import Request, SourceKind

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rhot.files.calibration import Exposure, load_exposure
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.sources.reader import Reader
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 from services.pi_tracker.sources.picamera_settings import (

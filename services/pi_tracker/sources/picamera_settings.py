@@ -12,7 +12,7 @@ import numpy as np
 
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.image.frame import Image
 
 # The automatics of exposure and white balance switched on.

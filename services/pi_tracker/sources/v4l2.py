@@ -18,7 +18,7 @@ import cv2
 from rhot import clock
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 

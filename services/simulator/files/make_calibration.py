@@ -27,7 +27,8 @@ from rhot.files.calibration import (
     RigGeometry,
     save,
 )
-from rhot.files.config import CameraTable, RigConfig, load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import CameraTable
 from rhot.geometry.camera import pinhole
 from rhot.geometry.transforms import Array, rotation_from_vector, rotation_x, rotation_y, transform
 from services.simulator.files.fit_colors import Samples, fit_ranges, sample_pixels

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from rhot.files.config import Solver
+from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS
 from services.solver.finger import analytic, dls, dls_paper, fabrik, fabrik_paper

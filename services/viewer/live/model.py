@@ -16,7 +16,8 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
-from rhot.messages import HandPoints, HandPose, Health, ObjectPose
+from rhot.health_messages import Health
+from rhot.messages import HandPoints, HandPose, ObjectPose
 
 K = TypeVar("K")
 V = TypeVar("V")

@@ -14,7 +14,8 @@ import numpy as np
 from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
-from rhot.messages import HandPose, Health, StreamHealth
+from rhot.health_messages import Health, StreamHealth
+from rhot.messages import HandPose
 from services.viewer.live.model import View
 from services.viewer.live.palette import SOURCE_RGB
 

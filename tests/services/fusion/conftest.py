@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import pytest
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.intake.observations import ObservationBuilder

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot.errors import CalibrationError
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.transforms import apply, rotation_from_vector, transform
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.step import FusionStep

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rhot.files.config import ObjectTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import Array
 from rhot.messages import OpenVrDevice, OpenVrPose
 

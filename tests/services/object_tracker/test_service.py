@@ -13,7 +13,8 @@ import pytest
 from rhot import topics
 from rhot.errors import SourceError
 from rhot.files.capture import write_lines
-from rhot.files.config import Objects, ObjectTable, RigConfig, RigTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Objects, ObjectTable, RigTable
 from rhot.geometry.transforms import transform
 from rhot.messages import OpenVrPose
 from services.object_tracker.service import serve

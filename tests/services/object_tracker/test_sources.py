@@ -14,7 +14,8 @@ import pytest
 from rhot import clock
 from rhot.errors import CaptureError, SourceError
 from rhot.files.capture import write_lines
-from rhot.files.config import Objects, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Objects
 from rhot.messages import OpenVrPose
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.sources.libsurvive import LibSurvive

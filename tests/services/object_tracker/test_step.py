@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ObjectPlace, Objects, save
-from rhot.files.config import ObjectTable, RigConfig, RigTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import ObjectTable, RigTable
 from rhot.geometry.transforms import (
     Array,
     angle_between,

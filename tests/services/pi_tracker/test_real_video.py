@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.files.calibration import ColorRange, Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.sources.video import VideoReader
 from services.pi_tracker.step import TrackerStep
 

@@ -14,7 +14,8 @@ from rhot import topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.calibration import save
-from rhot.files.config import CameraTable, HandTable, RigConfig, RigTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, HandTable, RigTable
 from rhot.messages import Session
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame

@@ -10,7 +10,7 @@ import pytest
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.messages import MarkerFrame
 from services.pi_tracker.step import TrackerStep
 

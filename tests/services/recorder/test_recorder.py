@@ -8,8 +8,9 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.files.config import CameraTable, Objects, RigConfig, RigTable
-from rhot.files.config import Recorder as RecorderTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, Objects, RigTable
+from rhot.files.rig_tables import Recorder as RecorderTable
 from rhot.messages import Session
 from services.recorder.reader import read, read_attachments
 from services.recorder.recorder import Recorder, attachments, recorded_topics, recording_path

@@ -12,8 +12,8 @@ import pytest
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CaptureError
-from rhot.files.config import Recorder as RecorderTable
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Recorder as RecorderTable
 from rhot.messages import Session
 from services.recorder.reader import Record, read
 from services.recorder.service import serve

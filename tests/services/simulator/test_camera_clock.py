@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.simulator.camera_clock import CameraClock, camera_clock
 
 

@@ -15,7 +15,7 @@ import pytest
 from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError
-from rhot.files.config import CameraTable, Objects
+from rhot.files.rig_tables import CameraTable, Objects
 from rhot.messages import OpenVrPose
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame, Truth

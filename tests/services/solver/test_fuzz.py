@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rhot.errors import CalibrationError
-from rhot.files.config import RigConfig, Solver
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, HandModel, default_hand
 from rhot.messages import HandPoint, HandPoints

@@ -14,7 +14,8 @@ from rhot import topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.errors import CalibrationError, ConfigError
 from rhot.files.calibration import save
-from rhot.files.config import HandTable, RigConfig, RigTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import HandTable, RigTable
 from rhot.hand import default_hand
 from rhot.process.service import Service
 from services.solver.service import serve

@@ -8,7 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.config import RigConfig, Solver
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import (
     BASIC_LANDMARKS,

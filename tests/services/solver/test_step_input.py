@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rhot.errors import CalibrationError
-from rhot.files.config import RigConfig, Solver
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Solver
 from rhot.hand import BASIC_LANDMARKS, default_hand
 from rhot.messages import HandPoint, HandPoints
 from services.solver.step import SolverStep

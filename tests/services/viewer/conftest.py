@@ -13,8 +13,10 @@ import zstandard
 from viser import _messages
 from websockets.sync.client import ClientConnection, connect
 
-from rhot.files.config import CameraTable, HandTable, ObjectTable, RigConfig, RigTable, Viewer
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, HandTable, ObjectTable, RigTable, Viewer
 from rhot.hand import DIGITS, JOINTS, default_hand, forward, joint_radii_m
+from rhot.health_messages import Health, StreamHealth
 from rhot.messages import (
     FingerAngles,
     FingerPose,
@@ -22,9 +24,7 @@ from rhot.messages import (
     HandPoint,
     HandPoints,
     HandPose,
-    Health,
     ObjectPose,
-    StreamHealth,
     WristPose,
 )
 

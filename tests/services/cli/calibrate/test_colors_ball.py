@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rhot.files.calibration import load_colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.cli.application import application
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.video import VideoReader

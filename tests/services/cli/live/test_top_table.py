@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from rhot.messages import Health, StreamHealth
+from rhot.health_messages import Health, StreamHealth
 from services.cli.live.top_table import ServiceMonitor
 from services.cli.live.top_text import table_text
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from services.fusion.kalman.estimator import SHOW_SIGMA_M
 from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from services.fusion.kalman.rest_detection import REST_THRESHOLD
 from testing.synthetic_points import COLORS, START_NS, MovingHand, RestingHand, SyntheticRig, frames
 

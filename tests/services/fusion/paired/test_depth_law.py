@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.config import Disparity
+from rhot.files.rig_tables import Disparity
 from services.fusion.geometry.rectified_pair import rectified_pair
 from services.fusion.geometry.triangulation import TriangulationStatus
 from services.fusion.paired.depth_law import depth_law, locate

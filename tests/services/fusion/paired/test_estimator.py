@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.files.config import Fusion
+from rhot.files.rig_tables import Fusion
 from services.fusion.intake.observations import ObservationBuilder
 from services.fusion.paired.estimator import SPEED_SIGMA, PairedMethod
 from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames

@@ -8,7 +8,7 @@ import pytest
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.report import examine

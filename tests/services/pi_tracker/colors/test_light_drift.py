@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.files.calibration import Colors
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.light_drift import PERIOD_NS, DriftMonitor

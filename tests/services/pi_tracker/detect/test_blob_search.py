@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect import blob_search
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors

@@ -10,7 +10,8 @@ import pytest
 from rhot import topics
 from rhot.client import RigClient
 from rhot.files.calibration import save
-from rhot.files.config import CameraTable, HandTable, RigConfig, RigTable
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable, HandTable, RigTable
 from rhot.messages import Session
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.service import serve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame

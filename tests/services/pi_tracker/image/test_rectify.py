@@ -7,7 +7,7 @@ import pytest
 
 from rhot.errors import SourceError
 from rhot.files.calibration import Lens
-from rhot.files.config import Tracker
+from rhot.files.rig_tables import Tracker
 from rhot.geometry.camera import Camera
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier

@@ -10,7 +10,7 @@ import pytest
 
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.sources.picamera import PiCamera
 from services.pi_tracker.sources.picamera_settings import unpadded
 

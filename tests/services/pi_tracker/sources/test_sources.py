@@ -13,7 +13,8 @@ from rhot import clock, topics
 from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError, SourceError
 from rhot.files.calibration import Exposure, save
-from rhot.files.config import CameraTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources import ThreadedSource, is_file, open_reader

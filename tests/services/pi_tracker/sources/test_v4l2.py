@@ -8,7 +8,7 @@ import pytest
 from rhot import clock
 from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.sources.threaded import ThreadedSource
 from services.pi_tracker.sources.v4l2 import OpenCvCamera
 from services.pi_tracker.sources.video import VideoReader

@@ -10,7 +10,7 @@ import pytest
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import load_cameras, load_colors, load_exposure, load_lens, load_objects
-from rhot.files.config import CameraTable
+from rhot.files.rig_tables import CameraTable
 from rhot.geometry.transforms import angle_between
 from services.simulator.files import make_calibration
 from services.simulator.files.fit_colors import fit_ranges, in_range, sample_pixels

@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot.files import config as tables
-from rhot.files.config import HandTable, ObjectTable, RigConfig, World, load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import HandTable, ObjectTable, World
 from rhot.hand import LANDMARKS
 from services.simulator.files.rig_toml import rig_toml
 

@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.config import HandTable, RigConfig
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import HandTable
 from rhot.geometry.camera import Camera
 from rhot.hand import landmark_point
 from services.simulator.camera.visibility import patch_visibility

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rhot.messages import HandPoints, HandPose, Health, ObjectPose
+from rhot.health_messages import Health
+from rhot.messages import HandPoints, HandPose, ObjectPose
 from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
 
 STAMP_NS = 1_700_000_000_000_000_000

@@ -11,7 +11,8 @@ import msgspec
 import pytest
 
 from rhot.files.config import RigConfig
-from rhot.messages import FingerAngles, HandPoints, HandPose, Health, ObjectPose
+from rhot.health_messages import Health
+from rhot.messages import FingerAngles, HandPoints, HandPose, ObjectPose
 from services.viewer.live import panels
 from services.viewer.live.model import ViewModel
 
