@@ -10,7 +10,7 @@ SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench format docs figures clean system install browser wheel
+.PHONY: demo test check bench soak format docs figures clean system install browser wheel
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
@@ -29,7 +29,12 @@ check: $(STAMP)
 	$(BIN)/pytest -q $(HOUSE)
 
 bench: $(STAMP)
-	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	@for script in $(filter-out benchmarks/soak%,$(wildcard benchmarks/*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+# A simulated rig under random faults: memory, latency, recoveries; writes soak.md and soak.png.
+MINUTES ?= 30
+soak: $(STAMP)
+	$(BIN)/python benchmarks/soak.py --minutes $(MINUTES) $(ARGS)
 
 browser: $(STAMP)
 	@command -v chromium >/dev/null || { echo "Chromium is missing: sudo apt install chromium"; exit 1; }

@@ -1,0 +1,113 @@
+"""What a soak run measured, and what it says: growth of memory, flatness of latency, recoveries.
+
+Pure; times are seconds since the run began.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import theilslopes
+
+# A process fills its caches in its first minute; what it grows by later would go on growing.
+WARM_UP_S = 60.0
+# A slope needs a stretch of time: over less, allocator steps of a megabyte are all one sees.
+SHORTEST_S = 180.0
+# After a fault the latency is that of a rig that finds itself again.
+SETTLE_S = 10.0
+LIMIT_MB_PER_HOUR, LIMIT_LATENCY_RATIO = 1.0, 1.25
+
+
+@dataclass
+class Recovery:
+    """One fault: when, what, and how long after its end poses came again (None: not at all)."""
+
+    at_s: float
+    fault: str
+    recovered_s: float | None = None
+
+
+@dataclass
+class Run:
+    """Everything that was measured."""
+
+    # (process, pid) -> samples of (time in s, resident memory in MB)
+    memory: dict[tuple[str, int], list[tuple[float, float]]] = field(default_factory=dict)
+    # (time in s, glass-to-pose in ms)
+    latencies: list[tuple[float, float]] = field(default_factory=list)
+    recoveries: list[Recovery] = field(default_factory=list)
+    restarts: dict[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+    left_over: int = 0
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Memory of one process over its longest life: MB at its end, MB/h with its 95 % interval."""
+
+    process: str
+    minutes: float
+    rss_mb: float
+    slope_mb_h: float
+    low_mb_h: float
+    high_mb_h: float
+
+
+def growths(run: Run) -> list[Growth]:
+    """The longest life of each process, if it was long enough to tell."""
+    longest: dict[str, list[tuple[float, float]]] = {}
+    for (process, _), samples in run.memory.items():
+        warm = [sample for sample in samples if sample[0] >= samples[0][0] + WARM_UP_S]
+        if len(warm) > len(longest.get(process, [])):
+            longest[process] = warm
+    found = []
+    for process, samples in sorted(longest.items()):
+        hours, megabytes = (np.array(column) for column in zip(*samples, strict=True))
+        hours = hours / 3600.0
+        span_s = (hours[-1] - hours[0]) * 3600.0
+        if span_s >= SHORTEST_S:
+            slope, _, low, high = theilslopes(megabytes, hours)
+            found.append(Growth(process, span_s / 60.0, float(megabytes[-1]), slope, low, high))
+    return found
+
+
+def quiet_latencies(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) in s and latencies (n,) in ms of poses that no fault was near."""
+    times, latencies = (np.array(column) for column in zip(*run.latencies, strict=True))
+    quiet = times > WARM_UP_S
+    for one in run.recoveries:
+        until_s = one.at_s + (one.recovered_s or 0.0) + SETTLE_S
+        quiet &= (times < one.at_s - 1.0) | (times > until_s)
+    return times[quiet], latencies[quiet]
+
+
+def latency_ratio(run: Run) -> tuple[float, float, float]:
+    """Median latency in ms in the first and in the last third of the quiet time; last / first."""
+    _, latencies = quiet_latencies(run)
+    third = len(latencies) // 3
+    if third < 100:
+        return float("nan"), float("nan"), float("nan")
+    first, last = float(np.median(latencies[:third])), float(np.median(latencies[-third:]))
+    return first, last, last / first
+
+
+def shortfalls(run: Run) -> list[str]:
+    """What this run did not meet; empty if all is well."""
+    found = [
+        f"{growth.process} grows by {growth.slope_mb_h:.2f} MB/h"
+        for growth in growths(run)
+        # The lower end: a slope that noise alone can make is no growth.
+        if growth.slope_mb_h > LIMIT_MB_PER_HOUR and growth.low_mb_h > 0.0
+    ]
+    found += [
+        f"no pose after {one.fault} at {one.at_s:.0f} s"
+        for one in run.recoveries
+        if one.recovered_s is None
+    ]
+    ratio = latency_ratio(run)[2]
+    if ratio > LIMIT_LATENCY_RATIO:
+        found.append(f"latency at the end is {ratio:.2f} times that of the beginning")
+    if run.left_over:
+        found.append(f"{run.left_over} processes were left over")
+    return found
