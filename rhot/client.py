@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import TypeVar
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
+from rhot.bus.credentials import with_certificates
 from rhot.bus.liveliness import AliveWatch
 from rhot.bus.subscription import Subscription
 from rhot.camera_messages import Colors, ExposureControl
@@ -127,11 +129,19 @@ def _one(answers: list[T], camera: str) -> T:
 
 
 @contextlib.asynccontextmanager
-async def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str = "*") -> AsyncIterator[RigClient]:
+async def connect(
+    endpoint: str = "tcp/127.0.0.1:7447",
+    rig: str = "*",
+    certificates: str | Path | None = None,
+) -> AsyncIterator[RigClient]:
     """A session with the router at endpoint; waits for it as long as it takes (cancel, or use
     asyncio.timeout, to give up).
 
-    rig is the name in [rig] of rig.toml; "*" listens to every rig of that router.
+    rig is the name in [rig] of rig.toml; "*" listens to every rig of that router. certificates is
+    the folder of this host's ca.pem, own.pem and own.key, for an endpoint like tls/master.local:7448;
+    raises BusError if they are the reason that there is no session.
     """
-    async with open_bus(rig, [endpoint]) as bus:
+    folder = None if certificates is None else Path(certificates)
+    endpoints = with_certificates([endpoint], folder, "connect")
+    async with open_bus(rig, endpoints, despite_certificates=False) as bus:
         yield RigClient(bus)

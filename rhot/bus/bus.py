@@ -17,6 +17,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, TypeVar
 
@@ -24,6 +25,7 @@ import msgspec
 import zenoh
 
 from rhot import topics
+from rhot.bus.credentials import plain
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
@@ -37,6 +39,7 @@ from rhot.bus.queries import (
 )
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
+from rhot.bus.tls_diagnosis import certificate_problem
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.errors import BusError
 from rhot.messages import ClockEcho
@@ -62,19 +65,25 @@ _RETRY_S = 0.25
 # A router that starts together with its clients takes a second or two, which is no news; one that
 # is late is.
 _SILENT_ATTEMPTS = 10
+# Between two looks at the certificates while no router answers: a handshake with each of them.
+_LOOK_AGAIN_S = 10.0
 # A session that does not close in this time belongs to a wedged link; the process goes on without
 # it.
 _CLOSE_S = 3.0
 
 
 @contextlib.asynccontextmanager
-async def open_bus(rig: str, connect: Sequence[str]) -> AsyncIterator[Bus]:
+async def open_bus(
+    rig: str, connect: Sequence[str], *, despite_certificates: bool = True
+) -> AsyncIterator[Bus]:
     """A session with the router at `connect`; waits for the router as long as it takes, and is
     cancellable.
 
-    rig is the name in every key; "*" listens to all rigs (and cannot publish).
+    rig is the name in every key; "*" listens to all rigs (and cannot publish). A certificate that
+    keeps the session from opening is a line in the log at once, and waited for like the router: it
+    may be renewed. Without despite_certificates it raises BusError.
     """
-    session = await _connect(connect)
+    session = await _connect(connect, despite_certificates)
     bus = Bus(rig, session)
     try:
         yield bus
@@ -86,21 +95,34 @@ async def open_bus(rig: str, connect: Sequence[str]) -> AsyncIterator[Bus]:
             await asyncio.shield(asyncio.wait_for(asyncio.to_thread(session.close), _CLOSE_S))
 
 
-async def _connect(connect: Sequence[str]) -> zenoh.Session:
+async def _connect(connect: Sequence[str], despite_certificates: bool) -> zenoh.Session:
     config = client_config(connect)
-    attempts = 0
+    attempts, refused, look_s = 0, None, 0.0
     while True:
         try:
             return await asyncio.to_thread(zenoh.open, config)
         except zenoh.ZError as error:
             attempts += 1
-            if attempts == _SILENT_ATTEMPTS:
+            if time.monotonic() >= look_s:
+                before, refused = refused, await _refusal_of(connect, despite_certificates)
+                look_s = time.monotonic() + _LOOK_AGAIN_S
+                if refused and refused != before:
+                    log.error("%s [certificate_refused]", refused)
+            if attempts == _SILENT_ATTEMPTS and not refused:
                 log.warning(
                     "no router at %s yet, waiting for it: %s",
-                    ", ".join(connect),
-                    str(error).split(" at /")[0],
+                    ", ".join(map(plain, connect)),
+                    str(error).partition(" [")[0],
                 )
             await asyncio.sleep(_RETRY_S)
+
+
+async def _refusal_of(connect: Sequence[str], despite_certificates: bool) -> str | None:
+    """What a certificate has to do with a session that does not open; None if nothing."""
+    problem = await asyncio.to_thread(certificate_problem, list(connect), time.time())
+    if problem is not None and not despite_certificates:
+        raise BusError(problem)
+    return problem
 
 
 class Bus:

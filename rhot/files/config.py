@@ -58,6 +58,11 @@ class RigConfig(Table, frozen=True, kw_only=True):
         """Folder of calibration/*.json."""
         return Path(self.folder) / self.rig.calibration
 
+    @property
+    def certificates_dir(self) -> Path:
+        """Folder of this host's certificates; it need not exist."""
+        return Path(self.folder) / self.bus.certificates
+
     def camera_named(self, name: str) -> CameraTable:
         """The [[camera]] table of that name."""
         for camera in self.camera:

@@ -31,6 +31,16 @@ class Bus(Table, frozen=True, kw_only=True):
     connect: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     # Where the router of `rhot router`, `rhot up` and `rhot demo` listens.
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    # Folder of this host's ca.pem, own.pem and own.key (`rhot pki`), relative to rig.toml: for the
+    # endpoints that begin with tls/.
+    certificates: str = "pki"
+    # Names of certificates that may look on, and of those that may send what SteamVR sees.
+    viewers: tuple[Name, ...] = ()
+    object_sources: tuple[Name, ...] = ()
+    # Routers of other rigs to join, and the names of those rigs: their viewers see this rig's
+    # poses, and this rig's viewers theirs.
+    routers: tuple[str, ...] = ()
+    partners: tuple[Name, ...] = ()
 
 
 class CameraTable(Table, frozen=True, kw_only=True):

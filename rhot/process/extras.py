@@ -10,6 +10,7 @@ from rhot.errors import RhotError
 
 # The module as it is imported -> the extra of pyproject.toml that installs it.
 EXTRAS = {
+    "cryptography": "master",
     "cv2": "master",
     "matplotlib": "study",
     "mcap": "master",

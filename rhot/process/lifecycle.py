@@ -24,6 +24,7 @@ import msgspec
 import uvloop
 
 from rhot.bus.bus import open_bus
+from rhot.bus.credentials import client_endpoints
 from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
@@ -122,7 +123,7 @@ async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> No
     stopping = stop_on_signals()
     with cancelled_by(stopping):
         async with (
-            open_bus(config.rig.name, config.bus.connect) as bus,
+            open_bus(config.rig.name, client_endpoints(config)) as bus,
             asyncio.TaskGroup() as tasks,
         ):
             service = Service(name, instance, config, bus, tasks)

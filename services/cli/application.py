@@ -23,6 +23,7 @@ from services.cli.offline.simulate import simulate
 from services.cli.offline.track import track
 from services.cli.offline.tune import tune
 from services.cli.options import menu
+from services.cli.pki.pki import pki
 from services.cli.record.record import record
 from services.cli.record.replay import replay
 
@@ -66,4 +67,5 @@ def application() -> typer.Typer:
         app.command(name=function.__name__)(function)
     app.add_typer(calibrate)
     app.add_typer(tune, name="tune")
+    app.add_typer(pki)
     return app

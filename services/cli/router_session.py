@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from rhot.bus.bus import Bus, open_bus
+from rhot.bus.credentials import client_endpoints, plain, with_certificates
 from rhot.errors import BusError
 from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
@@ -22,22 +23,26 @@ _TIMEOUT_S = 3.0
 def rig_and_endpoints(config: Path | None, connect: str | None) -> tuple[RigConfig, list[str]]:
     """The rig of a rig.toml (default: the simulated one) and where its router is."""
     rig = load_rig(config or sim_toml())
-    return rig, [connect] if connect else list(rig.bus.connect)
+    if connect:
+        return rig, with_certificates([connect], rig.certificates_dir, "connect")
+    return rig, client_endpoints(rig)
 
 
 @contextlib.asynccontextmanager
 async def router_session(rig: str, endpoints: list[str]) -> AsyncIterator[Bus]:
     """A bus of the rig named `rig`, connected to the router at one of the endpoints.
 
-    Raises BusError if none answers in time.
+    Raises BusError if none answers in time, or a certificate is not accepted.
     """
     async with contextlib.AsyncExitStack() as stack:
         try:
             async with asyncio.timeout(_TIMEOUT_S):
-                bus = await stack.enter_async_context(open_bus(rig, endpoints))
+                bus = await stack.enter_async_context(
+                    open_bus(rig, endpoints, despite_certificates=False)
+                )
         except TimeoutError:
             raise BusError(
-                f"no router answers at {', '.join(endpoints)}; start the rig "
+                f"no router answers at {', '.join(map(plain, endpoints))}; start the rig "
                 "(`rhot demo`, `rhot up CONFIG`) or name another with --connect"
             ) from None
         yield bus
