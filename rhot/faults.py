@@ -72,6 +72,17 @@ _CAMERA = (
         "update picamera2 with `sudo apt full-upgrade`; markers are placed less well until then",
     ),
     _warning(
+        "camera_setting",
+        "the camera's driver refuses a setting",
+        "see `v4l2-ctl --list-ctrls` for what it takes; choose other fps or size_px in rig.toml",
+    ),
+    _warning(
+        "camera_readout_unknown",
+        "the sensor is not known: its rows count as exposed at once, which places fast markers less"
+        " well",
+        "use a camera v1 or v2, or one with a global shutter",
+    ),
+    _warning(
         "camera_unsynced",
         "the camera is to expose together with others, and finds no partner",
         "give one camera the other role of `sync` in rig.toml, at the same fps",

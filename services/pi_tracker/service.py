@@ -64,7 +64,7 @@ class CameraService:
         self._markers = service.bus.publisher(topics.MARKERS, camera=camera.name)
         self._pictures = PictureCache(service.bus, camera.name, service.tasks)
         ColorFitting(service, self._pictures, self._tracker)
-        self._notes_told = 0
+        self._notes_told: dict[tuple[str, str], str] = {}
 
     def companions(self) -> list[Coroutine[None, None, None]]:
         """What runs beside the frames, for ever."""
@@ -78,9 +78,16 @@ class CameraService:
             self._service.values["rejected_frames"] = source.rejected
             self._watch_drift(frame, found)
         self._pictures.show(frame, time.monotonic_ns())
-        for note in source.notes[self._notes_told :]:
-            self._service.error(note)
-        self._notes_told = len(source.notes)
+        self._tell_notes(source.notes.standing())
+
+    def _tell_notes(self, standing: dict[tuple[str, str], str]) -> None:
+        """Faults of what the source could not do as asked, and their ends."""
+        if standing != self._notes_told:
+            for code, subject in self._notes_told.keys() - standing.keys():
+                self._service.faults.clear(code, subject)
+            for (code, subject), text in standing.items():
+                self._service.faults.report(code, text, subject)
+            self._notes_told = standing
 
     def _track(self, frame: Frame) -> MarkerFrame:
         offset = self.offset.at(frame.stamp_ns)

@@ -12,6 +12,7 @@ from pathlib import Path
 from rhot.errors import CaptureError
 from rhot.files.capture import Capture, FrameStamp, read_stamps
 from services.pi_tracker.image.frame import Frame, Image, Layout
+from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.video_decoder import VideoDecoder
 
 
@@ -24,7 +25,7 @@ class CaptureReader:
     live = False
 
     def __init__(self, camera: str, folder: Path, start_ns: int | None = None) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(camera)
         self._camera = camera
         self._capture = Capture(folder)
         self._start_ns = start_ns

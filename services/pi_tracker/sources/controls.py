@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 from rhot.files.calibration import Exposure
 
+# What a source notes as camera_automatic until it is calibrated.
+UNCALIBRATED = "no exposure calibration: its automatics stay on, and colours may drift"
+
 
 @dataclass(frozen=True)
 class ExposureRequest:

@@ -13,6 +13,7 @@ import cv2
 
 from rhot.errors import CaptureError
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.numbered_frames import NumberedFrames
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".webp")
@@ -24,7 +25,7 @@ class FolderReader:
     live = False
 
     def __init__(self, camera: str, folder: Path, fps: float, start_ns: int = 0) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(camera)
         self._folder = folder
         self._paths: list[Path] = []
         self._frames = NumberedFrames(camera, fps, start_ns)

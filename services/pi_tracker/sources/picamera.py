@@ -21,7 +21,8 @@ from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
 from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.sources.controls import Controls
+from services.pi_tracker.sources.controls import UNCALIBRATED, Controls
+from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.picamera_settings import (
     AUTOMATIC,
     best_sensor_mode,
@@ -49,7 +50,7 @@ class PiCamera:
     live = True
 
     def __init__(self, table: CameraTable, number: int, exposure: Exposure | None) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(table.name)
         self.controls = Controls()
         self._table = table
         self._number = number
@@ -80,9 +81,6 @@ class PiCamera:
     def _error(self, text: str) -> SourceError:
         return SourceError(f"camera {self._table.name!r}: {text}")
 
-    def _note(self, text: str) -> None:
-        self.notes.append(f"camera {self._table.name!r}: {text}")
-
     def _configure(self) -> None:
         mode = best_sensor_mode(self._camera.sensor_modes, self._table)
         config = self._camera.create_video_configuration(
@@ -97,26 +95,26 @@ class PiCamera:
         )
         self._camera.configure(config)
         if mode and self._table.sync != "off" and self._table.fps > _MAX_SYNC_RATE * mode["fps"]:
-            self._note(f"fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one")
+            text = f"fps = {self._table.fps:g} is the sensor's fastest; sync needs a lower one"
+            self.notes.report("camera_unsynced", text, "fps")
         main = self._camera.camera_configuration()["main"]
         self._stride, self._size = int(main["stride"]), (int(main["size"][0]), int(main["size"][1]))
         if self._size != tuple(self._table.size_px):
             width, height = self._size
-            self._note(f"delivers {width}x{height} instead of {self._table.size_px}")
+            text = f"delivers {width}x{height} instead of {self._table.size_px}"
+            self.notes.report("camera_processing", text, "size")
         line_us = _LINE_US.get(str(self._camera.camera_properties.get("Model", "")), 0.0)
         self._row_time_ns = line_us * 1000.0 * (mode["size"][1] / self._size[1] if mode else 1.0)
         if not line_us:
-            self._note("the sensor's readout time is unknown; rows count as taken at once")
+            text = "the sensor's readout time is unknown; rows count as taken at once"
+            self.notes.report("camera_readout_unknown", text)
 
     def _initial_controls(self) -> dict[str, Any]:
         frame_us = round(1e6 / self._table.fps)
         controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)}
         controls |= sync_control(self._table)
         if self._exposure is None:
-            self._note(
-                "no exposure calibration, its auto modes stay on and colours may drift; "
-                f"run `rhot calibrate camera {self._table.name}`"
-            )
+            self.notes.report("camera_automatic", UNCALIBRATED)
             return controls
         return controls | fixed_exposure(self._exposure)
 
@@ -126,6 +124,8 @@ class PiCamera:
             self._camera.set_controls(
                 AUTOMATIC if request.exposure is None else fixed_exposure(request.exposure)
             )
+            if request.exposure is not None:
+                self.notes.clear("camera_automatic")
         try:
             completed = self._camera.capture_request(wait=False).get_result(timeout=_SILENCE_S)
         except TimeoutError:
@@ -150,16 +150,18 @@ class PiCamera:
         return frame
 
     def _check_sync(self, metadata: dict[str, Any]) -> None:
-        """Note once that there is no server, where a camera is to be in step with others."""
+        """Say that there is no partner, where a camera is to be in step with others."""
         if self._sync_done:
             return
         self._sync_done = bool(metadata.get("SyncReady"))
-        if not self._sync_done and self._seq >= _SYNC_S * self._table.fps:
-            self._note(
+        if self._sync_done:
+            self.notes.clear("camera_unsynced")
+        elif self._seq >= _SYNC_S * self._table.fps:
+            self.notes.report(
+                "camera_unsynced",
                 f"sync = {self._table.sync!r}, but not in step with any other after {_SYNC_S:g} s; "
-                "is there one camera with the other role, at the same fps, in the same network?"
+                "is there one camera with the other role, at the same fps, in the same network?",
             )
-            self._sync_done = True
 
     def _stamp_ns(self, metadata: dict[str, Any]) -> int:
         wall_ns = metadata.get("FrameWallClock")

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
+from services.pi_tracker.sources.notes import Notes
 
 
 class Reader(Protocol):
@@ -16,8 +17,8 @@ class Reader(Protocol):
     """
 
     live: bool
-    # What the source could not do as asked, for the journal.
-    notes: list[str]
+    # What the source could not do as asked.
+    notes: Notes
 
     def open(self) -> None: ...
 
@@ -30,7 +31,7 @@ class Source(Protocol):
     """A source of frames for a service."""
 
     live: bool
-    notes: list[str]
+    notes: Notes
     # Exposure, of sources that have it.
     controls: Controls | None
     # Frames that came and were not delivered: overtaken by newer ones, or malformed.

@@ -17,6 +17,7 @@ from rhot.bus.bus import Bus, Sample
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
+from services.pi_tracker.sources.notes import Notes
 
 # The frame in work and the next.
 _QUEUE = 2
@@ -28,7 +29,7 @@ class SimulatorSource:
     live = True
 
     def __init__(self, bus: Bus, camera: str) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(camera)
         self.controls: Controls | None = None
         self.dropped = 0
         self.rejected = 0

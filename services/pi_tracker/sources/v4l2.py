@@ -20,7 +20,8 @@ from rhot.errors import SourceError
 from rhot.files.calibration import Exposure
 from rhot.files.rig_tables import CameraTable
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.sources.controls import Controls
+from services.pi_tracker.sources.controls import UNCALIBRATED, Controls
+from services.pi_tracker.sources.notes import Notes
 
 # V4L2_EXPOSURE_MANUAL and _APERTURE_PRIORITY of V4L2_CID_EXPOSURE_AUTO; V4L2_CID_EXPOSURE_ABSOLUTE
 # counts in 100 us.
@@ -46,7 +47,7 @@ class OpenCvCamera:
         api: int = cv2.CAP_V4L2,
         open_capture: Callable[..., Any] = cv2.VideoCapture,
     ) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(table.name)
         # A GStreamer pipeline has properties of its own for its exposure.
         self.controls = (
             Controls("what the driver reports while its automatics run may be old")
@@ -82,8 +83,11 @@ class OpenCvCamera:
         self._set("one buffer", cv2.CAP_PROP_BUFFERSIZE, 1)
         if self._exposure is not None:
             self._fix(self._exposure)
+        else:
+            self.notes.report("camera_automatic", UNCALIBRATED)
 
     def _fix(self, exposure: Exposure) -> None:
+        self.notes.clear("camera_automatic")
         self._set("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL)
         self._set("exposure", cv2.CAP_PROP_EXPOSURE, exposure.exposure_us / _EXPOSURE_UNIT_US)
         self._set("gain", cv2.CAP_PROP_GAIN, exposure.gain)
@@ -92,8 +96,10 @@ class OpenCvCamera:
         self._set("blue gain", cv2.CAP_PROP_WHITE_BALANCE_BLUE_U, exposure.blue_gain)
 
     def _set(self, what: str, key: int, value: float) -> None:
-        if not self._capture.set(key, value):
-            self.notes.append(f"camera {self._table.name!r}: the driver refuses {what} = {value:g}")
+        if self._capture.set(key, value):
+            self.notes.clear("camera_setting", what)
+        else:
+            self.notes.report("camera_setting", f"the driver refuses {what} = {value:g}", what)
 
     def _automatic(self) -> None:
         self._set("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _AUTOMATIC)

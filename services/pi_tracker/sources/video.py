@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.numbered_frames import NumberedFrames
 from services.pi_tracker.sources.video_decoder import VideoDecoder
 
@@ -23,7 +24,7 @@ class VideoReader:
     live = False
 
     def __init__(self, camera: str, path: Path, fps: float, start_ns: int = 0) -> None:
-        self.notes: list[str] = []
+        self.notes = Notes(camera)
         self._decoder = VideoDecoder(path)
         self._frames = NumberedFrames(camera, fps, start_ns)
 

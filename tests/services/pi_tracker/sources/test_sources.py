@@ -18,6 +18,7 @@ from rhot.files.rig_tables import CameraTable
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources import ThreadedSource, is_file, open_reader
+from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.simulator import SimulatorSource
 
 DEADLINE_S = 10.0
@@ -74,7 +75,7 @@ class Scripted:
 
     def __init__(self, frames, *, live, error=None, pause_after=0):
         self.live = live
-        self.notes: list[str] = []
+        self.notes = Notes("left")
         self.frames = list(frames)
         self.error = error
         self.pause_after = pause_after

@@ -38,7 +38,9 @@ def test_a_usb_camera_is_set_by_hand_and_stamped_by_its_driver(video_capture):
         cv2.CAP_PROP_FPS: 25.0,
     }
     assert wanted.items() <= made[0].values.items()
-    assert camera.notes == ["camera 'left': the driver refuses red gain = 1.7"]
+    assert camera.notes.standing() == {
+        ("camera_setting", "left red gain"): "camera 'left': the driver refuses red gain = 1.7"
+    }
     frame = camera.read()
     assert (frame.layout, frame.size_px, frame.seq) == ("bgr", (640, 480), 0)
     # 12 ms old, and half of 8 ms exposure before that.
@@ -83,9 +85,13 @@ def test_a_usb_driver_without_values_reports_nothing(video_capture):
     del fake.values[cv2.CAP_PROP_WHITE_BALANCE_RED_V]
     camera = OpenCvCamera(table(), 0, None, open_capture=lambda *_: fake)
     camera.open()
+    assert list(camera.notes.standing()) == [("camera_automatic", "left")]
     camera.controls.adjust(None)
     camera.read()
     assert camera.controls.reported is None
+    camera.controls.adjust(EXPOSURE)
+    camera.read()
+    assert ("camera_automatic", "left") not in camera.notes.standing()
 
 
 def test_sources_without_such_controls_have_none(tmp_path):
