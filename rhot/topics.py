@@ -2,7 +2,7 @@
 
 No key string is written anywhere else: publishers, subscribers, health, recorder, `rhot top` and
 docs/reference/topics.md derive from TOPICS. A key is `<root>/<rig>/` + the template with its fields
-filled in, root being `rhot` for all but raw pictures; a field left out becomes the wildcard `*`.
+filled in, root being `rhot` for all but pictures; a field left out becomes the wildcard `*`.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ class Topic(Generic[T]):
     # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the
     # largest (HandPose, 9 kB).
     max_bytes: int = 65_536
-    # First part of the key. Raw pictures have another, so that a subscription to rhot/** shows JSON
-    # and stays small.
+    # First part of the key. Pictures have another, so that a subscription to rhot/** shows JSON and
+    # stays small.
     root: str = ROOT
 
     @property
@@ -152,6 +152,8 @@ PREVIEW: Topic[bytes] = Topic(
     about="JPEG, published while somebody subscribes",
     media_type="image/jpeg",
     max_bytes=4_000_000,
+    # A subscription to rhot/** must not make cameras encode pictures.
+    root="rhot-picture",
 )
 FRAME: Topic[bytes] = Topic(
     "camera/{camera}/frame",

@@ -37,3 +37,10 @@ def test_docs_page_is_generated_from_the_table(repository):
     page = (repository / "docs" / "reference" / "topics.md").read_text()
     for topic in topics.TOPICS:
         assert f"{topic.template}`" in page
+
+
+def test_a_subscription_to_everything_of_a_rig_shows_json_only():
+    for topic in topics.TOPICS:
+        published = topic.kind in (topics.Kind.STREAM, topics.Kind.STATE)
+        if published and topic.root == topics.ROOT:
+            assert topic.media_type == "application/json", topic.template

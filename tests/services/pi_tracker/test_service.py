@@ -9,9 +9,10 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+import zenoh
 
 from rhot import topics
-from rhot.bus.bus import Bus, open_bus
+from rhot.bus.bus import Bus, client_config, open_bus
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.calibration import save
 from rhot.files.config import RigConfig
@@ -19,6 +20,7 @@ from rhot.files.rig_tables import CameraTable, HandTable, RigTable
 from rhot.messages import Session
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame
+from services.pi_tracker.endpoints import preview
 from services.pi_tracker.service import serve
 
 DEADLINE_S = 15.0
@@ -160,11 +162,48 @@ async def test_pictures_for_who_asks(config, router, rig):
         while not task.done():
             rig.shoot()
             await asyncio.wait([task], timeout=0.05)
-        preview = cv2.imdecode(np.frombuffer(task.result().payload, np.uint8), cv2.IMREAD_COLOR)
-        assert preview.shape == (SIZE[1], SIZE[0], 3)
+        shown = cv2.imdecode(np.frombuffer(task.result().payload, np.uint8), cv2.IMREAD_COLOR)
+        assert shown.shape == (SIZE[1], SIZE[0], 3)
         (lossless,) = await other.get(topics.FRAME, 2.0, camera="left")
         picture = cv2.imdecode(np.frombuffer(lossless, np.uint8), cv2.IMREAD_COLOR)
         assert np.array_equal(picture, cv2.cvtColor(rig._frame.image, cv2.COLOR_YUV2BGR_I420))
+
+
+async def test_who_subscribes_to_everything_gets_json_and_makes_nobody_encode(
+    config, router, rig, monkeypatch
+):
+    encoded = []
+    monkeypatch.setattr(preview, "jpeg", lambda frame: encoded.append(frame.seq) or b"jpeg")
+    with zenoh.open(client_config([router])) as session:
+        heard = []
+        everything = session.declare_subscriber(
+            "rhot/**", lambda one: heard.append((str(one.key_expr), one.payload.to_bytes()))
+        )
+        async with (
+            asyncio.timeout(DEADLINE_S),
+            open_bus("test", [router]) as master,
+            running(config, router) as service,
+        ):
+            master.answer(topics.SESSION, lambda: Session(running=True, start_ns=1))
+            beat = service.tasks.create_task(service.beat())
+            await rig.camera_wanted()
+            while not any(key.endswith("/markers") for key, _ in heard) or not any(
+                key.endswith("/health") for key, _ in heard
+            ):
+                rig.shoot()
+                await asyncio.sleep(0.05)
+            assert encoded == []
+            assert all(msgspec.json.decode(payload) for _, payload in heard)
+            # The picture is there for who asks for it by name.
+            pictures = master.raw(topics.PREVIEW, 4)
+            task = asyncio.ensure_future(anext(pictures))
+            while not task.done():
+                rig.shoot()
+                await asyncio.wait([task], timeout=0.05)
+            assert task.result().key == "rhot-picture/test/camera/left/preview"
+            assert encoded
+            beat.cancel()
+        everything.undeclare()
 
 
 async def test_new_colours_need_no_restart(config, router, rig, colors, tmp_path):

@@ -35,7 +35,7 @@ async def test_everything_marked_is_recorded_garbage_too(running: Callable, tmp_
     keys = {
         "rhot/desk/camera/left/markers": b"\xff\x00",
         "rhot/desk/hand/right/pose": b"[1]",
-        "rhot/desk/camera/left/preview": b"jpeg",
+        "rhot-picture/desk/camera/left/preview": b"jpeg",
     }
     async with running("recorder", serve, config) as (service, bus):
 

@@ -133,8 +133,8 @@ async def test_pictures_are_asked_for_only_while_the_switch_is_on(
 
         def send() -> None:
             publisher.put_bytes(JPEG)
-            bus.put_raw("rhot/desk/camera/right/preview", b"<script>")
-            bus.put_raw("rhot/desk/camera/nobody/preview", JPEG)
+            bus.put_raw("rhot-picture/desk/camera/right/preview", b"<script>")
+            bus.put_raw("rhot-picture/desk/camera/nobody/preview", JPEG)
 
         with sending(send):
             shown = await asyncio.to_thread(
