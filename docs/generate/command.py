@@ -18,8 +18,9 @@ _ABOUT = """`rhot COMMAND --help` says the same. What a user can mend is one lin
 and exit code 2; a bug is a traceback and exit code 1. Relative paths in a rig.toml start at its
 folder."""
 _SERVICES = """`rhot up` and `rhot demo` start the services; on a Raspberry Pi, or under systemd,
-start them by these names. Each takes the options below, and logs JSON lines on standard output;
-the environment variable `RHOT_LOG` sets the level (`debug`, `info`, `warning`)."""
+start them by these names. Each takes the options below and logs on standard output: with times on a
+terminal, with priorities in systemd's journal, as JSON lines with `RHOT_LOG_FORMAT=json`. The
+environment variable `RHOT_LOG` sets the level (`debug`, `info`, `warning`)."""
 # Alike in rhot/process/lifecycle.py, `command`; tests/docs compares them.
 SERVICE_OPTIONS = {
     "--config FILE": "rig.toml; must be given",

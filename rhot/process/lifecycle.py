@@ -12,9 +12,7 @@ import argparse
 import asyncio
 import contextlib
 import importlib
-import json
 import logging
-import os
 import signal
 import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
@@ -25,11 +23,12 @@ import uvloop
 
 from rhot.bus.bus import open_bus
 from rhot.bus.credentials import client_endpoints
-from rhot.errors import RhotError, leaves
+from rhot.errors import RhotError
 from rhot.files.config import RigConfig, load_rig
-from rhot.process import systemd
+from rhot.process import logs, systemd
 from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
+from rhot.process.user_errors import user_errors
 
 Serve = Callable[[Service], Awaitable[None]]
 
@@ -72,7 +71,10 @@ def command(name: str, module: str, about: str | None, instance_option: str = "i
         if missing is None:
             raise
         parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
-    log_json_lines(f"{name}/{options.name}")
+    try:
+        logs.set_up(f"{name}/{options.name}")
+    except RhotError as error:
+        parser.exit(EXIT_USER, f"{program}: error: {error}\n")
     sys.exit(run(name, options.name, options.config, serve, options.connect))
 
 
@@ -92,16 +94,6 @@ def run(
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
-
-
-def user_errors(error: Exception, program: str) -> list[RhotError]:
-    """What the user can mend of an error or a group of them; empty if any of it is a bug.
-
-    program is the command's name. A missing extra is the user's to install, and says how.
-    """
-    found = [missing_extra(leaf, program) or leaf for leaf in leaves(error)]
-    errors = [leaf for leaf in found if isinstance(leaf, RhotError)]
-    return errors if len(errors) == len(found) else []
 
 
 def _program(name: str) -> str:
@@ -170,31 +162,3 @@ async def _watchdog() -> None:
     while period_s is not None:
         systemd.notify("WATCHDOG=1")
         await asyncio.sleep(period_s)
-
-
-class _JsonLines(logging.Formatter):
-    """One JSON object a line, for the journal."""
-
-    def __init__(self, who: str) -> None:
-        super().__init__()
-        self._who = who
-
-    def format(self, record: logging.LogRecord) -> str:
-        line = {
-            "time": self.formatTime(record),
-            "level": record.levelname.lower(),
-            "who": self._who,
-            "text": record.getMessage(),
-        }
-        if record.exc_info:
-            line["trace"] = self.formatException(record.exc_info)
-        return json.dumps(line, ensure_ascii=False)
-
-
-def log_json_lines(who: str) -> None:
-    """Log as JSON lines on standard output; RHOT_LOG sets the level (default info)."""
-    handler = logging.StreamHandler(sys.stdout)
-    handler.setFormatter(_JsonLines(who))
-    logging.basicConfig(
-        level=os.environ.get("RHOT_LOG", "info").upper(), handlers=[handler], force=True
-    )

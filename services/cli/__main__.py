@@ -5,8 +5,11 @@ from __future__ import annotations
 import logging
 import sys
 
-from rhot.process.lifecycle import EXIT_USER, user_errors
+from rhot.plain_text import printable
+from rhot.process import logs
+from rhot.process.lifecycle import EXIT_USER
 from rhot.process.service import rhot_version
+from rhot.process.user_errors import user_errors
 
 PROGRAM = "rhot"
 
@@ -14,6 +17,8 @@ PROGRAM = "rhot"
 def main() -> None:
     """Entry point of rhot."""
     logging.basicConfig(level="WARNING", format=f"{PROGRAM}: %(message)s")
+    if logs.is_journal(sys.stderr):
+        logs.set_up(PROGRAM, sys.stderr)
     # The same as the option of application.py, but without typer, which an installation of the core
     # dependencies alone does not have.
     if sys.argv[1:] == ["--version"]:
@@ -29,7 +34,7 @@ def main() -> None:
         if not errors:
             raise
         for one in errors:
-            print(f"{PROGRAM}: error: {one}", file=sys.stderr)
+            print(f"{PROGRAM}: error: {printable(str(one))}", file=sys.stderr)
         sys.exit(EXIT_USER)
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import sys
 from typing import TextIO
 
+from rhot.plain_text import printable
+
 _LEVELS = {"debug": 0, "info": 1, "warning": 2, "error": 3, "critical": 4}
 
 
@@ -27,7 +29,9 @@ class Terminal:
     def line(self, text: str) -> None:
         """A line that stays."""
         self._clear()
-        self._out.write(text + "\n")
+        # Line by line: a traceback of a child has several.
+        for one in text.splitlines() or [""]:
+            self._out.write(printable(one) + "\n")
         if self._status:
             self._out.write(self._status)
         self._out.flush()
@@ -37,8 +41,8 @@ class Terminal:
         if not self._out.isatty():
             return
         self._clear()
-        self._status = text
-        self._out.write(text)
+        self._status = printable(text)
+        self._out.write(self._status)
         self._out.flush()
 
     def end(self) -> None:

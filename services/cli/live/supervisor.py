@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import ctypes
 import json
+import os
 import re
 import signal
 import sys
@@ -18,6 +19,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from rhot.process import logs
 from rhot.process.lifecycle import EXIT_USER
 
 # As systemd's RestartSec of the installed units: poses are back within a second of a crash.
@@ -75,6 +77,8 @@ class Supervisor:
             start_new_session=True,
             preexec_fn=_die_with_parent,
             limit=_LINE_LIMIT,
+            # The level of a line is to be read here, whatever the user likes to read.
+            env={**os.environ, logs.FORMAT: "json"},
         )
         self.pids[child.name] = process.pid
         try:

@@ -50,7 +50,8 @@ def start(tmp_path, endpoint):
                 {ENDINGS[ending]}
             command("probe", "__main__", "a service that ends as it is told")
         """)
-        environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), **environment}
+        own = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "RHOT_LOG_FORMAT": "json"}
+        environment = {**os.environ, **own, **environment}
         argv = [sys.executable, "-c", script, "--config", str(tmp_path / "rig.toml")]
         pipes = {"stdout": asyncio.subprocess.PIPE, "stderr": asyncio.subprocess.STDOUT}
         return await asyncio.create_subprocess_exec(*argv, **pipes, env=environment)

@@ -1,0 +1,110 @@
+"""How a process logs: for a person on a terminal, for the journal, or as JSON for a supervisor.
+
+RHOT_LOG_FORMAT is `text` (the default) or `json`; RHOT_LOG sets the level (default info). Text has
+the time, except in the journal, which has its own; there each line begins with its priority
+(sd-daemon(3)). One record is one line, and control characters of strangers' texts are spaces; only
+a traceback, which is a bug's, has several.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from typing import TextIO
+
+from rhot.errors import ConfigError
+from rhot.plain_text import printable
+
+FORMAT = "RHOT_LOG_FORMAT"
+_FORMATS = ("text", "json")
+_LEVELS = ("debug", "info", "warning", "error", "critical")
+# sd-daemon(3): 2 critical, 3 error, 4 warning, 6 informational, 7 debug.
+_PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
+
+
+def set_up(who: str, out: TextIO | None = None) -> None:
+    """Log as the environment says, on standard output; who names the process, e.g. "fusion/main".
+
+    Raises ConfigError on a value of RHOT_LOG or RHOT_LOG_FORMAT that is none.
+    """
+    out = out or sys.stdout
+    wanted, level = _chosen(FORMAT, "text", _FORMATS), _chosen("RHOT_LOG", "info", _LEVELS)
+    handler = logging.StreamHandler(out)
+    if wanted == "json":
+        handler.setFormatter(_JsonLines(who))
+    elif is_journal(out):
+        handler.setFormatter(_JournalLines())
+    else:
+        # In a file the day matters; on a terminal it is today.
+        handler.setFormatter(_TimedLines(who, "%H:%M:%S" if out.isatty() else "%Y-%m-%d %H:%M:%S"))
+    logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
+
+
+def _chosen(variable: str, default: str, valid: tuple[str, ...]) -> str:
+    value = os.environ.get(variable) or default
+    if value.lower() not in valid:
+        raise ConfigError(f"{variable}={printable(value)}: unknown; valid: {', '.join(valid)}")
+    return value.lower()
+
+
+def is_journal(out: TextIO) -> bool:
+    """Whether what is written there goes to systemd's journal (systemd.exec(5))."""
+    try:
+        status = os.fstat(out.fileno())
+    except (OSError, ValueError):
+        return False
+    return os.environ.get("JOURNAL_STREAM", "") == f"{status.st_dev}:{status.st_ino}"
+
+
+class _JsonLines(logging.Formatter):
+    """One JSON object a line, for who reads with a program."""
+
+    def __init__(self, who: str) -> None:
+        super().__init__()
+        self._who = who
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {
+            "time": self.formatTime(record),
+            "level": record.levelname.lower(),
+            "who": self._who,
+            "text": printable(record.getMessage()),
+        }
+        if record.exc_info:
+            line["trace"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False)
+
+
+class _Lines(logging.Formatter):
+    """The record's line, and those of its traceback, each behind the same beginning."""
+
+    def start(self, record: logging.LogRecord) -> str:
+        raise NotImplementedError
+
+    def format(self, record: logging.LogRecord) -> str:
+        lines = [record.getMessage()]
+        if record.exc_info:
+            lines += self.formatException(record.exc_info).splitlines()
+        start = self.start(record)
+        return "\n".join(start + printable(line) for line in lines)
+
+
+class _JournalLines(_Lines):
+    """`<4>text`: the journal knows time, host and unit itself."""
+
+    def start(self, record: logging.LogRecord) -> str:
+        return f"<{_PRIORITY.get(record.levelname, 6)}>"
+
+
+class _TimedLines(_Lines):
+    """`12:03:11 fusion/main warning: text`."""
+
+    def __init__(self, who: str, time_format: str) -> None:
+        super().__init__(datefmt=time_format)
+        self._who = who
+
+    def start(self, record: logging.LogRecord) -> str:
+        level = "" if record.levelname == "INFO" else f" {record.levelname.lower()}"
+        return f"{self.formatTime(record, self.datefmt)} {self._who}{level}: "
