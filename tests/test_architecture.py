@@ -57,7 +57,7 @@ FLOORS_OF_RHOT = (
     {"rhot/health_messages"},
     {"rhot/topics", "rhot/faults"},
     {"rhot/files", "rhot/bus"},
-    {"rhot/process"},
+    {"rhot/process", "rhot/watch"},
     {"rhot/client"},
     {"rhot/__init__"},
 )

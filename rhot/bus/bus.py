@@ -137,6 +137,11 @@ class Bus:
         self._open: list[Any] = []
         self._tasks: set[asyncio.Task[None]] = set()
 
+    @property
+    def connected(self) -> bool:
+        """Whether a router is at the other end now; a lost one is noticed within two seconds."""
+        return bool(self._session.info.routers_zid())
+
     def publisher(self, topic: Topic[T], **names: str) -> Publisher[T]:
         """A publisher of one stream; its name fields must all be given."""
         key = topic.key(self.rig, **names)
@@ -273,11 +278,12 @@ class Bus:
             key, payload, encoding=encoding, congestion_control=zenoh.CongestionControl.DROP
         )
 
-    def close(self, subscription: Subscription[Any] | RawSubscription) -> None:
+    def close(self, subscription: Subscription[Any] | RawSubscription | AliveWatch) -> None:
         """End one subscription before the session ends; its stream leaves health with it."""
         subscription.undeclare()
         self._open = [entity for entity in self._open if entity is not subscription]
-        self.streams[:] = [stats for stats in self.streams if stats is not subscription.stats]
+        own = getattr(subscription, "stats", None)
+        self.streams[:] = [stats for stats in self.streams if stats is not own]
 
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""

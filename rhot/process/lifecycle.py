@@ -23,12 +23,11 @@ import uvloop
 
 from rhot.bus.bus import open_bus
 from rhot.bus.credentials import client_endpoints
-from rhot.errors import RhotError
+from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
 from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
-from rhot.process.user_errors import user_errors
 
 Serve = Callable[[Service], Awaitable[None]]
 
@@ -94,6 +93,16 @@ def run(
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
+
+
+def user_errors(error: Exception, program: str) -> list[RhotError]:
+    """What the user can mend of an error or a group of them; empty if any of it is a bug.
+
+    program is the command's name. A missing extra is the user's to install, and says how.
+    """
+    found = [missing_extra(leaf, program) or leaf for leaf in leaves(error)]
+    errors = [leaf for leaf in found if isinstance(leaf, RhotError)]
+    return errors if len(errors) == len(found) else []
 
 
 def _program(name: str) -> str:

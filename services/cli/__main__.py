@@ -7,9 +7,8 @@ import sys
 
 from rhot.plain_text import printable
 from rhot.process import logs
-from rhot.process.lifecycle import EXIT_USER
+from rhot.process.lifecycle import EXIT_USER, user_errors
 from rhot.process.service import rhot_version
-from rhot.process.user_errors import user_errors
 
 PROGRAM = "rhot"
 

@@ -1,30 +1,37 @@
-"""`rhot top`: the state, rates, losses and latencies of every service, live.
+"""`rhot top`: what is wrong, and the state, rates, losses and ages of every service, live.
 
-Rates are compared with the topics table. Latencies are of each hop, and from glass to pose: from
-mid-exposure to the published pose.
+On a terminal it fills the second screen and leaves it at the end; elsewhere it prints tables. Rates
+are compared with the topics table. The parts of a pose's age add up, from mid-exposure to the
+published pose.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from typing import Annotated
 
 import msgspec
 import typer
 import uvloop
 
-from rhot import clock, topics
-from rhot.bus.bus import Bus
+from rhot import clock
 from rhot.files.config import RigConfig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
-from services.cli.live.top_table import ServiceMonitor, TopTable, expected_services
-from services.cli.live.top_text import table_text
+from rhot.process.rig_watch import watching
+from rhot.watch.rig_monitor import RigMonitor
+from rhot.watch.rig_state import RigState
+from services.cli.live.alternate_screen import alternate_screen, size
+from services.cli.live.top_screen import screen
 from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import rig_and_endpoints, router_session
 
 # A beat comes once a second: within two, every running service has sent one.
 _LISTEN_S = 2.2
+# Of a table that goes to a file or a pipe.
+_WIDTH = 120
 
 
 def top(
@@ -35,54 +42,42 @@ def top(
         typer.Option(help="print one table and end; exit code 1 if something is missing or slow"),
     ] = False,
     seconds: Annotated[float | None, typer.Option(min=1.0, help="end after so long")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a table")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a second")] = False,
 ) -> None:
-    """Show every service, its rates and latencies, live."""
+    """Show what is wrong, every service, its rates and latencies, live."""
     rig, endpoints = rig_and_endpoints(config, connect)
-    table = uvloop.run(_top(rig, endpoints, once, seconds, as_json))
-    if once and (table is None or not table.healthy):
+    state = uvloop.run(_top(rig, endpoints, once, seconds, as_json))
+    if once and (state is None or not state.healthy):
         raise typer.Exit(1)
 
 
 async def _top(
     rig: RigConfig, endpoints: list[str], once: bool, seconds: float | None, as_json: bool
-) -> TopTable | None:
+) -> RigState | None:
     stopping = stop_on_signals()
-    monitor, table = ServiceMonitor(rig.rig.name, expected_services(rig)), None
+    monitor, state = RigMonitor(rig, clock.now_ns()), None
     with cancelled_by(stopping):
-        async with router_session(rig.rig.name, endpoints) as bus, asyncio.TaskGroup() as tasks:
-            listeners = [
-                tasks.create_task(_beats(bus, monitor)),
-                tasks.create_task(_tokens(bus, monitor)),
-            ]
+        async with router_session(rig.rig.name, endpoints) as bus, watching(bus, monitor):
             left_s = _LISTEN_S if once else seconds
             await asyncio.sleep(_LISTEN_S)
-            while True:
-                table = monitor.table(clock.now_ns())
-                _show(table, as_json)
-                left_s = None if left_s is None else left_s - (_LISTEN_S if once else 1.0)
-                if left_s is not None and left_s <= 0.0:
-                    break
-                await asyncio.sleep(1.0)
-            for task in listeners:
-                task.cancel()
-    return table
+            with _display(once, as_json) as show:
+                while True:
+                    state = monitor.state(clock.now_ns())
+                    show(state)
+                    left_s = None if left_s is None else left_s - (_LISTEN_S if once else 1.0)
+                    if left_s is not None and left_s <= 0.0:
+                        break
+                    await asyncio.sleep(1.0)
+    return state
 
 
-async def _beats(bus: Bus, monitor: ServiceMonitor) -> None:
-    async for health in bus.every(topics.HEALTH, 1024):
-        monitor.beat(health, clock.now_ns())
-
-
-async def _tokens(bus: Bus, monitor: ServiceMonitor) -> None:
-    async for change in bus.watch_alive():
-        monitor.token(change.service, change.instance, change.alive)
-
-
-def _show(table: TopTable, as_json: bool) -> None:
+@contextlib.contextmanager
+def _display(once: bool, as_json: bool) -> Iterator[Callable[[RigState], None]]:
+    """How a state is shown: as JSON, as a table, or on the terminal's second screen."""
     if as_json:
-        typer.echo(msgspec.json.encode(table).decode())
-        return
-    if sys.stdout.isatty():
-        typer.echo("\033[H\033[2J", nl=False)
-    typer.echo(table_text(table))
+        yield lambda state: typer.echo(msgspec.json.encode(state).decode())
+    elif once or not sys.stdout.isatty():
+        yield lambda state: typer.echo("\n".join(screen(state, _WIDTH, None)))
+    else:
+        with alternate_screen() as show:
+            yield lambda state: show(screen(state, *size()))
