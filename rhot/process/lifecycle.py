@@ -2,7 +2,8 @@
 
 A service is one coroutine, `serve(service)`. It runs in one TaskGroup together with the health beat
 and the watchdog; whatever fails there ends the process with a message and a code (2: the user can
-mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0.
+mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0;
+new calibration files end it with code 75, to be started with them at once.
 While the router is away at start, the service waits for it.
 """
 
@@ -26,6 +27,7 @@ from rhot.bus.credentials import client_endpoints
 from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
+from rhot.process.calibration_watch import CalibrationChanged
 from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
 
@@ -34,6 +36,8 @@ Serve = Callable[[Service], Awaitable[None]]
 log = logging.getLogger("rhot.lifecycle")
 
 EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
+# EX_TEMPFAIL of sysexits.h, "try again": nothing is wrong, the service wants to be started anew.
+EXIT_AGAIN = 75
 
 
 def command(name: str, module: str, about: str | None, instance_option: str = "instance") -> None:
@@ -111,6 +115,10 @@ def _program(name: str) -> str:
 
 def _explain(error: Exception, name: str, instance: str) -> int:
     """Log what ended a service; its exit code."""
+    ends = list(leaves(error))
+    if all(isinstance(end, CalibrationChanged) for end in ends):
+        log.info("%s", ends[0])
+        return EXIT_AGAIN
     errors = user_errors(error, _program(name))
     for one in errors:
         log.error("%s", one)

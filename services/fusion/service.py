@@ -2,17 +2,23 @@
 
 As the master it also broadcasts the session and answers for session and clock. Late frames are
 inserted or counted; a missing camera leaves its landmarks `predicted`, then absent, and the rest
-goes on; without calibration (lenses, rig.json) the service ends with the command that makes it.
+goes on; without calibration (lenses, rig.json) the service ends with the command that makes it,
+with a new one it starts anew. A rig that tracks markers only has a master all the same.
 """
 
 from __future__ import annotations
 
 import asyncio
 import time
+from pathlib import Path
 
 from rhot import clock, topics
 from rhot.files.calibration import load_hand, load_rig_cameras
+from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
+from rhot.hand import HandModel, HandName
 from rhot.messages import ClockEcho
+from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.fusion.health import HealthFigures
 from services.fusion.session_state import SessionState
@@ -23,11 +29,9 @@ from services.fusion.warm import warm_up
 async def serve(service: Service) -> None:
     """Turns the cameras' markers into 3D landmarks, and is the master of session and clock."""
     config = service.config
-    cameras = load_rig_cameras(config)
-    hands = {
-        hand: load_hand(config.calibration_dir, hand, table.scale)
-        for hand, table in config.hand.items()
-    }
+    if not config.has_depth:
+        await _serve_without_depth(service)
+    cameras, hands = load_and_watch(service, _calibration_files(config), lambda: _load(config))
     step = FusionStep(config, cameras, hands)
     await asyncio.to_thread(warm_up, config, cameras, hands)
     publishers = {hand: service.bus.publisher(topics.POINTS, hand=hand) for hand in config.hand}
@@ -41,6 +45,28 @@ async def serve(service: Service) -> None:
         for points in step.step(frame):
             publishers[points.hand].put(points)
         health.note_frame(time.perf_counter() - began_s, time.monotonic())
+
+
+def _calibration_files(config: RigConfig) -> list[Path]:
+    lenses = [f"{camera.name}.lens.json" for camera in config.camera]
+    hands = [f"hand.{hand}.json" for hand in config.hand]
+    return [config.calibration_dir / name for name in ("rig.json", *lenses, *hands)]
+
+
+def _load(config: RigConfig) -> tuple[dict[str, Camera], dict[HandName, HandModel]]:
+    """Cameras and hands of the rig, from calibration/."""
+    hands = {
+        hand: load_hand(config.calibration_dir, hand, table.scale)
+        for hand, table in config.hand.items()
+    }
+    return load_rig_cameras(config), hands
+
+
+async def _serve_without_depth(service: Service) -> None:
+    """Be the master of a rig that tracks markers only, for ever."""
+    _serve_session_and_clock(service)
+    service.ready()
+    await asyncio.Event().wait()
 
 
 async def _note_poses(service: Service, step: FusionStep) -> None:

@@ -2,7 +2,7 @@
 
 Only the newest points count (latest): a solver that is behind skips. Missing points: no pose is
 published. A hand that was never measured is solved with the tables' bones at the scale of rig.toml,
-and health says so. Health also tells how long a pose takes.
+and health says so. Health also tells how long a pose takes. A new hand.<hand>.json starts it anew.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from rhot import topics
 from rhot.bus.bus import Publisher, Subscription
 from rhot.errors import ConfigError
 from rhot.files.calibration import load_hand
+from rhot.files.config import RigConfig
 from rhot.hand import HandModel, HandName
 from rhot.messages import HandPoints, HandPose
+from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.solver.step import SolverStep
 from services.solver.warm import warm_up
@@ -31,10 +33,8 @@ async def serve(service: Service) -> None:
         raise ConfigError(
             "rig.toml has no [hand.right.markers] or [hand.left.markers]: there is no hand to solve"
         )
-    hands: dict[HandName, HandModel] = {
-        name: load_hand(config.calibration_dir, name, table.scale)
-        for name, table in config.hand.items()
-    }
+    files = [config.calibration_dir / f"hand.{name}.json" for name in config.hand]
+    hands = load_and_watch(service, files, lambda: _load(config))
     step = SolverStep(config, hands)
     # Compiling (a minute without a cache) must not stop the heartbeat.
     await asyncio.get_running_loop().run_in_executor(None, warm_up, config, hands)
@@ -51,6 +51,14 @@ async def serve(service: Service) -> None:
     async with asyncio.TaskGroup() as tasks:
         for name, (points, poses) in streams.items():
             tasks.create_task(_solve_hand(service, step, name, points, poses))
+
+
+def _load(config: RigConfig) -> dict[HandName, HandModel]:
+    """The model of every hand of the rig, from calibration/ or the tables."""
+    return {
+        name: load_hand(config.calibration_dir, name, table.scale)
+        for name, table in config.hand.items()
+    }
 
 
 async def _solve_hand(

@@ -3,7 +3,7 @@ rates.
 
 Nothing is subscribed to, and nothing is computed, while no browser is connected. Late streams are
 drawn when they come and hidden when they are a second old; missing ones are said to be missing.
-Uncalibrated cameras are left out, with a note.
+Uncalibrated cameras are left out, with a note; new lenses and places start the view anew.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
+from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from rhot.topics import Topic
 from services.viewer.calibration.page import CalibrationPage
@@ -35,7 +36,10 @@ async def serve(service: Service) -> None:
     """Shows the rig live at http://127.0.0.1:8080 (or [viewer] port)."""
     config = service.config
     loop = asyncio.get_running_loop()
-    setup = read_setup(config)
+    # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
+    names = ["rig.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
+    files = [config.calibration_dir / name for name in names]
+    setup = load_and_watch(service, files, lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
