@@ -10,7 +10,7 @@ from typing import TextIO
 
 from rhot.plain_text import printable
 
-_LEVELS = {"debug": 0, "info": 1, "warning": 2, "error": 3, "critical": 4}
+_LEVELS = {"debug": 0, "info": 1, "note": 2, "warning": 2, "error": 3, "critical": 4}
 
 
 class Terminal:

@@ -10,17 +10,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
-import json
 import os
-import re
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from rhot.process import logs
-from rhot.process.lifecycle import EXIT_USER
+from rhot.process.lifecycle import EXIT_AGAIN, EXIT_USER
+from services.cli.rig.child_output import ChildOutput
 
 # As systemd's RestartSec of the installed units: poses are back within a second of a crash.
 _RESTART_S = 0.5
@@ -31,8 +31,8 @@ _RESTART_AFTER_USER_ERROR_S = 5.0
 _STOP_S = 5.0
 _PR_SET_PDEATHSIG = 1
 _LINE_LIMIT = 1 << 20
-# How our programs refuse to start before they log: wrong options, a missing extra.
-_REFUSAL = re.compile(r"rhot[a-z-]*: error: (.*)")
+# A child that lived longer than this had started well: what it says next is news again.
+_SETTLED_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -49,26 +49,39 @@ def service_argv(package: str, *options: str) -> list[str]:
 
 
 class Supervisor:
-    """Runs children until cancelled; log(name, level, text) gets each line they write."""
+    """Runs children until cancelled; log(name, level, text) gets each line that they write, and
+    why they ended. A child that fails in the same way again says so once.
+    """
 
     def __init__(self, log: Callable[[str, str, str], None]) -> None:
         self.restarts: dict[str, int] = {}
         self.pids: dict[str, int] = {}
+        # Why each child that has ended did so, the last time.
+        self.reasons: dict[str, str] = {}
         self._log = log
 
     async def keep_running(self, child: Child) -> None:
         """Start one child again whenever it ends; ends it when cancelled."""
+        before, told = None, ""
         while True:
             started_s = time.monotonic()
-            code = await self._run_once(child)
-            pause_s = _RESTART_AFTER_USER_ERROR_S if code == EXIT_USER else _RESTART_S
-            self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
+            output = ChildOutput(partial(self._log, child.name), before)
+            code = await self._run_once(child, output)
             ran_s = time.monotonic() - started_s
-            text = f"ended with {_describe(code)} after {ran_s:.1f} s, starting again in"
-            self._log(child.name, "warning", f"{text} {pause_s:g} s")
+            self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
+            if code == EXIT_AGAIN:
+                self._log(child.name, "note", output.last_line)
+                before, told = None, ""
+                continue
+            pause_s = _RESTART_AFTER_USER_ERROR_S if code == EXIT_USER else _RESTART_S
+            self.reasons[child.name] = output.reason or f"ended with {_describe(code)}"
+            same = f"{code} {output.reason}"
+            if same != told or ran_s > _SETTLED_S:
+                self._log(child.name, "warning", _end_text(code, ran_s, pause_s, output))
+            before, told = output, same
             await asyncio.sleep(pause_s)
 
-    async def _run_once(self, child: Child) -> int:
+    async def _run_once(self, child: Child, output: ChildOutput) -> int:
         process = await asyncio.create_subprocess_exec(
             *child.argv,
             stdin=asyncio.subprocess.DEVNULL,
@@ -82,24 +95,23 @@ class Supervisor:
         )
         self.pids[child.name] = process.pid
         try:
-            await self._read_lines(child.name, process)
+            await _read_lines(process, output)
             return await process.wait()
         finally:
             await asyncio.shield(_end(process))
 
-    async def _read_lines(self, name: str, process: asyncio.subprocess.Process) -> None:
-        if process.stdout is None:
+
+async def _read_lines(process: asyncio.subprocess.Process, output: ChildOutput) -> None:
+    if process.stdout is None:
+        return
+    while True:
+        try:
+            line = await process.stdout.readline()
+        except ValueError:  # a line beyond the limit: asyncio has dropped it
+            continue
+        if not line:
             return
-        while True:
-            try:
-                line = await process.stdout.readline()
-            except ValueError:  # a line beyond the limit: asyncio has dropped it
-                continue
-            if not line:
-                return
-            level, text = _parse(line.decode(errors="replace").rstrip())
-            if text:
-                self._log(name, level, text)
+        output.take(line.decode(errors="replace").rstrip())
 
 
 def _die_with_parent() -> None:
@@ -120,16 +132,12 @@ async def _end(process: asyncio.subprocess.Process) -> None:
             await process.wait()
 
 
-def _parse(line: str) -> tuple[str, str]:
-    """(level, text) of a JSON log line; a refusal to start is an error, any other line info."""
-    if refusal := _REFUSAL.fullmatch(line):
-        return "error", refusal[1]
-    try:
-        record = json.loads(line)
-        text = str(record["text"]) + ("\n" + record["trace"] if "trace" in record else "")
-        return str(record["level"]), text
-    except (json.JSONDecodeError, KeyError, TypeError):
-        return "info", line
+def _end_text(code: int, ran_s: float, pause_s: float, output: ChildOutput) -> str:
+    text = f"ended with {_describe(code)} after {ran_s:.1f} s, starting again in {pause_s:g} s"
+    # An error has been told when it came; else the last lines are all there is to go by.
+    if code == 0 or output.last_error or not output.reason:
+        return text
+    return f"{text}; its last lines:\n{output.reason}"
 
 
 def _describe(code: int) -> str:

@@ -1,7 +1,8 @@
 """`rhot up CONFIG`: the master's processes of a real rig, supervised.
 
 These are router, fusion, solver, object tracker, viewer and recorder. Cameras whose `host` is empty
-are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there.
+are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there. It says that the
+rig is up once it is, and otherwise what is missing and why.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.options import VerboseOption
+from services.cli.rig.watch import RigWatch
 from services.cli.terminal import Terminal
 
 
@@ -38,7 +40,9 @@ def children_of(
         Child(f"pi_tracker/{c.name}", service_argv("pi_tracker", *common, "--camera", c.name))
         for c in local
     ]
-    children += [Child(name, service_argv(name, *common)) for name in ("fusion", "solver")]
+    # Fusion is the master of session and clock, also where markers alone are tracked.
+    for name in ("fusion", "solver") if config.has_depth else ("fusion",):
+        children.append(Child(name, service_argv(name, *common)))
     if config.object:
         children.append(Child("object_tracker", service_argv("object_tracker", *common)))
     if viewer:
@@ -60,14 +64,14 @@ def up(
 async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -> None:
     stopping = stop_on_signals()
     supervisor = Supervisor(terminal.log)
+    children = children_of(config, path, viewer=viewer)
     with cancelled_by(stopping):
         async with asyncio.TaskGroup() as tasks:
-            for child in children_of(config, path, viewer=viewer):
+            for child in children:
                 tasks.create_task(supervisor.keep_running(child))
+            terminal.line(f"starting rig {config.rig.name!r}; Ctrl-C ends it")
             remote = sorted({camera.host for camera in config.camera if camera.host})
-            terminal.line(
-                f"rig {config.rig.name!r} is up at {', '.join(config.bus.listen)}; "
-                f"Ctrl-C ends it, `rhot top --config {path}` shows it"
-            )
             if remote:
                 terminal.line(f"cameras expected from {', '.join(remote)}")
+            watch = RigWatch(config, path, [child.name for child in children], terminal.line)
+            await watch.run(supervisor.reasons)
