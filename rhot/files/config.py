@@ -63,6 +63,7 @@ class RigConfig(Table, frozen=True, kw_only=True):
         """Folder of this host's certificates; it need not exist."""
         return Path(self.folder) / self.bus.certificates
 
+    @property
     def has_depth(self) -> bool:
         """Whether hands can be solved; with one camera, or no hand, markers alone are tracked."""
         return len(self.camera) >= 2 and bool(self.hand)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
+from rhot.bus.credentials import client_endpoints
 from rhot.files.config import RigConfig
 from services.cli.rig.readiness import Missing, Readiness
 
@@ -48,7 +49,7 @@ class RigWatch:
                 self._look(self._readiness.missing(reasons), time.monotonic())
 
     async def _listen(self) -> None:
-        async with open_bus(self._config.rig.name, self._config.bus.connect) as bus:
+        async with open_bus(self._config.rig.name, client_endpoints(self._config)) as bus:
             self._readiness.router = True
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._follow_alive(bus))
