@@ -1,0 +1,674 @@
+#!/usr/bin/env bash
+# Installs rhot as systemd services on a Raspberry Pi with a camera, or on the master.
+# docs/guide/install.md explains it; `install.sh --help` lists what it can do.
+set -euo pipefail
+umask 022
+export LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive
+unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
+
+HERE=$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")
+readonly HERE
+# Raspberry Pi OS and Debian build picamera2 for this Python, so no other will do.
+readonly PYTHON=/usr/bin/python3
+readonly ROOT=/opt/rhot ETC=/etc/rhot STATE=/var/lib/rhot CACHE=/var/cache/rhot
+readonly UNITS=/etc/systemd/system SYSUSERS=/etc/sysusers.d/rhot.conf COMMAND=/usr/local/bin/rhot
+readonly KEEP_VERSIONS=3
+
+usage() {
+    cat <<'TEXT'
+install.sh pi CAMERA... --master HOST [options]   a Raspberry Pi with cameras
+install.sh master [options]                       router, fusion, solver, viewer, recorder
+install.sh upgrade [--wheels DIR]                 a new version, the same roles
+install.sh rollback                               the version before
+install.sh status                                 what is installed and what runs
+install.sh uninstall [--purge]                    remove rhot (--purge: its data, too)
+
+--config FILE   rig.toml of the rig; calibration/ beside it is brought where there is none yet
+--pki DIR       certificates of this machine: ca.pem, own.pem, own.key (from `rhot pki`)
+--wheels DIR    install from these wheels alone, without a network (`make wheels` collects them)
+--simulator     run the simulator of rig.toml on this machine (a rig without cameras)
+--no-start      do not start anything now; it starts with the machine
+--dry-run       say what would be done, do nothing
+TEXT
+}
+
+fail() {
+    printf 'install.sh: error: %s\n' "$*" >&2
+    exit 2
+}
+
+# ---- what is to be done, and doing it ------------------------------------------------------------
+
+DRY_RUN='' CHANGES=0
+
+say() { printf '%s\n' "$*"; }
+
+# change TEXT COMMAND...: one thing that is not yet as it should be; said, then done.
+change() {
+    say "  - $1"
+    CHANGES=$((CHANGES + 1))
+    if [[ -z $DRY_RUN ]]; then "${@:2}"; fi
+}
+
+# put SOURCE TARGET MODE OWNER: a file as it should be; nothing if it is already.
+put() {
+    local found=''
+    if [[ -e $2 ]]; then found=$(stat -c '%a %U' -- "$2"); fi
+    if [[ $found == "$3 $4" ]] && cmp -s -- "$1" "$2"; then return; fi
+    change "write $2" install -D -m "$3" -o "$4" -g "$(group_of "$4")" -T -- "$1" "$2"
+}
+
+group_of() { if [[ $1 == rhot ]]; then echo rhot; else echo root; fi; }
+
+# folder TARGET MODE OWNER
+folder() {
+    if [[ -d $1 && $(stat -c '%a %U' -- "$1") == "$2 $3" ]]; then return; fi
+    change "make the folder $1" install -d -m "$2" -o "$3" -g "$(group_of "$3")" -- "$1"
+}
+
+# link TARGET PLACE: a symbolic link, replaced in one step.
+link() {
+    if [[ -L $2 && $(readlink -- "$2") == "$1" ]]; then return; fi
+    if [[ -e $2 && ! -L $2 ]]; then
+        say "  ! $2 exists and is not a link: left as it is"
+        return
+    fi
+    change "link $2 to $1" relink "$1" "$2"
+}
+
+relink() {
+    ln -sfn -- "$1" "$2.new"
+    mv -fT -- "$2.new" "$2"
+}
+
+booted() { [[ -d /run/systemd/system ]]; }
+
+# ---- the machine ---------------------------------------------------------------------------------
+
+check_machine() {
+    if [[ $EUID -ne 0 && -z $DRY_RUN ]]; then fail "root is needed: sudo $0 ..."; fi
+    [[ -x $PYTHON ]] || fail "$PYTHON is missing: sudo apt install python3 python3-venv"
+    "$PYTHON" -c 'import struct, sys; sys.exit(struct.calcsize("P") != 8)' ||
+        fail "rhot needs a 64-bit system (there are no 32-bit packages of OpenCV and Zenoh):" \
+            "install the 64-bit Raspberry Pi OS"
+    "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+        fail "rhot needs Python 3.11 or newer, this is $("$PYTHON" --version):" \
+            "Debian 12 or 13, or Raspberry Pi OS 12 or 13"
+    command -v systemctl >/dev/null || fail "systemd is missing; rhot's services are its units"
+}
+
+has_package() { dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null | grep -qx installed; }
+
+offered() { apt-cache show "$1" >/dev/null 2>&1; }
+
+install_packages() {
+    local missing=()
+    "$PYTHON" -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3-venv)
+    if has_role pi && ! has_package python3-picamera2; then
+        if offered python3-picamera2; then
+            missing+=(python3-picamera2)
+        else
+            say "  ! this system offers no python3-picamera2: USB cameras and files only"
+        fi
+    fi
+    ((${#missing[@]})) || return 0
+    command -v apt-get >/dev/null || fail "${missing[*]} missing, and there is no apt to install it"
+    change "install ${missing[*]} (apt)" apt_install "${missing[@]}"
+}
+
+apt_install() {
+    apt-get install -y -qq --no-install-recommends "$@" >/dev/null ||
+        { apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null; } ||
+        fail "apt could not install $*; without a network, install it from the system's medium first"
+}
+
+make_user() {
+    put "$HERE/sysusers.d/rhot.conf" "$SYSUSERS" 644 root
+    if id -u rhot >/dev/null 2>&1; then return; fi
+    change "make the user rhot" systemd-sysusers "$SYSUSERS"
+}
+
+make_folders() {
+    folder "$ROOT" 755 root
+    folder "$ROOT/versions" 755 root
+    folder "$ETC" 755 root
+    folder "$STATE" 755 root
+    # The group may write: who calibrates by hand belongs to it. Files keep the group (2...).
+    folder "$STATE/calibration" 2775 rhot
+    folder "$STATE/recordings" 2775 rhot
+    folder "$CACHE" 755 rhot
+    link "$STATE/calibration" "$ETC/calibration"
+    link "$STATE/recordings" "$ETC/recordings"
+    local person=${SUDO_USER:-}
+    if [[ -n $person && $person != root ]] && ! id -nG "$person" | grep -qw rhot; then
+        change "let $person write calibrations (group rhot; from the next login)" \
+            usermod -aG rhot "$person"
+    fi
+}
+
+# ---- roles ---------------------------------------------------------------------------------------
+
+ROLES='' CAMERAS='' MASTER='' SIMULATOR=''
+
+has_role() { [[ " $ROLES " == *" $1 "* ]]; }
+
+# What was installed before: a machine may be a Pi and the master in one.
+read_installed() {
+    local key value
+    [[ -f $ROOT/installed ]] || return 0
+    while IFS='=' read -r key value; do
+        case $key in
+            roles) ROLES=$value ;;
+            cameras) CAMERAS=$value ;;
+            master) MASTER=$value ;;
+            simulator) SIMULATOR=$value ;;
+        esac
+    done <"$ROOT/installed"
+}
+
+add_role() { has_role "$1" || ROLES="${ROLES:+$ROLES }$1"; }
+
+write_installed() {
+    local new
+    new=$(mktemp)
+    printf 'roles=%s\ncameras=%s\nmaster=%s\nsimulator=%s\n' \
+        "$ROLES" "$CAMERAS" "$MASTER" "$SIMULATOR" >"$new"
+    put "$new" "$ROOT/installed" 644 root
+    rm -f -- "$new"
+}
+
+extras() {
+    local list=''
+    if has_role pi; then list=pi; fi
+    if has_role master || [[ -n $SIMULATOR ]]; then list="${list:+$list,}master"; fi
+    printf '%s' "$list"
+}
+
+# ---- versions ------------------------------------------------------------------------------------
+
+WHEELS='' WHEEL='' TEMPORARY=''
+
+clean_up() {
+    if [[ -n $TEMPORARY ]]; then rm -rf -- "$TEMPORARY"; fi
+}
+trap clean_up EXIT
+
+pip_options() {
+    if [[ -n $WHEELS ]]; then printf '%s\n' --no-index --find-links "$WHEELS"; fi
+}
+
+# Sets WHEEL: rhot's own wheel, from --wheels or built from the source tree this script lies in.
+find_wheel() {
+    local -a found=()
+    if [[ -n $WHEELS ]]; then
+        [[ -d $WHEELS ]] || fail "--wheels $WHEELS: no such folder"
+        WHEELS=$(readlink -f -- "$WHEELS")
+        mapfile -t found < <(find "$WHEELS" -maxdepth 1 -name 'rhot-*.whl' | sort -V)
+        ((${#found[@]})) || fail "$WHEELS holds no wheel of rhot: \`make wheels\` collects all that is needed"
+        WHEEL=${found[-1]}
+        return
+    fi
+    [[ -f $HERE/../pyproject.toml ]] ||
+        fail "no source tree around $HERE: name a folder of wheels with --wheels DIR"
+    TEMPORARY=$(mktemp -d)
+    "$PYTHON" -m venv "$TEMPORARY/build"
+    "$TEMPORARY/build/bin/pip" wheel --quiet --disable-pip-version-check --no-deps \
+        --wheel-dir "$TEMPORARY" "$HERE/.." ||
+        fail "rhot's wheel could not be built here (see above); build it elsewhere with \`make wheels\` and name the folder with --wheels"
+    WHEEL=$(find "$TEMPORARY" -maxdepth 1 -name 'rhot-*.whl')
+}
+
+# The name of a version: its number, and a digest of all that goes in, so that a new build of the
+# same number lies beside the old one.
+version_name() {
+    local number digest
+    number=$(basename -- "$WHEEL" | cut -d- -f2)
+    digest=$({
+        sha256sum <"$WHEEL"
+        if [[ -n $WHEELS ]]; then find "$WHEELS" -maxdepth 1 -name '*.whl' -printf '%f\n' | sort; fi
+        "$PYTHON" --version
+        extras
+    } | sha256sum | cut -c1-8)
+    printf '%s-%s' "$number" "$digest"
+}
+
+# make_version NAME: the virtual environment; .complete is written last.
+make_version() {
+    local place=$ROOT/versions/$1 flags=()
+    if [[ -f $place/.complete ]]; then return; fi
+    change "install rhot $1 into $place" build_version "$place"
+}
+
+build_version() {
+    local place=$1 flags=()
+    rm -rf -- "$place"
+    # picamera2 and libcamera come from apt, and are not on PyPI for this.
+    if has_role pi; then flags+=(--system-site-packages); fi
+    "$PYTHON" -m venv "${flags[@]}" "$place"
+    local -a options
+    mapfile -t options < <(pip_options)
+    "$place/bin/pip" install --quiet --disable-pip-version-check --no-warn-script-location \
+        "${options[@]}" "rhot[$(extras)] @ file://$WHEEL" || {
+        rm -rf -- "$place"
+        fail "pip could not install rhot (see above); nothing was changed for the version that runs"
+    }
+    cp -r -- "$HERE" "$place/deploy"
+    # Compiled now and not by each service on its first start, whose sandbox may not write here.
+    "$place/bin/python" -m compileall -q "$place/lib" >/dev/null 2>&1 || true
+    touch "$place/.complete"
+}
+
+current_version() {
+    if [[ -L $ROOT/current ]]; then basename -- "$(readlink -- "$ROOT/current")"; fi
+}
+
+# Compiled before the switch: what runs goes on with its own kernels meanwhile.
+warm_kernels() {
+    local place=$ROOT/versions/$1
+    if [[ $(extras) != *master* || -f $place/.warm ]]; then return; fi
+    change "compile the kernels (a minute or two, once per version)" run_warm "$place"
+}
+
+run_warm() {
+    (cd / && runuser -u rhot -- env HOME="$STATE" RHOT_CACHE="$CACHE" nice -n 10 \
+        "$1/bin/rhot" warm) | sed 's/^/    /'
+    touch "$1/.warm"
+}
+
+# switch_to NAME: `current`, and the units that belong to it.
+switch_to() {
+    link "$ROOT/versions/$1" "$ROOT/current"
+    put_units "$ROOT/versions/$1/deploy/systemd"
+    if has_role master; then link "$ROOT/current/bin/rhot" "$COMMAND"; fi
+}
+
+put_units() {
+    local from=$1 file
+    if [[ -n $DRY_RUN ]]; then from=$HERE/systemd; fi
+    folder "$UNITS/rhot-.service.d" 755 root
+    while IFS= read -r -d '' file; do
+        put "$from/$file" "$UNITS/$file" 644 root
+    done < <(cd "$from" && find . -type f -printf '%P\0' | sort -z)
+}
+
+remember() {
+    if [[ $(tail -n 1 "$ROOT/history" 2>/dev/null) == "$1" ]]; then return; fi
+    if [[ -z $DRY_RUN ]]; then printf '%s\n' "$1" >>"$ROOT/history"; fi
+}
+
+# The versions that count for a rollback: those of the history that are still there, newest first.
+kept_versions() {
+    local name
+    tac "$ROOT/history" 2>/dev/null | awk '!seen[$0]++' | while IFS= read -r name; do
+        if [[ -f $ROOT/versions/$name/.complete ]]; then printf '%s\n' "$name"; fi
+    done
+}
+
+prune_versions() {
+    local place kept
+    kept=$(kept_versions | head -n "$KEEP_VERSIONS")
+    for place in "$ROOT"/versions/*/; do
+        place=${place%/}
+        if [[ -d $place ]] && ! grep -qxF -- "${place##*/}" <<<"$kept"; then
+            change "remove the old version ${place##*/}" remove_version "$place"
+        fi
+    done
+}
+
+remove_version() {
+    local packages digest
+    # The folder of its kernels carries a digest of the package's place (rhot/process/numba_cache.py).
+    for packages in "$1"/lib/python3*/site-packages/services; do
+        digest=$(printf %s "$packages" | sha256sum | cut -c1-8)
+        rm -rf -- "$CACHE/rhot-kernels-$digest-"*
+    done
+    rm -rf -- "$1"
+}
+
+# ---- rig.toml and certificates -------------------------------------------------------------------
+
+CONFIG='' PKI=''
+
+# rig_says QUESTION...: what rig.toml says, read by rhot itself (services/cli/deploy/rig_units.py).
+rig_says() { "$ROOT/versions/$VERSION/bin/python" -m services.cli.deploy.rig_units "$@"; }
+
+put_config() {
+    local file
+    if [[ -z $CONFIG ]]; then
+        if [[ ! -f $ETC/rig.toml ]] && has_role pi && ! has_role master; then minimal_config; fi
+        return
+    fi
+    if [[ -z $DRY_RUN ]]; then rig_says check "$CONFIG" >/dev/null || fail "--config: see above"; fi
+    if [[ -f $ETC/rig.toml ]] && ! cmp -s -- "$CONFIG" "$ETC/rig.toml"; then
+        change "keep the old rig.toml as $ETC/rig.toml.bak" cp -p -- "$ETC/rig.toml" "$ETC/rig.toml.bak"
+    fi
+    put "$CONFIG" "$ETC/rig.toml" 644 root
+    for file in "$(dirname -- "$CONFIG")"/calibration/*.json; do
+        # Results of this machine are never replaced.
+        if [[ -f $file && ! -e $STATE/calibration/${file##*/} ]]; then
+            put "$file" "$STATE/calibration/${file##*/}" 644 rhot
+        fi
+    done
+}
+
+# A Pi without the rig's rig.toml: enough for its tracker.
+minimal_config() {
+    local new camera endpoint
+    [[ -n $MASTER ]] || fail "name the rig's rig.toml with --config, or the master with --master HOST"
+    endpoint="tcp/$MASTER:7447"
+    if [[ -n $PKI ]]; then endpoint="tls/$MASTER:7448"; fi
+    new=$(mktemp)
+    {
+        printf '# Made by install.sh. The rig has one rig.toml for all machines: replace this one by it.\n'
+        printf '[bus]\nconnect = ["%s"]\n' "$endpoint"
+        if [[ -n $PKI ]]; then printf 'certificates = "pki"\n'; fi
+        for camera in $CAMERAS; do printf '\n[[camera]]\nname = "%s"\nsource = "picamera2"\n' "$camera"; done
+    } >"$new"
+    put "$new" "$ETC/rig.toml" 644 root
+    rm -f -- "$new"
+}
+
+put_certificates() {
+    local name mode
+    [[ -n $PKI ]] || return 0
+    for name in ca.pem own.pem own.key; do
+        [[ -f $PKI/$name ]] || fail "--pki $PKI: $name is missing; it holds ca.pem, own.pem and own.key of one machine"
+    done
+    folder "$ETC/pki" 750 rhot
+    for name in ca.pem own.pem own.key; do
+        mode=644
+        if [[ $name == own.key ]]; then mode=600; fi
+        put "$PKI/$name" "$ETC/pki/$name" "$mode" rhot
+    done
+}
+
+# What --master says against what rig.toml says: a Pi that looks for another master never speaks.
+check_master() {
+    if [[ -z $MASTER || -n $DRY_RUN || ! -f $ETC/rig.toml ]]; then return; fi
+    if ! rig_says connect "$ETC/rig.toml" | grep -qF -- "/$MASTER:"; then
+        say "  ! $ETC/rig.toml does not connect to $MASTER, but to $(rig_says connect "$ETC/rig.toml" | paste -sd' '):"
+        say "    correct its [bus] connect, or give the rig's file with --config"
+    fi
+}
+
+# ---- units ---------------------------------------------------------------------------------------
+
+targets() {
+    local role
+    for role in $ROLES; do printf 'rhot-%s.target\n' "$role"; done
+}
+
+# Units of this machine's roles, one a line; without a rig.toml those that every rig has.
+wanted_units() {
+    local camera
+    if has_role master; then
+        printf '%s\n' rhot-router.service rhot-fusion.service rhot-solver.service rhot-viewer.service
+        if [[ -f $ETC/rig.toml && -z $DRY_RUN ]]; then rig_says units "$ETC/rig.toml"; fi
+    fi
+    for camera in $CAMERAS; do printf 'rhot-pi-tracker@%s.service\n' "$camera"; done
+    if [[ -n $SIMULATOR ]]; then printf '%s\n' rhot-simulator.service; fi
+}
+
+enable_units() {
+    local unit
+    local -a missing=()
+    while IFS= read -r unit; do
+        if [[ -n $DRY_RUN || $(systemctl is-enabled "$unit" 2>/dev/null) != enabled ]]; then
+            missing+=("$unit")
+        fi
+    done < <({ targets; wanted_units; } | sort -u)
+    ((${#missing[@]})) || return 0
+    change "start with the machine: ${missing[*]}" systemctl enable --quiet "${missing[@]}"
+}
+
+start_units() {
+    if ! booted; then
+        say "  (systemd does not run here: everything starts with the machine)"
+        return
+    fi
+    if [[ -n $NO_START ]]; then return; fi
+    if [[ ! -f $ETC/rig.toml ]]; then return; fi
+    local -a all stopped=()
+    mapfile -t all < <({ targets; wanted_units; } | sort -u)
+    if ((CHANGES)); then
+        change "start ${all[*]}" restart_units "${all[@]}"
+        return
+    fi
+    local unit
+    for unit in "${all[@]}"; do
+        systemctl is-active --quiet "$unit" || stopped+=("$unit")
+    done
+    ((${#stopped[@]})) || return 0
+    change "start ${stopped[*]}" systemctl start --no-block "${stopped[@]}"
+}
+
+# Not waited for by systemctl: a service that waits for its router is in order. Said after a while.
+restart_units() {
+    systemctl daemon-reload
+    systemctl reset-failed 'rhot-*' 2>/dev/null || true
+    systemctl restart --no-block "$@"
+    local _ unit
+    for _ in {1..20}; do
+        sleep 0.5
+        if systemctl is-active --quiet "$@"; then return; fi
+    done
+    for unit in "$@"; do
+        systemctl is-active --quiet "$unit" || say "    $unit: $(state_of "$unit")"
+    done
+}
+
+state_of() {
+    local state text
+    state=$(systemctl show -P ActiveState "$1" 2>/dev/null || true)
+    text=$(systemctl show -P StatusText "$1" 2>/dev/null || true)
+    printf '%s%s' "${state:-unknown}" "${text:+ ($text)}"
+}
+
+# ---- commands ------------------------------------------------------------------------------------
+
+VERSION='' NO_START=''
+
+# A new version beside the old ones, then everything that should be as the roles say.
+install_all() {
+    check_machine
+    install_packages
+    make_user
+    make_folders
+    if [[ -n $DRY_RUN && -z $WHEELS ]]; then
+        VERSION=new
+    else
+        find_wheel
+        VERSION=$(version_name)
+    fi
+    make_version "$VERSION"
+    put_config
+    put_certificates
+    check_master
+    warm_kernels "$VERSION"
+    switch_to "$VERSION"
+    write_installed
+    remember "$VERSION"
+    enable_units
+    start_units
+    prune_versions
+    finish
+}
+
+finish() {
+    if ((CHANGES == 0)); then
+        say "Nothing to do: rhot $VERSION is installed as $ROLES."
+        return
+    fi
+    if [[ -n $DRY_RUN ]]; then
+        say "A dry run: nothing was done."
+        return
+    fi
+    say "rhot $VERSION is installed as $ROLES."
+    next_steps
+}
+
+next_steps() {
+    say "What comes next:"
+    if [[ ! -f $ETC/rig.toml ]]; then
+        say "  write $ETC/rig.toml (copy config/rig.example.toml), then run this again with --config"
+    elif has_role master; then
+        say "  rhot check $ETC/rig.toml          is everything there?"
+        say "  rhot top --config $ETC/rig.toml   what runs, at what rate"
+    else
+        say "  on the master: rhot top --config $ETC/rig.toml shows this camera within seconds"
+    fi
+    say "  journalctl -fu 'rhot-*'                what the services say"
+    say "  sudo $ROOT/current/deploy/install.sh status | rollback | uninstall"
+}
+
+install_role() {
+    local role=$1
+    shift
+    local -a names=()
+    while (($#)); do
+        case $1 in
+            --master | --config | --pki | --wheels)
+                (($# > 1)) || fail "$1 needs a value"
+                case $1 in
+                    --master) MASTER=$2 ;;
+                    --config) CONFIG=$2 ;;
+                    --pki) PKI=$2 ;;
+                    --wheels) WHEELS=$2 ;;
+                esac
+                shift
+                ;;
+            --simulator) SIMULATOR=yes ;;
+            --no-start) NO_START=yes ;;
+            --dry-run) DRY_RUN=yes ;;
+            -*) fail "unknown option $1; see install.sh --help" ;;
+            *) names+=("$1") ;;
+        esac
+        shift
+    done
+    check_arguments "$role" "${names[@]}"
+    if [[ -n $role ]]; then add_role "$role"; fi
+    if ((${#names[@]})); then CAMERAS="${names[*]}"; fi
+    lock
+    install_all
+}
+
+check_arguments() {
+    local role=$1 name
+    shift
+    if [[ $role == pi ]]; then
+        (($#)) || fail "which camera? e.g. install.sh pi left --master 192.168.1.10"
+        [[ -n $MASTER || -n $CONFIG || -f $ETC/rig.toml ]] ||
+            fail "where is the master? --master HOST, or the rig's rig.toml with --config FILE"
+    elif (($#)); then
+        fail "unexpected $1; see install.sh --help"
+    fi
+    for name in "$@"; do
+        [[ $name =~ ^[A-Za-z0-9][A-Za-z0-9_-]*$ ]] || fail "$name is no name of a camera"
+    done
+    [[ -z $MASTER || $MASTER =~ ^[A-Za-z0-9.:_\[\]-]+$ ]] || fail "--master $MASTER is no host"
+    [[ -z $CONFIG || -f $CONFIG ]] || fail "--config $CONFIG: no such file"
+    [[ -z $PKI || -d $PKI ]] || fail "--pki $PKI: no such folder"
+}
+
+lock() {
+    if [[ -n $DRY_RUN ]]; then return; fi
+    if [[ $EUID -ne 0 ]]; then fail "root is needed: sudo $0 ..."; fi
+    exec 9>/run/lock/rhot-install.lock
+    flock -n 9 || fail "another install.sh is running"
+}
+
+upgrade() {
+    [[ -n $ROLES ]] || fail "rhot is not installed here: install.sh pi ... or install.sh master"
+    install_role '' "$@"
+}
+
+rollback() {
+    local before
+    lock
+    before=$(kept_versions | grep -vxF -- "$(current_version)" | head -n 1 || true)
+    [[ -n $before ]] || fail "there is no earlier version than $(current_version) here"
+    VERSION=$before
+    say "Back to rhot $before:"
+    switch_to "$before"
+    # The version that is left goes from the history, or a second rollback would return to it.
+    grep -vxF -- "$before" "$ROOT/history" | head -n -1 >"$ROOT/history.new" || true
+    printf '%s\n' "$before" >>"$ROOT/history.new"
+    mv -f -- "$ROOT/history.new" "$ROOT/history"
+    start_units
+    say "rhot $before runs again. \`install.sh upgrade\` goes forward."
+}
+
+status() {
+    local unit name
+    [[ -n $ROLES ]] || { say "rhot is not installed here."; return; }
+    say "roles: $ROLES${CAMERAS:+; cameras: $CAMERAS}${MASTER:+; master: $MASTER}"
+    for name in $(kept_versions); do
+        if [[ $name == "$(current_version)" ]]; then say "version $name (current)"; else say "version $name"; fi
+    done
+    VERSION=$(current_version)
+    while IFS= read -r unit; do
+        if booted; then say "$unit: $(state_of "$unit")"; else say "$unit: $(systemctl is-enabled "$unit" 2>/dev/null || true)"; fi
+    done < <({ targets; wanted_units; } | sort -u)
+}
+
+uninstall() {
+    local purge='' file unit
+    while (($#)); do
+        case $1 in
+            --purge) purge=yes ;;
+            --dry-run) DRY_RUN=yes ;;
+            *) fail "unknown option $1; see install.sh --help" ;;
+        esac
+        shift
+    done
+    lock
+    local -a units=()
+    for file in "$UNITS"/rhot-*.target "$UNITS"/rhot-*.service; do
+        if [[ -f $file ]]; then units+=("${file##*/}"); fi
+    done
+    for unit in $CAMERAS; do units+=("rhot-pi-tracker@$unit.service"); done
+    if ((${#units[@]})); then
+        if booted; then change "stop rhot" systemctl stop 'rhot-*.target' 'rhot-*.service'; fi
+        change "forget its units" forget_units "${units[@]}"
+    fi
+    if [[ -L $COMMAND && $(readlink -- "$COMMAND") == "$ROOT"/* ]]; then change "remove $COMMAND" rm -f -- "$COMMAND"; fi
+    for file in "$ROOT" "$CACHE" "$SYSUSERS"; do
+        if [[ -e $file ]]; then change "remove $file" rm -rf -- "$file"; fi
+    done
+    if [[ -z $purge ]]; then
+        if [[ -e $ETC || -e $STATE ]]; then say "$ETC and $STATE (calibrations, recordings) stay; --purge removes them."; fi
+    else
+        for file in "$ETC" "$STATE"; do
+            if [[ -e $file ]]; then change "remove $file" rm -rf -- "$file"; fi
+        done
+        if id -u rhot >/dev/null 2>&1; then change "remove the user rhot" userdel rhot; fi
+    fi
+    if ((CHANGES)); then say "rhot is removed."; else say "Nothing to do: rhot is not installed here."; fi
+}
+
+forget_units() {
+    systemctl disable --quiet "$@" 2>/dev/null || true
+    rm -rf -- "$UNITS"/rhot-*.service "$UNITS"/rhot-*.target "$UNITS/rhot-.service.d" \
+        "$UNITS"/rhot-*.target.wants
+    if booted; then
+        systemctl daemon-reload
+        systemctl reset-failed 'rhot-*' 2>/dev/null || true
+    fi
+}
+
+main() {
+    local command=${1:---help}
+    if (($#)); then shift; fi
+    read_installed
+    case $command in
+        pi | master) install_role "$command" "$@" ;;
+        upgrade) upgrade "$@" ;;
+        rollback) rollback ;;
+        status) status ;;
+        uninstall) uninstall "$@" ;;
+        -h | --help | help) usage ;;
+        *) fail "unknown command $command; pi, master, upgrade, rollback, status or uninstall" ;;
+    esac
+}
+
+main "$@"
