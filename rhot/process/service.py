@@ -47,11 +47,14 @@ class Service:
     bus: Bus
     tasks: asyncio.TaskGroup
     state: str = "starting"
+    # What it does, in a few words for `systemctl status`; the state where that says enough.
+    status: str = ""
     values: dict[str, float] = field(default_factory=dict)
     errors: int = 0
     faults: FaultLog = field(default_factory=lambda: FaultLog(clock.now_ns))
     _started_s: float = field(default_factory=time.monotonic)
     _ready_s: float = float("inf")
+    _told_status: str = ""
     _slow_beats: dict[str, int] = field(default_factory=dict)
 
     def ready(self) -> None:
@@ -95,7 +98,14 @@ class Service:
             ]
             publisher.put(self._health(streams, 100.0 * (cpu_s - last_cpu_s) / elapsed_s))
             self._log_changes(streams)
+            self._tell_status()
             last_s, last_cpu_s = now_s, cpu_s
+
+    def _tell_status(self) -> None:
+        status = self.status or self.state
+        if status != self._told_status:
+            self._told_status = status
+            systemd.notify(f"STATUS={status}")
 
     def _health(self, streams: list[StreamHealth], cpu_percent: float) -> Health:
         return Health(

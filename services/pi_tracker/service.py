@@ -18,19 +18,21 @@ from rhot.clock import OffsetEstimator
 from rhot.messages import MarkerFrame
 from rhot.process.service import Service
 from services.pi_tracker import sources
+from services.pi_tracker.endpoints.camera_faults import CameraFaults
 from services.pi_tracker.endpoints.color_fitting import ColorFitting
 from services.pi_tracker.endpoints.color_ranges import ColorRanges
 from services.pi_tracker.endpoints.exposure_control import ExposureEndpoint
 from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.endpoints.session_gate import SessionGate
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.monitors.camera_monitor import CameraMonitor
 from services.pi_tracker.tracker import CameraTracker
 
 
 async def serve(service: Service) -> None:
     """Finds the coloured markers in one camera's images."""
-    camera = CameraService(service)
     gate = SessionGate(service.bus)
+    camera = CameraService(service, gate)
     companions = [service.tasks.create_task(task) for task in (gate.follow(), *camera.companions())]
     try:
         service.ready()
@@ -38,7 +40,7 @@ async def serve(service: Service) -> None:
         table = service.config.camera_named(service.instance)
         start_ns = (await gate.started()).start_ns if sources.is_file(table) else 0
         source = sources.open_source(table, service.config, service.bus, start_ns)
-        camera.exposure.attach(source.controls)
+        camera.attach(source)
         companions.append(
             service.tasks.create_task(follow_master(service.bus, camera.offset, source.now_ns))
         )
@@ -54,40 +56,48 @@ async def serve(service: Service) -> None:
 class CameraService:
     """One camera's tracker with its endpoints on the bus: what the service does with each frame."""
 
-    def __init__(self, service: Service) -> None:
+    def __init__(self, service: Service, gate: SessionGate) -> None:
         self.offset = OffsetEstimator()
         self._service = service
         camera = service.config.camera_named(service.instance)
+        live = not sources.is_file(camera)
         self._tracker = CameraTracker(service.config, camera, time.perf_counter_ns)
-        self._colors = ColorRanges(service, self._tracker, live=not sources.is_file(camera))
-        self.exposure = ExposureEndpoint(service)
+        self._colors = ColorRanges(service, self._tracker, live=live)
+        self._exposure = ExposureEndpoint(service)
+        self._monitor = CameraMonitor(camera.name, camera.fps, live=live)
+        self._faults = CameraFaults(service, self._tracker, self._monitor, gate, self.offset)
         self._markers = service.bus.publisher(topics.MARKERS, camera=camera.name)
         self._pictures = PictureCache(service.bus, camera.name, service.tasks)
         ColorFitting(service, self._pictures, self._tracker)
-        self._notes_told: dict[tuple[str, str], str] = {}
 
     def companions(self) -> list[Coroutine[None, None, None]]:
         """What runs beside the frames, for ever."""
-        return [self._colors.follow_file(), self._colors.follow_bus(), self.exposure.follow()]
+        return [
+            self._colors.follow_file(),
+            self._colors.follow_bus(),
+            self._exposure.follow(),
+            self._faults.follow(),
+        ]
+
+    def attach(self, source: sources.Source) -> None:
+        """The source of the frames."""
+        self._exposure.attach(source.controls)
+        self._faults.attach(source)
 
     def take(self, frame: Frame, source: sources.Source, *, running: bool) -> None:
-        """One frame: markers while the session runs, pictures always."""
-        if running:
+        """One frame: markers while the session runs, pictures always.
+
+        A picture that comes again is not measured again.
+        """
+        now_ns = time.monotonic_ns()
+        if self._monitor.is_new(frame, now_ns) and running:
             found = self._track(frame)
+            self._faults.markers = len(found.markers)
             self._service.values["skipped_frames"] = source.dropped
             self._service.values["rejected_frames"] = source.rejected
             self._watch_drift(frame, found)
-        self._pictures.show(frame, time.monotonic_ns())
-        self._tell_notes(source.notes.standing())
-
-    def _tell_notes(self, standing: dict[tuple[str, str], str]) -> None:
-        """Faults of what the source could not do as asked, and their ends."""
-        if standing != self._notes_told:
-            for code, subject in self._notes_told.keys() - standing.keys():
-                self._service.faults.clear(code, subject)
-            for (code, subject), text in standing.items():
-                self._service.faults.report(code, text, subject)
-            self._notes_told = standing
+        self._monitor.watch(frame, self._faults.markers if running else 0, now_ns)
+        self._pictures.show(frame, now_ns)
 
     def _track(self, frame: Frame) -> MarkerFrame:
         offset = self.offset.at(frame.stamp_ns)

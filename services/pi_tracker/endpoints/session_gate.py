@@ -24,6 +24,11 @@ class SessionGate:
         self._started = asyncio.Event()
 
     @property
+    def known(self) -> bool:
+        """Whether anybody has said how the session stands."""
+        return self._session is not None
+
+    @property
     def running(self) -> bool:
         return self._session is not None and self._session.running
 

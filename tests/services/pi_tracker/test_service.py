@@ -70,8 +70,9 @@ class Rig:
         self._sessions.put(Session(running=running, start_ns=1))
 
     def shoot(self):
-        """Send one frame; its number."""
+        """Send one frame, unlike the last as a camera's are; its number."""
         self._seq += 1
+        self._frame.image[-1, -1] = self._seq % 256
         told = SimFrame(
             camera="left",
             seq=self._seq,
