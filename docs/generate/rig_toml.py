@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect as python
 from collections.abc import Iterator
 
 from msgspec import inspect
@@ -10,6 +9,7 @@ from msgspec import inspect
 from docs.generate.markdown import generated_from, in_markdown, paragraphs, wrapped
 from docs.generate.type_words import default_of, in_words
 from rhot.files.config import RigConfig
+from rhot.files.rig_comments import comments_of
 
 _ABOUT = """The one file of a rig that people write. A table that is missing means its defaults; an
 unknown table or key is an error that names the nearest valid one. `rhot check rig.toml` lists
@@ -17,22 +17,6 @@ everything that is wrong. Tools never change it: what they measure is in `calibr
 copy: [config/rig.example.toml](../../config/rig.example.toml)."""
 # What may follow the name of a table that holds tables.
 _KEYS = {"hand": ("left", "right")}
-
-
-def _comments(cls: type) -> dict[str, str]:
-    """The comment lines above each field, as one text."""
-    found: dict[str, str] = {}
-    above: list[str] = []
-    for line in python.getsource(cls).splitlines():
-        text = line.strip()
-        if text.startswith("#"):
-            above.append(text.lstrip("# "))
-        else:
-            name = text.partition(":")[0]
-            if above and name.isidentifier():
-                found[name] = " ".join(above)
-            above = []
-    return found
 
 
 def _key(field: inspect.Field, comment: str) -> str:
@@ -51,7 +35,7 @@ def _tables(cls: type, name: str, header: str) -> Iterator[str]:
     kind = inspect.type_info(cls)
     if not isinstance(kind, inspect.StructType):
         raise TypeError(f"{cls} is no table")
-    comments = _comments(cls)
+    comments = comments_of(cls)
     own, inner = [], []
     for field in kind.fields:
         below = _table_of(field.type)

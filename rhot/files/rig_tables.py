@@ -21,6 +21,7 @@ class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Rig(Table, frozen=True, kw_only=True):
+    # First part of every key on the bus: two rigs on one network have two names.
     name: Name = "desk"
     # Folder of calibration/*.json, relative to rig.toml.
     calibration: str = "calibration"
@@ -34,20 +35,25 @@ class Bus(Table, frozen=True, kw_only=True):
     # Folder of this host's ca.pem, own.pem and own.key (`rhot pki`), relative to rig.toml: for the
     # endpoints that begin with tls/.
     certificates: str = "pki"
-    # Names of certificates that may look on, and of those that may send what SteamVR sees.
+    # Names of certificates that may look on.
     viewers: tuple[Name, ...] = ()
+    # Names of certificates that may send what SteamVR sees.
     object_sources: tuple[Name, ...] = ()
-    # Routers of other rigs to join, and the names of those rigs: their viewers see this rig's
-    # poses, and this rig's viewers theirs.
+    # Routers of other rigs to join.
     routers: tuple[str, ...] = ()
+    # The names of those rigs: their viewers see this rig's poses, and this rig's viewers theirs.
     partners: tuple[Name, ...] = ()
 
 
 class CameraTable(Table, frozen=True, kw_only=True):
+    # In keys and in the names of its calibration files. The first camera's frame is the rig's: x
+    # right, y down, z forward.
     name: Name
     # picamera2[:N], v4l2:N or v4l2:/dev/..., video:FILE, folder:DIR, capture:DIR, simulator.
     source: str = "picamera2"
+    # Pictures a second, the same for all cameras: depth comes at the slowest one's.
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=240.0)] = 30.0
+    # Width and height. A lens calibration holds for the size that it was made at.
     size_px: tuple[Pixels, Pixels] = (640, 480)
     # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all
     # with the same fps, expose together.
@@ -67,9 +73,13 @@ class Tracker(Table, frozen=True, kw_only=True):
     rectify: bool = False
     # Gaussian kernel (odd, 0 = off) and erode / dilate rounds, on the mask.
     gaussian_px: Annotated[int, msgspec.Meta(ge=0, le=31)] = 3
+    # Rounds that take single pixels away.
     erode: Annotated[int, msgspec.Meta(ge=0, le=10)] = 1
+    # Rounds that give the rest its size back.
     dilate: Annotated[int, msgspec.Meta(ge=0, le=10)] = 1
+    # Pixels of the picture: smaller blobs are noise.
     min_area_px: NonNegative = 12.0
+    # Larger blobs are no marker.
     max_area_px: Positive = 20_000.0
 
 
@@ -81,14 +91,18 @@ class OneEuro(Table, frozen=True, kw_only=True):
     mincutoff_hz: Positive = 1.2
     # Hz per m/s.
     beta: NonNegative = 170.0
+    # Of the speed that the cutoff follows; 1 Hz is what the paper gives.
     dcutoff_hz: Positive = 1.0
 
 
 class Disparity(Table, frozen=True, kw_only=True):
     """RHOT eq. (9), D = k * x^z with D in cm and x in px, and the alignment angle of eq. (10)."""
 
+    # `rhot calibrate depth` measures k and z; these are the RHOT paper's.
     k: Positive = 4543.3
+    # -1 is geometry's; distortion of the lenses moves it a little.
     z: Annotated[float, msgspec.Meta(ge=-3.0, le=-0.1)] = -1.035
+    # By how much the cameras' axes are off parallel.
     phi_rad: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)] = 0.0
     # "power": eq. (9) with k and z above; "geometry": z = -1 and k from eq. (10) with baseline,
     # field of view and phi_rad.
@@ -101,6 +115,7 @@ class Fusion(Table, frozen=True, kw_only=True):
     method: Literal["kalman", "triangulate", "disparity"] = "kalman"
     # How paired methods bring views to one instant.
     pairing: Literal["hermite", "linear", "nearest"] = "hermite"
+    # Of paired methods: what smooths their points.
     filter: Literal["one_euro", "none"] = "one_euro"
     # Instants a result waits for later observations, in frames of the fastest camera.
     lag_frames: Annotated[int, msgspec.Meta(ge=0, le=2)] = 0
@@ -117,13 +132,19 @@ class Fusion(Table, frozen=True, kw_only=True):
 
 
 class Solver(Table, frozen=True, kw_only=True):
+    # "dls": damped least squares; "fabrik": FABRIK; "analytic": closed form; "dls-paper" and
+    # "fabrik-paper": as the papers print them, for comparison.
     method: Literal["dls", "fabrik", "analytic", "dls-paper", "fabrik-paper"] = "dls"
+    # Of one finger: a bound for the worst case.
     max_iterations: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 60
+    # How close to its marker a finger's tip must come, in metres.
     tolerance_m: Positive = 1e-4
 
 
 class ObjectTable(Table, frozen=True, kw_only=True):
+    # In its key on the bus.
     name: Name
+    # Of its tracker, as SteamVR shows it: LHR-...
     serial: Name
 
 
@@ -131,30 +152,40 @@ class Objects(Table, frozen=True, kw_only=True):
     # steamvr, libsurvive, replay:FILE, simulator, or network (poses arrive on the bus from
     # elsewhere).
     source: str = "simulator"
+    # Poses a second; SteamVR's own rate is 90.
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 90.0
 
 
 class HandTable(Table, frozen=True, kw_only=True):
-    # landmark -> colour
+    # Landmark = colour: wrist, thumb_tip, index_tip, middle_tip, ring_tip, little_tip, and as an
+    # extra any other OpenXR joint; middle_proximal, the middle knuckle, helps most.
     markers: dict[str, Name]
     # Size against the average adult until `rhot calibrate hand` has measured it.
     scale: Annotated[float, msgspec.Meta(ge=0.4, le=1.6)] = 1.0
 
 
 class Simulator(Table, frozen=True, kw_only=True):
+    # What simulated cameras see; `rhot simulate --list` names the scenes.
     scene: str = "piano"
+    # Of noise, paint and the room: the same seed gives the same pictures.
     seed: Annotated[int, msgspec.Meta(ge=0)] = 1
+    # Of the motion, against the hand's own.
     speed: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 1.0
 
 
 class Viewer(Table, frozen=True, kw_only=True):
+    # This machine only; from another one, `ssh -L 8080:127.0.0.1:8080 MASTER`.
     host: Literal["127.0.0.1", "localhost"] = "127.0.0.1"
+    # Of the live view; the next free one if it is taken, 0 for any.
     port: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 8080
+    # How often the view is drawn, in Hz.
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=60.0)] = 30.0
 
 
 class Recorder(Table, frozen=True, kw_only=True):
+    # Of recordings, relative to rig.toml.
     folder: str = "recordings"
+    # Record from the start of `rhot up` on.
     autostart: bool = False
 
 

@@ -28,7 +28,7 @@ _FAULT, _SUBJECT = "not_calibrated", "calibration"
 Stamp = tuple[int, int, int] | None
 
 
-class CalibrationChanged(Exception):
+class CalibrationChangedError(Exception):
     """Ends a service that is to be started anew with the calibration there is now."""
 
 
@@ -36,7 +36,7 @@ def load_and_watch(service: Service, paths: Iterable[Path], load: Callable[[], T
     """What load() makes of the files at paths, some of which may not be there yet.
 
     As long as the service lives: once the files have changed, and load() still takes them, the
-    service ends with CalibrationChanged.
+    service ends with CalibrationChangedError.
     """
     # Before they are read: a change while the service starts, which may take a minute, counts.
     loaded = _stamps(paths)
@@ -64,7 +64,7 @@ async def _end_on_change(
                 text = f"new {changed} cannot be used, the old one still is: {error}"
                 service.faults.report(_FAULT, text, _SUBJECT)
             else:
-                raise CalibrationChanged(f"{changed} changed: starting again with it")
+                raise CalibrationChangedError(f"{changed} changed: starting again with it")
 
 
 def _stamps(paths: Iterable[Path]) -> dict[Path, Stamp]:

@@ -27,7 +27,7 @@ from rhot.bus.credentials import client_endpoints
 from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
-from rhot.process.calibration_watch import CalibrationChanged
+from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
 
@@ -116,7 +116,7 @@ def _program(name: str) -> str:
 def _explain(error: Exception, name: str, instance: str) -> int:
     """Log what ended a service; its exit code."""
     ends = list(leaves(error))
-    if all(isinstance(end, CalibrationChanged) for end in ends):
+    if all(isinstance(end, CalibrationChangedError) for end in ends):
         log.info("%s", ends[0])
         return EXIT_AGAIN
     errors = user_errors(error, _program(name))

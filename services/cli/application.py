@@ -13,6 +13,7 @@ from services.cli.calibrate.calibrate import calibrate
 from services.cli.check.check import check
 from services.cli.evaluate.plot import plot
 from services.cli.evaluate.score import score
+from services.cli.init.init import init
 from services.cli.live.demo import demo
 from services.cli.live.router import router
 from services.cli.live.session import session
@@ -28,6 +29,7 @@ from services.cli.record.record import record
 from services.cli.record.replay import replay
 
 COMMANDS = (
+    init,
     demo,
     up,
     router,

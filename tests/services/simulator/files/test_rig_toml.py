@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot.files import config as tables
+from rhot.files import rig_tables as tables
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import HandTable, ObjectTable, World
 from rhot.hand import LANDMARKS
