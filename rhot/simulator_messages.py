@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from rhot.messages import (
     Count,
     FingerAngles,
@@ -54,3 +58,16 @@ class SimFrame(Message, frozen=True, kw_only=True):
     row_time_ns: NonNegative
     size_px: tuple[int, int]
     clock_skew_ns: Offset
+
+
+# Whoever tries what a wrong clock does needs seconds, a missing time zone hours; more is a mistake.
+_DAY_NS = 86_400 * 10**9
+
+
+class SimClock(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How far somebody set the clock of a simulated camera computer ahead; negative: back.
+
+    As a request: how far it shall be.
+    """
+
+    ahead_ns: Annotated[int, msgspec.Meta(ge=-_DAY_NS, le=_DAY_NS)]

@@ -140,6 +140,12 @@ OPENVR = _stream(
 )
 OBJECT = _stream("object/{object}/pose", m.ObjectPose, Rate.OBJECT, "objects in the rig frame")
 TRUTH = _stream("sim/truth", s.Truth, Rate.CAMERA, "the simulator's ground truth")
+SIM_CLOCK = _query(
+    "sim/{camera}/clock",
+    s.SimClock,
+    Priority.DATA,
+    "a simulated camera computer's clock; a query with a payload sets it",
+)
 
 # Pictures: only for who asks.
 PREVIEW: Topic[bytes] = Topic(
@@ -235,6 +241,7 @@ TOPICS: tuple[Topic, ...] = (
     OPENVR,
     OBJECT,
     TRUTH,
+    SIM_CLOCK,
     PREVIEW,
     FRAME,
     SIM_FRAME,

@@ -3,9 +3,9 @@ ground truth, in real time.
 
 Each camera runs at its own phase, in a thread of its own; a picture is published when a real one
 would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; the
-clock of a simulated camera computer is off by SimFrame.clock_skew_ns. Late: a camera that cannot
-keep up skips frames and counts them in health. Uncalibrated: the service ends with the error that
-names the command. Nobody listens: it runs on.
+clock of a simulated camera computer is off by SimFrame.clock_skew_ns, and can be set
+(computer_clocks.py). Late: a camera that cannot keep up skips frames and counts them in health.
+Uncalibrated: the service ends with the error that names the command. Nobody listens: it runs on.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import cv2
 
@@ -22,6 +23,7 @@ from rhot.files.config import RigConfig
 from rhot.process.service import Service
 from rhot.simulator_messages import SimFrame
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
+from services.simulator.computer_clocks import ComputerClocks
 from services.simulator.scene.scene import Scene, load_scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
@@ -77,10 +79,10 @@ async def serve(service: Service) -> None:
             await asyncio.get_running_loop().run_in_executor(threads, _compiled, scene, name)
             for name in names
         ]
-        clock = SceneClock()
+        clock, computers = SceneClock(), ComputerClocks(names)
         async with asyncio.TaskGroup() as tasks:
             for source in sources:
-                tasks.create_task(_run_camera(service, source, clock, threads))
+                tasks.create_task(_run_camera(service, source, clock, computers, threads))
             tasks.create_task(_publish_truth(service, scene, clock))
             if config.objects.source == "simulator":
                 tasks.create_task(_publish_tracker_poses(service, scene, clock, config))
@@ -95,12 +97,17 @@ def _compiled(scene: Scene, camera: str) -> FrameSource:
 
 
 async def _run_camera(
-    service: Service, source: FrameSource, clock: SceneClock, threads: ThreadPoolExecutor
+    service: Service,
+    source: FrameSource,
+    clock: SceneClock,
+    computers: ComputerClocks,
+    threads: ThreadPoolExecutor,
 ) -> None:
     """Render and publish the frames of one camera, for ever."""
     loop = asyncio.get_running_loop()
     name, timing = source.camera.name, source.clock
     publisher = service.bus.publisher(topics.SIM_FRAME, camera=name)
+    service.bus.answer_requests(topics.SIM_CLOCK, partial(computers.answer, name), camera=name)
     # From mid-exposure of row 0 to the picture in memory.
     readout_s = source.camera.size_px[1] * timing.row_time_ns * 1e-9
     delay_s = 0.5 * timing.exposure_s + readout_s + _PROCESSING_S
@@ -113,7 +120,7 @@ async def _run_camera(
             skipped = int(late_s / timing.period_s)
             values[f"{name}_skipped"] += skipped
             seq += skipped
-        began_s = clock.now_s()
+        began_s, ahead_ns = clock.now_s(), computers.ahead_ns(name)
         frame = await loop.run_in_executor(threads, source.take, seq, clock.start_ns())
         if frame.image is None:
             values[f"{name}_lost"] += 1
@@ -121,19 +128,20 @@ async def _run_camera(
             render_ms = 1e3 * (clock.now_s() - began_s)
             values[f"{name}_render_ms"] += _SMOOTHING * (render_ms - values[f"{name}_render_ms"])
             await asyncio.sleep(max(0.0, frame.time_s + delay_s - clock.now_s()))
-            publisher.put_bytes(frame.image.tobytes(), attachment=_header(frame))
+            header = _header(frame, ahead_ns)
+            publisher.put_bytes(frame.image.tobytes(), attachment=header)
         seq += 1
 
 
-def _header(frame: TakenFrame) -> SimFrame:
-    """What travels with a picture."""
+def _header(frame: TakenFrame, ahead_ns: int) -> SimFrame:
+    """What travels with a picture of a camera whose computer's clock was set that far ahead."""
     return SimFrame(
         camera=frame.camera,
         seq=frame.seq,
-        stamp_ns=frame.stamp_ns,
+        stamp_ns=max(0, frame.stamp_ns + ahead_ns),
         row_time_ns=frame.row_time_ns,
         size_px=frame.size_px,
-        clock_skew_ns=frame.skew_ns,
+        clock_skew_ns=frame.skew_ns + ahead_ns,
     )
 
 
