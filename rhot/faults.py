@@ -242,6 +242,26 @@ _RIG = (
         "a service has stopped telling its health",
         "its computer is overloaded or unreachable",
     ),
+    _error(
+        "config_broken",
+        "rig.toml is missing, or says something that cannot be",
+        "run `rhot check` on it: it lists every problem",
+    ),
+    _error(
+        "no_points",
+        "fusion gives no points of a hand, although cameras see markers",
+        "hold the hand into view of two cameras; see fusion's journal",
+    ),
+    _error(
+        "no_pose",
+        "the solver gives no pose of a hand, although fusion gives points",
+        "are the wrist and three fingers seen? If so, see the solver's journal",
+    ),
+    _error(
+        "pose_implausible",
+        "poses are nowhere near the cameras",
+        "calibrate the rig anew: `rhot calibrate stereo`",
+    ),
 )
 
 FAULTS: dict[str, FaultKind] = {kind.code: kind for kind in (*_CAMERA, *_FUSION, *_SERVICE, *_RIG)}

@@ -18,7 +18,6 @@ from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
 # What is named before it is built, and the issue that builds it.
 TO_COME = {
     "rhot calibrate objects": "#12 Objects: Vive trackers in the hand's own frame",
-    "rhot doctor": "#11 In the field",
     "rhot pki": "#11 In the field",
     "docs/guide/operations.md": "#11 In the field",
     "docs/guide/troubleshooting.md": "#11 In the field",

@@ -11,6 +11,7 @@ from rhot.process.service import rhot_version
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.check.check import check
+from services.cli.doctor.doctor import doctor
 from services.cli.evaluate.plot import plot
 from services.cli.evaluate.score import score
 from services.cli.init.init import init
@@ -34,6 +35,7 @@ COMMANDS = (
     up,
     router,
     top,
+    doctor,
     session,
     track,
     score,

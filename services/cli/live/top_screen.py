@@ -14,7 +14,7 @@ from rhot.plain_text import clipped
 from rhot.watch.rig_state import Ages, RigState, ServiceRow, StandingFault
 
 _HEADER = f"{'service':<18} {'state':<9} {'up':>6} {'cpu%':>5} {'MB':>4} {'Hz':>6} {'of':>4}"
-_HEADER += f" {'markers':>8} {'age ms':>7} {'lost':>5}"
+_HEADER += f" {'markers':>8} {'age ms':>7} {'lost':>4}"
 
 
 def screen(state: RigState, width: int, height: int | None) -> list[str]:
@@ -113,7 +113,7 @@ def _service(state: RigState, row: ServiceRow) -> str:
     return (
         f"{begin} {_duration(health.uptime_s):>6} {_figure(health.cpu_percent, 0):>5} "
         f"{_figure(health.rss_mb, 0):>4} {rate:>6} {of:>4} {_markers(state, row):>8} {age:>7} "
-        f"{_figure(lost, 0) if lost else '':>5}"
+        f"{_figure(lost, 0) if lost else '':>4}"
     )
 
 

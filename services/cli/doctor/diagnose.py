@@ -1,0 +1,150 @@
+"""Observations -> links, from rig.toml over the router to the pose. Pure.
+
+What services tell of themselves comes before what was only observed from outside: a camera that is
+dark also gives no markers, and only the first of these is the cause.
+"""
+
+from __future__ import annotations
+
+from rhot.files.config import RigConfig
+from rhot.health_messages import Fault
+from rhot.watch.onlooker_faults import about, host_of
+from rhot.watch.rig_state import MISSING, RigState, ServiceRow, StandingFault
+from services.cli.doctor.links import Link, broken, from_faults, holds
+from services.cli.doctor.observations import Observations
+from services.cli.doctor.way_of_markers import CAMERA_CODES, camera_links, hand_links, object_links
+
+# Codes of fusion's of the cameras together, and of objects.
+_OF_VIEWS = (
+    "camera_wrong_size",
+    "camera_moved",
+    "cameras_mirrored",
+    "camera_unknown",
+    "not_calibrated",
+)
+_OF_OBJECTS = ("object_unregistered", "device_unknown")
+# Judged by links of their own, before the cameras.
+_JUDGED = ("second_service", "second_clock", "session_stopped", "service_absent")
+_KNOWN = {*CAMERA_CODES, *_OF_VIEWS, *_OF_OBJECTS, *_JUDGED, "service_gone", "service_silent"}
+
+
+def diagnose(seen: Observations) -> list[Link]:
+    """Every link that could be judged, in order; after the file, the router: nothing without it."""
+    links = [_file(seen)]
+    if seen.config is None:
+        return links
+    if seen.secured:
+        links.append(_certificates(seen))
+    links.append(_router(seen))
+    if seen.state is None:
+        return links
+    config, state = seen.config, seen.state
+    faults = [one.fault for one in state.faults]
+    links += [_service(config, row, seen) for row in state.services if row.expected]
+    links += [_one_of_each(seen, faults), _clock_master(seen, faults), _session(seen)]
+    for camera in config.camera:
+        links += camera_links(seen, state, camera)
+    links += _views(faults)
+    for hand in config.hand:
+        links += hand_links(seen, hand)
+    links += object_links(seen, [f for f in faults if f.code in _OF_OBJECTS])
+    return links + _remaining(state)
+
+
+def _file(seen: Observations) -> Link:
+    if seen.config is None:
+        return broken("rig.toml", "config_broken", seen.config_problem)
+    cameras = " and ".join(camera.name for camera in seen.config.camera) or "no camera"
+    return holds("rig.toml", f"{seen.config_path}: rig {seen.config.rig.name!r}, {cameras}")
+
+
+def _certificates(seen: Observations) -> Link:
+    if seen.certificate_problem and not seen.connected:
+        return broken("certificates", "certificate_refused", seen.certificate_problem)
+    return holds("certificates", "this host's certificate and the router's fit together")
+
+
+def _router(seen: Observations) -> Link:
+    if seen.connected:
+        at = [one.endpoint for one in seen.reached if not one.problem]
+        return holds("router", f"answers at {at[0]}" if at else "answers")
+    text = "; ".join(f"{one.endpoint}: {one.problem}" for one in seen.reached)
+    if seen.routers_here:
+        where = ", ".join(seen.routers_here)
+        text += f". A router on this computer listens at {where}"
+        action = f'set `connect = ["{seen.routers_here[0]}"]` under [bus] in rig.toml'
+        return broken("router", "router_unreachable", text, action)
+    return broken("router", "router_unreachable", text or "no endpoint in [bus] connect")
+
+
+def _service(config: RigConfig, row: ServiceRow, seen: Observations) -> Link:
+    who = about(row.service, row.instance)
+    if row.state not in MISSING:
+        version = f", version {row.health.version}" if row.health else ""
+        return holds(row.name, f"{row.state} on {_where(config, row)}{version}")
+    if row.service in ("fusion", "solver") and row.state != "silent" and seen.calibration_problem:
+        text = f"{who} cannot start: {seen.calibration_problem}"
+        return broken(row.name, "not_calibrated", text)
+    found = [
+        one.fault
+        for one in (seen.state.faults if seen.state else [])
+        if one.fault.subject == row.name and one.fault.code.startswith("service_")
+    ]
+    return from_faults(row.name, found) or broken(row.name, "service_absent", f"{who}: {row.state}")
+
+
+def _where(config: RigConfig, row: ServiceRow) -> str:
+    told = getattr(row.health, "host", "")
+    return told or host_of(config, row.service, row.instance)
+
+
+def _one_of_each(seen: Observations, faults: list[Fault]) -> Link:
+    if seen.doubles:
+        name, places = next(iter(seen.doubles.items()))
+        text = f"{len(places)} services of the name {name} run: {' and '.join(places)}"
+        return broken("one of each", "second_service", text)
+    found = from_faults("one of each", [f for f in faults if f.code == "second_service"])
+    return found or holds("one of each", "no service runs twice")
+
+
+def _clock_master(seen: Observations, faults: list[Fault]) -> Link:
+    masters = seen.clock_masters
+    if len(masters) > 1:
+        text = f"{len(masters)} answer for the master's clock: {' and '.join(masters)}"
+        return broken("master clock", "second_clock", text)
+    if not masters:
+        return broken("master clock", "clock_unknown", "nobody answers for the master's clock")
+    found = from_faults("master clock", [f for f in faults if f.code == "second_clock"])
+    return found or holds("master clock", "one answers")
+
+
+def _session(seen: Observations) -> Link:
+    if seen.session_running is None:
+        text = "nobody answers for the session, which fusion keeps"
+        action = "see whether fusion runs: `systemctl status rhot-fusion` on the master"
+        return broken("session", "session_stopped", text, action)
+    if not seen.session_running:
+        text = "the session is stopped: no camera sends markers"
+        return broken("session", "session_stopped", text)
+    return holds("session", "running")
+
+
+def _views(faults: list[Fault]) -> list[Link]:
+    found = from_faults("cameras together", [f for f in faults if f.code in _OF_VIEWS])
+    return [found or holds("cameras together", "their views fit the calibration")]
+
+
+def _remaining(state: RigState) -> list[Link]:
+    """What no link above judges: disks, heat, whatever else services complain of."""
+    links = []
+    for teller in dict.fromkeys(one.teller for one in state.faults):
+        own = [f.fault for f in state.faults if f.teller == teller and not _is_judged(f)]
+        if own and (link := from_faults(teller or "rig", own)):
+            links.append(link)
+    return links
+
+
+def _is_judged(one: StandingFault) -> bool:
+    """Whether a link above speaks of it; a lost source may be a camera's or another service's."""
+    of_camera = one.teller.startswith("pi_tracker/") or one.fault.code != "source_lost"
+    return one.fault.code in _KNOWN and of_camera

@@ -1,0 +1,49 @@
+"""Everything `rhot doctor` looks at, one after the other, until something is in the way."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+from rhot.errors import BusError, CalibrationError, ConfigError
+from rhot.files.calibration import load_hand, load_rig_cameras
+from rhot.files.config import RigConfig, load_rig
+from services.cli.doctor.listen import listen
+from services.cli.doctor.local_routers import router_endpoints
+from services.cli.doctor.observations import Observations
+from services.cli.doctor.reach import reach
+from services.cli.router_session import router_session
+
+
+async def observe(path: Path, connect: str | None) -> Observations:
+    """Look at a rig; connect replaces the endpoints of rig.toml. Raises nothing."""
+    seen = Observations(config_path=str(path))
+    try:
+        config = seen.config = load_rig(path)
+    except ConfigError as error:
+        seen.config_problem = str(error)
+        return seen
+    endpoints = [connect] if connect else list(config.bus.connect)
+    seen.calibration_problem = _calibration_problem(config)
+    seen.reached = list(await asyncio.gather(*(reach(endpoint) for endpoint in endpoints)))
+    if all(one.problem for one in seen.reached):
+        seen.routers_here = await asyncio.to_thread(router_endpoints)
+        return seen
+    try:
+        async with router_session(config.rig.name, endpoints) as bus:
+            await listen(bus, config, seen)
+    except BusError:
+        for one in seen.reached:
+            one.problem = one.problem or "something listens there, but it is no Zenoh router"
+    return seen
+
+
+def _calibration_problem(config: RigConfig) -> str:
+    """Why fusion or solver would not start, judged by this computer's files."""
+    try:
+        load_rig_cameras(config)
+        for hand, table in config.hand.items():
+            load_hand(config.calibration_dir, hand, table.scale)
+    except CalibrationError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,145 @@
+"""The links from a camera's picture to a hand's pose. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rhot.files.config import RigConfig
+from rhot.files.rig_tables import CameraTable
+from rhot.health_messages import Fault
+from rhot.watch.rig_state import RigState
+from services.cli.doctor.links import Link, broken, from_faults, holds
+from services.cli.doctor.observations import CameraSeen, HandSeen, Observations
+
+_PICTURE = (
+    "camera_dark",
+    "camera_frozen",
+    "camera_saturated",
+    "camera_slow",
+    "camera_silent",
+    "camera_automatic",
+    "camera_processing",
+    "camera_unsynced",
+    "source_lost",
+)
+_CLOCK = ("clock_unknown", "camera_clock_off")
+_COLORS = ("colors_missing", "color_drifted")
+CAMERA_CODES = {*_PICTURE, *_CLOCK, *_COLORS, "marker_not_seen"}
+# As in rhot/bus/stats.py: one frame lost in five is where a user should look.
+_SLOW = 0.8
+# A colour in fewer than one of twenty pictures is not seen, whatever is found here and there.
+_SEEN = 0.05
+# A stream of a few messages in several seconds is none.
+_MIN_MESSAGES = 3
+
+
+def camera_links(seen: Observations, state: RigState, camera: CameraTable) -> list[Link]:
+    """Picture, clock, colours and markers of one camera."""
+    faults = _of_camera(state, camera.name)
+    frames = seen.cameras.get(camera.name, CameraSeen())
+    colors = seen.config.colors if seen.config is not None else []
+    name = camera.name
+    return [
+        from_faults(f"camera {name}", [f for f in faults if f.code in _PICTURE])
+        or _frames(seen, camera, frames),
+        from_faults(f"clock of {name}", [f for f in faults if f.code in _CLOCK])
+        or _clock(name, frames),
+        from_faults(f"colors of {name}", [f for f in faults if f.code in _COLORS])
+        or holds(f"colors of {name}", "every colour has a range"),
+        _markers(name, frames, colors, [f for f in faults if f.code == "marker_not_seen"]),
+    ]
+
+
+def _of_camera(state: RigState, camera: str) -> list[Fault]:
+    """What its tracker says, and what others say of it."""
+    return [
+        one.fault
+        for one in state.faults
+        if one.teller == f"pi_tracker/{camera}"
+        or one.fault.subject == camera
+        or (one.fault.code == "marker_not_seen" and f" {camera} " in f" {one.fault.text} ")
+    ]
+
+
+def _frames(seen: Observations, camera: CameraTable, frames: CameraSeen) -> Link:
+    name = f"camera {camera.name}"
+    rate_hz = frames.frames / seen.listened_s if seen.listened_s > 0.0 else 0.0
+    if not frames.frames:
+        text = f"no markers of camera {camera.name!r} arrive, not even empty ones"
+        return broken(name, "camera_silent", text, subject=camera.name)
+    if rate_hz < _SLOW * camera.fps:
+        text = f"{rate_hz:.1f} pictures a second of {camera.fps:g}"
+        return broken(name, "camera_slow", text, subject=camera.name)
+    return holds(name, f"{rate_hz:.1f} pictures a second of {camera.fps:g}")
+
+
+def _clock(camera: str, frames: CameraSeen) -> Link:
+    name = f"clock of {camera}"
+    if frames.frames and not frames.clock_known:
+        text = f"the clock of camera {camera!r} is not compared with the master's yet"
+        return broken(name, "clock_unknown", text)
+    return holds(name, "compared with the master's" if frames.frames else "nothing to judge by")
+
+
+def _markers(camera: str, frames: CameraSeen, colors: Sequence[str], told: Sequence[Fault]) -> Link:
+    name = f"markers of {camera}"
+    if found := from_faults(name, told):
+        return found
+    if not frames.frames:
+        return holds(name, "nothing to judge by")
+    least = max(1.0, _SEEN * frames.frames)
+    missing = [color for color in colors if frames.colors.get(color, 0) < least]
+    if not missing:
+        return holds(name, f"all {len(colors)} colours are seen")
+    if len(missing) == len(colors):
+        text = f"camera {camera!r} sees no marker at all"
+        action = "hold the hand into view of every camera, in the light it was calibrated in"
+        return broken(name, "marker_not_seen", text, action)
+    text = f"camera {camera!r} sees {len(colors) - len(missing)} of {len(colors)} colours"
+    text += f", not {', '.join(missing)}"
+    action = f"if they are in view and lit: `rhot calibrate colors {camera}`"
+    return broken(name, "marker_not_seen", text, action)
+
+
+def hand_links(seen: Observations, hand: str) -> list[Link]:
+    """Points and poses of one hand."""
+    found = seen.hands.get(hand, HandSeen())
+    return [_points(hand, found), _poses(hand, found)]
+
+
+def _points(hand: str, found: HandSeen) -> Link:
+    name = f"points of {hand} hand"
+    if found.points < _MIN_MESSAGES:
+        return broken(name, "no_points", "fusion publishes no points at all")
+    if found.measured < _SEEN * found.points:
+        return broken(name, "no_points", "no marker is seen by two cameras at once")
+    return holds(name, f"{found.measured} of {found.points} messages with a measured point")
+
+
+def _poses(hand: str, found: HandSeen) -> Link:
+    name = f"pose of {hand} hand"
+    if found.poses < _MIN_MESSAGES:
+        return broken(name, "no_pose", "the solver publishes no pose")
+    if found.implausible:
+        text = f"{found.implausible} of {found.poses} poses are nowhere near the cameras"
+        return broken(name, "pose_implausible", text)
+    return holds(name, f"{found.poses} poses")
+
+
+def object_links(seen: Observations, told: Sequence[Fault]) -> list[Link]:
+    """Every object of rig.toml."""
+    config: RigConfig | None = seen.config
+    links = []
+    for table in config.object if config is not None else []:
+        name = f"object {table.name}"
+        own = [fault for fault in told if fault.subject in (table.name, table.serial)]
+        found = seen.objects.get(table.name)
+        if link := from_faults(name, own):
+            links.append(link)
+        elif found is None or not found.poses:
+            text = f"no pose of {table.serial} arrives"
+            action = "switch the tracker on, and see the object tracker's journal"
+            links.append(broken(name, "source_lost", text, action))
+        else:
+            links.append(holds(name, f"{found.poses} poses, {found.tracking}"))
+    return links
