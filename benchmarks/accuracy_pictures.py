@@ -16,7 +16,7 @@ from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Fusion
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName, landmark_point
-from rhot.messages import HandPoints
+from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import Scene, build_scene
@@ -28,6 +28,7 @@ RENDERED_SEEDS = (1, 2, 3, 4)
 # Tracks have started and clock offsets are estimated by then.
 WARM_S = 1.0
 Truth = Callable[[float], dict[str, Array]]
+Detector = Callable[[RigConfig, Scene, float], list[MarkerFrame]]
 
 
 class Score:
@@ -112,11 +113,12 @@ class Pictures:
         travel_m: tuple[float, float, float],
         seconds: float,
         seeds: tuple[int, ...] = RENDERED_SEEDS,
+        detector: Detector = detect,
     ) -> None:
         self._config = config
         self.distance_m = distance_m
         self._scenes = [make_scene(config, motion, distance_m, travel_m, seed) for seed in seeds]
-        self._given = [detect(config, scene, seconds) for scene in self._scenes]
+        self._given = [detector(config, scene, seconds) for scene in self._scenes]
         self._hands: dict[HandName, Any] = {
             hand: load_hand(config.calibration_dir, hand, table.scale)
             for hand, table in config.hand.items()

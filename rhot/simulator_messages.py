@@ -50,6 +50,8 @@ class Truth(Message, frozen=True, kw_only=True):
 class SimFrame(Message, frozen=True, kw_only=True):
     """The attachment of a simulated camera's image (I420 bytes): what a driver tells, and how far
     its computer's clock is ahead now.
+
+    full_range: Y in 0..255 instead of 16..235.
     """
 
     camera: Name
@@ -58,6 +60,7 @@ class SimFrame(Message, frozen=True, kw_only=True):
     row_time_ns: NonNegative
     size_px: tuple[int, int]
     clock_skew_ns: Offset
+    full_range: bool = False
 
 
 # Whoever tries what a wrong clock does needs seconds, a missing time zone hours; more is a mistake.

@@ -87,23 +87,33 @@ def noisy(image: Image, sigma: float, seed: int) -> Image:
     return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
 
 
-def i420(bgr: Image) -> Image:
+def i420(bgr: Image, full_range: bool = False) -> Image:
     """YUV420 as a camera makes it, the chroma of 2x2 pixels averaged.
 
-    (h, w, 3) -> (h * 3 / 2, w).
+    (h, w, 3) -> (h * 3 / 2, w). full_range: Y in 0..255 instead of 16..235.
     """
     height, width = bgr.shape[:2]
-    yuv = bgr.astype(np.float32) @ _YUV_FROM_BGR.T + np.array([16, 128, 128], np.float32)
+    yuv = bgr.astype(np.float32) @ _YUV_FROM_BGR.T
+    if full_range:
+        yuv *= np.array([255 / 219, 255 / 224, 255 / 224], np.float32)
+    yuv += np.array([0 if full_range else 16, 128, 128], np.float32)
     chroma = cv2.resize(yuv[..., 1:], (width // 2, height // 2), interpolation=cv2.INTER_AREA)
     planes = np.concatenate([yuv[..., 0].ravel(), chroma[..., 0].ravel(), chroma[..., 1].ravel()])
     return np.clip(np.rint(planes), 0, 255).astype(np.uint8).reshape(height * 3 // 2, width)
 
 
-def frame_of(bgr: Image, seq: int = 0, layout: Layout = "i420", fps: float = 30.0) -> Frame:
+def frame_of(
+    bgr: Image,
+    seq: int = 0,
+    layout: Layout = "i420",
+    fps: float = 30.0,
+    full_range: bool = False,
+) -> Frame:
     """A frame of a BGR image, number `seq` of a camera called "left"."""
-    image = i420(bgr) if layout == "i420" else bgr
+    image = i420(bgr, full_range) if layout == "i420" else bgr
     stamp_ns = 1_700_000_000_000_000_000 + round(seq * 1e9 / fps)
-    return Frame("left", seq, stamp_ns, 30_000.0, (bgr.shape[1], bgr.shape[0]), image, layout)
+    size_px = (bgr.shape[1], bgr.shape[0])
+    return Frame("left", seq, stamp_ns, 30_000.0, size_px, image, layout, full_range)
 
 
 def ranges() -> Colors:

@@ -171,6 +171,13 @@ class Simulator(Table, frozen=True, kw_only=True):
     seed: Annotated[int, msgspec.Meta(ge=0)] = 1
     # Of the motion, against the hand's own.
     speed: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 1.0
+    # What a Pi's camera does to its pictures by default and rhot switches off, to see what it
+    # costs: sharpening (libcamera's Sharpness; a Pi's default is 1) and denoising (share of the
+    # denoised picture; a Pi's tuning files say 0.75).
+    sharpen: Annotated[float, msgspec.Meta(ge=0.0, le=16.0)] = 0.0
+    denoise: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    # Live pictures with Y in 0..255 instead of 16..235.
+    full_range: bool = False
 
 
 class Viewer(Table, frozen=True, kw_only=True):

@@ -142,6 +142,7 @@ def _header(frame: TakenFrame, ahead_ns: int) -> SimFrame:
         row_time_ns=frame.row_time_ns,
         size_px=frame.size_px,
         clock_skew_ns=frame.skew_ns + ahead_ns,
+        full_range=frame.full_range,
     )
 
 

@@ -18,7 +18,7 @@ from services.pi_tracker.colors.propose import Proposal
 from services.pi_tracker.colors.report import Report
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.frame import Frame, Image
-from services.pi_tracker.image.yuv_planes import picture
+from services.pi_tracker.image.yuv_planes import bgr_image, picture
 
 # Of boxes and names, BGR.
 _RED = (0, 0, 255)
@@ -83,11 +83,7 @@ def overlay(training: TrainingSet, frames: Sequence[Frame], colors: Colors) -> I
         image = picture(frame)
         luma, chroma = image.cells((0, 0, *image.size))
         labels = table.classify(luma, chroma)
-        bgr = (
-            frame.image.copy()
-            if frame.layout == "bgr"
-            else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
-        )
+        bgr = bgr_image(frame).copy()
         size = (bgr.shape[1], bgr.shape[0])
         taken = cv2.resize((labels > 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
         bgr[taken > 0] = 255

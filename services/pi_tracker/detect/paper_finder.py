@@ -17,6 +17,7 @@ from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect.hsv_range import hsv_mask
 from services.pi_tracker.image.frame import Frame, Image
+from services.pi_tracker.image.yuv_planes import bgr_image
 
 # Standard deviation of a binary contour's centroid, a 9 px tip at sigma 5: .22 px of disparity
 # between two views.
@@ -36,11 +37,7 @@ class PaperFinder:
 
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image, at most one per colour."""
-        bgr = (
-            frame.image
-            if frame.layout == "bgr"
-            else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
-        )
+        bgr = bgr_image(frame)
         markers = []
         for name in self._ranges:
             marker = self._marker(bgr, name)

@@ -12,7 +12,8 @@ import cv2
 
 from rhot import topics
 from rhot.bus.bus import Bus
-from services.pi_tracker.image.frame import Frame, Image
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.yuv_planes import bgr_image
 
 # Previews are for people: 5 a second look alive and cost 2 % of a Pi's core each.
 _PREVIEW_PERIOD_NS = 200_000_000
@@ -22,21 +23,18 @@ _JPEG_QUALITY = 80
 _PNG_LEVEL = 1
 
 
-def bgr(frame: Frame) -> Image:
-    """The frame as BGR (h, w, 3)."""
-    return (
-        frame.image if frame.layout == "bgr" else cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
-    )
-
-
 def jpeg(frame: Frame) -> bytes:
     """The frame as JPEG."""
-    return cv2.imencode(".jpg", bgr(frame), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", bgr_image(frame), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[
+        1
+    ].tobytes()
 
 
 def png(frame: Frame) -> bytes:
     """The frame as PNG, lossless in BGR."""
-    return cv2.imencode(".png", bgr(frame), [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[1].tobytes()
+    return cv2.imencode(".png", bgr_image(frame), [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[
+        1
+    ].tobytes()
 
 
 class Preview:

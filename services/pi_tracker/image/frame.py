@@ -22,7 +22,8 @@ class Frame:
 
     stamp_ns is mid-exposure of row 0 on the camera's own clock, row_time_ns the time from one image
     row to the next. image is (height * 3 / 2, width) for "i420" (planes Y, U, V without padding;
-    BT.601, Y in 16..235) and (height, width, 3) for "bgr"; size_px is (width, height).
+    BT.601) and (height, width, 3) for "bgr"; size_px is (width, height). full_range: Y of "i420" is
+    in 0..255 instead of 16..235, and chroma as much wider about 128.
     """
 
     camera: str
@@ -32,3 +33,4 @@ class Frame:
     size_px: tuple[int, int]
     image: Image
     layout: Layout
+    full_range: bool = False

@@ -30,8 +30,8 @@ from rhot.geometry.transforms import Array
 from rhot.messages import Marker
 from services.pi_tracker.image.frame import Frame, Image
 
-# Black of limited-range luma, and no colour.
-_BLACK, _NEUTRAL = 16, 128
+# Black of limited-range luma, of full-range luma, and no colour.
+_BLACK, _FULL_BLACK, _NEUTRAL = 16, 0, 128
 Maps = tuple[Image, Image]
 
 
@@ -58,8 +58,9 @@ class Rectifier:
             return replace(frame, image=_resampled(frame.image, self._pixel_maps, 0))
         width, height = frame.size_px
         chroma = frame.image[height:].reshape(2, height // 2, width // 2)
+        black = _FULL_BLACK if frame.full_range else _BLACK
         planes = [
-            _resampled(frame.image[:height], self._pixel_maps, _BLACK),
+            _resampled(frame.image[:height], self._pixel_maps, black),
             *(_resampled(plane, self._cell_maps, _NEUTRAL) for plane in chroma),
         ]
         packed = np.concatenate([plane.ravel() for plane in planes])

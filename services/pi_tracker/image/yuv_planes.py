@@ -1,9 +1,11 @@
 """Any frame as luma and chroma: the one form in which colours are classified and blobs measured.
 
 Chroma is always that of 2x2 pixels, as a camera's YUV420 stream carries it. A BGR image is averaged
-2x2 first, never sampled (one pixel's chroma costs .87 px of centroid, the average .41). Only the
-part asked for is converted. An odd last row or column is left out. Cells are 2x2 pixels: cell (i,
-j) covers pixels 2i..2i+1, 2j..2j+1, so its centre lies at pixel 2i + 0.5.
+2x2 first, never sampled (one pixel's chroma costs .87 px of centroid, the average .41). Luma in
+0..255 (full range) is scaled to 16..235, and chroma with it: one table of colours, one scale of
+noise and one threshold hold for both. Only the part asked for is converted. An odd last row or
+column is left out. Cells are 2x2 pixels: cell (i, j) covers pixels 2i..2i+1, 2j..2j+1, so its
+centre lies at pixel 2i + 0.5.
 
 An image that does not have the shape its frame claims raises SourceError.
 """
@@ -28,6 +30,11 @@ _U_FROM_BGR = (0.439216, -0.290993, -0.148223)
 _V_FROM_BGR = (-0.071427, -0.367788, 0.439216)
 _LUMA = np.array([[*_Y_FROM_BGR, 16.0]])
 _CHROMA = np.array([[*_U_FROM_BGR, 128.0], [*_V_FROM_BGR, 128.0]])
+
+# Full range to limited range: 256 levels to 219 of luma about 16, and to 224 of chroma about 128.
+_LEVELS = np.arange(256.0)
+_LIMITED_LUMA = np.round(16.0 + _LEVELS * (219.0 / 255.0)).astype(np.uint8)
+_LIMITED_CHROMA = np.round(128.0 + (_LEVELS - 128.0) * (224.0 / 255.0)).astype(np.uint8)
 
 
 class Picture(Protocol):
@@ -73,6 +80,25 @@ class _PlanarPicture:
         chroma[:, :h, :w] = self._chroma[:, y0:y1, x0:x1]
 
 
+class _FullRangePicture:
+    """I420 with luma in 0..255, scaled to limited range where it is asked for."""
+
+    def __init__(self, planes: _PlanarPicture) -> None:
+        self.size = planes.size
+        self._planes = planes
+
+    def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
+        luma, chroma = self._planes.cells(rect, step)
+        return cv2.LUT(luma, _LIMITED_LUMA), cv2.LUT(chroma, _LIMITED_CHROMA)
+
+    def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
+        self._planes.copy_to(rect, luma, chroma)
+        x0, y0, x1, y1 = rect
+        w, h = x1 - x0, y1 - y0
+        luma[: 2 * h, : 2 * w] = cv2.LUT(luma[: 2 * h, : 2 * w], _LIMITED_LUMA)
+        chroma[:, :h, :w] = _LIMITED_CHROMA[chroma[:, :h, :w]]
+
+
 class _BgrPicture:
     """BGR, converted where it is asked for."""
 
@@ -106,7 +132,21 @@ def picture(frame: Frame) -> Picture:
         return _BgrPicture(image, width, height)
     if width % 2 or height % 2:
         raise SourceError(f"camera {frame.camera!r}: I420 needs even sizes, got {width}x{height}")
-    return _PlanarPicture(np.ascontiguousarray(image), width, height)
+    planes = _PlanarPicture(np.ascontiguousarray(image), width, height)
+    return _FullRangePicture(planes) if frame.full_range else planes
+
+
+def bgr_image(frame: Frame) -> Image:
+    """The frame as BGR (h, w, 3), for people and for what works in RGB."""
+    if frame.layout == "bgr":
+        return frame.image
+    if not frame.full_range:
+        return cv2.cvtColor(frame.image, cv2.COLOR_YUV2BGR_I420)
+    # OpenCV has no I420 of full range, but YCrCb is.
+    width, height = frame.size_px
+    chroma = frame.image[height:].reshape(2, height // 2, width // 2)
+    u, v = (cv2.resize(plane, (width, height), interpolation=cv2.INTER_NEAREST) for plane in chroma)
+    return cv2.cvtColor(cv2.merge((frame.image[:height], v, u)), cv2.COLOR_YCrCb2BGR)
 
 
 def _pixels(plane: Image, rect: Rect) -> Image:

@@ -1,5 +1,9 @@
 """A Raspberry Pi camera through picamera2: YUV420 frames at a fixed exposure.
 
+Pictures are neither sharpened nor denoised (picamera2's defaults are both), and what the camera
+reports is compared with that: one that does otherwise says which. YUV420 comes in limited range, as
+asked for, or in full range where the camera says so.
+
 FrameWallClock, on CLOCK_REALTIME, is the instant at which row 0 starts to be read out, the end of
 its exposure; half the exposure before it is the stamp. SensorTimestamp counts from boot and is
 never used. Without an exposure calibration the camera's auto modes stay on and the notes say so. A
@@ -25,8 +29,13 @@ from services.pi_tracker.sources.controls import UNCALIBRATED, Controls
 from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.picamera_settings import (
     AUTOMATIC,
+    ControlCheck,
     best_sensor_mode,
     fixed_exposure,
+    is_bt601,
+    is_full_range,
+    other_exposure,
+    plain_picture,
     reported_exposure,
     sync_control,
     unpadded,
@@ -40,6 +49,8 @@ _SILENCE_S = 2.0
 # The server tells its clients the common instant some seconds ahead; who has not heard of one by
 # then hears no server.
 _SYNC_S = 15.0
+# New values hold after three or four frames; what differs for this long is not on its way.
+_SETTLE_S = 2.0
 # A client moves its frames by stretching and shortening them: a sensor at its fastest cannot.
 _MAX_SYNC_RATE = 0.97
 
@@ -60,7 +71,11 @@ class PiCamera:
         self._size = table.size_px
         self._row_time_ns = 0.0
         self._seq = 0
+        self._full_range = False
         self._sync_done = table.sync == "off"
+        self._check = ControlCheck({}, table.fps)
+        # Frames in a row with another exposure than was fixed.
+        self._strays = 0
 
     def open(self) -> None:
         module = _picamera2()
@@ -75,6 +90,9 @@ class PiCamera:
             self._camera = module.Picamera2(self._number)
             self._configure()
             self._camera.start()
+            # Once more: what is set at the start is in no frame's metadata, what goes with a
+            # request is in that frame's.
+            self._camera.set_controls(self._check.wanted)
         except RuntimeError as error:
             raise self._error(f"cannot be started: {error}; does another program use it?") from None
 
@@ -103,16 +121,34 @@ class PiCamera:
             width, height = self._size
             text = f"delivers {width}x{height} instead of {self._table.size_px}"
             self.notes.report("camera_processing", text, "size")
+        self._take_colour_space()
         line_us = _LINE_US.get(str(self._camera.camera_properties.get("Model", "")), 0.0)
         self._row_time_ns = line_us * 1000.0 * (mode["size"][1] / self._size[1] if mode else 1.0)
         if not line_us:
             text = "the sensor's readout time is unknown; rows count as taken at once"
             self.notes.report("camera_readout_unknown", text)
 
+    def _take_colour_space(self) -> None:
+        """What the pictures' numbers mean, as libcamera has set it."""
+        # picamera2's own configuration() knows three colour spaces by their primaries, and says
+        # "limited" of one that libcamera has changed to full range.
+        space = self._camera.libcamera_config.at(0).color_space
+        self._full_range = is_full_range(space)
+        if not is_bt601(space):
+            text = f"delivers colours of {space} instead of BT.601"
+            self.notes.report("camera_processing", text, "colours")
+
     def _initial_controls(self) -> dict[str, Any]:
         frame_us = round(1e6 / self._table.fps)
         controls: dict[str, Any] = {"FrameDurationLimits": (frame_us, frame_us)}
         controls |= sync_control(self._table)
+        plain = plain_picture()
+        known = {name: plain[name] for name in plain if name in self._camera.camera_controls}
+        self._check = ControlCheck(known, self._table.fps)
+        if unknown := ", ".join(plain.keys() - known.keys()):
+            text = f"has no control {unknown}: it may process its picture"
+            self.notes.report("camera_processing", text, "controls")
+        controls |= known
         if self._exposure is None:
             self.notes.report("camera_automatic", UNCALIBRATED)
             return controls
@@ -121,6 +157,7 @@ class PiCamera:
     def read(self) -> Frame:
         request = self.controls.take()
         if request is not None:
+            self._exposure, self._strays = request.exposure, 0
             self._camera.set_controls(
                 AUTOMATIC if request.exposure is None else fixed_exposure(request.exposure)
             )
@@ -137,6 +174,7 @@ class PiCamera:
             completed.release()
         self.controls.reported = reported_exposure(metadata)
         self._check_sync(metadata)
+        self._check_picture(metadata)
         frame = Frame(
             self._table.name,
             self._seq,
@@ -145,6 +183,7 @@ class PiCamera:
             self._size,
             image,
             "i420",
+            self._full_range,
         )
         self._seq += 1
         return frame
@@ -162,6 +201,23 @@ class PiCamera:
                 f"sync = {self._table.sync!r}, but not in step with any other after {_SYNC_S:g} s; "
                 "is there one camera with the other role, at the same fps, in the same network?",
             )
+
+    def _check_picture(self, metadata: dict[str, Any]) -> None:
+        """Say what the camera does otherwise than asked: processing, exposure."""
+        if not self._check.done:
+            self._check.update(metadata)
+            if self._check.problem:
+                text = f"its picture is not left as it is: {self._check.problem}"
+                self.notes.report("camera_processing", text)
+        reported = self.controls.reported
+        if self._exposure is None or reported is None:
+            return
+        problem = other_exposure(self._exposure, reported)
+        if not problem and self._strays:
+            self.notes.clear("camera_automatic")
+        self._strays = self._strays + 1 if problem else 0
+        if self._strays == round(_SETTLE_S * self._table.fps):
+            self.notes.report("camera_automatic", f"does not hold its exposure: {problem}")
 
     def _stamp_ns(self, metadata: dict[str, Any]) -> int:
         wall_ns = metadata.get("FrameWallClock")

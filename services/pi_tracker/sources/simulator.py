@@ -75,4 +75,5 @@ class SimulatorSource:
             header.size_px,
             image,
             "i420",
+            header.full_range,
         )

@@ -27,6 +27,8 @@ class FrameTime:
 class TakenFrame:
     """One frame; image is I420 (h * 3 / 2, w) uint8, None if the frame was lost.
 
+    full_range: Y in 0..255 instead of 16..235.
+
     stamp_ns is mid-exposure of row 0 on the camera computer's clock, which reads skew_ns more than
     the master's at that instant.
     """
@@ -39,6 +41,7 @@ class TakenFrame:
     row_time_ns: float
     size_px: tuple[int, int]
     image: Bytes | None
+    full_range: bool = False
 
     @property
     def dropped(self) -> bool:
@@ -50,13 +53,14 @@ class FrameSource:
 
     recorded=False: stamps have the full clock error of CameraClock (live; the tracker measures it
     against the master). recorded=True: stamps have the residual error only (captures: offline there
-    is no master to ask).
+    is no master to ask), and pictures have limited range, which captures hold.
     """
 
     def __init__(self, scene: Scene, camera: str, *, recorded: bool = False) -> None:
         self.clock = scene.clocks[camera]
         self.camera = scene.cameras[camera]
-        self.renderer = Renderer(scene, camera)
+        full_range = scene.config.simulator.full_range and not recorded
+        self.renderer = Renderer(scene, camera, full_range=full_range)
         self._recorded = recorded
 
     def frame_time(self, seq: int) -> FrameTime:
@@ -78,6 +82,7 @@ class FrameSource:
             row_time_ns=self.clock.row_time_ns,
             size_px=self.camera.size_px,
             image=None if frame.dropped else self.renderer.picture(seq),
+            full_range=self.renderer.full_range,
         )
 
     def skew_ns(self, time_s: float) -> int:

@@ -1,7 +1,8 @@
 """From linear light to the planes of a YUV420 picture: lens blur, gamma, averaged chroma. Compiled
 kernels. Pure.
 
-YUV is BT.601 with limited range, what cv2.COLOR_YUV2BGR_I420 undoes. A camera averages the chroma
+YUV is BT.601 with limited range, what cv2.COLOR_YUV2BGR_I420 undoes; `full_range` makes the other
+one of it. A camera averages the chroma
 of each 2x2 pixels; OpenCV's own BGR2YUV_I420 takes one of the four, which moves edges by half a
 pixel.
 """
@@ -21,6 +22,8 @@ from services.simulator.scene.bodies import Ints
 # The sRGB curve as a table over the square root of light: nearly a line, so 1024 steps are exact to
 # 0.05 grey levels.
 _STEPS = 1024
+# Levels of full-range luma over those of limited range (chroma: 255 / 224).
+FULL_OVER_LIMITED = 255.0 / 219.0
 
 
 class Planes(NamedTuple):
@@ -40,6 +43,13 @@ def empty_planes(width: int, height: int) -> Planes:
 def copy_planes(planes: Planes) -> Planes:
     """A copy."""
     return Planes(planes.luma.copy(), planes.chroma.copy())
+
+
+def full_range(planes: Planes) -> Planes:
+    """The same picture with Y in 0..255 instead of 16..235, chroma about 128 as much wider."""
+    luma = (planes.luma - np.float32(16.0)) * np.float32(FULL_OVER_LIMITED)
+    chroma = (planes.chroma - np.float32(128.0)) * np.float32(255.0 / 224.0) + np.float32(128.0)
+    return Planes(luma, chroma)
 
 
 def copy_part(source: Planes, target: Planes, rows: slice, columns: slice) -> None:

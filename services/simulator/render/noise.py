@@ -40,6 +40,10 @@ class NoiseDraw(NamedTuple):
     sign: float  # +1 or -1
     strength: float  # grey levels a unit of the bank
 
+    def scaled(self, factor: float) -> NoiseDraw:
+        """The same noise, stronger."""
+        return self._replace(strength=self.strength * factor)
+
 
 def noise_bank(height: int, width: int, seed: int) -> NoiseBank:
     """White noise on a Bayer mosaic, interpolated bilinearly as cameras do.

@@ -24,6 +24,7 @@ from services.simulator.render.buffers import (
     dab_paths,
     frame_buffers,
 )
+from services.simulator.render.camera_processing import processed
 from services.simulator.render.edges import flag_edges, widen_columns
 from services.simulator.render.materials import surfaces_in_light
 from services.simulator.render.motion_paths import (
@@ -56,7 +57,9 @@ class Renderer:
     shapes is every body of the scene; clock says when each frame is exposed.
     """
 
-    def __init__(self, scene: Scene, camera: str) -> None:
+    def __init__(self, scene: Scene, camera: str, *, full_range: bool = False) -> None:
+        """full_range: pictures have Y in 0..255 instead of 16..235."""
+        self.full_range = full_range
         self.scene = scene
         self.camera: Camera = scene.cameras[camera]
         self.clock = scene.clocks[camera]
@@ -114,7 +117,9 @@ class Renderer:
     def picture(self, frame: int) -> Bytes:
         """Frame number `frame` as I420 (h * 3 / 2, w), with everything a camera adds."""
         self._draw(self.clock.time_s(frame))
-        return self._finish(draw_noise(self._seed, frame, self.scene.spec.noise))
+        noise = self.scene.spec.noise
+        image = self._finish(draw_noise(self._seed, frame, noise))
+        return processed(image, noise, self.scene.config.simulator)
 
     def clean(self, time_s: float) -> Bytes:
         """The picture whose row 0 is exposed about time_s, without noise; I420."""
@@ -142,7 +147,10 @@ class Renderer:
     def _finish(self, draw: NoiseDraw) -> Bytes:
         width, height = self.camera.size_px
         out = np.empty((height * 3 // 2, width), np.uint8)
-        add_noise(self._planes, self._noise_bank, draw, out)
+        planes = self._planes
+        if self.full_range:
+            planes, draw = develop.full_range(planes), draw.scaled(develop.FULL_OVER_LIMITED)
+        add_noise(planes, self._noise_bank, draw, out)
         return out
 
     def _draw(self, time_s: float) -> None:

@@ -56,6 +56,30 @@ def test_markers_are_where_the_paint_is(moving, colors, layout, method, toleranc
             assert marker.quality > 0.5
 
 
+@pytest.mark.parametrize("noise_levels", [2.0, 5.0])
+def test_both_ranges_of_a_pi_give_the_same_markers(studio, tip, colors, noise_levels):
+    """The same scene with the same noise, as YUV420 in limited and in full range."""
+    steps = {wide: tracker(colors) for wide in (False, True)}
+    differences_px = []
+    for seq in range(40):
+        x = 60.3 + 1.7 * seq
+        tips = [tip("green", x, 60.0), tip("blue", x + 30, 50.0), tip("magenta", x + 55, 75.0)]
+        clean, truth = studio.clean(tips, size_px=SIZE)
+        bgr = studio.bgr(clean, noise_levels, seq)
+        limited, full = (
+            {m.color: m for m in step.step(studio.of(bgr, seq, full_range=wide)).markers}
+            for wide, step in steps.items()
+        )
+        assert set(limited) == set(full) == set(truth)
+        for name, marker in limited.items():
+            other = full[name]
+            assert other.sigma_px == pytest.approx(marker.sigma_px, rel=0.15)
+            differences_px += [marker.x_px - other.x_px, marker.y_px - other.y_px]
+    # Half of that is measured; single markers differ by up to 0.08 px, where rounding decides
+    # whether a cell at the rim belongs to a blob.
+    assert np.sqrt(np.mean(np.square(differences_px))) <= 0.02
+
+
 @pytest.mark.parametrize("method", ["lut", "paper"])
 def test_a_frame_without_markers_is_a_message_too(studio, colors, method):
     frame, _ = studio.frame([], 3, size_px=SIZE)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from rhot.errors import SourceError
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.image.yuv_planes import picture
+from services.pi_tracker.image.yuv_planes import bgr_image, picture
 
 
 def frame_of(image, size_px, layout):
@@ -32,6 +33,34 @@ def test_bgr_and_i420_agree(studio, tip):
         assert not luma[:, 40:].any()
     assert np.abs(buffers[0][0].astype(int) - buffers[1][0]).max() <= 1
     assert np.abs(buffers[0][1].astype(int) - buffers[1][1]).max() <= 1
+
+
+def test_full_range_means_the_same_as_limited_range(studio, tip):
+    """Black, white and every paint; to one level, the rounding of both."""
+    clean, _ = studio.clean([tip("blue", 30.0, 32.0), tip("magenta", 50.0, 20.0)])
+    clean[:8, :8], clean[:8, 8:16] = 0.0, 255.0
+    bgr = studio.bgr(clean, 0.0, 1)
+    limited, full = (studio.of(bgr, full_range=wide) for wide in (False, True))
+    assert (full.image[:8, :8].max(), full.image[:8, 8:16].min()) == (0, 255)
+    rect = (0, 0, 32, 32)
+    for a, b in zip(picture(limited).cells(rect), picture(full).cells(rect), strict=True):
+        assert np.abs(a.astype(int) - b.astype(int)).max() <= 1
+    copies = []
+    for frame in (limited, full):
+        luma, chroma = np.zeros((70, 70), np.uint8), np.zeros((2, 35, 35), np.uint8)
+        picture(frame).copy_to(rect, luma, chroma)
+        assert not luma[64:].any()
+        assert not chroma[:, 32:].any()
+        copies.append((luma.astype(int), chroma.astype(int)))
+    assert np.abs(copies[0][0] - copies[1][0]).max() <= 1
+    assert np.abs(copies[0][1] - copies[1][1]).max() <= 1
+    # What people see: chroma has a quarter of the pixels, so compare what both ranges show.
+    difference = bgr_image(limited).astype(int) - bgr_image(full).astype(int)
+    assert np.abs(difference).max() <= 4
+    assert abs(difference.mean()) < 0.3
+    hsv = [cv2.cvtColor(bgr_image(frame), cv2.COLOR_BGR2HSV) for frame in (limited, full)]
+    assert tuple(hsv[1][2, 12]) == (0, 0, 255)
+    assert abs(int(hsv[0][32, 30, 0]) - int(hsv[1][32, 30, 0])) <= 1
 
 
 def test_chroma_is_averaged_not_sampled():

@@ -5,6 +5,7 @@ What picamera2 and cv2.VideoCapture do, and what they check.
 
 from __future__ import annotations
 
+import enum
 import sys
 import time
 import types
@@ -16,14 +17,63 @@ import numpy as np
 import pytest
 
 
+# libcamera's names as its Python bindings have them. Its enums are numbers for int() only.
+class Range(enum.Enum):
+    Full = 0
+    Limited = 1
+
+
+class YcbcrEncoding(enum.Enum):
+    Null = 0
+    Rec601 = 1
+    Rec709 = 2
+    Rec2020 = 3
+
+
+class NoiseReductionModeEnum(enum.Enum):
+    Off = 0
+    Fast = 1
+    HighQuality = 2
+
+    def __int__(self):
+        return self.value
+
+
+class ColorSpace:
+    """libcamera.ColorSpace as far as it is used."""
+
+    Range = Range
+    YcbcrEncoding = YcbcrEncoding
+
+    def __init__(self, name, encoding, span):
+        self.name, self.ycbcrEncoding, self.range = name, encoding, span
+
+    def __str__(self):
+        return f"<libcamera.ColorSpace '{self.name}'>"
+
+    @staticmethod
+    def Smpte170m():  # noqa: N802 - libcamera's name
+        return ColorSpace("SMPTE170M", YcbcrEncoding.Rec601, Range.Limited)
+
+    @staticmethod
+    def Sycc():  # noqa: N802 - libcamera's name
+        return ColorSpace("sYCC", YcbcrEncoding.Rec601, Range.Full)
+
+    @staticmethod
+    def Rec709():  # noqa: N802 - libcamera's name
+        return ColorSpace("Rec709", YcbcrEncoding.Rec709, Range.Limited)
+
+
 class FakeRequest:
     """picamera2's CompletedRequest: a flat buffer with padded rows, metadata by name.
 
     To be released once.
     """
 
-    def __init__(self, camera):
+    def __init__(self, camera, carried):
         self._camera = camera
+        # The controls that were set since the request before, which libcamera reports with this.
+        self._carried = carried
         self.released = 0
 
     def make_buffer(self, name):
@@ -38,7 +88,11 @@ class FakeRequest:
         return np.concatenate([luma.ravel(), chroma.ravel(), np.zeros(64, np.uint8)])
 
     def get_metadata(self):
-        return dict(self._camera.metadata)
+        reported = {
+            name: value if isinstance(value, (bool, float, tuple)) else int(value)
+            for name, value in self._carried.items()
+        }
+        return {**reported, **self._camera.metadata}
 
     def release(self):
         self.released += 1
@@ -68,6 +122,23 @@ class FakePicamera2:
     made: ClassVar[list[FakePicamera2]] = []
     cameras: ClassVar = [{"Model": "ov5647", "Num": 0}]
     padding = 0
+    # What libcamera makes of the colour space it is asked for; None leaves it.
+    colour_space = None
+    # (least, most, default) of what can be set, by name.
+    known: ClassVar = {
+        "AeEnable": (False, True, True),
+        "AwbEnable": (False, True, None),
+        "ExposureTime": (1, 66_666, 20_000),
+        "AnalogueGain": (1.0, 16.0, 1.0),
+        "ColourGains": (0.0, 32.0, None),
+        "FrameDurationLimits": (33_333, 120_000, 33_333),
+        "NoiseReductionMode": (0, 4, 0),
+        "Sharpness": (0.0, 16.0, 1.0),
+        "Brightness": (-1.0, 1.0, 0.0),
+        "Contrast": (0.0, 32.0, 1.0),
+        "Saturation": (0.0, 32.0, 1.0),
+        "SyncMode": (0, 2, 0),
+    }
 
     @staticmethod
     def global_camera_info():
@@ -82,10 +153,15 @@ class FakePicamera2:
             "ColourGains": (1.7, 1.4),
         }
         self.set = []
+        self._carried = {}
         self.started = self.closed = self.silent = False
         self.requests = []
         self._config = None
         FakePicamera2.made.append(self)
+
+    @property
+    def camera_controls(self):
+        return FakePicamera2.known
 
     @property
     def sensor_modes(self):
@@ -111,13 +187,18 @@ class FakePicamera2:
             "main": dict(main),
             "colour_space": colour_space,
             "buffer_count": buffer_count,
-            "controls": controls,
+            "controls": (
+                {"NoiseReductionMode": NoiseReductionModeEnum.Fast} | controls
+                if "NoiseReductionMode" in FakePicamera2.known
+                else controls
+            ),
             "queue": queue,
             "sensor": sensor,
         }
 
     def configure(self, config):
         assert not self.started
+        self._advertised(config["controls"])
         width, _ = config["main"]["size"]
         self._config = {
             **config,
@@ -127,6 +208,18 @@ class FakePicamera2:
     def camera_configuration(self):
         return self._config
 
+    @property
+    def libcamera_config(self):
+        space = FakePicamera2.colour_space or self._config["colour_space"]
+        stream = types.SimpleNamespace(color_space=space)
+        return types.SimpleNamespace(at=lambda index: (stream,)[index])
+
+    @staticmethod
+    def _advertised(controls):
+        for name in controls:
+            if name not in FakePicamera2.known:
+                raise RuntimeError(f"Control {name} is not advertised by libcamera")
+
     def start(self):
         if self._config is None:
             raise RuntimeError("Camera not configured")
@@ -134,11 +227,14 @@ class FakePicamera2:
 
     def set_controls(self, controls):
         assert self.started
+        self._advertised(controls)
         self.set.append(controls)
+        self._carried |= controls
 
     def capture_request(self, wait=None):
         assert wait is False
-        self.requests.append(FakeRequest(self))
+        self.requests.append(FakeRequest(self, self._carried))
+        self._carried = {}
         return FakeJob(None if self.silent else self.requests[-1])
 
     def close(self):
@@ -150,9 +246,13 @@ def picamera2(monkeypatch):
     """The stand-in where the package would be."""
     FakePicamera2.made = []
     monkeypatch.setattr(FakePicamera2, "padding", 0)
+    monkeypatch.setattr(FakePicamera2, "colour_space", None)
     monkeypatch.setitem(sys.modules, "picamera2", types.SimpleNamespace(Picamera2=FakePicamera2))
-    space = types.SimpleNamespace(Smpte170m=lambda: "smpte170m")
-    monkeypatch.setitem(sys.modules, "libcamera", types.SimpleNamespace(ColorSpace=space))
+    draft = types.SimpleNamespace(NoiseReductionModeEnum=NoiseReductionModeEnum)
+    libcamera = types.SimpleNamespace(
+        ColorSpace=ColorSpace, controls=types.SimpleNamespace(draft=draft)
+    )
+    monkeypatch.setitem(sys.modules, "libcamera", libcamera)
     return FakePicamera2
 
 
