@@ -2,7 +2,7 @@
 other: `python benchmarks/picture.py [--seconds N] [--seeds N] [--json FILE]`.
 
 The same pictures as they come from the sensor, and as a Pi's image processor would deliver them by
-default (services/simulator/render/camera_processing.py, a model that was not compared with a Pi):
+default (services.simulator.camera.processing.py, a model that was not compared with a Pi):
     plain        what rhot asks of a Pi's camera
     sharpened    libcamera's Sharpness 1, its default
     denoised     0.75, as the tuning files have it
@@ -36,7 +36,7 @@ from rhot.messages import MarkerFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
-from services.simulator.render.camera_processing import processed
+from services.simulator.camera.processing import processed
 from services.simulator.scene.scene import Scene
 from testing import synthetic_images
 from testing.synthetic_points import START_NS

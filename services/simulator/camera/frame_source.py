@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from services.simulator.camera.processing import processed
 from services.simulator.render.renderer import Bytes, Renderer
 from services.simulator.scene.scene import Scene
 
@@ -62,6 +63,7 @@ class FrameSource:
         full_range = scene.config.simulator.full_range and not recorded
         self.renderer = Renderer(scene, camera, full_range=full_range)
         self._recorded = recorded
+        self._noise, self._settings = scene.spec.noise, scene.config.simulator
 
     def frame_time(self, seq: int) -> FrameTime:
         """When frame `seq` is exposed, and whether it is lost."""
@@ -81,10 +83,13 @@ class FrameSource:
             skew_ns=skew_ns,
             row_time_ns=self.clock.row_time_ns,
             size_px=self.camera.size_px,
-            image=None if frame.dropped else self.renderer.picture(seq),
+            image=None if frame.dropped else self._picture(seq),
             full_range=self.renderer.full_range,
         )
 
     def skew_ns(self, time_s: float) -> int:
         """How far the stamping clock is ahead of the master's."""
         return self.clock.residual_at_ns(time_s) if self._recorded else self.clock.skew_ns(time_s)
+
+    def _picture(self, seq: int) -> Bytes:
+        return processed(self.renderer.picture(seq), self._noise, self._settings)

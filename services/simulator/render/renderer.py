@@ -24,7 +24,6 @@ from services.simulator.render.buffers import (
     dab_paths,
     frame_buffers,
 )
-from services.simulator.render.camera_processing import processed
 from services.simulator.render.edges import flag_edges, widen_columns
 from services.simulator.render.materials import surfaces_in_light
 from services.simulator.render.motion_paths import (
@@ -117,9 +116,7 @@ class Renderer:
     def picture(self, frame: int) -> Bytes:
         """Frame number `frame` as I420 (h * 3 / 2, w), with everything a camera adds."""
         self._draw(self.clock.time_s(frame))
-        noise = self.scene.spec.noise
-        image = self._finish(draw_noise(self._seed, frame, noise))
-        return processed(image, noise, self.scene.config.simulator)
+        return self._finish(draw_noise(self._seed, frame, self.scene.spec.noise))
 
     def clean(self, time_s: float) -> Bytes:
         """The picture whose row 0 is exposed about time_s, without noise; I420."""

@@ -9,7 +9,7 @@ import pytest
 
 from rhot.files.rig_tables import Simulator
 from services.simulator.camera.frame_source import FrameSource
-from services.simulator.render.camera_processing import processed
+from services.simulator.camera.processing import processed
 from services.simulator.render.renderer import Renderer
 from services.simulator.scene.scene import load_scene
 
@@ -75,10 +75,10 @@ def test_denoising_smooths_noise_and_keeps_edges(edge):
 def test_the_simulator_processes_as_rig_toml_says(config, fist, renderer):
     settings = msgspec.structs.replace(config.simulator, sharpen=1.0, denoise=0.75)
     changed = msgspec.structs.replace(config, simulator=settings)
-    pictures = Renderer(load_scene(changed, "fist", seed=1), "left")
+    source = FrameSource(load_scene(changed, "fist", seed=1), "left")
     plain = renderer.picture(5)
     expected = processed(plain, fist.spec.noise, settings)
-    assert np.array_equal(pictures.picture(5), expected)
+    assert np.array_equal(source.take(5).image, expected)
     assert np.mean(expected != plain) > 0.2
 
 
