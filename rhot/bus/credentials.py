@@ -64,7 +64,9 @@ def with_certificates(endpoints: Iterable[str], folder: Path | None, side: Side)
         )
     options = _options(Credentials.of(folder), side)
     return [
-        f"{endpoint}#{options}" if endpoint.startswith(_SECURED) and "#" not in endpoint else endpoint
+        f"{endpoint}#{options}"
+        if endpoint.startswith(_SECURED) and "#" not in endpoint
+        else endpoint
         for endpoint in endpoints
     ]
 

@@ -135,7 +135,10 @@ def _router_problem(address: str, files: Credentials) -> str | None:
             f"({_reason(error)}): it believes in another authority, or its clock is wrong; "
             f"`rhot pki list` shows which it should have, then {_BRING}"
         )
-    except (OSError, ValueError):  # nobody there, no such host, no such port: no certificate's fault
+    except (
+        OSError,
+        ValueError,
+    ):  # nobody there, no such host, no such port: no certificate's fault
         return None
     return None
 
@@ -164,7 +167,9 @@ def _untrusted(error: ssl.SSLCertVerificationError, host: str, files: Credential
                 f"its certificate does not hold for the name {host}; connect by a name that "
                 f"`rhot pki list` shows, or `rhot pki renew --host {host}` for the master"
             )
-    return f"its certificate is not of the authority in {files.ca} ({error.verify_message}); {_BRING}"
+    return (
+        f"its certificate is not of the authority in {files.ca} ({error.verify_message}); {_BRING}"
+    )
 
 
 def _check_readable(path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rhot.bus.roles import MASTER, ROLES, Role
+from rhot.bus.roles import MASTER, ROLES
 from rhot.errors import BusError
 from rhot.files.config import load_rig
 from services.cli.options import menu
