@@ -18,8 +18,8 @@ from typing import TypeVar
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.credentials import with_certificates
 from rhot.bus.liveliness import AliveWatch
+from rhot.bus.security.credentials import with_certificates
 from rhot.bus.subscription import Subscription
 from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
@@ -138,8 +138,8 @@ async def connect(
     asyncio.timeout, to give up).
 
     rig is the name in [rig] of rig.toml; "*" listens to every rig of that router. certificates is
-    the folder of this host's ca.pem, own.pem and own.key, for an endpoint like tls/master.local:7448;
-    raises BusError if they are the reason that there is no session.
+    the folder of this host's ca.pem, own.pem and own.key, for an endpoint like
+    tls/master.local:7448; raises BusError if they are the reason that there is no session.
     """
     folder = None if certificates is None else Path(certificates)
     endpoints = with_certificates([endpoint], folder, "connect")

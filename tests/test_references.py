@@ -18,7 +18,6 @@ from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
 # What is named before it is built, and the issue that builds it.
 TO_COME = {
     "rhot calibrate objects": "#12 Objects: Vive trackers in the hand's own frame",
-    "rhot pki": "#11 In the field",
     "docs/guide/operations.md": "#11 In the field",
     "docs/guide/troubleshooting.md": "#11 In the field",
 }
@@ -34,7 +33,7 @@ FENCED = re.compile(r"^```[a-z]*\n(.*?)^```|((?:^    .*\n)+)", re.MULTILINE | re
 ENTRY_POINT = re.compile(r"\brhot-[a-z][a-z-]*\b")
 FILE = re.compile(
     r"(?<![\w./<-])((?:rhot|services|tests|testing|benchmarks|docs|config|deploy)/"
-    r"(?:[A-Za-z0-9_.<>*{}-]+/)*(?:[A-Za-z0-9_-]+\.(?:py|md|toml|json|sh)|(?=[\s`),.;]|$)))"
+    r"(?:[A-Za-z0-9_.<>*{}-]+/)*(?:[A-Za-z0-9_-]+\.(?:py|md|toml|json5?|sh)|(?=[\s`),.;]|$)))"
 )
 
 

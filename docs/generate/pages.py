@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from docs.generate import command, figures, messages, rig_toml, topics
+from docs.generate import command, figures, messages, rig_toml, routers, topics
 
 ROOT = Path(__file__).parents[2]
 REFERENCE = ROOT / "docs" / "reference"
@@ -14,6 +14,8 @@ GENERATED: dict[Path, Callable[[], str]] = {
     REFERENCE / "messages.md": messages.page,
     REFERENCE / "command.md": command.page,
     REFERENCE / "rig-toml.md": rig_toml.page,
+    ROOT / "deploy" / "zenoh" / "loopback.json5": routers.loopback,
+    ROOT / "deploy" / "zenoh" / "lan.json5": routers.lan,
 }
 
 

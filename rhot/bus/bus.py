@@ -25,7 +25,6 @@ import msgspec
 import zenoh
 
 from rhot import topics
-from rhot.bus.credentials import plain
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
@@ -37,9 +36,10 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
+from rhot.bus.security.credentials import plain
+from rhot.bus.security.tls_diagnosis import certificate_problem
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
-from rhot.bus.tls_diagnosis import certificate_problem
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.errors import BusError
 from rhot.messages import ClockEcho

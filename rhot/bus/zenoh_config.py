@@ -10,18 +10,31 @@ from typing import Any
 import msgspec
 import zenoh
 
+from rhot.bus.security.access_control import access_control
+from rhot.bus.security.credentials import with_certificates
+from rhot.bus.security.limits import limits
 from rhot.errors import BusError
+from rhot.files.config import RigConfig
 
 # Of shared memory for what goes to processes of the same machine: room for eight pictures of 640 x
 # 480. Zenoh's own 16 MB, one pool in the sender and its image in each receiver, brought a tracker
 # that gets simulated pictures to 137 MB.
 _POOL_BYTES = 4 << 20
+# Back within half a second of the other side's return.
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
-def _transport() -> dict[str, Any]:
+def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
     # A cut cable is noticed after 1.5 s instead of 9 s; QoS keeps pictures from delaying poses.
+    link: dict[str, Any] = {
+        "tx": {"lease": 2000, "keep_alive": 4},
+        # A host whose certificate has ended is a stranger at once, not from its next start.
+        "tls": {"close_link_on_expiration": True},
+    }
+    if max_message_bytes is not None:
+        link["rx"] = {"max_message_size": max_message_bytes}
     return {
-        "link": {"tx": {"lease": 2000, "keep_alive": 4}},
+        "link": link,
         "unicast": {"qos": {"enabled": True}},
         "shared_memory": {"transport_optimization": {"pool_size": _POOL_BYTES}},
     }
@@ -35,11 +48,7 @@ def client_config(connect: Sequence[str]) -> zenoh.Config:
             "connect": {
                 "endpoints": list(connect),
                 "timeout_ms": 0,
-                "retry": {
-                    "period_init_ms": 100,
-                    "period_max_ms": 500,
-                    "period_increase_factor": 1.5,
-                },
+                "retry": _RETRY,
             },
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
             "transport": _transport(),
@@ -47,17 +56,31 @@ def client_config(connect: Sequence[str]) -> zenoh.Config:
     )
 
 
-def router_config(listen: Sequence[str]) -> zenoh.Config:
-    """A router listening at `listen`, inspectable at `@/*/router`."""
-    return _config(
-        {
-            "mode": "router",
-            "listen": {"endpoints": list(listen)},
-            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-            "transport": _transport(),
-            "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
-        }
-    )
+def router_config(listen: Sequence[str], rig: RigConfig | None = None) -> zenoh.Config:
+    """A router listening at `listen`, inspectable at `@/*/router` from this machine.
+
+    With a rig it lets through what fits that rig, and joins the routers that its rig.toml names.
+    """
+    return _config(router_settings(listen, rig))
+
+
+def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict[str, Any]:
+    """What router_config is made of, for Zenoh's own router to read from a file."""
+    bounds = limits(rig)
+    settings = {
+        "mode": "router",
+        "listen": {"endpoints": list(listen)},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": _transport(bounds.pop("max_message_size")),
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
+        **bounds,
+    }
+    if rig is not None and rig.bus.access == "certificates":
+        settings["access_control"] = access_control(rig)
+    if rig is not None and rig.bus.routers:
+        endpoints = with_certificates(rig.bus.routers, rig.certificates_dir, "connect")
+        settings["connect"] = {"endpoints": endpoints, "timeout_ms": -1, "retry": _RETRY}
+    return settings
 
 
 def _config(values: dict[str, Any]) -> zenoh.Config:

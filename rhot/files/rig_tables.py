@@ -35,6 +35,9 @@ class Bus(Table, frozen=True, kw_only=True):
     # Folder of this host's ca.pem, own.pem and own.key (`rhot pki`), relative to rig.toml: for the
     # endpoints that begin with tls/.
     certificates: str = "pki"
+    # "certificates": beyond this machine each host may do what the role in its certificate says,
+    # and who has none nothing; "open": everybody who reaches the router may do anything.
+    access: Literal["certificates", "open"] = "certificates"
     # Names of certificates that may look on.
     viewers: tuple[Name, ...] = ()
     # Names of certificates that may send what SteamVR sees.

@@ -23,11 +23,12 @@ import msgspec
 import uvloop
 
 from rhot.bus.bus import open_bus
-from rhot.bus.credentials import client_endpoints
+from rhot.bus.security.credentials import client_endpoints
 from rhot.errors import RhotError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
 from rhot.process.calibration_watch import CalibrationChangedError
+from rhot.process.certificate_watch import watch_certificate
 from rhot.process.extras import missing_extra
 from rhot.process.service import Service, rhot_version
 
@@ -136,7 +137,8 @@ async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> No
             asyncio.TaskGroup() as tasks,
         ):
             service = Service(name, instance, config, bus, tasks)
-            companions = [tasks.create_task(service.beat()), tasks.create_task(_watchdog())]
+            company = (service.beat(), watch_certificate(service), _watchdog())
+            companions = [tasks.create_task(one) for one in company]
             await serve(service)
             # A source that ended (a file, a replay) ends its service; what keeps it company goes
             # too.

@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.credentials import client_endpoints, plain, with_certificates
+from rhot.bus.security.credentials import client_endpoints, plain, with_certificates
 from rhot.errors import BusError
 from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
@@ -23,9 +23,14 @@ _TIMEOUT_S = 3.0
 def rig_and_endpoints(config: Path | None, connect: str | None) -> tuple[RigConfig, list[str]]:
     """The rig of a rig.toml (default: the simulated one) and where its router is."""
     rig = load_rig(config or sim_toml())
+    return rig, endpoints_of(rig, connect)
+
+
+def endpoints_of(rig: RigConfig, connect: str | None) -> list[str]:
+    """Where a rig's router is, or the given endpoint, with this host's certificates."""
     if connect:
-        return rig, with_certificates([connect], rig.certificates_dir, "connect")
-    return rig, client_endpoints(rig)
+        return with_certificates([connect], rig.certificates_dir, "connect")
+    return client_endpoints(rig)
 
 
 @contextlib.asynccontextmanager

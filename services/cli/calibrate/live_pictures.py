@@ -21,7 +21,7 @@ from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig
-from services.cli.router_session import router_session
+from services.cli.router_session import endpoints_of, router_session
 from services.cli.terminal import Terminal
 from services.pi_tracker.image.frame import Frame
 
@@ -55,7 +55,7 @@ class LiveCameras:
     @property
     def endpoints(self) -> list[str]:
         """Where the router is."""
-        return [self.connect] if self.connect else list(self.rig.bus.connect)
+        return endpoints_of(self.rig, self.connect)
 
 
 async def next_frames(bus: Bus, camera: str, count: int) -> list[Frame]:

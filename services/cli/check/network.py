@@ -26,13 +26,20 @@ def check_bus(config: RigConfig, path: Path) -> list[Problem]:
             if not _is_endpoint(endpoint)
         ]
     for endpoint in config.bus.listen:
-        if _is_open(endpoint):
+        if _is_open(endpoint) and config.bus.access == "open":
             text = (
                 f"[bus] listen: {endpoint!r} is open to its network without protection: anybody "
                 "there can read and publish; use a network of your own, or tls/ with certificates "
-                "(deploy/)"
+                "(docs/guide/security.md)"
             )
             problems.append(warning(path, text))
+        elif _is_open(endpoint):
+            text = (
+                f"[bus] listen: {endpoint!r} has no certificates, so that nobody beyond this "
+                "machine may do anything there; listen at tls/0.0.0.0:7448 (docs/guide/security.md)"
+                ' or, in a network of your own, set [bus] access = "open"'
+            )
+            problems.append(error(path, text))
     remote = sorted({camera.host for camera in config.camera if camera.host})
     if remote and all(_is_loopback(endpoint.partition("/")[2]) for endpoint in config.bus.listen):
         text = (

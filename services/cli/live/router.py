@@ -7,17 +7,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 import uvloop
 import zenoh
 
-from rhot.bus.bus import router_config
+from rhot.bus.security.credentials import credentials_in, is_secured, plain, with_certificates
+from rhot.bus.security.tls_diagnosis import own_problem
+from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError
-from rhot.files.config import load_rig
+from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 
@@ -25,16 +29,23 @@ _LOOPBACK = "tcp/127.0.0.1:7447"
 
 
 @contextlib.asynccontextmanager
-async def running_router(listen: Sequence[str]) -> AsyncIterator[None]:
-    """A router for as long as the block lasts.
+async def running_router(
+    listen: Sequence[str], rig: RigConfig | None = None
+) -> AsyncIterator[None]:
+    """A router for as long as the block lasts, with the rules of a rig's rig.toml.
 
-    Raises BusError if an endpoint cannot be listened at.
+    Raises BusError if an endpoint cannot be listened at, or this host's certificate is no good.
     """
+    for endpoint in filter(is_secured, listen):
+        files = credentials_in(endpoint)
+        problem = own_problem(files, time.time()) if files else None
+        if problem:
+            raise BusError(f"no router can listen at {plain(endpoint)}: {problem}")
     try:
-        session = await asyncio.to_thread(zenoh.open, router_config(listen))
+        session = await asyncio.to_thread(zenoh.open, router_config(listen, rig))
     except zenoh.ZError as error:
         raise BusError(
-            f"no router can listen at {', '.join(listen)}: {error}. "
+            f"no router can listen at {', '.join(map(plain, listen))}: {error}. "
             "Is one running there already? Choose another port with --listen tcp/127.0.0.1:PORT"
         ) from None
     try:
@@ -44,20 +55,39 @@ async def running_router(listen: Sequence[str]) -> AsyncIterator[None]:
 
 
 def router(
-    config: Annotated[Path | None, typer.Option(help="rig.toml whose [bus] listen counts")] = None,
-    listen: Annotated[
-        list[str] | None, typer.Option(help="endpoint, e.g. tcp/0.0.0.0:7447 for the whole network")
+    config: Annotated[
+        Path | None, typer.Option(help="rig.toml: where to listen, and who may do what")
     ] = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(help="endpoint, e.g. tls/0.0.0.0:7448, instead of rig.toml's"),
+    ] = None,
+    show: Annotated[
+        bool, typer.Option("--print", help="print the configuration, for a zenohd, and end")
+    ] = False,
 ) -> None:
     """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
-    endpoints = listen or (list(load_rig(config).bus.listen) if config else [_LOOPBACK])
-    uvloop.run(_route(endpoints))
+    rig = load_rig(config) if config else None
+    endpoints = listen or (list(rig.bus.listen) if rig else [_LOOPBACK])
+    if rig is not None:
+        endpoints = with_certificates(endpoints, rig.certificates_dir, "listen")
+    if show:
+        typer.echo(router_json5(endpoints, rig))
+        return
+    uvloop.run(_route(endpoints, rig))
 
 
-async def _route(endpoints: list[str]) -> None:
+def router_json5(listen: Sequence[str], rig: RigConfig | None) -> str:
+    """The router's configuration as a stock zenohd reads it."""
+    settings = msgspec.json.encode(router_settings(listen, rig))
+    about = "// Written by `rhot router --print`: change rig.toml and print it again."
+    return f"{about}\n{msgspec.json.format(settings, indent=2).decode()}"
+
+
+async def _route(endpoints: list[str], rig: RigConfig | None) -> None:
     stopping = stop_on_signals()
     with cancelled_by(stopping):
-        async with running_router(endpoints):
-            typer.echo(f"router listening at {', '.join(endpoints)}")
+        async with running_router(endpoints, rig):
+            typer.echo(f"router listening at {', '.join(map(plain, endpoints))}")
             systemd.notify("READY=1")
             await asyncio.Event().wait()

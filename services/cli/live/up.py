@@ -31,8 +31,8 @@ def children_of(
     endpoint replaces the endpoints of rig.toml.
     """
     common = ["--config", str(path), *(option for e in endpoint for option in ("--connect", e))]
-    listen = [option for e in (endpoint or config.bus.listen) for option in ("--listen", e)]
-    children = [Child("router", service_argv("cli", "router", *listen))]
+    listen = [option for e in endpoint for option in ("--listen", e)]
+    children = [Child("router", service_argv("cli", "router", "--config", str(path), *listen))]
     local = [camera for camera in config.camera if not camera.host]
     if any(camera.source == "simulator" for camera in local):
         children.append(Child("simulator", service_argv("simulator", *common)))

@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from rhot.bus.roles import Identity, Role, common_name, identity
+from rhot.bus.security.roles import Identity, Role, common_name, identity
 from rhot.errors import BusError
 
 # The authority outlives the hardware of a rig: to replace it means to visit every host.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from cryptography import x509
 
-from rhot.bus.credentials import CA, CERTIFICATE, KEY
+from rhot.bus.security.credentials import CA, CERTIFICATE, KEY
 from rhot.errors import BusError
 from services.cli.pki.certificates import Issued, read_issued
 

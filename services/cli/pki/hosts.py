@@ -6,8 +6,8 @@ import ipaddress
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rhot.bus.credentials import is_secured, plain
-from rhot.bus.roles import MASTER, Role, certificate_names
+from rhot.bus.security.credentials import is_secured, plain
+from rhot.bus.security.roles import MASTER, Role, certificate_names
 from rhot.files.config import RigConfig
 
 
@@ -42,7 +42,7 @@ def master_hosts(this_host: str, more_hosts: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_local(hosts: Sequence[str]) -> tuple[str, ...]:
-    """The hosts, and each bare name also as NAME.local, as the network's own name service has it."""
+    """The hosts, and each bare name also as NAME.local, as it is called without a name server."""
     found: list[str] = []
     for host in hosts:
         found.append(host)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rhot.bus.roles import MASTER, ROLES
+from rhot.bus.security.roles import MASTER, ROLES
 from rhot.errors import BusError
 from rhot.files.config import load_rig
 from services.cli.options import menu
@@ -40,7 +40,7 @@ HostOption = Annotated[
 pki = menu("pki", "Certificates for a rig on a network.")
 
 
-@pki.command()
+@pki.command(name="init")
 def init(config: ConfigOption, folder: FolderOption = None, host: HostOption = None) -> None:
     """Make an authority, and certificates for the master and every host that rig.toml names.
 
@@ -93,7 +93,7 @@ def issue_one(
         )
 
 
-@pki.command()
+@pki.command(name="renew")
 def renew(
     names: Annotated[list[str] | None, typer.Argument(help="whose; default: everybody's")] = None,
     new_keys: Annotated[
@@ -103,7 +103,7 @@ def renew(
     config: ConfigOption = Path("rig.toml"),
     folder: FolderOption = None,
 ) -> None:
-    """Make certificates last longer, for the keys that the hosts have. --host goes to the master."""
+    """Make certificates last longer, for the keys that hosts have. --host goes to the master."""
     where = _where(folder, config)
     authority = where.authority()
     everybody = [name for name, _ in where.certificates()][1:]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.credentials import client_endpoints
+from rhot.bus.security.credentials import client_endpoints
 from rhot.files.config import RigConfig
 from services.cli.rig.readiness import Missing, Readiness
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rhot.bus.credentials import Credentials, credentials_in, is_secured, plain
+from rhot.bus.security.credentials import Credentials, credentials_in, is_secured, plain
 from rhot.errors import BusError
 
 # A router on the same network answers within milliseconds.

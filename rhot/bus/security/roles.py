@@ -1,6 +1,6 @@
 """Who somebody is on a secured bus: the common name of a certificate, `<rig>.<role>.<name>`.
 
-`rhot pki` writes it, the router's access control (rhot/bus/access_control.py) knows it. Pure.
+`rhot pki` writes it, the router's access control (access_control.py beside this) knows it. Pure.
 """
 
 from __future__ import annotations
@@ -49,7 +49,10 @@ def common_name(rig: str, role: Role, name: str) -> str:
 def identity(text: str) -> Identity | None:
     """What a common name says, or None if it is not one of ours."""
     match = _COMMON_NAME.match(text)
-    return Identity(match["rig"], match["role"], match["name"]) if match else None  # type: ignore[arg-type]
+    if match is None:
+        return None
+    role = next(role for role in ROLES if role == match["role"])
+    return Identity(match["rig"], role, match["name"])
 
 
 def certificate_names(config: RigConfig) -> dict[Role, list[str]]:

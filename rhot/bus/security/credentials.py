@@ -3,7 +3,7 @@
 `[bus] certificates` of rig.toml is a folder with `ca.pem` (whom to believe), `own.pem` and
 `own.key` (who this host is). Zenoh takes them as options of an endpoint, after a `#`; an endpoint
 that has options of its own is left as it is. Pure: whether the files are any good is looked at in
-rhot/bus/tls_diagnosis.py.
+rhot/bus/security/tls_diagnosis.py.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from rhot.files.config import RigConfig
 Side = Literal["connect", "listen"]
 
 CA, CERTIFICATE, KEY = "ca.pem", "own.pem", "own.key"
-_SECURED = ("tls/", "quic/")
+# Zenoh's protocols that take certificates.
+SECURED = ("tls", "quic")
 # What separates an endpoint's options cannot stand in a file's name.
 _SEPARATORS = "#;=|?"
 
@@ -64,9 +65,7 @@ def with_certificates(endpoints: Iterable[str], folder: Path | None, side: Side)
         )
     options = _options(Credentials.of(folder), side)
     return [
-        f"{endpoint}#{options}"
-        if endpoint.startswith(_SECURED) and "#" not in endpoint
-        else endpoint
+        f"{endpoint}#{options}" if is_secured(endpoint) and "#" not in endpoint else endpoint
         for endpoint in endpoints
     ]
 
@@ -83,7 +82,7 @@ def _options(files: Credentials, side: Side) -> str:
 
 def is_secured(endpoint: str) -> bool:
     """Whether an endpoint speaks TLS."""
-    return endpoint.startswith(_SECURED)
+    return endpoint.partition("/")[0] in SECURED
 
 
 def plain(endpoint: str) -> str:

@@ -1,0 +1,1 @@
+"""A bus beyond one machine: certificates, who may do what, and how much at most."""

@@ -1,0 +1,100 @@
+"""What a router lets through at most: sizes by topic, rates by stream. Pure.
+
+Against a publisher gone mad; nothing that a rig sends comes near (docs/guide/security.md has the
+measurements). The sizes are those that receivers reject anyway (Topic.max_bytes), enforced before a
+message is copied to each of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rhot import topics
+from rhot.bus.security.credentials import SECURED
+from rhot.files.config import RigConfig
+from rhot.topics import Kind, Rate, Topic
+
+# A PNG of noise is a little larger than its pixels, which are three bytes each.
+_BYTES_PER_PIXEL = 3.2
+# A message's key, attachment and framing.
+_OVERHEAD_BYTES = 65_536
+# Only on links from other machines: a recording is replayed on this one as fast as somebody likes.
+# Zenoh lets a message pass if the last one is at least 1/rate old, so that the rate must exceed
+# what two frames that waited for the same stalled link leave between them, not only the camera's.
+# 5 kHz, 0.2 ms: twenty times the fastest camera.
+_STREAM_HZ = 5_000.0
+# Settings, session and health change by hand, or once a second.
+_SLOW_HZ = 200.0
+
+
+def limits(config: RigConfig | None) -> dict[str, Any]:
+    """Zenoh's filters and bounds for a rig's router; without a rig, those of the largest camera."""
+    largest = max(_largest_message(topic, config) for topic in topics.TOPICS)
+    return {
+        "low_pass_filter": _sizes(config),
+        "downsampling": [] if config is None else _rates(config),
+        "max_message_size": largest + _OVERHEAD_BYTES,
+    }
+
+
+def _largest_message(topic: Topic, config: RigConfig | None) -> int:
+    """Bytes of the largest message of a topic: of pictures, that of the rig's largest camera."""
+    if topic.message is not None or config is None or not config.camera:
+        return topic.max_bytes
+    pixels = max(width * height for width, height in (c.size_px for c in config.camera))
+    return min(topic.max_bytes, round(pixels * _BYTES_PER_PIXEL) + _OVERHEAD_BYTES)
+
+
+def _sizes(config: RigConfig | None) -> list[dict[str, Any]]:
+    by_size: dict[int, list[str]] = {}
+    for topic in topics.TOPICS:
+        if topic.kind is not Kind.TOKEN:
+            by_size.setdefault(_largest_message(topic, config), []).append(topic.key("*"))
+    return [
+        {
+            "id": f"at-most-{size}-bytes",
+            "flows": ["ingress"],
+            "messages": ["put", "query", "reply"],
+            "size_limit": size,
+            "key_exprs": keys,
+        }
+        for size, keys in sorted(by_size.items())
+    ]
+
+
+def _rates(config: RigConfig) -> list[dict[str, Any]]:
+    # A rule counts all keys that it matches together: with wildcards, what one program sends at one
+    # instant for two cameras would be one message too many.
+    rules = [
+        {"key_expr": key, "freq": _STREAM_HZ if _is_fast(topic) else _SLOW_HZ}
+        for topic in topics.TOPICS
+        if topic.kind in (Kind.STREAM, Kind.STATE)
+        for key in _keys_of(topic, config)
+    ]
+    return [
+        {
+            "id": "rates",
+            "flows": ["ingress"],
+            "messages": ["put"],
+            "link_protocols": list(SECURED),
+            "rules": rules,
+        }
+    ]
+
+
+def _keys_of(topic: Topic, config: RigConfig) -> list[str]:
+    """Every key that a rig's programs send of a topic; health has a wildcard, one key a program."""
+    names: dict[str, list[str]] = {
+        "camera": [camera.name for camera in config.camera],
+        "hand": [str(hand) for hand in config.hand],
+        "serial": [item.serial for item in config.object],
+        "object": [item.name for item in config.object],
+    }
+    if len(topic.fields) == 1:
+        (field,) = topic.fields
+        return [topic.key(config.rig.name, **{field: name}) for name in names[field]]
+    return [topic.key(config.rig.name)]
+
+
+def _is_fast(topic: Topic) -> bool:
+    return topic.kind is Kind.STREAM and topic.rate not in (Rate.BEAT, Rate.DEMAND)
