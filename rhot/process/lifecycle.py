@@ -16,7 +16,8 @@ import importlib
 import logging
 import signal
 import sys
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from pathlib import Path
 
 import msgspec
@@ -30,6 +31,7 @@ from rhot.process import logs, systemd
 from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.certificate_watch import watch_certificate
 from rhot.process.extras import missing_extra
+from rhot.process.restart_hold import hold_back
 from rhot.process.service import Service, rhot_version
 
 Serve = Callable[[Service], Awaitable[None]]
@@ -86,15 +88,21 @@ def run(
     name: str, instance: str, config_path: Path, serve: Serve, connect: Sequence[str] = ()
 ) -> int:
     """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml."""
+    started_s = time.monotonic()
+    files = [config_path, config_path.parent / "calibration"]
     try:
         config = load_rig(config_path)
         if connect:
             config = msgspec.structs.replace(
                 config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect))
             )
+        files = [config_path, config.calibration_dir]
         uvloop.run(_live(name, instance, config, serve))
     except Exception as error:
-        return _explain(error, name, instance)
+        code = _explain(error, name, instance)
+        if code != EXIT_AGAIN:
+            hold_back(error, time.monotonic() - started_s, files)
+        return code
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
@@ -133,11 +141,12 @@ async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> No
     stopping = stop_on_signals()
     with cancelled_by(stopping):
         async with (
+            fed_watchdog(),
             open_bus(config.rig.name, client_endpoints(config)) as bus,
             asyncio.TaskGroup() as tasks,
         ):
             service = Service(name, instance, config, bus, tasks)
-            company = (service.beat(), watch_certificate(service), _watchdog())
+            company = (service.beat(), watch_certificate(service))
             companions = [tasks.create_task(one) for one in company]
             await serve(service)
             # A source that ended (a file, a replay) ends its service; what keeps it company goes
@@ -172,12 +181,24 @@ def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
             raise
 
 
-async def _watchdog() -> None:
-    """Tell systemd that the event loop turns.
+@contextlib.asynccontextmanager
+async def fed_watchdog() -> AsyncIterator[None]:
+    """Tell systemd that the event loop turns, as long as the block lasts.
 
-    A loop that is stuck says nothing and is restarted.
+    A loop that is stuck says nothing and is restarted. Until the service is ready it asks for more
+    time instead of being taken for dead: it may wait for its router.
     """
+
+    async def feed(period_s: float) -> None:
+        while True:
+            systemd.notify("WATCHDOG=1")
+            systemd.ask_for_time()
+            await asyncio.sleep(period_s)
+
     period_s = systemd.watchdog_s()
-    while period_s is not None:
-        systemd.notify("WATCHDOG=1")
-        await asyncio.sleep(period_s)
+    feeding = asyncio.create_task(feed(period_s)) if period_s is not None else None
+    try:
+        yield
+    finally:
+        if feeding is not None:
+            feeding.cancel()

@@ -8,9 +8,19 @@ from __future__ import annotations
 import os
 import socket
 
+# What systemd gives a start before it asks for more (TimeoutStartSec of the units).
+_START_S = 120
+
+
+class _Start:
+    """Whether READY=1 has been sent."""
+
+    over = False
+
 
 def notify(state: str) -> bool:
     """Send a state such as "READY=1"; whether somebody was there to hear it (sd_notify(3))."""
+    _Start.over = _Start.over or "READY=1" in state
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:
         return False
@@ -22,6 +32,15 @@ def notify(state: str) -> bool:
         except OSError:
             return False
     return True
+
+
+def ask_for_time() -> None:
+    """Say that the start takes longer, as long as it is not over (the router may be away).
+
+    Not later: it would put off the watchdog as well.
+    """
+    if not _Start.over:
+        notify(f"EXTEND_TIMEOUT_USEC={_START_S * 1_000_000}")
 
 
 def watchdog_s() -> float | None:

@@ -20,10 +20,11 @@ import zenoh
 from rhot.bus.security.credentials import credentials_in, is_secured, plain, with_certificates
 from rhot.bus.security.tls_diagnosis import own_problem
 from rhot.bus.zenoh_config import router_config, router_settings
-from rhot.errors import BusError
+from rhot.errors import BusError, RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.lifecycle import EXIT_USER, cancelled_by, fed_watchdog, stop_on_signals
+from rhot.process.restart_hold import hold_back
 
 _LOOPBACK = "tcp/127.0.0.1:7447"
 
@@ -67,14 +68,27 @@ def router(
     ] = False,
 ) -> None:
     """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
+    if show:
+        typer.echo(router_json5(*_settings(config, listen)))
+        return
+    started_s = time.monotonic()
+    try:
+        uvloop.run(_route(*_settings(config, listen)))
+    except RhotError as error:
+        typer.echo(f"rhot: error: {error}", err=True)
+        hold_back(error, time.monotonic() - started_s, [config] if config else [])
+        raise typer.Exit(EXIT_USER) from None
+
+
+def _settings(
+    config: Path | None, listen: list[str] | None
+) -> tuple[list[str], RigConfig | None]:
+    """Endpoints with their certificates, and the rig whose roles the router keeps to."""
     rig = load_rig(config) if config else None
     endpoints = listen or (list(rig.bus.listen) if rig else [_LOOPBACK])
     if rig is not None:
         endpoints = with_certificates(endpoints, rig.certificates_dir, "listen")
-    if show:
-        typer.echo(router_json5(endpoints, rig))
-        return
-    uvloop.run(_route(endpoints, rig))
+    return endpoints, rig
 
 
 def router_json5(listen: Sequence[str], rig: RigConfig | None) -> str:
@@ -87,7 +101,7 @@ def router_json5(listen: Sequence[str], rig: RigConfig | None) -> str:
 async def _route(endpoints: list[str], rig: RigConfig | None) -> None:
     stopping = stop_on_signals()
     with cancelled_by(stopping):
-        async with running_router(endpoints, rig):
+        async with fed_watchdog(), running_router(endpoints, rig):
             typer.echo(f"router listening at {', '.join(map(plain, endpoints))}")
             systemd.notify("READY=1")
             await asyncio.Event().wait()

@@ -32,3 +32,17 @@ def test_watchdog_is_ours_only_with_our_pid(monkeypatch):
     assert systemd.watchdog_s() is None
     monkeypatch.delenv("WATCHDOG_USEC")
     assert systemd.watchdog_s() is None
+
+
+def test_more_time_is_asked_for_until_ready_and_never_after(tmp_path, monkeypatch):
+    monkeypatch.setattr(systemd, "_Start", type("Fresh", (), {"over": False}))
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
+        server.bind(str(tmp_path / "notify"))
+        server.settimeout(5.0)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        systemd.ask_for_time()
+        systemd.notify("READY=1\nSTATUS=running")
+        systemd.ask_for_time()
+        systemd.notify("STOPPING=1")
+        heard = [server.recv(100) for _ in range(3)]
+    assert heard == [b"EXTEND_TIMEOUT_USEC=120000000", b"READY=1\nSTATUS=running", b"STOPPING=1"]

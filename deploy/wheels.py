@@ -1,0 +1,76 @@
+"""Collects every wheel that install.sh needs without a network: `make wheels`.
+
+dist/wheels/master holds rhot and its dependencies for this machine, dist/wheels/pi those for 64-bit
+Raspberry Pi OS 12 and 13 (Python 3.11 and 3.13).
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from pip._vendor.packaging.requirements import Requirement
+
+SOURCE = Path(__file__).resolve().parents[1]
+# Debian 12 and 13 have glibc 2.36 and 2.41: wheels of both older tags run there.
+PI_PLATFORMS = ("manylinux_2_28_aarch64", "manylinux_2_17_aarch64", "manylinux2014_aarch64")
+PI_PYTHONS = ("3.11", "3.13")
+
+
+def requirements(extra: str, python: str, machine: str) -> list[str]:
+    """What rhot with one extra needs under that Python on that machine.
+
+    `pip download` asks markers of the Python it runs in, whatever --python-version says: so they
+    are asked here.
+    """
+    project = tomllib.loads((SOURCE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    environment = {"python_version": python, "platform_machine": machine, "extra": extra}
+    wanted = []
+    for line in [*project["dependencies"], *project["optional-dependencies"][extra]]:
+        requirement = Requirement(line)
+        if requirement.marker is None or requirement.marker.evaluate(environment):
+            wanted.append(f"{requirement.name}{requirement.specifier}")
+    return wanted
+
+
+def pip(*arguments: str) -> None:
+    """Run pip of this Python; its failure ends the program with its code."""
+    quiet = ("--quiet", "--disable-pip-version-check")
+    done = subprocess.run([sys.executable, "-m", "pip", *arguments[:1], *quiet, *arguments[1:]])
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
+def collect_pi(folder: Path) -> None:
+    """Wheels of a Pi's tracker, for each Python that Raspberry Pi OS has."""
+    platforms = [option for one in PI_PLATFORMS for option in ("--platform", one)]
+    for python in PI_PYTHONS:
+        target = ["--only-binary=:all:", "--python-version", python, *platforms]
+        pip("download", *target, "--dest", str(folder), *requirements("pi", python, "aarch64"))
+
+
+def main() -> None:
+    """Fill dist/wheels, or the folder that --out names."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=SOURCE / "dist" / "wheels")
+    parser.add_argument("roles", nargs="*", default=["master", "pi"], metavar="master|pi")
+    options = parser.parse_args()
+    for role in options.roles:
+        folder = options.out / role
+        folder.mkdir(parents=True, exist_ok=True)
+        # An older build of the same number would be taken for the newest.
+        for old in folder.glob("rhot-*.whl"):
+            old.unlink()
+        pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(SOURCE))
+        if role == "pi":
+            collect_pi(folder)
+        else:
+            pip("wheel", "--wheel-dir", str(folder), f"{SOURCE}[{role}]")
+        print(f"{folder}: {len(list(folder.glob('*.whl')))} wheels")
+
+
+if __name__ == "__main__":
+    main()
