@@ -26,6 +26,7 @@ install.sh uninstall [--purge]                    remove rhot (--purge: its data
 --config FILE   rig.toml of the rig; calibration/ beside it is brought where there is none yet
 --pki DIR       certificates of this machine: ca.pem, own.pem, own.key (from `rhot pki`)
 --wheels DIR    install from these wheels alone, without a network (`make wheels` collects them)
+--wheel FILE    rhot's own wheel (or a folder that holds it); what it needs comes from PyPI
 --simulator     run the simulator of rig.toml on this machine (a rig without cameras)
 --no-start      do not start anything now; it starts with the machine
 --dry-run       say what would be done, do nothing
@@ -208,9 +209,16 @@ find_wheel() {
         WHEEL=${found[-1]}
         return
     fi
+    if [[ -n $WHEEL ]]; then
+        if [[ -d $WHEEL ]]; then WHEEL=$(find "$WHEEL" -maxdepth 1 -name 'rhot-*.whl' | sort -V | tail -n 1); fi
+        [[ -f $WHEEL && $(basename -- "$WHEEL") == rhot-*.whl ]] || fail "--wheel: no wheel of rhot there"
+        WHEEL=$(readlink -f -- "$WHEEL")
+        return
+    fi
     [[ -f $HERE/../pyproject.toml ]] ||
         fail "no source tree around $HERE: name a folder of wheels with --wheels DIR"
     TEMPORARY=$(mktemp -d)
+    say "  (building rhot's wheel from $(readlink -f -- "$HERE/.."))"
     "$PYTHON" -m venv "$TEMPORARY/build"
     "$TEMPORARY/build/bin/pip" wheel --quiet --disable-pip-version-check --no-deps \
         --wheel-dir "$TEMPORARY" "$HERE/.." ||
@@ -474,7 +482,7 @@ install_all() {
     install_packages
     make_user
     make_folders
-    if [[ -n $DRY_RUN && -z $WHEELS ]]; then
+    if [[ -n $DRY_RUN && -z $WHEELS$WHEEL ]]; then
         VERSION=new
     else
         find_wheel
@@ -527,13 +535,14 @@ install_role() {
     local -a names=()
     while (($#)); do
         case $1 in
-            --master | --config | --pki | --wheels)
+            --master | --config | --pki | --wheels | --wheel)
                 (($# > 1)) || fail "$1 needs a value"
                 case $1 in
                     --master) MASTER=$2 ;;
                     --config) CONFIG=$2 ;;
                     --pki) PKI=$2 ;;
                     --wheels) WHEELS=$2 ;;
+                    --wheel) WHEEL=$2 ;;
                 esac
                 shift
                 ;;

@@ -39,7 +39,8 @@ def requirements(extra: str, python: str, machine: str) -> list[str]:
 def pip(*arguments: str) -> None:
     """Run pip of this Python; its failure ends the program with its code."""
     quiet = ("--quiet", "--disable-pip-version-check")
-    done = subprocess.run([sys.executable, "-m", "pip", *arguments[:1], *quiet, *arguments[1:]])
+    command = [sys.executable, "-m", "pip", *arguments[:1], *quiet, *arguments[1:]]
+    done = subprocess.run(command, check=False)
     if done.returncode:
         sys.exit(done.returncode)
 

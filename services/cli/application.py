@@ -11,6 +11,7 @@ from rhot.process.service import rhot_version
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.check.check import check
+from services.cli.deploy.deploy import deploy
 from services.cli.doctor.doctor import doctor
 from services.cli.evaluate.plot import plot
 from services.cli.evaluate.score import score
@@ -44,6 +45,7 @@ COMMANDS = (
     record,
     replay,
     check,
+    deploy,
     board,
     warm,
 )
