@@ -19,6 +19,7 @@ from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
 from rhot.messages import ClockEcho
 from rhot.process.calibration_watch import load_and_watch
+from rhot.process.computer_watch import watch_computer
 from rhot.process.service import Service
 from services.fusion.health import HealthFigures
 from services.fusion.session_state import SessionState
@@ -38,6 +39,7 @@ async def serve(service: Service) -> None:
     frames = service.bus.every(topics.MARKERS, 64)
     _serve_session_and_clock(service)
     service.tasks.create_task(_note_poses(service, step))
+    service.tasks.create_task(watch_computer(service))
     health = HealthFigures(step, service.values, service.error, time.monotonic())
     service.ready()
     async for frame in frames:

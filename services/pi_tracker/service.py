@@ -16,6 +16,7 @@ from rhot import topics
 from rhot.bus.master_clock import follow_master
 from rhot.clock import OffsetEstimator
 from rhot.messages import MarkerFrame
+from rhot.process.computer_watch import watch_computer
 from rhot.process.service import Service
 from services.pi_tracker import sources
 from services.pi_tracker.endpoints.camera_faults import CameraFaults
@@ -33,7 +34,8 @@ async def serve(service: Service) -> None:
     """Finds the coloured markers in one camera's images."""
     gate = SessionGate(service.bus)
     camera = CameraService(service, gate)
-    companions = [service.tasks.create_task(task) for task in (gate.follow(), *camera.companions())]
+    beside = (gate.follow(), watch_computer(service), *camera.companions())
+    companions = [service.tasks.create_task(task) for task in beside]
     try:
         service.ready()
         service.state = "waiting"
