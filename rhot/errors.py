@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from typing import Literal
 
 # Why a request was refused: it does not decode; what it asks for cannot be; the service has no
-# such thing; its machine could not keep the result; it failed, which is a fault of the service.
-RefusalCode = Literal["malformed", "invalid", "unsupported", "not_saved", "failed"]
+# such thing; its machine could not keep the result; too many ask at once; it failed, which is a
+# fault of the service.
+RefusalCode = Literal["malformed", "invalid", "unsupported", "not_saved", "busy", "failed"]
 
 
 class RhotError(Exception):

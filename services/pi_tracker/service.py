@@ -116,4 +116,5 @@ class CameraService:
     def _watch_drift(self, frame: Frame, found: MarkerFrame) -> None:
         values, drifted = self._tracker.watch_drift(frame, found)
         self._service.values.update(values)
-        self._colors.tell_drift(drifted, frame.stamp_ns)
+        if drifted is not None:
+            self._colors.tell_drift(drifted)

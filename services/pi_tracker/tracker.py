@@ -76,8 +76,8 @@ class CameraTracker:
 
     def watch_drift(
         self, frame: Frame, found: MarkerFrame
-    ) -> tuple[dict[str, float], list[Drifted]]:
-        """Figures for health, and the colours that have drifted; both empty between two checks."""
+    ) -> tuple[dict[str, float], list[Drifted] | None]:
+        """Figures for health, and the colours that have drifted; none and None between checks."""
         if not self._drift.update(frame, found.markers):
-            return {}, []
+            return {}, None
         return self._drift.values(), self._drift.drifted()

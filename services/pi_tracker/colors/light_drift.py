@@ -34,6 +34,8 @@ _MIN_QUALITY = 0.3
 # outside. Measured: with white balance turned, markers are first lost at 0.8 and at half of a
 # patch; without drift, in simulated and real video, 0.4 and 0.26 were the most.
 _MAX_HUE_OFFSET, _MAX_OUTSIDE = 0.55, 0.35
+# Over once it is clearly less, or it would come and go with every cloud.
+_OVER = 0.85
 # What a suggested range leaves below what is seen now; as bounds.py does.
 _SATURATION_SHARE, _VALUE_SHARE, _MIN_LEVEL = 0.65, 0.5, 25.0
 # Quantiles of a patch's saturation and value: highlights, rims and dark sides lie below.
@@ -85,6 +87,7 @@ class DriftMonitor:
         self._ranges = dict(colors.colors if isinstance(colors, Colors) else colors)
         self._observations: dict[str, deque[Observation]] = {}
         self._due_ns = 0
+        self._told: set[str] = set()
 
     def update(self, frame: Frame, markers: Sequence[Marker]) -> bool:
         """Take in one frame if a second has passed; whether it did."""
@@ -116,10 +119,12 @@ class DriftMonitor:
         found = []
         for color, observations in self._observations.items():
             hue_off, outside = self._typical(color)
-            off = abs(hue_off) > _MAX_HUE_OFFSET or outside > _MAX_OUTSIDE
+            share = _OVER if color in self._told else 1.0
+            off = abs(hue_off) > share * _MAX_HUE_OFFSET or outside > share * _MAX_OUTSIDE
             if off and len(observations) >= _MIN_OBSERVATIONS:
                 suggested = _suggested(self._ranges[color], observations)
                 found.append(Drifted(color, round(hue_off, 2), round(outside, 2), suggested))
+        self._told = {one.color for one in found}
         return found
 
     def _typical(self, color: str) -> tuple[float, float]:

@@ -7,6 +7,7 @@ names no marker can have, and colours that are missing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 
@@ -18,11 +19,31 @@ from rhot.messages import Name
 MAX_COLORS = 64
 
 
+# A calibration's statistics are tables of tables; much deeper ones end in a RecursionError.
+_MAX_NESTING = 16
+
+
+def check_nesting(colors: Colors) -> None:
+    """Raises CalibrationError on statistics that are nested deeper than any tool writes them."""
+    level: list[Any] = [colors.inputs, colors.residuals]
+    for _ in range(_MAX_NESTING):
+        level = [
+            inner
+            for one in level
+            if isinstance(one, (dict, list))
+            for inner in (one.values() if isinstance(one, dict) else one)
+        ]
+        if not level:
+            return
+    raise CalibrationError(f"its inputs or residuals are nested deeper than {_MAX_NESTING} levels")
+
+
 def check_colors(colors: Colors, required: Sequence[str]) -> None:
     """Raises CalibrationError saying which colour is wrong, and how.
 
     required are colours that must be there.
     """
+    check_nesting(colors)
     if not colors.colors:
         raise CalibrationError("there is no colour in it")
     if len(colors.colors) > MAX_COLORS:

@@ -25,6 +25,9 @@ from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.tracker import CameraTracker
 
+# One is at work, and each takes a second or two; who would wait longer has gone by then.
+_MOST_WAITING = 3
+
 
 class ColorFitting:
     """Answers fit requests with the pictures of a cache."""
@@ -34,9 +37,21 @@ class ColorFitting:
         self._wanted = service.config.colors
         # One at a time: it takes most of a Pi's core for a second, beside the tracker.
         self._lock = asyncio.Lock()
+        self._asked = 0
         service.bus.answer_requests(topics.FIT, self._answer, camera=service.instance)
 
     async def _answer(self, payload: bytes) -> FitResult:
+        if self._asked > _MOST_WAITING:
+            return FitResult(
+                error=f"{_MOST_WAITING} others wait already for this camera's fit; ask again later"
+            )
+        self._asked += 1
+        try:
+            return await self._fit(payload)
+        finally:
+            self._asked -= 1
+
+    async def _fit(self, payload: bytes) -> FitResult:
         try:
             request = msgspec.json.decode(payload, type=FitRequest)
             names = list(

@@ -19,16 +19,16 @@ import msgspec
 from rhot import topics
 from rhot.bus.queries import UNDECODABLE
 from rhot.errors import CalibrationError, RefusalCode, RefusedError
-from rhot.files.calibration import Colors, load_colors, save
+from rhot.files.calibration import Colors, load_colors
 from rhot.process.service import Service
 from services.pi_tracker.colors.light_drift import Drifted
-from services.pi_tracker.colors.validate import check_colors
+from services.pi_tracker.colors.validate import check_colors, check_nesting
+from services.pi_tracker.endpoints.latest_change import LatestChange, write_setting
+from services.pi_tracker.endpoints.refusals import Refusals
 from services.pi_tracker.tracker import CameraTracker
 
 # Ranges saved by hand are used a second later.
 _FILE_PERIOD_S = 1.0
-# Drift is told again while it lasts, but not every second.
-_DRIFT_EVERY_NS = 60_000_000_000
 
 log = logging.getLogger("rhot.pi_tracker")
 
@@ -42,12 +42,11 @@ class ColorRanges:
     def __init__(self, service: Service, tracker: CameraTracker, *, live: bool) -> None:
         self._service, self._tracker = service, tracker
         self._camera, self._path = tracker.camera.name, tracker.colors_path
-        self._drift_told_ns: dict[str, int] = {}
         # What health was last told of colours: with new ones it is no longer so.
         self._file_ns = _modified_ns(self._path)
         # One change at a time: the file and the tracker must agree on the last.
-        self._lock = asyncio.Lock()
-        service.values["colors_refused"] = 0
+        self._changes = LatestChange(self._check_and_use)
+        self._refusals = Refusals(service, "colors")
         try:
             self._use_file()
         except CalibrationError as error:
@@ -56,19 +55,13 @@ class ColorRanges:
             self._start_without(str(error))
         service.bus.answer_requests(topics.COLORS, self._answer, camera=self._camera)
 
-    def tell_drift(self, drifted: list[Drifted], now_ns: int) -> None:
-        """Say in health which colours have drifted, each once in a while."""
-        for one in drifted:
-            since_ns = now_ns - self._drift_told_ns.get(one.color, -_DRIFT_EVERY_NS)
-            # A clock that was set back counts as due.
-            if not 0 <= since_ns < _DRIFT_EVERY_NS:
-                self._drift_told_ns[one.color] = now_ns
-                self._service.faults.report(
-                    "color_drifted",
-                    one.text(self._camera),
-                    one.color,
-                    f"run `rhot calibrate colors {self._camera}`",
-                )
+    def tell_drift(self, drifted: list[Drifted]) -> None:
+        """Say in health which colours have drifted: these, and no others any more."""
+        self._service.faults.replace(
+            "color_drifted",
+            {one.color: one.text(self._camera) for one in drifted},
+            {one.color: f"run `rhot calibrate colors {self._camera}`" for one in drifted},
+        )
 
     async def follow_file(self) -> None:
         """Use what is saved by hand, for ever."""
@@ -88,7 +81,7 @@ class ColorRanges:
             try:
                 await self._change(sample.payload)
             except RefusedError as error:
-                self._service.error(str(error), "request_refused", self._camera)
+                self._refusals.tell(error)
 
     async def _answer(self, payload: bytes) -> Colors:
         """The ranges in use, after the change that the payload asks for."""
@@ -101,29 +94,35 @@ class ColorRanges:
         try:
             colors = _dated(msgspec.json.decode(payload, type=Colors))
             made_by = f" of {colors.date} by {colors.tool}"[:120]
-            async with self._lock:
-                await self._check_and_use(colors)
+            self._check(colors)
+            await self._changes.make(colors)
         except RefusedError as error:
             raise self._refusal(made_by, error.code, error) from None
         except CalibrationError as error:
             raise self._refusal(made_by, "invalid", error) from None
         except UNDECODABLE as error:
             raise self._refusal(made_by, "malformed", error) from None
-        log.info("new colours%s: %s", made_by, ", ".join(sorted(colors.colors)))
+
+    def _check(self, colors: Colors) -> None:
+        """Raises CalibrationError."""
+        # Colours may come one after the other, but none that is tracked may go.
+        there = self._tracker.colors.colors
+        check_colors(colors, [name for name in self._service.config.colors if name in there])
 
     async def _check_and_use(self, colors: Colors) -> None:
         tracker = self._tracker
-        # Colours may come one after the other, but none that is tracked may go.
-        tracked = [name for name in self._service.config.colors if name in tracker.colors.colors]
-        check_colors(colors, tracked)
+        # Others may have come since they were checked.
+        self._check(colors)
         step = tracker.prepare(colors, tracker.calibrated(colors))
         try:
-            await asyncio.to_thread(save, self._path, colors)
+            await asyncio.to_thread(write_setting, self._path, colors)
         except OSError as error:
             raise RefusedError(f"{self._path} cannot be written: {error}", "not_saved") from None
         self._file_ns = _modified_ns(self._path)
         tracker.use(colors, step)
         self._forget_problems()
+        names = ", ".join(sorted(colors.colors))
+        log.info("new colours of %s by %s: %s", colors.date[:60], colors.tool[:60], names)
         missing = [name for name in self._service.config.colors if name not in colors.colors]
         if missing:
             self._report(
@@ -132,14 +131,13 @@ class ColorRanges:
             )
 
     def _refusal(self, made_by: str, code: RefusalCode, error: Exception) -> RefusedError:
-        self._service.values["colors_refused"] += 1
-        reason = f"colours{made_by} for camera {self._camera!r} are refused: {error}"
-        log.info("%s", reason)
-        return RefusedError(reason, code)
+        text = f"colours{made_by} for camera {self._camera!r} are refused: {error}"
+        return self._refusals.refusal(text, code)
 
     def _use_file(self) -> None:
         """Use the file's ranges; raises CalibrationError and keeps the old."""
         colors = load_colors(self._path.parent, self._camera)
+        check_nesting(colors)
         if colors != self._tracker.colors:
             step = self._tracker.prepare(colors, self._tracker.wanted(colors))
             self._tracker.use(colors, step)
@@ -157,10 +155,9 @@ class ColorRanges:
 
     def _forget_problems(self) -> None:
         """Other ranges are used: what was said of the old ones no longer holds."""
-        self._drift_told_ns.clear()
         self._service.faults.clear("colors_missing", self._camera)
         self._service.faults.replace("color_drifted", {})
-        self._service.faults.clear("request_refused", self._camera)
+        self._refusals.clear()
         values = self._service.values
         for name in [name for name in values if name.endswith(("_hue_off", "_outside"))]:
             del values[name]

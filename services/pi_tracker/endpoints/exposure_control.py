@@ -18,9 +18,11 @@ from rhot import clock, topics
 from rhot.bus.queries import UNDECODABLE
 from rhot.camera_messages import ExposureControl
 from rhot.errors import CalibrationError, RefusalCode, RefusedError
-from rhot.files.calibration import Exposure, load_exposure, save
+from rhot.files.calibration import Exposure, load_exposure
 from rhot.process.service import Service
 from services.pi_tracker.colors.settling import Settling
+from services.pi_tracker.endpoints.latest_change import LatestChange, write_setting
+from services.pi_tracker.endpoints.refusals import Refusals
 from services.pi_tracker.sources.controls import Controls
 
 # picamera2's automatics settle in one to two seconds, a webcam's in five.
@@ -39,7 +41,8 @@ class ExposureEndpoint:
         self._controls: Controls | None = None
         self._state = ExposureControl(adjustable=False, note="the camera is not open yet")
         # One change at a time: automatics run for seconds.
-        self._lock = asyncio.Lock()
+        self._changes = LatestChange(self._set, _merged)
+        self._refusals = Refusals(service, "exposure")
         service.bus.answer_requests(topics.EXPOSURE, self._answer, camera=self._camera.name)
 
     def attach(self, controls: Controls | None) -> None:
@@ -66,7 +69,7 @@ class ExposureEndpoint:
             try:
                 await self._change(sample.payload)
             except RefusedError as error:
-                self._service.error(str(error))
+                self._refusals.tell(error)
 
     async def _answer(self, payload: bytes) -> ExposureControl:
         """The exposure, after the change that the payload asks for."""
@@ -77,16 +80,15 @@ class ExposureEndpoint:
     async def _change(self, payload: bytes) -> None:
         try:
             wanted = msgspec.json.decode(payload, type=ExposureControl)
-            async with self._lock:
-                await self._set(wanted)
+            await self._changes.make(wanted)
         except RefusedError as error:
             raise self._refusal(error.code, error) from None
         except UNDECODABLE as error:
             raise self._refusal("malformed", error) from None
 
     def _refusal(self, code: RefusalCode, error: Exception) -> RefusedError:
-        name = self._camera.name
-        return RefusedError(f"exposure for camera {name!r} is refused: {error}", code)
+        text = f"exposure for camera {self._camera.name!r} is refused: {error}"
+        return self._refusals.refusal(text, code)
 
     async def _set(self, wanted: ExposureControl) -> None:
         if self._controls is None:
@@ -141,7 +143,7 @@ class ExposureEndpoint:
         )
         controls.adjust(made)
         try:
-            await asyncio.to_thread(save, self._path, made)
+            await asyncio.to_thread(write_setting, self._path, made)
         except OSError as error:
             self._state = _state(made, note, 0)
             raise RefusedError(
@@ -149,6 +151,20 @@ class ExposureEndpoint:
                 "not_saved",
             ) from None
         self._state = _state(made, note, clock.now_ns())
+        self._refusals.clear()
+
+
+def _merged(earlier: ExposureControl, later: ExposureControl) -> ExposureControl:
+    """Both wishes in one, as if made one after the other; a 0 leaves a value as it is."""
+    if "auto" in (earlier.mode, later.mode):
+        return later
+    return msgspec.structs.replace(
+        later,
+        exposure_us=later.exposure_us or earlier.exposure_us,
+        gain=later.gain or earlier.gain,
+        red_gain=later.red_gain or earlier.red_gain,
+        blue_gain=later.blue_gain or earlier.blue_gain,
+    )
 
 
 def _unknown(what: str) -> float:

@@ -41,7 +41,7 @@ class PictureCache(Preview):
         _keep(self._used, name, frame, _USED)
         return frame
 
-    async def _answer(self) -> bytes | None:
+    async def _encoded(self) -> bytes | None:
         frame = self._last
         if frame is None:
             return None

@@ -12,12 +12,16 @@ import cv2
 
 from rhot import topics
 from rhot.bus.bus import Bus
+from services.pi_tracker.endpoints.shared_answer import SharedAnswer
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import bgr_image
 
 # Previews are for people: 5 a second look alive and cost 2 % of a Pi's core each.
 _PREVIEW_PERIOD_NS = 200_000_000
 _JPEG_QUALITY = 80
+# The page asks four times a second, a calibration as soon as it has an answer; a picture of 0.5 MB
+# goes to few at a time, as answers wait in memory until the network has taken them.
+_FRAME_PERIOD_S, _MOST_ASKERS = 0.05, 4
 # PNG level 1: half the size of level 9's time budget is not worth a second of waiting for one
 # frame.
 _PNG_LEVEL = 1
@@ -46,6 +50,8 @@ class Preview:
         self._last: Frame | None = None
         self._sent_ns = 0
         self._busy = False
+        self._frames = SharedAnswer(self._encoded, _FRAME_PERIOD_S, _MOST_ASKERS)
+        # A coroutine function, so that it runs on the event loop.
         bus.answer(topics.FRAME, self._answer, camera=camera)
 
     def show(self, frame: Frame, now_ns: int) -> None:
@@ -69,4 +75,8 @@ class Preview:
             self._busy = False
 
     async def _answer(self) -> bytes | None:
+        return await self._frames.get()
+
+    async def _encoded(self) -> bytes | None:
+        """The last frame as PNG, None if there is none yet."""
         return None if self._last is None else await asyncio.to_thread(png, self._last)

@@ -153,7 +153,7 @@ async def test_a_file_that_cannot_be_written_keeps_the_old(
 
     async with tracking(config) as (_, client):
         await seen(client, "blue", "green")
-        monkeypatch.setattr("services.pi_tracker.endpoints.color_ranges.save", full)
+        monkeypatch.setattr("services.pi_tracker.endpoints.color_ranges.write_setting", full)
         with pytest.raises(RefusedError, match=r"cannot be written.*No space left") as caught:
             await client.set_colors(
                 "left", Colors(date="d", tool="t", colors={**colors.colors, "green": NOTHING})
