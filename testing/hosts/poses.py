@@ -20,6 +20,9 @@ ENOUGH_MEASURED = 4
 GAP_S = 0.3
 # A pose that is older than this when it arrives helps nobody.
 _MAX_AGE_S = 0.5
+# Wrist and tips of this rig's small pictures are within 30 mm of the truth; a camera's clock that is
+# a tenth of a second off makes it decimetres.
+WRONG_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -34,21 +37,29 @@ class SeenPose:
     error_m: float | None
 
     @property
-    def good(self) -> bool:
-        """Whether it tells where the hand is now."""
+    def live(self) -> bool:
+        """Whether it claims to tell where the hand is now."""
         return self.measured >= ENOUGH_MEASURED and -_MAX_AGE_S < self.age_s < _MAX_AGE_S
 
+    @property
+    def wrong(self) -> bool:
+        """Whether it is far from the truth."""
+        return self.error_m is not None and self.error_m > WRONG_M
 
-def back_at_s(
-    poses: Sequence[SeenPose], since_s: float, now_s: float, calm_s: float
-) -> float | None:
-    """When good poses came again after an instant, and have come without a gap for calm_s since.
+    @property
+    def good(self) -> bool:
+        """Whether it tells where the hand is now."""
+        return self.live and not self.wrong
 
-    since_s itself if they were never away for longer than GAP_S; None if they are not back yet.
+
+def back_at_s(poses: Sequence[SeenPose], fault_s: float, now_s: float, calm_s: float) -> float | None:
+    """When good poses came again after a fault, and have come without a gap for calm_s since.
+
+    poses are those since the fault. The result is fault_s itself if they were never away for longer
+    than GAP_S; None if they are not back yet.
     """
-    good = [pose.at_s for pose in poses if pose.good and pose.at_s >= since_s]
-    back_s = last_s = since_s
-    for at_s in good:
+    back_s = last_s = fault_s
+    for at_s in (pose.at_s for pose in poses if pose.good):
         if at_s - last_s > GAP_S:
             back_s = at_s
         last_s = at_s
@@ -90,11 +101,11 @@ class PoseWatch:
         """Poses that came after an instant of CLOCK_MONOTONIC."""
         return [pose for pose in list(self.poses) if pose.at_s >= instant_s]
 
-    def wait_back(self, since_s: float, timeout_s: float, calm_s: float = 2.0) -> float | None:
+    def wait_back(self, fault_s: float, timeout_s: float, calm_s: float = 2.0) -> float | None:
         """Wait until poses are back, as back_at_s() has it; None if they are not in time."""
         deadline_s = time.monotonic() + timeout_s
         while (now_s := time.monotonic()) < deadline_s:
-            back_s = back_at_s(self.since(since_s), since_s, now_s, calm_s)
+            back_s = back_at_s(self.since(fault_s), fault_s, now_s, calm_s)
             if back_s is not None:
                 return back_s
             time.sleep(0.05)
