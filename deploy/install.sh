@@ -574,7 +574,8 @@ check_arguments() {
     for name in "$@"; do
         [[ $name =~ ^[A-Za-z0-9][A-Za-z0-9_-]*$ ]] || fail "$name is no name of a camera"
     done
-    [[ -z $MASTER || $MASTER =~ ^[A-Za-z0-9.:_\[\]-]+$ ]] || fail "--master $MASTER is no host"
+    local host_name='^[][A-Za-z0-9.:_-]+$'
+    [[ -z $MASTER || $MASTER =~ $host_name ]] || fail "--master $MASTER is no host"
     [[ -z $CONFIG || -f $CONFIG ]] || fail "--config $CONFIG: no such file"
     [[ -z $PKI || -d $PKI ]] || fail "--pki $PKI: no such folder"
 }

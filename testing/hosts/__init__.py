@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 # Program -> Debian package that holds it.
@@ -28,4 +29,10 @@ def missing() -> str:
         return f"needs Debian packages: sudo apt install {' '.join(absent)}"
     if not Path("/usr/bin/python3").exists():
         return "needs the system's Python, which units run: sudo apt install python3-venv"
+    probe = subprocess.run(
+        ["unshare", "--mount", "--net", "--pid", "--fork", "true"], capture_output=True, check=False
+    )
+    if probe.returncode:
+        said = probe.stderr.decode(errors="replace").strip()
+        return f"needs a machine where root may make namespaces, not a locked container: {said}"
     return ""

@@ -165,6 +165,11 @@ class Container:
         said = self.run("systemctl", "show", unit, *(f"--property={one}" for one in properties))
         return dict(line.split("=", 1) for line in said.splitlines() if "=" in line)
 
+    def restarts(self) -> int:
+        """How often systemd has restarted a service of rhot since the host booted."""
+        said = self.run("systemctl", "show", "rhot-*.service", "--property=NRestarts", "--value")
+        return sum(int(line) for line in said.split())
+
     def kill(self, unit: str, number: signal.Signals) -> None:
         """A signal to the main process of a unit."""
         pid = self.show(unit, "MainPID")["MainPID"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -35,16 +34,9 @@ class FaultTable(msgspec.Struct, kw_only=True):
 
     def as_text(self) -> str:
         """The table, and a line that sums it up."""
-        lines = [
-            f"{'fault':44} {'counted from':14} {'poses':>7} {'wanted':>7} {'service':>8} "
-            f"{'restarts':>8} {'wrong':>5}"
-        ]
-        for row in self.rows:
-            lines.append(
-                f"{row.fault:44} {row.counts_from:14} {_seconds(row.poses_s):>7} "
-                f"{_seconds(row.wanted_s):>7} {_seconds(row.service_s):>8} "
-                f"{row.restarts:8} {row.wrong_poses:5}{'  HUNG' if row.hung else ''}"
-            )
+        head = ("fault", "counted from", "poses", "wanted", "service", "restarts", "wrong")
+        lines = [_LINE.format(*head)]
+        lines += [_line(row) for row in self.rows]
         hangs = sum(row.hung for row in self.rows)
         slow = [row.fault for row in self.rows if _missed(row)]
         lines.append(
@@ -60,14 +52,18 @@ class FaultTable(msgspec.Struct, kw_only=True):
         path.write_bytes(msgspec.json.format(msgspec.json.encode(self)) + b"\n")
 
 
+_LINE = "{:44} {:12} {:>8} {:>8} {:>8} {:>8} {:>6}"
+
+
+def _line(row: FaultRow) -> str:
+    poses, wanted, service = (_seconds(s) for s in (row.poses_s, row.wanted_s, row.service_s))
+    cells = (row.fault, row.counts_from, poses, wanted, service, row.restarts, row.wrong_poses)
+    return _LINE.format(*cells) + ("  HUNG" if row.hung else "")
+
+
 def _seconds(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f} s"
 
 
 def _missed(row: FaultRow) -> bool:
     return row.wanted_s is not None and (row.poses_s is None or row.poses_s > row.wanted_s)
-
-
-def slowest(rows: Sequence[FaultRow]) -> float | None:
-    """The longest time to poses again; None if there is no row."""
-    return max((row.poses_s for row in rows if row.poses_s is not None), default=None)

@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -94,6 +95,25 @@ class HostedRig:
         """A watch of the master's bus, from the master."""
         return PoseWatch(self.network.namespace_path(MASTER), NAME, LOOPBACK)
 
+    def restarts(self) -> int:
+        """How often systemd has restarted a service of rhot, on all hosts since they booted."""
+        return sum(host.restarts() for host in self.hosts.values())
+
+    def zenoh_get(self, key: str, value: str) -> str:
+        """What the master's bus answers to a query with a payload, asked with the Zenoh CLI."""
+        network = f"--net={self.network.namespace_path(MASTER)}"
+        zenoh = Path(sys.executable).parent / "zenoh"
+        client = (zenoh, "--mode", "client", "--connect", LOOPBACK)
+        ask = ("get", "--selector", key, "--value", value, "--decoder", "text")
+        return run(["nsenter", network, "--", *client, *ask])
+
+    def journals(self) -> str:
+        """The last that rhot said on every host."""
+        return "\n".join(
+            f"== {name}\n{host.journal('-u', 'rhot-*', '-n', '40')}"
+            for name, host in self.hosts.items()
+        )
+
     def remove(self) -> None:
         """Everything of it is gone."""
         for host in self.hosts.values():
@@ -138,5 +158,7 @@ def _keep(host: Container, kept: Path) -> None:
         old.unlink(missing_ok=True)
     new = kept.with_suffix(f".tar.{host.name}")
     folders = [name for name in _VERSIONS if (host.disk / name).is_dir()]
-    subprocess.run(["tar", "-C", host.disk, "-c", "-f", new, "--numeric-owner", *folders], check=True)
+    subprocess.run(
+        ["tar", "-C", host.disk, "-c", "-f", new, "--numeric-owner", *folders], check=True
+    )
     new.replace(kept)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ ENOUGH_MEASURED = 4
 GAP_S = 0.3
 # A pose that is older than this when it arrives helps nobody.
 _MAX_AGE_S = 0.5
-# Wrist and tips of this rig's small pictures are within 30 mm of the truth; a camera's clock that is
-# a tenth of a second off makes it decimetres.
+# Wrist and tips from this rig's small pictures are within 30 mm of the truth; a camera's clock that
+# is a tenth of a second off makes it decimetres.
 WRONG_M = 0.1
 
 
@@ -52,7 +52,9 @@ class SeenPose:
         return self.live and not self.wrong
 
 
-def back_at_s(poses: Sequence[SeenPose], fault_s: float, now_s: float, calm_s: float) -> float | None:
+def back_at_s(
+    poses: Sequence[SeenPose], fault_s: float, now_s: float, calm_s: float
+) -> float | None:
     """When good poses came again after a fault, and have come without a gap for calm_s since.
 
     poses are those since the fault. The result is fault_s itself if they were never away for longer
@@ -101,6 +103,10 @@ class PoseWatch:
         """Poses that came after an instant of CLOCK_MONOTONIC."""
         return [pose for pose in list(self.poses) if pose.at_s >= instant_s]
 
+    def wait_first(self, timeout_s: float) -> float | None:
+        """Wait for two seconds of good poses; when they began, None if that does not happen."""
+        return self.wait_back(time.monotonic(), timeout_s)
+
     def wait_back(self, fault_s: float, timeout_s: float, calm_s: float = 2.0) -> float | None:
         """Wait until poses are back, as back_at_s() has it; None if they are not in time."""
         deadline_s = time.monotonic() + timeout_s
@@ -110,6 +116,31 @@ class PoseWatch:
                 return back_s
             time.sleep(0.05)
         return None
+
+    def wait_fault(self, service: str, code: str, timeout_s: float) -> bool:
+        """Wait until a service's health names a fault."""
+        return self._wait_health(
+            service,
+            lambda health: any(fault["code"] == code for fault in health["faults"]),
+            timeout_s,
+        )
+
+    def wait_value(self, service: str, name: str, value: float, timeout_s: float) -> bool:
+        """Wait until a figure of a service's health has a value."""
+        return self._wait_health(
+            service, lambda health: health["values"].get(name) == value, timeout_s
+        )
+
+    def _wait_health(
+        self, service: str, condition: Callable[[dict[str, Any]], bool], timeout_s: float
+    ) -> bool:
+        since_s = time.monotonic()
+        while time.monotonic() < since_s + timeout_s:
+            for (name, _), (at_s, health) in list(self.health.items()):
+                if name == service and at_s >= since_s and condition(health):
+                    return True
+            time.sleep(0.1)
+        return False
 
     def close(self) -> None:
         """End the watching process."""

@@ -21,13 +21,14 @@ _COLLECT_S = 900.0
 def collect(folder: Path) -> Path:
     """The folder, filled with what both roles need."""
     folder.mkdir(parents=True, exist_ok=True)
-    pip = [folder.parent / "venv" / "bin" / "pip", "--disable-pip-version-check"]
-    if not pip[0].exists():
+    python = folder.parent / "venv" / "bin" / "python"
+    if not python.exists():
         run([PYTHON, "-m", "venv", folder.parent / "venv"], _COLLECT_S, _environment())
     for old in folder.glob("rhot-*.whl"):
         old.unlink()
     digest = hashlib.sha256((ROOT / "pyproject.toml").read_bytes()).hexdigest()
     done = folder.parent / "wheels.digest"
+    pip = [python, "-m", "pip", "--disable-pip-version-check"]
     wheel = [*pip, "wheel", "--quiet", "--wheel-dir", folder]
     if done.exists() and done.read_text() == digest:
         run([*wheel, "--no-deps", ROOT], _COLLECT_S, _environment())
