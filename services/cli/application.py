@@ -22,6 +22,7 @@ from services.cli.live.session import session
 from services.cli.live.top import top
 from services.cli.live.up import up
 from services.cli.live.warm import warm
+from services.cli.live.watch import watch
 from services.cli.offline.simulate import simulate
 from services.cli.offline.track import track
 from services.cli.offline.tune import tune
@@ -37,6 +38,7 @@ COMMANDS = (
     router,
     top,
     doctor,
+    watch,
     session,
     track,
     score,
