@@ -36,6 +36,7 @@ class RigWatch:
         self._told_s = self._started_s + _PATIENCE_S - _TELL_AGAIN_S
         self._state: list[tuple[str, str]] | None = None
         self._told: list[tuple[str, str]] | None = None
+        self._was_up = False
         self._port = 0
 
     async def run(self, reasons: Mapping[str, str]) -> None:
@@ -83,11 +84,12 @@ class RigWatch:
     def _tell(self, missing: Sequence[Missing], after_s: float) -> None:
         name = f"rig {self._config.rig.name!r}"
         if not missing:
-            again = " again" if self._told is not None else f" after {after_s:.0f} s"
+            again = " again" if self._was_up else f" after {after_s:.0f} s"
+            self._was_up = True
             where = ", ".join(self._config.bus.listen)
             self._say(f"{name} is up{again}, router at {where}; `rhot top --config {self._path}`")
             return
-        state = "no longer up" if self._told == [] else "not up yet"
+        state = "not up" if self._was_up else "not up yet"
         self._say(f"{name} is {state}:")
         for one in missing:
             self._say(f"  {one.who}: {one.why.splitlines()[0]}")

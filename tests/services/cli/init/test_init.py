@@ -1,4 +1,4 @@
-"""`rhot init` writes a rig.toml that its reader takes, says what comes next, and overwrites none."""
+"""`rhot init` writes a rig.toml that its reader takes, says what comes next, overwrites none."""
 
 from __future__ import annotations
 
