@@ -1,5 +1,5 @@
-"""Whether calibration/ holds what a rig.toml needs, and whether the two fit: lenses, extrinsics,
-hands, objects; colours and exposures are in colors.py.
+"""Whether calibration/ holds what this machine needs of it, and whether that fits rig.toml: lenses,
+extrinsics, hands, objects; colours and exposures are in colors.py.
 
 Every missing or broken file is reported with the command that makes it; a hand nobody has measured
 is a note, since tables stand in.
@@ -24,26 +24,31 @@ from rhot.files.rig_tables import CameraTable
 from rhot.geometry.camera import Camera
 from services.cli.check.colors import check_colors, check_exposure
 from services.cli.check.problems import Problem, error, load_or_report, note, warning
+from services.cli.rig.place import Place
 
 # Depth error grows as 1 / baseline: at 20 mm and 0.6 m it is 34 mm per pixel, which no filter mends
 # (9.1 mm at 75 mm).
 _MIN_BASELINE_M = 0.020
 
 
-def check_calibration(config: RigConfig) -> list[Problem]:
-    """Problems of all files under calibration/ that this rig refers to."""
+def check_calibration(config: RigConfig, place: Place) -> list[Problem]:
+    """Problems of the files under calibration/ that the services of this machine load."""
     problems: list[Problem] = []
     for camera in config.camera:
-        problems += (
-            check_colors(config, camera) + check_exposure(config, camera) + _lens(config, camera)
-        )
+        if camera.name in place.cameras:
+            problems += check_colors(config, camera) + check_exposure(config, camera)
+        # A tracker that rectifies pictures needs its lens, too.
+        if place.master or (config.tracker.rectify and camera.name in place.cameras):
+            problems += _lens(config, camera)
+    if not place.master:
+        return problems
     return problems + _extrinsics(config) + _hands(config) + _objects(config)
 
 
 def _lens(config: RigConfig, camera: CameraTable) -> list[Problem]:
     path = config.calibration_dir / f"{camera.name}.lens.json"
-    # One camera alone tracks markers, and those need no lens.
-    if len(config.camera) < 2 and not path.exists():
+    # Markers alone need no lens.
+    if not config.has_depth and not config.tracker.rectify and not path.exists():
         return []
     problems: list[Problem] = []
     lens = load_or_report(partial(load_lens, config.calibration_dir, camera.name), problems, path)
@@ -58,9 +63,9 @@ def _lens(config: RigConfig, camera: CameraTable) -> list[Problem]:
 
 
 def _extrinsics(config: RigConfig) -> list[Problem]:
-    if len(config.camera) < 2:
-        return []
     path = config.calibration_dir / "rig.json"
+    if not config.has_depth and not path.exists():
+        return []
     problems: list[Problem] = []
     geometry = load_or_report(partial(load_geometry, config.calibration_dir), problems, path)
     if geometry is None:
@@ -92,6 +97,8 @@ def _extrinsics(config: RigConfig) -> list[Problem]:
 
 def _hands(config: RigConfig) -> list[Problem]:
     problems: list[Problem] = []
+    if not config.has_depth:
+        return problems
     for hand, table in config.hand.items():
         path = config.calibration_dir / f"hand.{hand}.json"
         if not path.exists():

@@ -12,6 +12,11 @@ import msgspec
 import typer
 
 from services.cli.check.problems import Report, report
+from services.cli.rig.answers import Answers, ask_rig
+from services.cli.rig.certificates import certificate_problem
+from services.cli.rig.machine import addresses_of, is_this_machine
+from services.cli.rig.place import place_of
+from services.cli.rig.ports import taken_ports
 
 
 def check(
@@ -19,7 +24,10 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="exit with 1 on warnings too")] = False,
 ) -> None:
-    """List every problem of a rig.toml: keys, colours, calibrations, sources, network."""
+    """List every problem of a rig.toml: keys, colours, calibrations, sources, network.
+
+    Run on the master, it also asks the trackers that run; on a Pi it looks at what lives there.
+    """
     found = check_config(config)
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(found), indent=1).decode())
@@ -30,14 +38,34 @@ def check(
 
 
 def check_config(config: Path) -> Report:
-    """All findings on one rig.toml."""
+    """All findings on one rig.toml, as this machine's place in the rig wants it."""
     from services.cli.check.calibration import check_calibration
+    from services.cli.check.machines import (
+        check_certificates,
+        check_hosts,
+        check_ports,
+        check_router,
+    )
     from services.cli.check.rig import check_rig
+    from services.cli.check.running import check_remote_cameras, questions_to
     from services.cli.check.toml import read_rig
 
     rig, problems = read_rig(config)
-    if rig is not None:
-        problems = problems + check_rig(rig, config) + check_calibration(rig)
+    if rig is None:
+        return report(str(config), problems)
+    place = place_of(rig, is_this_machine)
+    taken = taken_ports(rig.bus.listen) if place.master else {}
+    questions = questions_to(rig, place)
+    asks = questions or taken or not place.master
+    answers = ask_rig(rig, questions) if asks else Answers()
+    problems += check_rig(rig, config, place) + check_calibration(rig, place)
+    problems += check_hosts(rig, config, place, addresses_of)
+    problems += check_certificates(rig, certificate_problem(rig, place))
+    if place.master:
+        problems += check_ports(rig, config, taken, answers)
+        problems += check_remote_cameras(rig, config, place, answers)
+    else:
+        problems += check_router(rig, config, answers)
     return report(str(config), problems)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from itertools import combinations
 
-from rhot.files.calibration import ColorRange, load_colors, load_exposure
+from rhot.files.calibration import ColorRange, Colors, load_colors, load_exposure
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from services.cli.check.problems import Problem, error, load_or_report, warning
@@ -21,24 +21,30 @@ def check_colors(config: RigConfig, camera: CameraTable) -> list[Problem]:
     colors = load_or_report(
         partial(load_colors, config.calibration_dir, camera.name), problems, path
     )
-    if colors is None:
-        return problems
+    return problems if colors is None else color_problems(config, camera, colors, str(path))
+
+
+def color_problems(
+    config: RigConfig, camera: CameraTable, colors: Colors, where: str
+) -> list[Problem]:
+    """What is wrong with the colours of a file, or of a tracker; where names it."""
+    problems: list[Problem] = []
     wanted = config.colors or sorted(colors.colors)
     for name in wanted:
         if name not in colors.colors:
             has = ", ".join(sorted(colors.colors)) or "none"
             text = (
-                f"colour {name!r} of rig.toml's markers is missing; the file has {has}. "
+                f"colour {name!r} of rig.toml's markers is missing; it has {has}. "
                 f"Add it with `rhot calibrate colors {camera.name}`"
             )
-            problems.append(error(path, text))
+            problems.append(error(where, text))
     for a, b in combinations([name for name in wanted if name in colors.colors], 2):
         if overlap(colors.colors[a], colors.colors[b]):
             text = (
                 f"the ranges of {a!r} and {b!r} overlap: a blob of one may be taken for the other; "
                 "narrow them with `rhot calibrate colors`"
             )
-            problems.append(warning(path, text))
+            problems.append(warning(where, text))
     return problems
 
 

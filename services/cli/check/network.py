@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from ipaddress import ip_address
 from pathlib import Path
 
 from rhot.files.config import RigConfig
 from services.cli.check.problems import Problem, error, warning
+from services.cli.rig.place import host_and_port, is_local, network_hosts
 
 # Zenoh's transports that bring their own protection, and those that never leave the machine.
 _PROTECTED, _LOCAL = ("tls", "quic"), ("unixsock-stream", "unixpipe")
 _OTHERS = ("tcp", "udp", "ws")
+# Listening there is listening at all addresses of the machine.
+_EVERYWHERE = ("0.0.0.0", "::")
 
 
 def check_bus(config: RigConfig, path: Path) -> list[Problem]:
@@ -41,10 +43,16 @@ def check_bus(config: RigConfig, path: Path) -> list[Problem]:
             )
             problems.append(error(path, text))
     remote = sorted({camera.host for camera in config.camera if camera.host})
-    if remote and all(_is_loopback(endpoint.partition("/")[2]) for endpoint in config.bus.listen):
+    if remote and all(map(_is_loopback, config.bus.listen)):
         text = (
             "[bus] listen: only this machine can reach the router, but there are cameras on "
             f"{', '.join(remote)}"
+        )
+        problems.append(error(path, text))
+    if remote and not network_hosts(config.bus.connect):
+        text = (
+            "[bus] connect: names no address of the master that other machines can reach, but "
+            f"there are cameras on {', '.join(remote)}; add e.g. tls/master.local:7448"
         )
         problems.append(error(path, text))
     return problems
@@ -54,30 +62,21 @@ def _is_endpoint(endpoint: str) -> bool:
     protocol, _, address = endpoint.partition("/")
     if protocol in _LOCAL:
         return bool(address)
-    host, port = _host_and_port(address)
+    host, port = host_and_port(endpoint)
     known = protocol in (*_OTHERS, *_PROTECTED)
     return known and bool(host) and port.isdecimal() and 0 <= int(port) <= 65535
 
 
 def _is_open(endpoint: str) -> bool:
     """Whether other machines may connect without protection."""
-    protocol, _, address = endpoint.partition("/")
-    guarded = protocol in (*_PROTECTED, *_LOCAL) or _is_loopback(address)
+    protocol = endpoint.partition("/")[0]
+    guarded = protocol in (*_PROTECTED, *_LOCAL) or _is_loopback(endpoint)
     return _is_endpoint(endpoint) and not guarded
 
 
-def _is_loopback(address: str) -> bool:
-    host = _host_and_port(address)[0].strip("[]")
-    try:
-        return host == "localhost" or ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
-def _host_and_port(address: str) -> tuple[str, str]:
-    """Of HOST:PORT?METADATA#CONFIGURATION, as Zenoh writes addresses."""
-    host, _, port = address.partition("#")[0].partition("?")[0].rpartition(":")
-    return host, port
+def _is_loopback(endpoint: str) -> bool:
+    host = host_and_port(endpoint)[0]
+    return is_local(host) and host not in _EVERYWHERE
 
 
 def check_viewer(config: RigConfig, path: Path) -> list[Problem]:

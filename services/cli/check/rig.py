@@ -15,34 +15,37 @@ from rhot.files.config import RigConfig
 from services.cli.check.network import check_bus, check_viewer
 from services.cli.check.problems import Problem, error, note, warning
 from services.cli.check.sources import check_camera_source, check_object_source
+from services.cli.rig.place import Place
 from services.simulator.scene.catalog import scene_spec
 
 # Sources that one camera has for itself.
 _DEVICES = ("picamera2", "v4l2")
 
 
-def check_rig(config: RigConfig, path: Path) -> list[Problem]:
-    """Problems of everything but calibration/."""
+def check_rig(config: RigConfig, path: Path, place: Place) -> list[Problem]:
+    """Problems of everything but calibration/; of devices and files only those of this machine."""
     problems = _cameras(config, path) + _same_device(config, path)
     for camera in config.camera:
-        problems += check_camera_source(config, camera, path)
-    return (
-        problems
-        + _world(config, path)
-        + check_object_source(config, path)
-        + check_bus(config, path)
-        + _simulator(config, path)
-        + check_viewer(config, path)
-    )
+        here = camera.name in place.cameras
+        problems += check_camera_source(config, camera, path, here=here)
+    problems += _world(config, path) + check_bus(config, path) + _simulator(config, path)
+    if place.master:
+        problems += check_object_source(config, path) + check_viewer(config, path)
+    return problems
 
 
 def _cameras(config: RigConfig, path: Path) -> list[Problem]:
     count = len(config.camera)
     problems = []
-    if config.hand and count < 2:
-        there = "is one" if count else "is none"
-        text = f"[hand]: a hand needs two cameras for depth, there {there}; add a [[camera]] table"
+    if config.hand and not count:
+        text = "[hand]: a hand needs two cameras for depth, there is none; add a [[camera]] table"
         problems.append(error(path, text))
+    elif config.hand and count == 1:
+        text = (
+            "there is one camera: its markers are tracked, but a hand needs two for depth, and is "
+            "not solved"
+        )
+        problems.append(note(path, text))
     elif not count and not config.object:
         text = "there is neither a [[camera]] nor an [[object]]; nothing would be tracked"
         problems.append(error(path, text))

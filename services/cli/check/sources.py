@@ -15,15 +15,17 @@ _CAMERA_SOURCES = (
 _OBJECT_SOURCES = "steamvr, libsurvive, replay:FILE, simulator, network"
 
 
-def check_camera_source(config: RigConfig, camera: CameraTable, path: Path) -> list[Problem]:
-    """Whether the source of a camera can be used; devices and files of other hosts pass."""
+def check_camera_source(
+    config: RigConfig, camera: CameraTable, path: Path, *, here: bool
+) -> list[Problem]:
+    """Whether the source of a camera can be used; devices and files that are not here pass."""
     kind, _, detail = camera.source.partition(":")
     where = f"camera {camera.name!r}: source = {camera.source!r}"
     match kind:
         case "simulator" if not detail:
             return []
         case "picamera2" if not detail or detail.isdecimal():
-            if camera.host or find_spec("picamera2") is not None:
+            if not here or find_spec("picamera2") is not None:
                 return []
             text = (
                 f"{where} needs picamera2, which this machine has not; set `host` to the Pi, or "
@@ -32,12 +34,12 @@ def check_camera_source(config: RigConfig, camera: CameraTable, path: Path) -> l
             return [warning(path, text)]
         case "v4l2" if detail:
             device = Path(f"/dev/video{detail}" if detail.isdecimal() else detail)
-            if camera.host or device.exists():
+            if not here or device.exists():
                 return []
             text = f"{where}: there is no {device}; `v4l2-ctl --list-devices` lists them"
             return [error(path, text)]
         case "video" | "folder" | "capture" if detail:
-            if camera.host:
+            if not here:
                 return []
             return _check_files(Path(config.folder) / detail, kind, camera.name, where, path)
     return [error(path, f"{where}: is no source; valid: {_CAMERA_SOURCES}")]

@@ -34,7 +34,8 @@ def children_of(
     listen = [option for e in endpoint for option in ("--listen", e)]
     children = [Child("router", service_argv("cli", "router", "--config", str(path), *listen))]
     local = [camera for camera in config.camera if not camera.host]
-    if any(camera.source == "simulator" for camera in local):
+    # Also for simulated cameras that are tracked on other hosts.
+    if any(camera.source == "simulator" for camera in config.camera):
         children.append(Child("simulator", service_argv("simulator", *common)))
     children += [
         Child(f"pi_tracker/{c.name}", service_argv("pi_tracker", *common, "--camera", c.name))

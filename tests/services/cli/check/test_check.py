@@ -209,8 +209,17 @@ def test_a_camera_of_another_host_is_not_looked_for_here(rig):
     assert any("only this machine can reach the router" in text for text in found)
 
 
-def test_a_hand_needs_two_cameras(rig):
+def test_markers_of_one_camera_are_no_error(rig):
     replace(rig, '[[camera]]\nname = "right"\nsource = "simulator"', "")
+    for name in ("rig.json", "left.lens.json"):
+        (rig.parent / "calibration" / name).unlink()
+    assert texts(rig) == []
+    assert any("needs two for depth" in text for text in texts(rig, "note"))
+
+
+def test_a_hand_without_a_camera_is_one(rig):
+    text = rig.read_text()
+    rig.write_text(text[: text.index("[[camera]]")] + "[hand.right.markers]\nwrist = 'violet'")
     assert any("two cameras" in text for text in texts(rig))
 
 
