@@ -1,7 +1,8 @@
 """Health beats and liveliness tokens of a rig, gathered into a RigState.
 
 A service whose beat is missing for three seconds is `silent`, one whose token is gone is `gone`,
-one that rig.toml expects and that never came is `absent`. Pure: time is an argument. Nothing from
+one that rig.toml expects and that never came is `absent`; `alive` is one whose first beat is waited
+for. Pure: time is an argument. Nothing from
 the network makes it grow without bound.
 """
 
@@ -18,6 +19,8 @@ from rhot.watch.rig_state import CameraRow, RigState, ServiceRow, StandingFault
 
 # Three beats: one may be late, two may be lost.
 _SILENT_NS = 3_000_000_000
+# Tokens of those who are there come at once, also through a busy router.
+_TOKENS_NS = 1_000_000_000
 # A last beat may come after the news that its sender has gone; one that starts anew beats later.
 _LATE_NS = 500_000_000
 # A rig of two Pis has eight services.
@@ -73,7 +76,7 @@ class RigMonitor:
             stamp_ns=now_ns,
             connection="ok" if self._lost_ns is None else "lost",
             services=rows,
-            faults=self._faults(rows),
+            faults=self._faults(rows, now_ns),
             cameras=[self._camera(camera.name, beats) for camera in self._config.camera],
             ages=ages,
             glass_to_pose_ms={one.hand: (one.pose_ms, one.pose_p99_ms) for one in ages},
@@ -91,8 +94,12 @@ class RigMonitor:
             state = "absent"
         elif name in self._alive and not alive and beat_ns < token_ns + _LATE_NS:
             state = "gone"
-        elif health is None or now_ns - beat_ns > _SILENT_NS:
+        elif now_ns - max(beat_ns, token_ns) > _SILENT_NS or (
+            health is not None and now_ns - beat_ns > _SILENT_NS
+        ):
             state = "silent"
+        elif health is None:
+            state = "alive"
         else:
             state = health.state
         return ServiceRow(
@@ -104,13 +111,15 @@ class RigMonitor:
             heard_ns=max(beat_ns, token_ns),
         )
 
-    def _faults(self, rows: Iterable[ServiceRow]) -> list[StandingFault]:
+    def _faults(self, rows: Iterable[ServiceRow], now_ns: int) -> list[StandingFault]:
         if self._lost_ns is not None:
             lost = router_lost(self._config.bus.connect, self._lost_ns)
             return [StandingFault(teller="", fault=lost)]
+        settled = now_ns - self._since_ns >= _TOKENS_NS
         found = [
             StandingFault(teller="", fault=fault)
             for fault in missing_services(self._config, rows, self._since_ns)
+            if settled or fault.code != "service_absent"
         ]
         found += [
             StandingFault(teller=row.name, fault=fault)

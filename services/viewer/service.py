@@ -17,8 +17,10 @@ from typing import Any
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.process.calibration_watch import load_and_watch
+from rhot.process.rig_watch import watching
 from rhot.process.service import Service
 from rhot.topics import Topic
+from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.calibration.page import CalibrationPage
 from services.viewer.live.gui import LivePanel
 from services.viewer.live.model import ViewModel
@@ -66,8 +68,9 @@ async def _show_live(
     service: Service, connected: asyncio.Event, panel: LivePanel, scene: LiveScene
 ) -> None:
     """Subscribe and draw for as long as a browser is connected."""
+    rig = RigMonitor(service.config, clock.now_ns())
     model = ViewModel()
-    async with asyncio.TaskGroup() as tasks:
+    async with watching(service.bus, rig), asyncio.TaskGroup() as tasks:
         followers = [
             tasks.create_task(_follow(service.bus, topic, take)) for topic, take in _handlers(model)
         ]
@@ -79,7 +82,8 @@ async def _show_live(
             scene.show(view, trails=panel.trails)
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
-                panel.show(view)
+                now_ns = clock.now_ns()
+                panel.show(view, rig.state(now_ns).faults, now_ns)
                 pictures = _switch_pictures(tasks, pictures, service, panel)
             await asyncio.sleep(1.0 / service.config.viewer.rate_hz)
         for follower in [*followers, *([pictures] if pictures else [])]:

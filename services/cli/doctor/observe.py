@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from pathlib import Path
 
+from rhot.bus.credentials import is_secured
+from rhot.bus.tls_diagnosis import certificate_problem
 from rhot.errors import BusError, CalibrationError, ConfigError
 from rhot.files.calibration import load_hand, load_rig_cameras
-from rhot.files.config import RigConfig, load_rig
+from rhot.files.config import RigConfig
 from services.cli.doctor.listen import listen
 from services.cli.doctor.local_routers import router_endpoints
 from services.cli.doctor.observations import Observations
 from services.cli.doctor.reach import reach
-from services.cli.router_session import router_session
+from services.cli.router_session import rig_and_endpoints, router_session
 
 
 async def observe(path: Path, connect: str | None) -> Observations:
     """Look at a rig; connect replaces the endpoints of rig.toml. Raises nothing."""
     seen = Observations(config_path=str(path))
     try:
-        config = seen.config = load_rig(path)
-    except ConfigError as error:
+        config, endpoints = rig_and_endpoints(path, connect)
+    except (ConfigError, BusError) as error:
         seen.config_problem = str(error)
         return seen
-    endpoints = [connect] if connect else list(config.bus.connect)
+    seen.config, seen.secured = config, any(map(is_secured, endpoints))
     seen.calibration_problem = _calibration_problem(config)
+    if seen.secured:
+        problem = await asyncio.to_thread(certificate_problem, endpoints, time.time())
+        seen.certificate_problem = problem or ""
     seen.reached = list(await asyncio.gather(*(reach(endpoint) for endpoint in endpoints)))
     if all(one.problem for one in seen.reached):
         seen.routers_here = await asyncio.to_thread(router_endpoints)

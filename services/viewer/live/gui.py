@@ -12,7 +12,8 @@ import viser
 
 from rhot.files.config import RigConfig
 from rhot.hand import HandName
-from services.viewer.live import panels
+from rhot.watch.rig_state import StandingFault
+from services.viewer.live import fault_panel, panels
 from services.viewer.live.model import View
 
 # JPEG files begin with this; other bytes are not sent to a browser.
@@ -26,6 +27,8 @@ class LivePanel:
         gui = server.gui
         self._config = config
         self._notes = notes
+        # Above everything else, and not there while all is well.
+        self._faults = gui.add_html("", visible=False)
         self._status = gui.add_html(panels.status(config, _NOTHING, notes))
         gui.add_html(panels.legend())
         self._trails = gui.add_checkbox("finger trails", False)
@@ -56,8 +59,10 @@ class LivePanel:
         """Whether camera pictures are switched on."""
         return bool(self._pictures.value)
 
-    def show(self, view: View) -> None:
-        """Bring the texts up to date."""
+    def show(self, view: View, faults: Sequence[StandingFault] = (), now_ns: int = 0) -> None:
+        """Bring the texts up to date; now_ns is CLOCK_REALTIME."""
+        self._faults.visible = bool(faults)
+        self._faults.content = fault_panel.faults(faults, now_ns)
         self._status.content = panels.status(self._config, view, self._notes)
         self._rates.content = panels.rates(view.health)
         for hand, handle in self._angles.items():

@@ -95,7 +95,11 @@ async def test_uncalibrated_cameras_are_left_out_with_a_note(
     async with running("viewer", serve, config) as (service, _):
         await until(lambda: service.state == "running")
         browser = await asyncio.to_thread(browse, int(service.values["port"]))
-        status = await asyncio.to_thread(browser.wait_for, "GuiHtmlMessage")
+        status = await asyncio.to_thread(
+            browser.wait_for,
+            "GuiHtmlMessage",
+            props=lambda props: "waiting for hand poses" in props["content"],
+        )
         assert "camera left is not drawn: rig.json: no such file" in status["props"]["content"]
         assert "waiting for hand poses" in status["props"]["content"]
 
