@@ -77,9 +77,11 @@ def running(router: str) -> Running:
             asyncio.TaskGroup() as tasks,
         ):
             service = Service(name, instance, config, theirs, tasks)
-            task = tasks.create_task(serve(service))
+            tasks.create_task(serve(service))
             yield service, ours
-            task.cancel()
+            # What a service leaves in its tasks ends with its process, and here with this.
+            for task in list(tasks._tasks):
+                task.cancel()
 
     return run
 

@@ -115,7 +115,8 @@ async def test_nothing_is_done_while_nobody_looks(
         for _ in range(2):
             browser = await asyncio.to_thread(browse, int(service.values["port"]))
             await until(lambda: publisher.wanted)
-            assert len(service.bus.streams) == 4
+            # Poses, points, objects, and health twice: for its rates and for what is wrong.
+            assert len(service.bus.streams) == 5
             await asyncio.to_thread(browser.close)
             await until(lambda: not publisher.wanted)
             assert service.bus.streams == []
