@@ -22,6 +22,7 @@ from rhot.files.rig_tables import (
     CameraTable,
     Fusion,
     HandTable,
+    Metrics,
     Objects,
     ObjectTable,
     Recorder,
@@ -51,6 +52,7 @@ class RigConfig(Table, frozen=True, kw_only=True):
     simulator: Simulator = Simulator()
     viewer: Viewer = Viewer()
     recorder: Recorder = Recorder()
+    metrics: Metrics = Metrics()
     folder: str = "."
 
     @property

@@ -199,6 +199,15 @@ class Recorder(Table, frozen=True, kw_only=True):
     autostart: bool = False
 
 
+class Metrics(Table, frozen=True, kw_only=True):
+    # Health for Prometheus, at http://HOST:PORT/metrics, from `rhot up` and from systemd.
+    enabled: bool = False
+    # Who may ask: by default this machine only. There is no password.
+    host: str = "127.0.0.1"
+    # 0 for any free one.
+    port: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 9464
+
+
 class World(Table, frozen=True, kw_only=True):
     """Turns the rig frame away from the first camera: T_rig_from_camera as 4x4 rows, metres."""
 

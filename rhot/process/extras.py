@@ -16,6 +16,7 @@ EXTRAS = {
     "mcap": "master",
     "numba": "master",
     "openvr": "openvr",
+    "prometheus_client": "master",
     "scipy": "master",
     "typer": "master",
     "viser": "master",

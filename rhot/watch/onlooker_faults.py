@@ -22,6 +22,7 @@ _ABOUT = {
     "simulator": "the simulator",
     "viewer": "the viewer",
     "recorder": "the recorder",
+    "metrics": "the metrics for Prometheus",
 }
 _CODES = {"absent": "service_absent", "gone": "service_gone", "silent": "service_silent"}
 

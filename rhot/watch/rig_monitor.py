@@ -30,7 +30,8 @@ _MAX_SERVICES = 64
 def expected_services(config: RigConfig) -> list[tuple[str, str]]:
     """(service, instance) of all that rig.toml calls for, without viewer and recorder."""
     expected = [("pi_tracker", camera.name) for camera in config.camera]
-    expected += [("fusion", "main"), ("solver", "main")]
+    # Markers alone are no pose: nothing is solved.
+    expected += [(name, "main") for name in ("fusion", "solver")[: 1 + config.has_depth]]
     if any(camera.source == "simulator" for camera in config.camera):
         expected.insert(0, ("simulator", "main"))
     return expected + ([("object_tracker", "main")] if config.object else [])

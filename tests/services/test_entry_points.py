@@ -85,6 +85,7 @@ def test_services_answer_with_the_core_alone(without, program, option):
         ("rhot-simulator", "cv2", "master"),
         ("rhot-viewer", "viser", "master"),
         ("rhot-recorder", "mcap", "master"),
+        ("rhot-metrics", "prometheus_client", "master"),
     ],
 )
 def test_a_service_names_the_extra_it_lacks(without, program, module, extra):

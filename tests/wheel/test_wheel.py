@@ -23,6 +23,7 @@ ENTRY_POINTS = (
     "rhot-simulator",
     "rhot-viewer",
     "rhot-recorder",
+    "rhot-metrics",
 )
 # What each extra is for: these entry points must start with it alone.
 COMPLETE = {
