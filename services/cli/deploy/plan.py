@@ -13,6 +13,7 @@ from typing import Literal
 
 from rhot.bus.credentials import is_secured
 from rhot.bus.roles import MASTER, cameras_by_certificate
+
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from rhot.bus.credentials import CA, CERTIFICATE, KEY
+
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 from services.cli.deploy.plan import Machine, calibrations

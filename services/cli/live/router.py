@@ -80,9 +80,7 @@ def router(
         raise typer.Exit(EXIT_USER) from None
 
 
-def _settings(
-    config: Path | None, listen: list[str] | None
-) -> tuple[list[str], RigConfig | None]:
+def _settings(config: Path | None, listen: list[str] | None) -> tuple[list[str], RigConfig | None]:
     """Endpoints with their certificates, and the rig whose roles the router keeps to."""
     rig = load_rig(config) if config else None
     endpoints = listen or (list(rig.bus.listen) if rig else [_LOOPBACK])

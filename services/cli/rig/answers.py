@@ -11,9 +11,10 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from rhot.bus.credentials import client_endpoints
+
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.credentials import client_endpoints
 from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
 from rhot.files.config import RigConfig

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 
 from rhot.bus.credentials import plain
+
 from rhot.files.config import RigConfig
 
 
