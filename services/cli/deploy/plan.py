@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from rhot.bus.credentials import is_secured
-from rhot.bus.roles import MASTER, cameras_by_certificate
-
+from rhot.bus.security.credentials import is_secured
+from rhot.bus.security.roles import MASTER, cameras_by_certificate
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 

@@ -9,8 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from rhot.bus.credentials import CA, CERTIFICATE, KEY
-
+from rhot.bus.security.credentials import CA, CERTIFICATE, KEY
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 from services.cli.deploy.plan import Machine, calibrations

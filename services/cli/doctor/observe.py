@@ -6,9 +6,8 @@ import asyncio
 import time
 from pathlib import Path
 
-from rhot.bus.credentials import is_secured
-from rhot.bus.tls_diagnosis import certificate_problem
-
+from rhot.bus.security.credentials import is_secured
+from rhot.bus.security.tls_diagnosis import certificate_problem
 from rhot.errors import BusError, CalibrationError, ConfigError
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig

@@ -11,10 +11,9 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rhot.bus.credentials import client_endpoints
-
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
+from rhot.bus.security.credentials import client_endpoints
 from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
 from rhot.files.config import RigConfig

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 
-from rhot.bus.credentials import Credentials, is_secured
-from rhot.bus.roles import cameras_by_certificate, common_name
-from rhot.bus.tls_diagnosis import own_problem, read_own_certificate
-
+from rhot.bus.security.credentials import Credentials, is_secured
+from rhot.bus.security.roles import cameras_by_certificate, common_name
+from rhot.bus.security.tls_diagnosis import own_problem, read_own_certificate
 from rhot.files.config import RigConfig
 from services.cli.rig.place import Place
 

@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from ipaddress import ip_address
 
-from rhot.bus.credentials import plain
-
+from rhot.bus.security.credentials import plain
 from rhot.files.config import RigConfig
 
 
