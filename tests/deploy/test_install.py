@@ -1,0 +1,290 @@
+"""install.sh and `rhot deploy` on a Pi's stand-in: a container with a real systemd, and sshd.
+
+The tests follow each other, as a machine's life does. A master is installed by `make test-system`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from testing import hosts
+from testing.hosts.commands import run
+from testing.hosts.container import Container
+from testing.hosts.network import Network, lan
+from testing.source_tree import ROOT
+
+SYSTEM_PYTHON = Path("/usr/bin/python3")
+INSTALL, RUNS = "/srv/deploy/install.sh", "/opt/rhot/current/deploy/install.sh"
+UNIT = "rhot-pi-tracker@left.service"
+PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet")
+RIG = """
+[bus]
+connect = ["tcp/127.0.0.1:7447"]
+[[camera]]
+name = "left"
+source = "folder:/srv/pictures"
+host = "pi-left"
+"""
+ROUTER = """
+import time, zenoh
+from rhot.bus.bus import router_config
+session = zenoh.open(router_config(["tcp/127.0.0.1:7447"]))
+time.sleep(1e6)
+"""
+
+
+def why_not() -> str:
+    """Why these tests cannot run here; empty if they can."""
+    if reason := hosts.missing():
+        return reason
+    if not shutil.which("sshd"):
+        return "needs Debian packages: sudo apt install openssh-server"
+    version = run([SYSTEM_PYTHON, "-c", "import sys; print(*sys.version_info[:2])"]).split()
+    if version != [str(number) for number in sys.version_info[:2]]:
+        return f"{SYSTEM_PYTHON} is Python {'.'.join(version)}, and its wheels are not ours"
+    return ""
+
+
+pytestmark = [
+    pytest.mark.wheel,
+    pytest.mark.timeout(900),
+    pytest.mark.skipif(bool(why_not()), reason=why_not()),
+]
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory) -> tuple[Path, Path]:
+    """Folders that hold all a Pi needs: with this rhot, and with one that is called 9.9.9."""
+    folder = tmp_path_factory.mktemp("wheels")
+    now, next_one = folder / "now", folder / "next"
+    run([*PIP, "-w", now, f"{ROOT}[pi]"], timeout_s=600.0)
+    tree = folder / "tree"
+    files = run(["git", "-C", ROOT, "ls-files", "rhot", "services", "config", "deploy"]).split("\n")
+    for name in (*filter(None, files), "pyproject.toml", "README.md", "LICENSE"):
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tree / name)
+    text = (tree / "pyproject.toml").read_text()
+    (tree / "pyproject.toml").write_text(re.sub(r'(?m)^version = ".*"', 'version = "9.9.9"', text))
+    shutil.copytree(now, next_one, ignore=shutil.ignore_patterns("rhot-*"))
+    run([*PIP, "--no-deps", "-w", next_one, tree], timeout_s=600.0)
+    return now, next_one
+
+
+@pytest.fixture(scope="module")
+def network() -> Iterator[Network]:
+    with lan("pi-left", "desk") as network:
+        yield network
+
+
+@pytest.fixture(scope="module")
+def pi(network, wheels, tmp_path_factory) -> Iterator[Container]:
+    """A host that has booted, and knows nothing of rhot."""
+    shown = {ROOT / "deploy": "/srv/deploy", wheels[0]: "/srv/now", wheels[1]: "/srv/next"}
+    host = Container("pi-left", network.namespace_path("pi-left"), shown)
+    try:
+        for number in range(3):
+            host.write(f"/srv/pictures/{number}.ppm", "P3 2 2 255\n" + "9 9 9 " * 4)
+        host.write("/srv/rig.toml", RIG)
+        host.write("/srv/router.py", ROUTER)
+        host.boot()
+        yield host
+    finally:
+        host.remove()
+
+
+def wait_until_active(host: Container, unit: str, pid: str = "") -> str:
+    """Its process, which is another than `pid`."""
+    deadline_s = time.monotonic() + 60.0
+    while time.monotonic() < deadline_s:
+        found = host.show(unit, "ActiveState", "MainPID")
+        if found["ActiveState"] == "active" and found["MainPID"] != pid:
+            return found["MainPID"]
+        time.sleep(0.2)
+    pytest.fail(f"{unit} is not active:\n{host.journal('-u', unit)}")
+
+
+def current(host: Container) -> str:
+    return host.run("readlink", "/opt/rhot/current").strip().rpartition("/")[2]
+
+
+def test_a_pi_is_installed_without_a_network(pi):
+    said = pi.run(
+        *(INSTALL, "pi", "left", "--master", "127.0.0.1"),
+        *("--config", "/srv/rig.toml", "--wheels", "/srv/now"),
+        timeout_s=600.0,
+    )
+    assert "is installed as pi" in said
+    assert "What comes next" in said
+    assert pi.run("/opt/rhot/current/bin/rhot-pi-tracker", "--version").strip()
+    assert pi.run("stat", "-c", "%U %a", "/var/lib/rhot/calibration").strip() == "rhot 2775"
+    assert pi.run("systemctl", "is-enabled", "rhot-pi.target", UNIT).split() == ["enabled"] * 2
+
+
+def test_the_tracker_waits_for_its_router_and_then_runs_in_its_sandbox(pi):
+    assert pi.show(UNIT, "ActiveState", "NRestarts") == {
+        "ActiveState": "activating",
+        "NRestarts": "0",
+    }
+    router = ("systemd-run", "-q", "--unit=router", "/opt/rhot/current/bin/python")
+    pi.run(*router, "/srv/router.py")
+    pid = wait_until_active(pi, UNIT)
+    status = pi.run("cat", f"/proc/{pid}/status")
+    assert re.search(r"^Seccomp:\t2$", status, re.MULTILINE), status
+    assert re.search(r"^CapBnd:\t0+$", status, re.MULTILINE), status
+    assert pi.run("ps", "-o", "user=", "-p", pid).strip() == "rhot"
+    assert pi.show(UNIT, "WatchdogUSec")["WatchdogUSec"] == "10s"
+
+
+def test_a_second_run_changes_nothing(pi):
+    pid = pi.show(UNIT, "MainPID")["MainPID"]
+    said = pi.run(INSTALL, "upgrade", "--wheels", "/srv/now", timeout_s=600.0)
+    assert said.startswith("Nothing to do"), said
+    assert pi.show(UNIT, "MainPID")["MainPID"] == pid
+
+
+def test_a_killed_tracker_is_back_at_once(pi):
+    pid = pi.show(UNIT, "MainPID")["MainPID"]
+    pi.run("kill", "-9", pid)
+    wait_until_active(pi, UNIT, pid)
+
+
+def test_a_broken_rig_toml_is_waited_for_and_not_spun_on(pi):
+    good = pi.run("cat", "/etc/rhot/rig.toml")
+    pi.run("sh", "-c", "echo nonsense >>/etc/rhot/rig.toml")
+    pi.run("systemctl", "restart", "--no-block", UNIT)
+    deadline_s = time.monotonic() + 60.0
+    while "not valid TOML" not in pi.show(UNIT, "StatusText").get("StatusText", ""):
+        assert time.monotonic() < deadline_s, pi.journal("-u", UNIT)
+        time.sleep(0.2)
+    before = pi.show(UNIT, "NRestarts")["NRestarts"]
+    time.sleep(5.0)
+    assert pi.show(UNIT, "NRestarts")["NRestarts"] == before
+    pi.run("sh", "-c", f"printf %s '{good}' >/etc/rhot/rig.toml")
+    wait_until_active(pi, UNIT)
+
+
+def test_an_upgrade_that_fails_leaves_what_runs(pi):
+    pi.run("sh", "-c", "mkdir /srv/broken; cp /srv/next/rhot-*.whl /srv/broken/")
+    before, pid = current(pi), pi.show(UNIT, "MainPID")["MainPID"]
+    said = pi.try_run(INSTALL, "upgrade", "--wheels", "/srv/broken", timeout_s=600.0)
+    assert "nothing was changed for the version that runs" in said
+    assert (current(pi), pi.show(UNIT, "MainPID")["MainPID"]) == (before, pid)
+
+
+def test_an_upgrade_and_a_rollback_switch_what_runs(pi):
+    old, pid = current(pi), pi.show(UNIT, "MainPID")["MainPID"]
+    pi.run(INSTALL, "upgrade", "--wheels", "/srv/next", timeout_s=600.0)
+    assert current(pi).startswith("9.9.9-")
+    pid = wait_until_active(pi, UNIT, pid)
+    assert "9.9.9" in pi.run("/opt/rhot/current/bin/rhot-pi-tracker", "--version")
+    assert pi.run(RUNS, "rollback").startswith(f"Back to rhot {old}")
+    assert current(pi) == old
+    wait_until_active(pi, UNIT, pid)
+    assert "there is no earlier version" in pi.try_run(RUNS, "rollback")
+    assert f"version {old} (current)" in pi.run(RUNS, "status")
+
+
+def test_three_versions_are_kept(pi):
+    for name in ("0.0.1-a", "0.0.2-b", "0.0.3-c"):
+        pi.run(
+            "sh",
+            "-c",
+            f"mkdir /opt/rhot/versions/{name}; touch /opt/rhot/versions/{name}/.complete",
+        )
+        pi.run("sed", "-i", f"1i {name}", "/opt/rhot/history")
+    pi.run(INSTALL, "upgrade", "--wheels", "/srv/next", timeout_s=600.0)
+    kept = pi.run("ls", "/opt/rhot/versions").split()
+    assert len(kept) == 3
+    assert current(pi) in kept
+
+
+@pytest.fixture
+def ssh_config(pi, network) -> Iterator[Path]:
+    """A daemon on the Pi, and what the desk needs to log in there as root."""
+    # Not tmp_path: a path of a socket has at most 108 characters.
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for key in ("host", "user"):
+            run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", folder / key])
+        daemon = (
+            f"Port 2222\nListenAddress {network.addresses['pi-left']}\nStrictModes no\n"
+            "HostKey /srv/ssh/host\nAuthorizedKeysFile /srv/ssh/user.pub\nPidFile none\n"
+            "PermitRootLogin prohibit-password\nSubsystem sftp internal-sftp\n"
+        )
+        (folder / "sshd").write_text(daemon)
+        pi.run("mkdir", "-p", "/srv/ssh", "/run/sshd")
+        for path in (folder / "host", folder / "user.pub", folder / "sshd"):
+            words = pi.inside("sh", "-c", f"umask 077; cat >/srv/ssh/{path.name}")
+            subprocess.run(words, input=path.read_bytes(), check=True)
+        pi.run(
+            "systemd-run", "-q", "--unit=ssh-test", "/usr/sbin/sshd", "-D", "-f", "/srv/ssh/sshd"
+        )
+        (folder / "config").write_text(
+            f"Host pi-left\nHostName {network.addresses['pi-left']}\nPort 2222\nUser root\n"
+            f"IdentityFile {folder}/user\nIdentitiesOnly yes\nBatchMode yes\n"
+            f"StrictHostKeyChecking accept-new\nUserKnownHostsFile {folder}/known\n"
+            "ConnectionAttempts 20\n"
+        )
+        yield folder / "config"
+        pi.run("systemctl", "stop", "ssh-test")
+
+
+def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
+    pi, network, wheels, ssh_config, tmp_path
+):
+    (tmp_path / "rig.toml").write_text(RIG + "fps = 25.0\n")
+    (tmp_path / "calibration").mkdir()
+    (tmp_path / "calibration" / "left.lens.json").write_text("{}")
+    (tmp_path / "calibration" / "right.lens.json").write_text("{}")
+    before = current(pi)
+    said = run(
+        ["ip", "netns", "exec", network.namespace("desk"), sys.executable, "-m", "services.cli"]
+        + ["deploy", "pi-left", "--config", tmp_path / "rig.toml", "--wheels", wheels[0]]
+        + ["--ssh-config", ssh_config],
+        timeout_s=600.0,
+        environment=os.environ,
+    )
+    assert "pi-left: pi left" in said
+    assert "keep the old rig.toml as /etc/rhot/rig.toml.bak" in said
+    assert pi.run("cat", "/etc/rhot/rig.toml") == (tmp_path / "rig.toml").read_text()
+    assert pi.run("ls", "/var/lib/rhot/calibration").split() == ["left.lens.json"]
+    assert current(pi) != before
+    assert "rhot-deploy" not in pi.run("ls", "-a", "/root")
+
+
+def test_a_host_that_is_not_there_is_told(network, ssh_config, wheels, tmp_path):
+    (tmp_path / "rig.toml").write_text(RIG.replace('"pi-left"', '"10.77.0.99"'))
+    said = run(
+        ["ip", "netns", "exec", network.namespace("desk"), sys.executable, "-m", "services.cli"]
+        + ["deploy", "10.77.0.99", "--config", tmp_path / "rig.toml", "--wheels", wheels[0]],
+        timeout_s=120.0,
+        environment=os.environ,
+        check=False,
+    )
+    assert "rhot deploy: failed on 10.77.0.99" in said
+
+
+def test_uninstall_leaves_the_data_and_purge_nothing(pi):
+    pi.run("systemctl", "stop", "router")
+    assert "/var/lib/rhot" in pi.run(RUNS, "uninstall")
+    assert pi.processes("rhot") == []
+    pi.run("test", "!", "-e", "/opt/rhot")
+    pi.run("test", "-f", "/etc/rhot/rig.toml")
+    assert "rhot-" not in pi.run("systemctl", "list-unit-files", "--no-legend")
+    assert "rhot is removed" in pi.run(INSTALL, "uninstall", "--purge")
+    assert (
+        pi.try_run("ls", "-d", "/etc/rhot", "/var/lib/rhot", "/var/cache/rhot").count("No such")
+        == 3
+    )
+    assert "no such user" in pi.try_run("id", "rhot")
+    assert "Nothing to do" in pi.run(INSTALL, "uninstall", "--purge")
