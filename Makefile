@@ -10,7 +10,7 @@ SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench soak format docs figures clean system install browser wheel test-system
+.PHONY: demo test check bench soak format docs figures clean system install browser wheel test-system wheels test-arm64
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
@@ -43,7 +43,16 @@ browser: $(STAMP)
 
 # The built wheel in new environments, with each extra alone; takes minutes and downloads packages.
 wheel: $(STAMP)
-	$(BIN)/pytest -q --durations=10 tests/wheel $(ARGS)
+	$(BIN)/pytest -q --durations=10 -m wheel tests/wheel tests/deploy $(ARGS)
+
+# All packages of an installation without a network: dist/wheels/master (this kind of machine) and pi.
+wheels: $(STAMP)
+	$(BIN)/python -m testing.collect_wheels $(ARGS)
+
+# install.sh and a tracker on an emulated 64-bit ARM Debian; as root, 10 to 20 minutes. Not in CI.
+test-arm64: $(STAMP)
+	$(BIN)/python -m testing.collect_wheels pi
+	tests/deploy/arm64.sh
 
 # A master and two Pis as containers with systemd, installed by deploy/install.sh; faults are planted
 # and a table is printed (and written to build/system.json). Needs root and systemd-container; the

@@ -40,7 +40,8 @@ fail() {
 
 # ---- what is to be done, and doing it ------------------------------------------------------------
 
-DRY_RUN='' CHANGES=0
+# RESTART: something has changed that the services have read.
+DRY_RUN='' CHANGES=0 RESTART=''
 
 say() { printf '%s\n' "$*"; }
 
@@ -56,6 +57,7 @@ put() {
     local found=''
     if [[ -e $2 ]]; then found=$(stat -c '%a %U' -- "$2"); fi
     if [[ $found == "$3 $4" ]] && cmp -s -- "$1" "$2"; then return; fi
+    case $2 in "$UNITS"/* | "$ETC"/*) RESTART=yes ;; esac
     change "write $2" install -D -m "$3" -o "$4" -g "$(group_of "$4")" -T -- "$1" "$2"
 }
 
@@ -74,6 +76,7 @@ link() {
         say "  ! $2 exists and is not a link: left as it is"
         return
     fi
+    if [[ $2 == "$ROOT/current" ]]; then RESTART=yes; fi
     change "link $2 to $1" relink "$1" "$2"
 }
 
@@ -436,31 +439,33 @@ start_units() {
     fi
     if [[ -n $NO_START ]]; then return; fi
     if [[ ! -f $ETC/rig.toml ]]; then return; fi
-    local -a all stopped=()
-    mapfile -t all < <({ targets; wanted_units; } | sort -u)
-    if ((CHANGES)); then
-        change "start ${all[*]}" restart_units "${all[@]}"
-        return
-    fi
     local unit
-    for unit in "${all[@]}"; do
-        systemctl is-active --quiet "$unit" || stopped+=("$unit")
-    done
-    ((${#stopped[@]})) || return 0
-    change "start ${stopped[*]}" systemctl start --no-block "${stopped[@]}"
+    local -a running=() stopped=()
+    while IFS= read -r unit; do
+        if [[ $unit != *.target && $(systemctl is-active "$unit") =~ ^(active|activating|reloading)$ ]]; then
+            running+=("$unit")
+        elif ! systemctl is-active --quiet "$unit"; then
+            stopped+=("$unit")
+        fi
+    done < <({ targets; wanted_units; } | sort -u)
+    if [[ -z $DRY_RUN ]]; then systemctl daemon-reload; fi
+    if [[ -n $RESTART ]] && ((${#running[@]})); then
+        change "start again ${running[*]}" begin restart "${running[@]}"
+    fi
+    if ((${#stopped[@]})); then change "start ${stopped[*]}" begin start "${stopped[@]}"; fi
 }
 
-# Not waited for by systemctl: a service that waits for its router is in order. Said after a while.
-restart_units() {
-    systemctl daemon-reload
-    systemctl reset-failed 'rhot-*' 2>/dev/null || true
-    systemctl restart --no-block "$@"
+# begin start|restart UNIT...: systemctl does not wait (a service that waits for its router is in
+# order); after ten seconds it is said how far they are.
+begin() {
     local _ unit
+    systemctl reset-failed 'rhot-*' 2>/dev/null || true
+    systemctl "$1" --no-block "${@:2}"
     for _ in {1..20}; do
         sleep 0.5
-        if systemctl is-active --quiet "$@"; then return; fi
+        if systemctl is-active --quiet "${@:2}"; then return; fi
     done
-    for unit in "$@"; do
+    for unit in "${@:2}"; do
         systemctl is-active --quiet "$unit" || say "    $unit: $(state_of "$unit")"
     done
 }

@@ -1,4 +1,4 @@
-"""Collects every wheel that install.sh needs without a network: `make wheels`.
+"""Collect every wheel that install.sh needs without a network: `make wheels`.
 
 dist/wheels/master holds rhot and its dependencies for this machine, dist/wheels/pi those for 64-bit
 Raspberry Pi OS 12 and 13 (Python 3.11 and 3.13).
@@ -7,6 +7,7 @@ Raspberry Pi OS 12 and 13 (Python 3.11 and 3.13).
 from __future__ import annotations
 
 import argparse
+import platform
 import subprocess
 import sys
 import tomllib
@@ -17,6 +18,7 @@ from pip._vendor.packaging.requirements import Requirement
 SOURCE = Path(__file__).resolve().parents[1]
 # Debian 12 and 13 have glibc 2.36 and 2.41: wheels of both older tags run there.
 PI_PLATFORMS = ("manylinux_2_28_aarch64", "manylinux_2_17_aarch64", "manylinux2014_aarch64")
+SYSTEM_PYTHON = "/usr/bin/python3"
 PI_PYTHONS = ("3.11", "3.13")
 
 
@@ -49,27 +51,39 @@ def collect_pi(folder: Path) -> None:
     """Wheels of a Pi's tracker, for each Python that Raspberry Pi OS has."""
     platforms = [option for one in PI_PLATFORMS for option in ("--platform", one)]
     for python in PI_PYTHONS:
-        target = ["--only-binary=:all:", "--python-version", python, *platforms]
-        pip("download", *target, "--dest", str(folder), *requirements("pi", python, "aarch64"))
+        _download(folder, "pi", python, "aarch64", platforms)
+
+
+def collect_master(folder: Path) -> None:
+    """Wheels of a master like this machine, for the Python that install.sh takes."""
+    ask = "import sys; print('%d.%d' % sys.version_info[:2])"
+    python = SYSTEM_PYTHON if Path(SYSTEM_PYTHON).exists() else sys.executable
+    done = subprocess.run([python, "-c", ask], capture_output=True, text=True, check=True)
+    _download(folder, "master", done.stdout.strip(), platform.machine(), [])
+
+
+def _download(folder: Path, extra: str, python: str, machine: str, options: list[str]) -> None:
+    target = ["--only-binary=:all:", "--python-version", python, *options]
+    pip("download", *target, "--dest", str(folder), *requirements(extra, python, machine))
+
+
+COLLECT = {"master": collect_master, "pi": collect_pi}
 
 
 def main() -> None:
     """Fill dist/wheels, or the folder that --out names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=SOURCE / "dist" / "wheels")
-    parser.add_argument("roles", nargs="*", default=["master", "pi"], metavar="master|pi")
+    parser.add_argument("roles", nargs="*", choices=[[], *COLLECT], metavar="master|pi")
     options = parser.parse_args()
-    for role in options.roles:
+    for role in options.roles or COLLECT:
         folder = options.out / role
         folder.mkdir(parents=True, exist_ok=True)
         # An older build of the same number would be taken for the newest.
         for old in folder.glob("rhot-*.whl"):
             old.unlink()
         pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(SOURCE))
-        if role == "pi":
-            collect_pi(folder)
-        else:
-            pip("wheel", "--wheel-dir", str(folder), f"{SOURCE}[{role}]")
+        COLLECT[role](folder)
         print(f"{folder}: {len(list(folder.glob('*.whl')))} wheels")
 
 

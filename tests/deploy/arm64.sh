@@ -22,9 +22,9 @@ done
 
 # The Debian itself is made once, and kept (about 250 MB, 5 minutes).
 mkdir -p "$CACHE"
-if [[ ! -s $CACHE/$SUITE.tar ]]; then
+if [[ ! -f $CACHE/$SUITE.tar ]]; then
     echo "== making an arm64 Debian ($SUITE)"
-    mmdebstrap --quiet --arch=arm64 --variant=minbase \
+    mmdebstrap --quiet --format=tar --arch=arm64 --variant=minbase \
         --include=python3,python3-venv,systemd,systemd-sysv "$SUITE" "$CACHE/$SUITE.tar.new"
     mv "$CACHE/$SUITE.tar.new" "$CACHE/$SUITE.tar"
 fi
@@ -42,6 +42,7 @@ mount -t tmpfs -o mode=755 tmpfs "$ROOT/dev"
 for device in null zero full random urandom; do
     cp -a "/dev/$device" "$ROOT/dev/$device"
 done
+ln -s /proc/self/fd "$ROOT/dev/fd"
 mkdir "$ROOT/dev/shm" "$ROOT/srv/wheels" "$ROOT/srv/deploy"
 cp "$WHEELS"/*.whl "$ROOT/srv/wheels/"
 cp -r "$SOURCE/deploy/." "$ROOT/srv/deploy/"

@@ -17,11 +17,13 @@ from pathlib import Path
 
 import pytest
 
+from rhot.files.calibration import save
 from testing import hosts
 from testing.hosts.commands import run
 from testing.hosts.container import Container
 from testing.hosts.network import Network, lan
 from testing.source_tree import ROOT
+from testing.synthetic_images import ranges
 
 SYSTEM_PYTHON = Path("/usr/bin/python3")
 INSTALL, RUNS = "/srv/deploy/install.sh", "/opt/rhot/current/deploy/install.sh"
@@ -94,6 +96,7 @@ def pi(network, wheels, tmp_path_factory) -> Iterator[Container]:
     try:
         for number in range(3):
             host.write(f"/srv/pictures/{number}.ppm", "P3 2 2 255\n" + "9 9 9 " * 4)
+        save(host.disk / "srv" / "left.colors.json", ranges())
         host.write("/srv/rig.toml", RIG)
         host.write("/srv/router.py", ROUTER)
         host.boot()
@@ -113,6 +116,14 @@ def wait_until_active(host: Container, unit: str, pid: str = "") -> str:
     pytest.fail(f"{unit} is not active:\n{host.journal('-u', unit)}")
 
 
+def wait_for_status(host: Container, text: str) -> None:
+    """The tracker says for what it waits."""
+    deadline_s = time.monotonic() + 60.0
+    while text not in host.show(UNIT, "StatusText").get("StatusText", ""):
+        assert time.monotonic() < deadline_s, host.journal("-u", UNIT)
+        time.sleep(0.2)
+
+
 def current(host: Container) -> str:
     return host.run("readlink", "/opt/rhot/current").strip().rpartition("/")[2]
 
@@ -130,13 +141,20 @@ def test_a_pi_is_installed_without_a_network(pi):
     assert pi.run("systemctl", "is-enabled", "rhot-pi.target", UNIT).split() == ["enabled"] * 2
 
 
-def test_the_tracker_waits_for_its_router_and_then_runs_in_its_sandbox(pi):
+def test_the_tracker_waits_for_its_router_and_for_its_colours(pi):
+    assert pi.show(UNIT, "ActiveState")["ActiveState"] == "activating"
+    router = ("systemd-run", "-q", "--unit=router", "/opt/rhot/current/bin/python")
+    pi.run(*router, "/srv/router.py")
+    wait_for_status(pi, "rhot calibrate colors left")
     assert pi.show(UNIT, "ActiveState", "NRestarts") == {
         "ActiveState": "activating",
         "NRestarts": "0",
     }
-    router = ("systemd-run", "-q", "--unit=router", "/opt/rhot/current/bin/python")
-    pi.run(*router, "/srv/router.py")
+    pi.run("cp", "/srv/left.colors.json", "/etc/rhot/calibration/")
+    wait_until_active(pi, UNIT)
+
+
+def test_the_tracker_runs_in_its_sandbox(pi):
     pid = wait_until_active(pi, UNIT)
     status = pi.run("cat", f"/proc/{pid}/status")
     assert re.search(r"^Seccomp:\t2$", status, re.MULTILINE), status
@@ -162,10 +180,7 @@ def test_a_broken_rig_toml_is_waited_for_and_not_spun_on(pi):
     good = pi.run("cat", "/etc/rhot/rig.toml")
     pi.run("sh", "-c", "echo nonsense >>/etc/rhot/rig.toml")
     pi.run("systemctl", "restart", "--no-block", UNIT)
-    deadline_s = time.monotonic() + 60.0
-    while "not valid TOML" not in pi.show(UNIT, "StatusText").get("StatusText", ""):
-        assert time.monotonic() < deadline_s, pi.journal("-u", UNIT)
-        time.sleep(0.2)
+    wait_for_status(pi, "not valid TOML")
     before = pi.show(UNIT, "NRestarts")["NRestarts"]
     time.sleep(5.0)
     assert pi.show(UNIT, "NRestarts")["NRestarts"] == before
@@ -239,6 +254,15 @@ def ssh_config(pi, network) -> Iterator[Path]:
         pi.run("systemctl", "stop", "ssh-test")
 
 
+def at_the_desk(
+    network: Network, host: str, folder: Path, wheels: Path, *options: str | Path
+) -> list[str | Path]:
+    """`rhot deploy` of the rig in `folder`, on another computer of the network."""
+    inside = ["ip", "netns", "exec", network.namespace("desk"), sys.executable]
+    command = ["-m", "services.cli", "deploy", host, "--config", folder / "rig.toml"]
+    return [*inside, *command, "--wheels", wheels, *options]
+
+
 def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
     pi, network, wheels, ssh_config, tmp_path
 ):
@@ -248,16 +272,17 @@ def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
     (tmp_path / "calibration" / "right.lens.json").write_text("{}")
     before = current(pi)
     said = run(
-        ["ip", "netns", "exec", network.namespace("desk"), sys.executable, "-m", "services.cli"]
-        + ["deploy", "pi-left", "--config", tmp_path / "rig.toml", "--wheels", wheels[0]]
-        + ["--ssh-config", ssh_config],
+        at_the_desk(network, "pi-left", tmp_path, wheels[0], "--ssh-config", ssh_config),
         timeout_s=600.0,
         environment=os.environ,
     )
     assert "pi-left: pi left" in said
     assert "keep the old rig.toml as /etc/rhot/rig.toml.bak" in said
     assert pi.run("cat", "/etc/rhot/rig.toml") == (tmp_path / "rig.toml").read_text()
-    assert pi.run("ls", "/var/lib/rhot/calibration").split() == ["left.lens.json"]
+    assert pi.run("ls", "/var/lib/rhot/calibration").split() == [
+        "left.colors.json",
+        "left.lens.json",
+    ]
     assert current(pi) != before
     assert "rhot-deploy" not in pi.run("ls", "-a", "/root")
 
@@ -265,8 +290,7 @@ def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
 def test_a_host_that_is_not_there_is_told(network, ssh_config, wheels, tmp_path):
     (tmp_path / "rig.toml").write_text(RIG.replace('"pi-left"', '"10.77.0.99"'))
     said = run(
-        ["ip", "netns", "exec", network.namespace("desk"), sys.executable, "-m", "services.cli"]
-        + ["deploy", "10.77.0.99", "--config", tmp_path / "rig.toml", "--wheels", wheels[0]],
+        at_the_desk(network, "10.77.0.99", tmp_path, wheels[0]),
         timeout_s=120.0,
         environment=os.environ,
         check=False,

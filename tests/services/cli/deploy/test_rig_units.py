@@ -1,0 +1,43 @@
+"""The units that install.sh enables for a rig.toml."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from rhot.files.config import load_rig
+from services.cli.defaults import config_dir
+from services.cli.deploy.rig_units import master_units
+from services.cli.live.up import children_of
+
+
+def asked(question, path) -> subprocess.CompletedProcess[str]:
+    """What install.sh runs."""
+    command = [sys.executable, "-m", "services.cli.deploy.rig_units", question, str(path)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("name", ["sim.toml", "rig.example.toml"])
+def test_a_master_runs_what_rhot_up_runs(name):
+    path = config_dir() / name
+    rig = load_rig(path)
+    always = {"rhot-router.service", "rhot-fusion.service", "rhot-solver.service"}
+    units = {*always, "rhot-viewer.service", *master_units(rig)} - {"rhot-pi.target"}
+    children = children_of(rig, path, viewer=True)
+    names = (child.name.replace("_", "-").replace("/", "@") for child in children)
+    assert units == {f"rhot-{name}.service" for name in names}
+
+
+def test_install_sh_gets_lines(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text('[bus]\nconnect = ["tcp/a:1", "tls/b:2"]\n[recorder]\nautostart = true\n')
+    assert asked("connect", path).stdout.split() == ["tcp/a:1", "tls/b:2"]
+    assert asked("units", path).stdout.split() == ["rhot-recorder.service"]
+    assert asked("check", path).stdout == ""
+    path.write_text("[bsu]\n")
+    wrong = asked("check", path)
+    assert wrong.returncode == 2
+    assert "bsu" in wrong.stderr
+    assert len(wrong.stderr.splitlines()) == 1
