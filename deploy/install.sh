@@ -310,14 +310,16 @@ remember() {
 # The versions that count for a rollback: those of the history that are still there, newest first.
 kept_versions() {
     local name
-    tac "$ROOT/history" 2>/dev/null | awk '!seen[$0]++' | while IFS= read -r name; do
+    [[ -f $ROOT/history ]] || return 0
+    tac "$ROOT/history" | awk '!seen[$0]++' | while IFS= read -r name; do
         if [[ -f $ROOT/versions/$name/.complete ]]; then printf '%s\n' "$name"; fi
     done
 }
 
 prune_versions() {
     local place kept
-    kept=$(kept_versions | head -n "$KEEP_VERSIONS")
+    # Not head, which would end the pipe early: an error to pipefail.
+    kept=$(kept_versions | awk -v keep="$KEEP_VERSIONS" 'NR <= keep')
     for place in "$ROOT"/versions/*/; do
         place=${place%/}
         if [[ -d $place ]] && ! grep -qxF -- "${place##*/}" <<<"$kept"; then
@@ -413,8 +415,11 @@ targets() {
 wanted_units() {
     local camera
     if has_role master; then
-        printf '%s\n' rhot-router.service rhot-fusion.service rhot-solver.service rhot-viewer.service
-        if [[ -f $ETC/rig.toml && -z $DRY_RUN ]]; then rig_says units "$ETC/rig.toml"; fi
+        if [[ -f $ETC/rig.toml && -z $DRY_RUN ]]; then
+            rig_says units "$ETC/rig.toml"
+        else
+            printf 'rhot-%s.service\n' router fusion solver viewer
+        fi
     fi
     for camera in $CAMERAS; do printf 'rhot-pi-tracker@%s.service\n' "$camera"; done
     if [[ -n $SIMULATOR ]]; then printf '%s\n' rhot-simulator.service; fi

@@ -138,7 +138,7 @@ def test_every_entry_point_that_a_text_names_exists():
     # folders.
     there |= {unit.stem.split("@")[0] for unit in (ROOT / "deploy" / "systemd").glob("rhot-*")}
     there |= {name for name in TO_COME if name.startswith("rhot-")}
-    there |= {"rhot-sim", "rhot-picture", "rhot-kernels", "rhot-demo"}
+    there |= {"rhot-sim", "rhot-picture", "rhot-kernels", "rhot-demo", "rhot-deploy"}
     for where, text in texts():
         for name in ENTRY_POINT.findall(text):
             is_known = name.rstrip("-") in there or any(name.startswith(f"{t}-") for t in there)

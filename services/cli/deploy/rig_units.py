@@ -15,12 +15,13 @@ from rhot.process.lifecycle import EXIT_OK, EXIT_USER
 
 
 def master_units(config: RigConfig) -> list[str]:
-    """Units beside router, fusion, solver and viewer, which every master has: what `rhot up` would
-    run for the same file.
-    """
+    """Units of the master: what `rhot up` would run for the same file."""
     local = [camera for camera in config.camera if not camera.host]
     units = ["rhot-pi.target"] if local else []
+    units += ["rhot-router.service", "rhot-fusion.service", "rhot-viewer.service"]
     units += [f"rhot-pi-tracker@{camera.name}.service" for camera in local]
+    if config.has_depth:
+        units.append("rhot-solver.service")
     if any(camera.source == "simulator" for camera in local):
         units.append("rhot-simulator.service")
     if config.object:
