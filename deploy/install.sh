@@ -264,8 +264,6 @@ build_version() {
         fail "pip could not install rhot (see above); nothing was changed for the version that runs"
     }
     cp -r -- "$HERE" "$place/deploy"
-    # Compiled now and not by each service on its first start, whose sandbox may not write here.
-    "$place/bin/python" -m compileall -q "$place/lib" >/dev/null 2>&1 || true
     touch "$place/.complete"
 }
 
