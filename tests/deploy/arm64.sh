@@ -59,8 +59,9 @@ echo "== $(inside uname -m), $(inside /usr/bin/python3 --version)"
 echo "== install.sh pi left, offline"
 inside_offline /srv/deploy/install.sh pi left --master 192.0.2.10 --wheels /srv/wheels
 echo "== again: nothing may change"
-inside_offline /srv/deploy/install.sh pi left --master 192.0.2.10 --wheels /srv/wheels |
-    tee /dev/stderr | grep -q "^Nothing to do" || fail "the second run changed something"
+again=$(inside_offline /srv/deploy/install.sh pi left --master 192.0.2.10 --wheels /srv/wheels)
+echo "$again"
+[[ $again == *"Nothing to do"* ]] || fail "the second run changed something"
 echo "== what is installed"
 inside_offline /opt/rhot/current/bin/rhot-pi-tracker --version
 inside_offline /opt/rhot/current/bin/python -c \
