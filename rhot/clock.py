@@ -87,6 +87,21 @@ class OffsetEstimator:
             self._exchanges.append(exchange)
         self._contradictions.clear()
 
+    @property
+    def doubted(self) -> bool:
+        """Whether the last exchange contradicted the others: a few more will tell."""
+        return bool(self._contradictions)
+
+    def follow_step(self, step_ns: int) -> None:
+        """The own clock was set ahead by so much (negative: back), as another clock tells."""
+        for kept in (self._exchanges, self._contradictions):
+            moved = [
+                _Exchange(one.at_ns + step_ns, one.offset_ns + step_ns, one.delay_ns)
+                for one in kept
+            ]
+            kept.clear()
+            kept.extend(moved)
+
     def at(self, own_ns: int) -> Offset:
         """Offset at an instant of the own clock."""
         if not self._exchanges:

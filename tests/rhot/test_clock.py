@@ -67,3 +67,23 @@ def test_a_clock_that_ran_backwards_during_the_exchange_is_ignored():
     estimator = OffsetEstimator()
     estimator.update(START_NS, START_NS, START_NS - 1)
     assert estimator.at(START_NS).sigma_ns == -1
+
+
+def test_a_step_that_is_known_is_followed_at_once():
+    estimator = OffsetEstimator()
+    exchanges(estimator, seconds=30, offset_ns=5_000_000, drift_ppm=20.0)
+    before = estimator.at(30 * 10**9)
+    estimator.follow_step(-(2 * 10**9))
+    after = estimator.at(28 * 10**9)
+    assert after.offset_ns == pytest.approx(before.offset_ns - 2 * 10**9, abs=1000)
+    assert after.sigma_ns == pytest.approx(before.sigma_ns, rel=0.01)
+
+
+def test_an_exchange_that_contradicts_is_doubted_until_more_tell():
+    estimator = OffsetEstimator()
+    exchanges(estimator, seconds=10, offset_ns=0)
+    assert not estimator.doubted
+    estimator.update(11 * 10**9, 9 * 10**9, 11 * 10**9 + 500_000)
+    assert estimator.doubted
+    estimator.update(12 * 10**9, 12 * 10**9 + 250_000, 12 * 10**9 + 500_000)
+    assert not estimator.doubted
