@@ -3,11 +3,13 @@ older one.
 
 numba looks only at the file a kernel is written in: one that calls into a changed file goes on with
 the old callee. So the folder's name carries a digest of all files with kernels. Services that
-compile call `use_cache` in their package, before numba is imported.
+compile call `use_cache` in their package, before numba is imported. Another version of rhot with
+the same kernels need not compile them: `adopt` takes them over.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
@@ -17,6 +19,8 @@ from pathlib import Path
 _FOLDER = "RHOT_CACHE"
 _NUMBA = "NUMBA_CACHE_DIR"
 _PREFIX = "rhot-kernels-"
+# In each folder: the path of the package whose kernels it holds. numba names subfolders after it.
+_PLACE = "place.txt"
 
 
 def cache_root() -> Path:
@@ -55,6 +59,7 @@ def use_cache(package: Path) -> Path | None:
     try:
         folder = cache_folder(package)
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / _PLACE).write_text(str(package.absolute()))
     except (OSError, RuntimeError):  # RuntimeError: a user without a home
         return None
     if not os.access(folder, os.W_OK):
@@ -70,3 +75,30 @@ def clear_old(package: Path) -> None:
     for folder in cache_root().glob(f"{place}-*"):
         if folder != current:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def adopt(package: Path) -> Path | None:
+    """Take over the kernels of the same sources from where they lay before (another version of
+    rhot); returns the folder they came from, None if there are none, or it has its own already.
+    """
+    folder = cache_folder(package)
+    if any(folder.rglob("*.nbc")):
+        return None
+    digest = folder.name.rpartition("-")[2]
+    for other in sorted(cache_root().glob(f"{_PREFIX}*-{digest}")):
+        with contextlib.suppress(OSError):
+            before = Path((other / _PLACE).read_text())
+            if other == folder or not any(other.rglob("*.nbc")):
+                continue
+            for room in [package, *sorted(package.rglob("*/"))]:
+                old = other / _subfolder(before / room.relative_to(package))
+                if old.is_dir():
+                    new = folder / _subfolder(room.absolute())
+                    shutil.copytree(old, new, dirs_exist_ok=True)
+            return other
+    return None
+
+
+def _subfolder(room: Path) -> str:
+    """Where numba (its UserProvidedCacheLocator) keeps the kernels of a folder's files."""
+    return f"{room.name}_{hashlib.sha1(str(room).encode()).hexdigest()}"

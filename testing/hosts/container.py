@@ -7,7 +7,6 @@ gone. Its disk (the overlay's upper layer) outlives a reboot, and goes with `rem
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import shutil
@@ -102,8 +101,10 @@ class Container:
             *("--system-call-filter=@memlock", "--timezone=off"),
             *(f"--bind-ro={source}:{target}" for source, target in self._shown.items()),
         )
-        # Should this process be killed, the container goes, too.
-        wrapper = ("setpriv", "--pdeathsig", "KILL", "unshare", "--mount", "sh", "-c")
+        # Should this process be killed, the container goes, too: unshare dies with it, the first
+        # process of the namespace with unshare, and all the others with that.
+        namespace = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc")
+        wrapper = ("setpriv", "--pdeathsig", "KILL", *namespace, "sh", "-c")
         words = (*wrapper, _MOUNT_AND_BOOT, "sh", self._folder / "root", self._folder, *nspawn)
         self._process = subprocess.Popen(
             [str(word) for word in words],
@@ -133,15 +134,16 @@ class Container:
 
     def _find_leader(self) -> int:
         """The container's init: the child of systemd-nspawn that is number 1 to itself; 0: none."""
-        assert self._process is not None
-        pid = self._process.pid
-        with contextlib.suppress(OSError):
-            for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-                status = Path(f"/proc/{child}/status").read_text()
-                numbers = re.search(r"^NSpid:\t\d+\t1$", status, re.MULTILINE)
-                if numbers and Path(f"/proc/{child}/comm").read_text().strip() == "systemd":
-                    return int(child)
+        for nspawn in self._nspawn():
+            for child in _children(nspawn):
+                status = _read(Path(f"/proc/{child}/status"))
+                if re.search(r"^NSpid:.*\t1$", status, re.MULTILINE) and "systemd" in status[:40]:
+                    return child
         return 0
+
+    def _nspawn(self) -> list[int]:
+        """Process id of systemd-nspawn, the first process of the namespace that unshare made."""
+        return _children(self._process.pid) if self._process is not None else []
 
     @property
     def leader(self) -> int:
@@ -188,8 +190,9 @@ class Container:
         """Shut the host down in order; its disk stays. Kills it if that takes too long."""
         if self._process is None:
             return
-        # What systemd-nspawn takes as the power button.
-        self._process.send_signal(signal.SIGTERM)
+        for nspawn in self._nspawn():
+            # What it takes as the power button.
+            os.kill(nspawn, signal.SIGTERM)
         try:
             self._process.wait(_STOP_S)
         except subprocess.TimeoutExpired:
@@ -210,6 +213,18 @@ class Container:
         """Power gone, and the disk removed."""
         self.pull_the_plug()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _read(path: Path) -> str:
+    """A file of /proc; empty if its process is gone."""
+    try:
+        return path.read_text()
+    except OSError:
+        return ""
+
+
+def _children(pid: int) -> list[int]:
+    return [int(word) for word in _read(Path(f"/proc/{pid}/task/{pid}/children")).split()]
 
 
 def copy_in(container: Container, source: Path, target: str) -> None:

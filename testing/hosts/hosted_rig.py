@@ -1,7 +1,7 @@
 """A whole rig on hosts of its own: a master and two Pis, installed by deploy/install.sh.
 
-What takes minutes (the environments, compiled kernels) is kept in build/hosts/ for the next run
-with the same wheels; install.sh finds it as an earlier installation.
+What takes minutes is kept in build/hosts/ for the next run, where install.sh finds it as an earlier
+installation: the environments if the wheels are the same, compiled kernels always.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -30,7 +29,7 @@ _KEPT = ROOT / "build" / "hosts"
 _WHEELS, _DEPLOY, _BROUGHT = "/srv/wheels", "/srv/deploy", "/srv/brought"
 # A cold compilation of all kernels on a busy machine takes most of it.
 _INSTALL_S = 600.0
-_VERSIONS = ("opt/rhot/versions", "var/cache/rhot")
+_VERSIONS, _KERNELS = "opt/rhot/versions", "var/cache/rhot"
 
 
 class HostedRig:
@@ -59,6 +58,8 @@ class HostedRig:
             host.write("/etc/hosts", f"127.0.0.1 localhost\n::1 localhost\n{names}")
             host.write(f"{_BROUGHT}/README", "What a test brings to this host.\n")
             _restore(host, self._kept(name))
+            if name == MASTER:
+                _restore(host, _KEPT / "kernels.tar")
             host.boot()
         config = write_rig(self._folder)
         self._bring(MASTER, config, config.parent / "calibration")
@@ -81,7 +82,9 @@ class HostedRig:
     def _install(self, name: str, *command: str) -> None:
         said = self.hosts[name].run("bash", *command, timeout_s=_INSTALL_S)
         self.installed[name] = self.installed.get(name, "") + said
-        _keep(self.hosts[name], self._kept(name))
+        _keep(self.hosts[name], _VERSIONS, self._kept(name))
+        if name == MASTER:
+            _keep(self.hosts[name], _KERNELS, _KEPT / "kernels.tar")
 
     def _bring(self, name: str, *paths: Path) -> None:
         for path in paths:
@@ -150,15 +153,12 @@ def _restore(host: Container, kept: Path) -> None:
         run(["tar", "-C", host.disk, "-x", "-f", kept, "--numeric-owner", "-p"])
 
 
-def _keep(host: Container, kept: Path) -> None:
-    """Keep the environments and kernels of a host; those of older wheels go."""
-    if kept.exists() or not (host.disk / _VERSIONS[0]).is_dir():
+def _keep(host: Container, folder: str, kept: Path) -> None:
+    """Keep a folder of a host; what was kept of older wheels goes."""
+    if kept.exists() and kept.stem != "kernels":
         return
     for old in kept.parent.glob(f"{kept.name.partition('-')[0]}-*.tar*"):
         old.unlink(missing_ok=True)
     new = kept.with_suffix(f".tar.{host.name}")
-    folders = [name for name in _VERSIONS if (host.disk / name).is_dir()]
-    subprocess.run(
-        ["tar", "-C", host.disk, "-c", "-f", new, "--numeric-owner", *folders], check=True
-    )
+    run(["tar", "-C", host.disk, "-c", "-f", new, "--numeric-owner", folder], _INSTALL_S)
     new.replace(kept)

@@ -15,7 +15,7 @@ import typer
 import services
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import load_rig
-from rhot.process.numba_cache import clear_old
+from rhot.process.numba_cache import adopt, clear_old
 from services.cli.defaults import sim_toml
 
 
@@ -25,6 +25,8 @@ def warm(
     ] = None,
 ) -> None:
     """Compile all kernels once, ahead of the first start."""
+    package = Path(services.__file__).parent
+    adopt(package)
     # Only here: `rhot --help` must not wait for numba.
     from services.fusion.warm import warm_up as warm_fusion
     from services.simulator.camera.frame_source import FrameSource
@@ -43,5 +45,5 @@ def warm(
         scene = load_scene(rig)
         for name in names:
             FrameSource(scene, name).take(0)
-    clear_old(Path(services.__file__).parent)
+    clear_old(package)
     typer.echo(f"kernels compiled in {time.monotonic() - started_s:.1f} s")

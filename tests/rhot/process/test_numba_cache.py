@@ -5,12 +5,13 @@ state.
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 
 import pytest
 
-from rhot.process.numba_cache import cache_folder, clear_old, use_cache
+from rhot.process.numba_cache import adopt, cache_folder, clear_old, use_cache
 
 PACKAGE = (
     "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\n"
@@ -39,8 +40,7 @@ def package(tmp_path, monkeypatch):
     return folder
 
 
-def outcome(package, **variables) -> int:
-    code = "from kernels.outer import outer; print(outer(1))"
+def outcome(package, code="from kernels.outer import outer; print(outer(1))", **variables) -> int:
     environment = {**os.environ, "PYTHONPATH": str(package.parent), **variables}
     return int(
         subprocess.run(
@@ -88,3 +88,23 @@ def test_systemds_folder_comes_before_the_users(package, monkeypatch, tmp_path):
     monkeypatch.delenv("RHOT_CACHE")
     monkeypatch.setenv("CACHE_DIRECTORY", f"{tmp_path / 'rhot'}:{tmp_path / 'other'}")
     assert cache_folder(package).parent == tmp_path / "rhot"
+
+
+def test_kernels_of_another_version_are_taken_over(package, tmp_path):
+    """As after an upgrade that changes no kernel: nothing is compiled."""
+    assert outcome(package) == 2
+    new = tmp_path / "new" / "kernels"
+    shutil.copytree(package, new, ignore=shutil.ignore_patterns("__pycache__"))
+    assert adopt(new) == cache_folder(package)
+    # numba counts what it read from its cache, for `outer` itself.
+    code = "from kernels.outer import outer; outer(1); print(sum(outer.stats.cache_hits.values()))"
+    assert outcome(new, code=code) == 1
+    assert adopt(new) is None
+
+
+def test_other_kernels_are_not_taken_over(package, tmp_path):
+    assert outcome(package) == 2
+    new = tmp_path / "new" / "kernels"
+    shutil.copytree(package, new, ignore=shutil.ignore_patterns("__pycache__"))
+    (new / "inner.py").write_text(KERNEL.format(name="inner", body="x + 10"))
+    assert adopt(new) is None
