@@ -1,4 +1,4 @@
-"""`rhot check && rhot up` on a rig of two Pis and a master: three hosts with a network of their own,
+"""`rhot check && rhot up` on a rig of two Pis and a master: three hosts with a LAN of their own,
 mTLS, real trackers of simulated cameras on the Pis, and no manual step.
 """
 

@@ -25,6 +25,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
 from rhot.process.lifecycle import EXIT_USER, cancelled_by, fed_watchdog, stop_on_signals
 from rhot.process.restart_hold import hold_back
+from services.cli.rig.ports import taken_ports
 
 _LOOPBACK = "tcp/127.0.0.1:7447"
 
@@ -45,14 +46,25 @@ async def running_router(
     try:
         session = await asyncio.to_thread(zenoh.open, router_config(listen, rig))
     except zenoh.ZError as error:
-        raise BusError(
-            f"no router can listen at {', '.join(map(plain, listen))}: {error}. "
-            "Is one running there already? Choose another port with --listen tcp/127.0.0.1:PORT"
-        ) from None
+        raise BusError(_why_not(listen, error)) from None
     try:
         yield
     finally:
         await asyncio.to_thread(session.close)
+
+
+def _why_not(listen: Sequence[str], error: zenoh.ZError) -> str:
+    """Why no router can listen: a port that another process has, else Zenoh's own reason."""
+    where = f"no router can listen at {', '.join(map(plain, listen))}"
+    taken = taken_ports(listen)
+    if not taken:
+        return f"{where}: {str(error).split(' at /')[0]}"
+    port, owner = next(iter(taken.items()))
+    return (
+        f"{where}: {owner or 'a process of another user'} listens at port {port} already; "
+        "if it is a router of yours, use or stop it, else choose another port, e.g. "
+        f"--listen tcp/127.0.0.1:{port + 1}"
+    )
 
 
 def router(

@@ -17,6 +17,8 @@ Log = Callable[[str, str], None]
 _REFUSAL = re.compile(r"rhot[a-z-]*: error: (.*)")
 # Enough of a traceback to see what failed and where.
 _LAST_LINES = 6
+# Between an error and the end that it led to: Zenoh may add a backtrace of this length.
+_RECENT_LINES = 60
 # What one start of a service can have to say; a run of weeks must not fill the memory.
 _SERIOUS_LINES = 50
 _SERIOUS = ("warning", "error", "critical")
@@ -29,7 +31,8 @@ class ChildOutput:
         """before is the run that ended just now, if this one follows a failure."""
         self._log = log
         self._known = frozenset(before.serious) if before else frozenset[str]()
-        self._last: deque[tuple[str, str]] = deque(maxlen=_LAST_LINES)
+        self._last: deque[str] = deque(maxlen=_LAST_LINES)
+        self._error, self._lines_since = "", 0
         self.serious: deque[str] = deque(maxlen=_SERIOUS_LINES)
 
     def take(self, line: str) -> None:
@@ -37,7 +40,10 @@ class ChildOutput:
         level, text = parsed(line)
         if not text:
             return
-        self._last.append((level, text))
+        self._last.append(text)
+        self._lines_since += 1
+        if level in ("error", "critical"):
+            self._error, self._lines_since = text, 0
         if level not in _SERIOUS:
             self._log(level, text)
             return
@@ -47,19 +53,18 @@ class ChildOutput:
 
     @property
     def last_error(self) -> str:
-        """The last error among its last lines, which says why it ended; "" if there is none."""
-        errors = [text for level, text in self._last if level in ("error", "critical")]
-        return errors[-1] if errors else ""
+        """The last error, if it is recent enough to be why it ended; else ""."""
+        return self._error if self._lines_since <= _RECENT_LINES else ""
 
     @property
     def reason(self) -> str:
         """Its last error, or its last lines where it gave none; "" if it wrote nothing."""
-        return self.last_error or "\n".join(text for _, text in self._last)
+        return self.last_error or "\n".join(self._last)
 
     @property
     def last_line(self) -> str:
         """The last line it wrote."""
-        return self._last[-1][1] if self._last else ""
+        return self._last[-1] if self._last else ""
 
 
 def parsed(line: str) -> tuple[str, str]:

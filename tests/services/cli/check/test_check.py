@@ -45,7 +45,7 @@ def test_the_rigs_that_come_along_are_sound():
     assert texts(sim_toml()) == []
     example = check_config(config_dir() / "rig.example.toml")
     assert all(
-        "calibration" in problem.where or problem.severity != "error"
+        "calibration" in problem.where or "pki" in problem.where or problem.severity != "error"
         for problem in example.problems
     )
 
@@ -230,8 +230,11 @@ def test_an_object_that_is_not_registered(rig):
 
 def test_a_router_open_to_the_network_is_a_warning(rig):
     append(rig, '[bus]\nlisten = ["tcp/0.0.0.0:7447"]')
+    assert any("has no certificates" in text for text in texts(rig))
+    append(rig, 'access = "open"')
     assert any("without protection" in text for text in texts(rig, "warning"))
     replace(rig, "tcp/0.0.0.0:7447", "tls/0.0.0.0:7447")
+    assert any("rhot pki" in text for text in texts(rig))
     assert not any("without protection" in text for text in texts(rig, "warning"))
     replace(rig, "tls/0.0.0.0:7447", "0.0.0.0")
     assert any("is no endpoint" in text for text in texts(rig))
@@ -262,7 +265,7 @@ def test_the_command_prints_and_exits_accordingly(rig):
     sound = run(application(), ["check", str(rig)])
     assert sound.exit_code == 0
     assert "0 errors" in sound.stdout
-    append(rig, '[bus]\nlisten = ["tcp/0.0.0.0:7447"]')
+    append(rig, '[bus]\nlisten = ["tcp/0.0.0.0:7447"]\naccess = "open"')
     assert run(application(), ["check", str(rig)]).exit_code == 0
     assert run(application(), ["check", "--strict", str(rig)]).exit_code == 1
     append(rig, "[bogus]")

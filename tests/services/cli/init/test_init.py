@@ -16,6 +16,7 @@ from rhot.files.rig_comments import comments_of
 from rhot.files.rig_tables import Bus, CameraTable, HandTable
 from services.cli.application import application
 from services.cli.check.check import check_config
+from services.cli.defaults import config_dir
 from services.cli.init.choices import camera_choice, default_markers
 
 RHOT = str(Path(sys.executable).parent / "rhot")
@@ -86,6 +87,12 @@ def test_every_line_that_is_no_key_is_a_comment_of_the_tables(path):
     text = " ".join(line.strip("# ") for line in path.read_text().splitlines())
     for table, key in ((Bus, "listen"), (CameraTable, "host"), (HandTable, "markers")):
         assert comments_of(table)[key] in text
+
+
+def test_the_example_that_comes_along_is_what_it_writes(path):
+    pis = ("--camera", "left=pi-left.local", "--camera", "right=pi-right.local")
+    init(path, *pis, "--master", "192.168.1.10", "--objects", "cup=LHR-12345678")
+    assert (config_dir() / "rig.example.toml").read_text() == path.read_text()
 
 
 def test_what_is_there_is_never_overwritten(path):
