@@ -12,6 +12,9 @@ def next_steps(path: Path, choices: Choices) -> str:
     steps: list[tuple[str, str]] = []
     if choices.hosts:
         steps.append((f"rhot pki init --config {path}", "certificates for every machine"))
+        folder = path.parent
+        copy = f"cp -r {folder / 'pki-hosts' / 'master'} {folder / 'pki'}"
+        steps.append((copy, "this machine's, if it is the master"))
         steps += [(f"rhot deploy {host} --config {path}", "install it") for host in choices.hosts]
     steps += [
         (f"rhot check {path}", "what is wrong or missing, with the command that mends it"),
