@@ -47,6 +47,7 @@ IMPURE_ROOMS = {
     "services/cli",
 }
 # Rooms of the command that work on files alone: what they find must not depend on when they run.
+# (What check asks of this machine and of a running rig, it asks through services/cli/rig.)
 PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offline"}
 
 # The floors of rhot/, from the lowest: each uses only what is named, and what lies below it.
