@@ -19,7 +19,6 @@ from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
 TO_COME = {
     "rhot calibrate objects": "#12 Objects: Vive trackers in the hand's own frame",
     "docs/guide/operations.md": "#11 In the field",
-    "docs/guide/troubleshooting.md": "#11 In the field",
 }
 
 # What docs/extend.md makes as an example, and tests/docs/test_extend.py runs.

@@ -63,6 +63,14 @@ def from_faults(name: str, faults: Iterable[Fault]) -> Link | None:
     )
 
 
+def judged(name: str, faults: Iterable[Fault], observed: Link) -> Link:
+    """What services say where it breaks the link, else what was observed where that does."""
+    told = from_faults(name, faults)
+    if told is None or (told.state != "broken" and observed.state == "broken"):
+        return observed
+    return told
+
+
 def breaks(fault: Fault) -> bool:
     """Whether a fault breaks its link, rather than making it worse."""
     return fault.severity == "error" or fault.code in _EXPLAINS

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from rhot.health_messages import Fault
 from rhot.watch.rig_state import RigState
-from services.cli.doctor.links import Link, broken, from_faults, holds
+from services.cli.doctor.links import Link, broken, from_faults, holds, judged
 from services.cli.doctor.observations import CameraSeen, HandSeen, Observations
 
 _PICTURE = (
@@ -19,6 +19,8 @@ _PICTURE = (
     "camera_silent",
     "camera_automatic",
     "camera_processing",
+    "camera_setting",
+    "camera_readout_unknown",
     "camera_unsynced",
     "source_lost",
 )
@@ -39,14 +41,16 @@ def camera_links(seen: Observations, state: RigState, camera: CameraTable) -> li
     frames = seen.cameras.get(camera.name, CameraSeen())
     colors = seen.config.colors if seen.config is not None else []
     name = camera.name
+
+    def told(codes: Iterable[str]) -> list[Fault]:
+        return [fault for fault in faults if fault.code in codes]
+
+    ranges = holds(f"colors of {name}", "every colour has a range")
     return [
-        from_faults(f"camera {name}", [f for f in faults if f.code in _PICTURE])
-        or _frames(seen, camera, frames),
-        from_faults(f"clock of {name}", [f for f in faults if f.code in _CLOCK])
-        or _clock(name, frames),
-        from_faults(f"colors of {name}", [f for f in faults if f.code in _COLORS])
-        or holds(f"colors of {name}", "every colour has a range"),
-        _markers(name, frames, colors, [f for f in faults if f.code == "marker_not_seen"]),
+        judged(f"camera {name}", told(_PICTURE), _frames(seen, camera, frames)),
+        judged(f"clock of {name}", told(_CLOCK), _clock(name, frames)),
+        judged(ranges.name, told(_COLORS), ranges),
+        judged(f"markers of {name}", told(["marker_not_seen"]), _markers(name, frames, colors)),
     ]
 
 
@@ -81,10 +85,8 @@ def _clock(camera: str, frames: CameraSeen) -> Link:
     return holds(name, "compared with the master's" if frames.frames else "nothing to judge by")
 
 
-def _markers(camera: str, frames: CameraSeen, colors: Sequence[str], told: Sequence[Fault]) -> Link:
+def _markers(camera: str, frames: CameraSeen, colors: Sequence[str]) -> Link:
     name = f"markers of {camera}"
-    if found := from_faults(name, told):
-        return found
     if not frames.frames:
         return holds(name, "nothing to judge by")
     least = max(1.0, _SEEN * frames.frames)
