@@ -62,7 +62,7 @@ from services.cli.live.supervisor import Child, Supervisor
 from services.cli.live.up import children_of
 from services.cli.live.working_copy import working_copy
 from services.cli.pki.certificates import issue, make_authority
-from services.cli.pki.folders import Folder
+from services.cli.pki.folders import PkiFolder
 from testing.picture_feed import PictureFeed
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
@@ -152,7 +152,7 @@ async def test_a_broken_rig_toml(tmp_path: Path) -> None:
 async def test_certificates(tmp_path: Path, sim_toml: Path, planted: str, says: str) -> None:
     now = datetime.datetime.now(datetime.UTC)
     before = now - datetime.timedelta(days=4000) if planted == "ended" else now
-    ours, hosts = make_authority("sim", now), Folder(tmp_path / "made")
+    ours, hosts = make_authority("sim", now), PkiFolder(tmp_path / "made")
     theirs = make_authority("sim", now) if planted == "stranger" else ours
     hosts.write_host("master", issue(ours, "master", "m", ["127.0.0.1"], now), ours)
     hosts.write_host("pi", issue(theirs, "camera", "left", [], before), theirs)

@@ -6,6 +6,7 @@ dark also gives no markers, and only the first of these is the cause.
 
 from __future__ import annotations
 
+from rhot.faults import FAULTS
 from rhot.files.config import RigConfig
 from rhot.health_messages import Fault
 from rhot.watch.onlooker_faults import about, host_of
@@ -70,9 +71,12 @@ def _router(seen: Observations) -> Link:
         return holds("router", f"answers at {at[0]}" if at else "answers")
     text = "; ".join(f"{one.endpoint}: {one.problem}" for one in seen.reached)
     if seen.routers_here:
-        where = ", ".join(seen.routers_here)
-        text += f". A router on this computer listens at {where}"
-        action = f'set `connect = ["{seen.routers_here[0]}"]` under [bus] in rig.toml'
+        here = ", ".join(seen.routers_here)
+        text += f". A router of this computer listens at {here}"
+        action = FAULTS["router_unreachable"].action + (
+            f'; or, if that one is this rig\'s, `connect = ["{seen.routers_here[0]}"]` under [bus] '
+            "in rig.toml"
+        )
         return broken("router", "router_unreachable", text, action)
     return broken("router", "router_unreachable", text or "no endpoint in [bus] connect")
 
