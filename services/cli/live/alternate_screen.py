@@ -25,7 +25,7 @@ def alternate_screen(out: TextIO | None = None) -> Iterator[Callable[[Sequence[s
     def show(lines: Sequence[str]) -> None:
         drawn = [_colored(line, colors) + _REST_OF_LINE for line in lines]
         # No line end after the last: it would scroll a full screen.
-        stream.write(_HOME + "\r\n".join(drawn) + _REST_OF_SCREEN)
+        stream.write(_HOME + "\n".join(drawn) + _REST_OF_SCREEN)
         stream.flush()
 
     stream.write(_ENTER)
