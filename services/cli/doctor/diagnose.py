@@ -83,6 +83,10 @@ def _router(seen: Observations) -> Link:
 
 def _service(config: RigConfig, row: ServiceRow, seen: Observations) -> Link:
     who = about(row.service, row.instance)
+    if row.state == "starting":
+        text = f"{who} is still starting"
+        action = "wait; the first start compiles for a minute, which `rhot warm` does ahead"
+        return broken(row.name, "service_absent", text, action)
     if row.state not in MISSING:
         version = f", version {row.health.version}" if row.health else ""
         return holds(row.name, f"{row.state} on {_where(config, row)}{version}")
