@@ -42,6 +42,19 @@ def set_up(who: str, out: TextIO | None = None) -> None:
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
 
 
+def set_up_command(program: str) -> None:
+    """Log warnings as `rhot: text` on standard error, for a person who waits for a command.
+
+    In the journal (`rhot router` as a service) as services do. Raises ConfigError likewise.
+    """
+    if is_journal(sys.stderr):
+        set_up(program, sys.stderr)
+        return
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_CommandLines(program))
+    logging.basicConfig(level="WARNING", handlers=[handler])
+
+
 def _chosen(variable: str, default: str, valid: tuple[str, ...]) -> str:
     value = os.environ.get(variable) or default
     if value.lower() not in valid:
@@ -108,3 +121,14 @@ class _TimedLines(_Lines):
     def start(self, record: logging.LogRecord) -> str:
         level = "" if record.levelname == "INFO" else f" {record.levelname.lower()}"
         return f"{self.formatTime(record, self.datefmt)} {self._who}{level}: "
+
+
+class _CommandLines(_Lines):
+    """`rhot: text`."""
+
+    def __init__(self, program: str) -> None:
+        super().__init__()
+        self._program = program
+
+    def start(self, record: logging.LogRecord) -> str:  # noqa: ARG002 - alike for all records
+        return f"{self._program}: "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 
 from rhot.plain_text import printable
@@ -15,15 +14,13 @@ PROGRAM = "rhot"
 
 def main() -> None:
     """Entry point of rhot."""
-    logging.basicConfig(level="WARNING", format=f"{PROGRAM}: %(message)s")
-    if logs.is_journal(sys.stderr):
-        logs.set_up(PROGRAM, sys.stderr)
     # The same as the option of application.py, but without typer, which an installation of the core
     # dependencies alone does not have.
     if sys.argv[1:] == ["--version"]:
         print(rhot_version())
         return
     try:
+        logs.set_up_command(PROGRAM)
         # Not above: where typer is missing, this import fails, and the user gets one line.
         from services.cli.application import application
 

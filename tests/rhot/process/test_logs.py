@@ -76,3 +76,21 @@ def test_an_unknown_setting_names_the_valid_ones(variable):
     )
     assert ended.returncode == 1
     assert f"{variable}=loud: unknown; valid: " in ended.stderr
+
+
+def test_a_command_says_its_name_and_no_time():
+    script = """
+import logging
+from rhot.process import logs
+logs.set_up_command("rhot")
+logging.getLogger("x").info("calm")
+logging.getLogger("x").warning("a \\x1b[31mred lie")
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment(),
+    )
+    assert (ended.stdout, ended.stderr) == ("", "rhot: a  [31mred lie\n")
