@@ -140,7 +140,12 @@ class Bus:
     @property
     def connected(self) -> bool:
         """Whether a router is at the other end now; a lost one is noticed within two seconds."""
-        return bool(self._session.info.routers_zid())
+        return bool(self.routers)
+
+    @property
+    def routers(self) -> list[str]:
+        """Ids of the routers at the other end."""
+        return sorted(str(zid) for zid in self._session.info.routers_zid())
 
     def publisher(self, topic: Topic[T], **names: str) -> Publisher[T]:
         """A publisher of one stream; its name fields must all be given."""

@@ -28,6 +28,8 @@ rendered pictures:
 20. a second fusion runs
 21. a second service answers for the master's clock
 22. a disk is nearly full
+
+and two routers, which is one too many, before all of these.
 """
 
 from __future__ import annotations
@@ -135,6 +137,17 @@ async def test_something_else_than_a_router_listens(sim_toml: Path) -> None:
     assert cause is not None
     assert cause.code == "router_unreachable"
     assert "no Zenoh router" in cause.text
+
+
+async def test_two_routers(tmp_path: Path) -> None:
+    """Of which a service meets the first that answers, and not the other's services."""
+    one, other = free_endpoint(), free_endpoint()
+    path = tmp_path / "rig.toml"
+    path.write_text(f'[bus]\nconnect = ["{one}", "{other}"]\n', encoding="utf-8")
+    async with running_router([one]), running_router([other]):
+        cause = first_cause(await links_of(path))
+    assert cause is not None
+    assert (cause.name, cause.code) == ("router", "second_service")
 
 
 async def test_a_broken_rig_toml(tmp_path: Path) -> None:

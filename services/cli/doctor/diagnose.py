@@ -46,7 +46,7 @@ def diagnose(seen: Observations) -> list[Link]:
     for camera in config.camera:
         links += camera_links(seen, state, camera)
     links += _views(faults)
-    for hand in config.hand:
+    for hand in config.hand if config.has_depth else ():
         links += hand_links(seen, hand)
     links += object_links(seen, [f for f in faults if f.code in _OF_OBJECTS])
     return links + _remaining(state)
@@ -66,6 +66,11 @@ def _certificates(seen: Observations) -> Link:
 
 
 def _router(seen: Observations) -> Link:
+    routers = {one.router: one.endpoint for one in seen.reached if one.router}
+    if len(routers) > 1:
+        text = f"different routers answer at {' and at '.join(routers.values())}"
+        action = "stop one: services of the one do not meet those of the other"
+        return broken("router", "second_service", text, action)
     if seen.connected:
         at = [one.endpoint for one in seen.reached if not one.problem]
         return holds("router", f"answers at {at[0]}" if at else "answers")

@@ -9,10 +9,14 @@ from rhot.watch.rig_state import RigState
 
 
 class Reach(msgspec.Struct, kw_only=True):
-    """Whether a router answers at an endpoint of rig.toml; problem is "" if it does."""
+    """Whether a router answers at an endpoint of rig.toml; problem is "" if it does.
+
+    router is its id, where several endpoints were compared.
+    """
 
     endpoint: str
     problem: str = ""
+    router: str = ""
 
 
 class CameraSeen(msgspec.Struct, kw_only=True):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from rhot.bus.security.credentials import is_secured
@@ -13,7 +15,7 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from services.cli.doctor.listen import listen
 from services.cli.doctor.local_routers import router_endpoints
-from services.cli.doctor.observations import Observations
+from services.cli.doctor.observations import Observations, Reach
 from services.cli.doctor.reach import reach
 from services.cli.router_session import rig_and_endpoints, router_session
 
@@ -35,6 +37,7 @@ async def observe(path: Path, connect: str | None) -> Observations:
     if all(one.problem for one in seen.reached):
         seen.routers_here = await asyncio.to_thread(router_endpoints)
         return seen
+    await _compare_routers(config.rig.name, endpoints, seen.reached)
     try:
         async with router_session(config.rig.name, endpoints) as bus:
             await listen(bus, config, seen)
@@ -44,8 +47,21 @@ async def observe(path: Path, connect: str | None) -> Observations:
     return seen
 
 
+async def _compare_routers(rig: str, endpoints: Sequence[str], reached: Sequence[Reach]) -> None:
+    """Which router answers at each endpoint, where more than one does."""
+    answering = [pair for pair in zip(endpoints, reached, strict=True) if not pair[1].problem]
+    if len(answering) < 2:
+        return
+    for endpoint, one in answering:
+        with contextlib.suppress(BusError):
+            async with router_session(rig, [endpoint]) as bus:
+                one.router = ",".join(bus.routers)
+
+
 def _calibration_problem(config: RigConfig) -> str:
     """Why fusion or solver would not start, judged by this computer's files."""
+    if not config.has_depth:
+        return ""
     try:
         load_rig_cameras(config)
         for hand, table in config.hand.items():
