@@ -114,7 +114,7 @@ def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
         output = processes[1].stdout
         assert output is not None
         line = next(line for line in output if "live view at" in line)
-        yield msgspec.json.decode(line)["text"].removeprefix("live view at ")
+        yield line.split("live view at ")[1].strip()
         for process in processes:
             process.terminate()
             assert process.stdout is not None

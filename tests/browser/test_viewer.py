@@ -24,6 +24,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_x, rotation_z
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, ObjectPose, WristPose
+from testing.sample_health import beat, fault
 
 pytestmark = pytest.mark.browser
 DEADLINE_S = 30.0
@@ -62,7 +63,7 @@ def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
     ) as process:
         assert process.stdout is not None
         line = next(line for line in process.stdout if "live view at" in line)
-        yield msgspec.json.decode(line)["text"].removeprefix("live view at ")
+        yield line.split("live view at ")[1].strip()
         process.terminate()
         process.stdout.read()
     assert process.returncode == 0
@@ -189,4 +190,32 @@ def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
         page.wait_for_timeout(200)
     assert blue_and_green(picture(page))[0].sum() <= 300, "a hand is drawn that is not there"
     assert errors == []
+    page.close()
+
+
+def test_a_fault_stands_at_the_top_with_what_to_do_until_it_is_over(
+    chromium: Any, viewer: str, router: str, rig: RigConfig, in_background: InBackground
+) -> None:
+    key = topics.HEALTH.key(rig.rig.name, service="fusion", instance="main")
+    over = threading.Event()
+    moved = fault("camera_moved", "<b>left</b> has moved", "left")
+
+    def publish(stop: threading.Event) -> None:
+        with zenoh.open(client_config([router])) as session:
+            while not stop.wait(0.3):
+                health = beat("fusion", faults=[] if over.is_set() else [moved])
+                session.put(key, msgspec.json.encode(health))
+
+    in_background(publish)
+    page = chromium.new_page(viewport={"width": 1200, "height": 750})
+    page.goto(viewer)
+    told = page.get_by_text("fusion: <b>left</b> has moved")
+    told.wait_for(timeout=DEADLINE_S * 1e3)
+    panel = page.inner_text("body")
+    assert panel.index("has moved") < panel.index("waiting for hand poses of the right hand")
+    assert "run `rhot calibrate stereo`" in panel
+    # The trackers of this rig do not run, which is nobody's own word.
+    page.get_by_text("the tracker of camera left is not running").wait_for(timeout=DEADLINE_S * 1e3)
+    over.set()
+    told.wait_for(state="hidden", timeout=DEADLINE_S * 1e3)
     page.close()
