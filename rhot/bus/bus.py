@@ -36,8 +36,8 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
-from rhot.bus.security.credentials import plain
-from rhot.bus.security.tls_diagnosis import certificate_problem
+from rhot.bus.security.credentials import credentials_in, plain
+from rhot.bus.security.tls_diagnosis import certificate_problem, exposed_key
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
@@ -97,6 +97,11 @@ async def open_bus(
 
 async def _connect(connect: Sequence[str], despite_certificates: bool) -> zenoh.Session:
     config = client_config(connect)
+    for endpoint in connect:
+        # It works, and somebody should mend it; a router with such a key does not start.
+        files = credentials_in(endpoint)
+        if files is not None and (warning := exposed_key(files)):
+            log.warning("%s", warning)
     attempts, refused, look_s = 0, None, 0.0
     while True:
         try:

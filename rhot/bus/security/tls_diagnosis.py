@@ -54,11 +54,8 @@ def read_own_certificate(files: Credentials) -> OwnCertificate:
     """
     for path in (files.ca, files.certificate, files.key):
         _check_readable(path)
-    if files.key.stat().st_mode & 0o007:
-        raise BusError(
-            f"everybody on this computer may read the private key {files.key}; "
-            f"run `chmod 600 {files.key}`"
-        )
+    if problem := exposed_key(files):
+        raise BusError(problem)
     try:
         found = _shown_to_own_authority(files)
     except ssl.SSLCertVerificationError as error:
@@ -76,6 +73,17 @@ def read_own_certificate(files: Credentials) -> OwnCertificate:
         ssl.cert_time_to_seconds(found["notBefore"]),
         ssl.cert_time_to_seconds(found["notAfter"]),
     )
+
+
+def exposed_key(files: Credentials) -> str | None:
+    """What is wrong if everybody on this computer may read the private key; else None."""
+    with contextlib.suppress(OSError):  # missing: found where it is read
+        if files.key.stat().st_mode & 0o007:
+            return (
+                f"everybody on this computer may read the private key {files.key}; "
+                f"run `chmod 600 {files.key}`"
+            )
+    return None
 
 
 def own_problem(files: Credentials, now_s: float) -> str | None:
