@@ -27,7 +27,8 @@ async def watch_certificate(service: Service) -> None:
             service.faults.replace("certificate_expiring", {})
         else:
             days = own.days_left(time.time())
-            text = f"certificate {own.common_name} ends on {own.end_date}, in {days:.0f} days"
+            when = f"ends on {own.end_date}, in {days:.0f} days" if days > 0 else "has ended"
+            text = f"this host's certificate {own.common_name} {when}"
             soon = {own.common_name: text} if days < WARN_DAYS else {}
             service.faults.replace("certificate_expiring", soon)
         await asyncio.sleep(_PERIOD_S)

@@ -195,5 +195,3 @@ async def test_a_certificate_that_rig_toml_does_not_name_may_do_nothing(everybod
         assert not await everybody.arrives("here", topics.POSE, "thief", **HAND)
         assert not await everybody.arrives("thief", topics.POSE, "here", **HAND)
         assert not await thief.get(topics.CLOCK, QUIET_S)
-
-

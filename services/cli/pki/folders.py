@@ -17,7 +17,8 @@ from rhot.bus.security.credentials import CA, CERTIFICATE, KEY
 from rhot.errors import BusError
 from services.cli.pki.certificates import Issued, read_issued
 
-_AUTHORITY, _CA_KEY = "authority", "ca.key"
+AUTHORITY = "authority"
+_CA_KEY = "ca.key"
 
 
 class PkiFolder:
@@ -32,7 +33,7 @@ class PkiFolder:
 
     def write_authority(self, authority: Issued) -> None:
         """Keep a new authority; raises BusError if there is one already."""
-        folder = self.path / _AUTHORITY
+        folder = self.path / AUTHORITY
         if (folder / CA).exists() or (folder / _CA_KEY).exists():
             raise BusError(
                 f"there is an authority in {folder} already; add a host with `rhot pki issue NAME`,"
@@ -44,13 +45,13 @@ class PkiFolder:
 
     def authority(self) -> Issued:
         """The authority; raises BusError if there is none, or it is damaged."""
-        folder = self.path / _AUTHORITY
+        folder = self.path / AUTHORITY
         return _read(folder / CA, folder / _CA_KEY, "make one with `rhot pki init`")
 
     def write_host(self, name: str, issued: Issued, authority: Issued) -> Path:
         """Write the three files of a host, over older ones; its folder."""
-        if name == _AUTHORITY:
-            raise BusError(f"a host cannot be called {_AUTHORITY!r}; choose another name")
+        if name == AUTHORITY:
+            raise BusError(f"a host cannot be called {AUTHORITY!r}; choose another name")
         folder = self.host(name)
         _make_private(folder)
         _write(folder / KEY, issued.key_pem, 0o600)
@@ -65,7 +66,7 @@ class PkiFolder:
 
     def certificates(self) -> Iterator[tuple[str, x509.Certificate]]:
         """Name of folder and certificate: the authority's, then the hosts' by name."""
-        own = [(_AUTHORITY, self.path / _AUTHORITY / CA)]
+        own = [(AUTHORITY, self.path / AUTHORITY / CA)]
         hosts = [(path.parent.name, path) for path in sorted(self.path.glob(f"*/{CERTIFICATE}"))]
         for name, path in own + hosts:
             if not path.exists():

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rhot.bus.security.credentials import is_secured, plain
 from rhot.bus.security.roles import MASTER, Role, certificate_names
+from rhot.errors import BusError
 from rhot.files.config import RigConfig
 
 
@@ -33,6 +34,12 @@ def wanted_certificates(
     hosts = {camera.name: camera.host for camera in config.camera}
     for role, names in certificate_names(config).items():
         wanted += [Wanted(name, role, with_local([hosts.get(name, "")])) for name in names]
+    twice = [one.name for one in wanted if [other.name for other in wanted].count(one.name) > 1]
+    if twice:
+        raise BusError(
+            f"{twice[0]!r} names two hosts in rig.toml (cameras, [bus] viewers, [bus] "
+            f"object_sources; {MASTER!r} is the master's); each needs a name of its own"
+        )
     return wanted
 
 

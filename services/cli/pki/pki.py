@@ -22,7 +22,7 @@ from services.cli.pki.certificates import (
     name_of,
     new_key,
 )
-from services.cli.pki.folders import PkiFolder
+from services.cli.pki.folders import AUTHORITY, PkiFolder
 from services.cli.pki.hosts import Wanted, master_hosts, wanted_certificates, with_local
 
 FOLDER = "pki-hosts"
@@ -57,7 +57,7 @@ def init(config: ConfigOption, folder: FolderOption = None, host: HostOption = N
         _say(where.write_host(one.name, issued, authority), issued)
     typer.echo(
         f"\nCopy each folder to its host, as {rig.bus.certificates}/ beside its rig.toml. "
-        f"{where.path / 'authority'} stays here: who has its ca.key can make certificates."
+        f"{where.path / AUTHORITY} stays here: who has its ca.key can make certificates."
     )
 
 
@@ -77,7 +77,7 @@ def issue_one(
         raise BusError(f"the certificate of role master is called {MASTER}, and no other is")
     where = _where(folder, config)
     authority = where.authority()
-    if where.host(name).exists():
+    if name != AUTHORITY and where.host(name).exists():
         raise BusError(
             f"{where.host(name)} exists already; `rhot pki renew {name}` makes it last longer"
         )
