@@ -209,7 +209,7 @@ ROOMS_TESTED_AS_A_WHOLE = {
     [
         (
             "services.pi_tracker.service",
-            {"scipy", "numba", "viser", "mcap", "typer", "matplotlib"},
+            {"scipy", "numba", "viser", "mcap", "typer", "matplotlib", "cryptography"},
         ),
         (
             "services.object_tracker.service",

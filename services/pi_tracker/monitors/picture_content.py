@@ -19,7 +19,7 @@ _ROWS = 8
 # Luma (16..235) below which paint is as dark as its noise: value 28, where no range begins lower
 # than 25 (colors/bounds.py). A covered sensor at full gain stays below with 99 % of its cells; a
 # hand at the far end of the volume covers 2 % of the picture.
-_DARK_LUMA, _DARK_PERCENTILE = 40.0, 99.0
+_DARK_LUMA, _DARK_SHARE = 40.0, 0.99
 # RGB 250, of which exposure_advice.py says that it tells nothing of a colour. A window behind the
 # hand takes a third of the picture, and the rest is as good as ever.
 _WHITE_LUMA, _MAX_WHITE = 231.0, 0.4
@@ -60,7 +60,8 @@ class PictureContent:
         luma = np.concatenate(
             [image.cells((0, y, width, y + 1))[0] for y in range(step // 2, height, step)]
         )
-        self.luma = float(np.percentile(luma, _DARK_PERCENTILE))
+        brightest = round(_DARK_SHARE * (luma.size - 1))
+        self.luma = float(np.partition(luma.ravel(), brightest)[brightest])
         self.white = float(np.count_nonzero(luma >= _WHITE_LUMA)) / luma.size
         if self.luma < _DARK_LUMA and not markers:
             return "camera_dark"

@@ -14,6 +14,7 @@ import numpy as np
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, Sample
+from rhot.bus.queries import UNDECODABLE
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
@@ -53,7 +54,7 @@ class SimulatorSource:
     def _frame(self, sample: Sample) -> Frame | None:
         try:
             header = self._decoder.decode(sample.attachment)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        except UNDECODABLE:
             return None
         width, height = header.size_px
         valid = (

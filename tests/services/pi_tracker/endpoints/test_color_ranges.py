@@ -95,6 +95,8 @@ async def test_what_was_wrong_is_no_longer_said_once_other_colours_are_used(
         client.bus.put_raw(topics.COLORS.key("desk", camera="left"), msgspec.json.encode(bad))
         await refused(service, 1)
         assert "of d by t for camera 'left' are refused" in service.last_error
+        (fault,) = [one for one in service.faults.standing() if one.code == "request_refused"]
+        assert fault.subject == "left colors"
         await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
         assert service.last_error == ""
         service.error("something else")
@@ -203,6 +205,7 @@ async def test_drift_is_told_in_health_and_not_followed(config, tracking, seen, 
         errors = service.errors
         await client.set_colors("left", Colors(date="e", tool="t", colors=colors.colors))
         assert "green_hue_off" not in service.values or abs(service.values["green_hue_off"]) < 0.5
+        assert "color_drifted" not in {fault.code for fault in service.faults.standing()}
         assert service.errors == errors
 
 
