@@ -41,15 +41,16 @@ def places(studio, tip):
 
 @pytest.fixture
 def run(studio, places, fitted):
-    """Twelve seconds under light of the given colour (B, G, R).
+    """Twelve seconds under light of the given colour (B, G, R), or so many more of a monitor.
 
     The monitor at their end, and the colours that were missing in any frame.
     """
 
-    def make(light, seconds=12):
+    def make(light, seconds=12, drift=None):
         step = TrackerStep("left", Colors(colors=fitted), Tracker(), SIZE, list(PLACES))
-        drift, lost = DriftMonitor(fitted), set()
-        for number in range(seconds * 2):
+        start = 0 if drift is None else 1000
+        drift, lost = drift or DriftMonitor(fitted), set()
+        for number in range(start, start + seconds * 2):
             bgr = studio.bgr(places[number % 3] * np.array(light, np.float32), 5.0, number)
             frame = studio.of(bgr, number * 15)
             markers = step.step(frame).markers
@@ -84,6 +85,13 @@ def test_another_white_balance_is_told_before_markers_are_lost(run, fitted):
         assert "rhot calibrate colors left" in text
         low, high = one.suggested.hsv_low, one.suggested.hsv_high
         assert f"{low[0]},{low[1]},{low[2]} to {high[0]},{high[1]},{high[2]}" in text
+
+
+def test_it_is_over_once_the_light_is_as_before(run):
+    drift, _ = run((1.0, 1.0, 1.12))
+    assert drift.drifted()
+    run((1.0, 1.0, 1.0), 22, drift)
+    assert drift.drifted() == []
 
 
 def test_the_suggested_range_fits(run, fitted, studio, tip):
