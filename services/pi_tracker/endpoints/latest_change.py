@@ -22,8 +22,8 @@ from rhot.files.calibration import save
 C = TypeVar("C")
 
 _PERIOD_S = 1.0
-# People and pages that set one camera at the same time are two or three.
-_MOST_WAITING = 32
+# At 200 a second all have their answer; each waits with a few kB.
+_MOST_WAITING = 512
 # What was in use for so long, somebody was content with; what is replaced sooner was a trial.
 _GOOD_S = 60.0
 

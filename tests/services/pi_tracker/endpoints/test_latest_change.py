@@ -59,7 +59,8 @@ async def test_what_fails_fails_for_all_who_waited_and_for_nobody_else():
     await changes.make("good")
 
 
-async def test_only_so_many_may_wait():
+async def test_only_so_many_may_wait(monkeypatch):
+    monkeypatch.setattr(latest_change, "_MOST_WAITING", 32)
     began = asyncio.Event()
 
     async def apply(wanted):
