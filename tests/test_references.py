@@ -18,7 +18,6 @@ from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
 # What is named before it is built, and the issue that builds it.
 TO_COME = {
     "rhot calibrate objects": "#12 Objects: Vive trackers in the hand's own frame",
-    "docs/guide/operations.md": "#11 In the field",
 }
 
 # What docs/extend.md makes as an example, and tests/docs/test_extend.py runs.

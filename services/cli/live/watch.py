@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any
@@ -20,6 +21,7 @@ import uvloop
 from rhot import clock, topics
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
+from rhot.health_messages import Health
 from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
 from rhot.plain_text import printable
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
@@ -33,11 +35,13 @@ _PERIOD_S = 0.2
 # Health comes once a second, everything else more often.
 _PATIENCE_S = 5.0
 _EXAMPLES = "hand/right/pose, hand/right/points, camera/left/markers, service/fusion/main/health"
+# Words of a table that are read as numbers; longer ones are stamps.
+_NUMBER = re.compile(r"-?[0-9.]{1,9}( deg| mm)?$")
 Row = Sequence[str]
 
 
 def watch(
-    stream: Annotated[str, typer.Argument(help=f"what comes after rhot/RIG/, e.g. {_EXAMPLES}")],
+    stream: Annotated[str, typer.Argument(help=f"the end of its key, e.g. {_EXAMPLES}")],
     config: RunningRigOption = None,
     connect: ConnectOption = None,
     once: Annotated[bool, typer.Option(help="print one table and end")] = False,
@@ -117,6 +121,8 @@ def table(message: msgspec.Struct, now_ns: int) -> list[str]:
             title, rows = f"camera {message.camera}", _markers(message)
         case ObjectPose():
             title, rows = message.object, _object(message)
+        case Health():
+            title, rows = f"{message.service}/{message.instance}", _health(message)
         case _:
             title, rows = type(message).__name__, _anything(msgspec.to_builtins(message))
     stamp_ns = getattr(message, "stamp_ns", None)
@@ -173,6 +179,22 @@ def _object(pose: ObjectPose) -> list[Row]:
     ]
 
 
+def _health(health: Health) -> list[Row]:
+    rows: list[Row] = [
+        (health.state, f"for {health.uptime_s:.0f} s, version {health.version}, pid {health.pid}"),
+        *(
+            (fault.severity, f"{fault.text}; {fault.action} [{fault.code}]")
+            for fault in health.faults
+        ),
+        *((name, f"{value:g}") for name, value in sorted(health.values.items())),
+    ]
+    for one in health.streams:
+        of = f" of {one.expected_hz:g}" if one.expected_hz else ""
+        lost = f", {one.dropped} dropped, {one.rejected} rejected"
+        rows.append((one.direction, f"{one.key} {one.rate_hz:.1f}{of} Hz{lost}"))
+    return rows
+
+
 def _anything(value: Any, path: str = "") -> list[Row]:
     """The leaves of any other message, each with the way to it."""
     if isinstance(value, dict):
@@ -194,7 +216,7 @@ def _aligned(rows: Sequence[Row]) -> list[str]:
     widths = [max((len(row[n]) for row in rows if n < len(row)), default=0) for n in range(most)]
     return [
         "  ".join(
-            cell.rjust(width) if cell[:1].isdigit() or cell[:1] == "-" else cell.ljust(width)
+            cell.rjust(width) if _NUMBER.match(cell) else cell.ljust(width)
             for cell, width in zip(row, widths, strict=False)
         ).rstrip()
         for row in rows
