@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+import msgspec
 import numpy as np
 import pytest
 
@@ -146,3 +149,14 @@ def test_another_size_than_the_lens_is_refused(studio, lens):
 
 def test_no_markers_no_places(lens):
     assert Rectifier(lens).to_camera_pixels([]) == []
+
+
+def test_what_the_camera_does_not_see_is_black_in_both_ranges(lens):
+    """A lens that draws the corners in leaves none of its picture there."""
+    bowed = msgspec.structs.replace(lens, distortion=(0.3, 0.0, 0.0, 0.0, 0.0))
+    grey = frame_with("Y", np.full(SIZE[::-1], 120.0))
+    for full_range, black in ((False, 16), (True, 0)):
+        seen = Rectifier(bowed).rectify(dataclasses.replace(grey, full_range=full_range))
+        assert seen.full_range is full_range
+        assert seen.image[0, 0] == black
+        assert seen.image[SIZE[1] // 2, SIZE[0] // 2] == 120

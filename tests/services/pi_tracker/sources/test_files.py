@@ -217,3 +217,21 @@ def test_folders_without_images(tmp_path):
         FolderReader("left", tmp_path, 10.0).open()
     with pytest.raises(CaptureError, match="no such folder of images"):
         FolderReader("left", tmp_path / "nowhere", 10.0).open()
+
+
+@pytest.mark.parametrize(("name", "codec"), [("full.avi", "MJPG"), ("limited.mp4", "mp4v")])
+def test_videos_of_both_ranges_show_black_white_and_colour_as_they_are(tmp_path, name, codec):
+    """Motion JPEG is YUV420 in full range, MPEG-4 in limited range; OpenCV knows which is which."""
+    picture = np.zeros((48, 96, 3), np.uint8)
+    picture[:, 32:64], picture[:, 64:] = 255, (60, 30, 220)
+    writer = cv2.VideoWriter(
+        str(tmp_path / name), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), 20.0, (96, 48)
+    )
+    for _ in range(2):
+        writer.write(picture)
+    writer.release()
+    frame = read_all(VideoReader("left", tmp_path / name, 20.0))[0]
+    black, white, red = (frame.image[24, x].astype(int) for x in (16, 48, 80))
+    assert black.max() <= 2
+    assert white.min() >= 248
+    assert np.abs(red - (60, 30, 220)).max() <= 6

@@ -202,6 +202,9 @@ async def test_simulated_frames_come_over_the_bus_and_nonsense_is_counted(router
                     await asyncio.sleep(0.005)
             publisher.put_bytes(image.tobytes(), attachment())
             taken = await waiting
+            publisher.put_bytes(image.tobytes(), attachment(full_range=True))
+            wide = await anext(stream)
+    assert (taken.full_range, wide.full_range) == (False, True)
     assert (taken.seq, taken.stamp_ns, taken.row_time_ns, taken.size_px, taken.layout) == (
         4,
         99,
