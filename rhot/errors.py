@@ -7,8 +7,18 @@ it and exit.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Literal
+
+import msgspec
+
+# What decoding untrusted JSON may raise. RecursionError: 5 kB of opening brackets are enough.
+UNDECODABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+# No space left, quota used up, or a file larger than the system lets this process write.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 # Why a request was refused: it does not decode; what it asks for cannot be; the service has no
 # such thing; its machine could not keep the result; too many ask at once; it failed, which is a
@@ -30,6 +40,10 @@ class CalibrationError(RhotError):
 
 class CaptureError(RhotError):
     """A capture, video or recording cannot be read or written."""
+
+
+class DiskFullError(CaptureError):
+    """A file could not be written for want of space; what was written of it may be incomplete."""
 
 
 class SourceError(RhotError):
@@ -55,3 +69,29 @@ def leaves(error: BaseException) -> Iterator[BaseException]:
             yield from leaves(inner)
     else:
         yield error
+
+
+def disk_full(error: BaseException, path: Path | None = None) -> DiskFullError | None:
+    """The one line for a write that failed for want of space; None for every other error.
+
+    path is the file, where the error itself does not name one (those of write and flush do not).
+    """
+    if not isinstance(error, OSError) or error.errno not in _FULL:
+        return None
+    where = path or error.filename or "a file"
+    return DiskFullError(
+        f"{where}: cannot be written: {error.strerror}; free some space (`df -h` shows where), "
+        "or write elsewhere"
+    )
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raises DiskFullError naming the file where the block fails for want of space."""
+    try:
+        yield
+    except OSError as error:
+        full = disk_full(error, path)
+        if full is None:
+            raise
+        raise full from None

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from rhot.messages import Count, Message, Name, NonNegative, Stamp
+from rhot.messages import Count, Host, Message, Name, NonNegative, SessionId, Stamp
 
 Severity = Literal["error", "warning"]
 # A service has a few faults at once, hardly ever ten; what says more is broken or hostile.
@@ -56,7 +56,8 @@ class StreamHealth(Message, frozen=True, kw_only=True):
 class Health(Message, frozen=True, kw_only=True):
     """A service's state once a second. values holds its own figures, e.g.
 
-    stage times in ms or the clock offset; faults is what is wrong now.
+    stage times in ms or the clock offset; faults is what is wrong now. session is the id of its
+    Zenoh session, as the router lists it, and new at each start: two of one name are two services.
     """
 
     service: Name
@@ -64,6 +65,8 @@ class Health(Message, frozen=True, kw_only=True):
     stamp_ns: Stamp
     version: str
     pid: Count
+    host: Host = ""
+    session: SessionId = ""
     uptime_s: NonNegative
     state: str
     streams: list[StreamHealth]

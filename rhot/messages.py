@@ -27,6 +27,11 @@ NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Unit = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 
 
+# A computer's name as others may print it, "" if it has none; a Zenoh session's id, "" if unknown.
+Host = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{0,64}$")]
+SessionId = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{0,32}$")]
+
+
 class Message(msgspec.Struct, frozen=True, kw_only=True):
     """Base of all messages."""
 
@@ -245,9 +250,16 @@ class Session(Message, frozen=True, kw_only=True):
 
 
 class ClockEcho(Message, frozen=True, kw_only=True):
-    """Answer to a clock query: the master's clock when it answered."""
+    """Answer to a clock query: the master's clock when it answered, and which master it is.
+
+    A rig has one master. Where several answer, session (of Zenoh) and host tell them apart, and
+    uptime_ns which of them was first.
+    """
 
     master_ns: Stamp
+    session: SessionId = ""
+    host: Host = ""
+    uptime_ns: Count = 0
 
 
 class Refusal(Message, frozen=True, kw_only=True):

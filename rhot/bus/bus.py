@@ -25,10 +25,10 @@ import msgspec
 import zenoh
 
 from rhot import topics
+from rhot.bus.clock_exchange import ClockExchange
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
-    UNDECODABLE,
     Answerer,
     Asker,
     Handler,
@@ -41,7 +41,7 @@ from rhot.bus.security.tls_diagnosis import certificate_problem, exposed_key
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
-from rhot.errors import BusError
+from rhot.errors import UNDECODABLE, BusError
 from rhot.messages import ClockEcho
 from rhot.topics import Kind, Topic
 
@@ -219,22 +219,29 @@ class Bus:
         key = topic.key(self.rig, **names)
         return only_answer(topic, key, await self._asker.replies(topic, key, timeout_s, request))
 
-    async def echo(
+    async def echoes(
         self, now_ns: Callable[[], int], timeout_s: float = 1.0
-    ) -> tuple[int, int, int] | None:
-        """One exchange with the master's clock.
+    ) -> list[ClockExchange]:
+        """One exchange with the clock of the master, or of each that takes itself for one.
 
-        (asked, the master's answer, answered) in ns, or None without an answer. Both own stamps are
-        read from now_ns as close to the wire as Python gets.
+        Both own stamps are read from now_ns as close to the wire as Python gets.
         """
         asked_ns = now_ns()
         key = topics.CLOCK.key(self.rig)
-        replies = await self._asker.replies(topics.CLOCK, key, timeout_s, now_ns=now_ns)
+        replies = await self._asker.replies(
+            topics.CLOCK, key, timeout_s, now_ns=now_ns, all_of_one_key=True
+        )
+        found = []
         for reply in replies.good:
             with contextlib.suppress(*UNDECODABLE):
                 echo = msgspec.json.decode(reply.payload, type=ClockEcho)
-                return asked_ns, echo.master_ns, reply.received_ns
-        return None
+                found.append(ClockExchange(asked_ns, reply.received_ns, echo))
+        return found
+
+    @property
+    def session(self) -> str:
+        """The id of this Zenoh session, as the router lists it."""
+        return str(self._session.zid())
 
     def answer(self, topic: Topic[Any], handler: Handler, **names: str) -> None:
         """Answer queries for the rest of the session.

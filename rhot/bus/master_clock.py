@@ -12,7 +12,11 @@ import time
 from collections.abc import Callable
 
 from rhot.bus.bus import Bus
+from rhot.bus.clock_exchange import MasterChoice, several_masters
 from rhot.clock import OffsetEstimator
+
+# What is wrong with the rig's masters, or None while all is well.
+Tell = Callable[[str | None], None]
 
 # An estimate from so many quick exchanges is as good as the window's minimum delay gets at once.
 _QUICK = 8
@@ -23,18 +27,35 @@ _STEP_NS = 2_000_000
 _READINGS = 4
 
 
-async def follow_master(bus: Bus, estimator: OffsetEstimator, own_ns: Callable[[], int]) -> None:
-    """Keep an estimator fed for ever: eight exchanges for a quick start, then one a second."""
-    exchanges = 0
+
+async def follow_master(
+    bus: Bus, estimator: OffsetEstimator, own_ns: Callable[[], int], tell: Tell | None = None
+) -> None:
+    """Keep an estimator fed for ever: eight exchanges for a quick start, then one a second.
+
+    Where more than one master answers, the one that was first is followed until it is gone; tell
+    hears of it after each exchange.
+    """
+    exchanges, choice = 0, MasterChoice()
     while True:
-        exchange = await bus.echo(own_ns)
-        if exchange is not None:
-            estimator.update(*exchange)
+        answers = await bus.echoes(own_ns)
+        chosen = choice.choose(answers)
+        if chosen is not None:
+            estimator.update(*chosen.stamps)
             exchanges += 1
-        if exchange is not None and (exchanges < _QUICK or estimator.doubted):
+        if tell is not None and answers:
+            tell(several_masters(answers))
+        if chosen is not None and (exchanges < _QUICK or estimator.doubted):
             await asyncio.sleep(_QUICK_S)
         elif (step_ns := await _step_ns(own_ns)) != 0:
             estimator.follow_step(step_ns)
+
+
+async def watch_masters(bus: Bus, own_ns: Callable[[], int], tell: Tell, period_s: float) -> None:
+    """For the master itself: ask who else answers for its clock, for ever."""
+    while True:
+        tell(several_masters(await bus.echoes(own_ns)))
+        await asyncio.sleep(period_s)
 
 
 async def _step_ns(own_ns: Callable[[], int]) -> int:

@@ -18,7 +18,7 @@ import msgspec
 import zenoh
 
 from rhot import clock
-from rhot.errors import BusError, RefusedError, RhotError
+from rhot.errors import UNDECODABLE, BusError, RefusedError, RhotError
 from rhot.messages import Refusal
 from rhot.topics import Topic
 
@@ -26,10 +26,11 @@ T = TypeVar("T")
 Answer = msgspec.Struct | bytes | None
 Handler = Callable[[], Answer | Awaitable[Answer]]
 RequestHandler = Callable[[bytes], Awaitable[Answer]]
-UNDECODABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 log = logging.getLogger("rhot.bus")
 
+# Zenoh's own choice keeps one answer of each key, and holds it until all have come.
+_EVERYBODY, _EACH = zenoh.QueryTarget.ALL, zenoh.ConsolidationMode.NONE
 # A reason is for people: one that is longer than a page helps nobody, and may not fit an answer.
 _MAX_REASON = 2000
 
@@ -63,8 +64,12 @@ class Asker:
         timeout_s: float,
         request: msgspec.Struct | None = None,
         now_ns: Callable[[], int] = clock.now_ns,
+        *,
+        all_of_one_key: bool = False,
     ) -> Replies:
-        """Everything that answers within timeout_s."""
+        """Everything that answers within timeout_s: of several that answer with the same key one,
+        or all_of_one_key, each as soon as it is there.
+        """
         replies = Replies()
         done: asyncio.Future[None] = self._loop.create_future()
 
@@ -88,6 +93,8 @@ class Asker:
             zenoh.handlers.Callback(on_reply, on_end),
             payload=None if request is None else msgspec.json.encode(request),
             timeout=timeout_s,
+            target=_EVERYBODY if all_of_one_key else None,
+            consolidation=_EACH if all_of_one_key else None,
         )
         # Zenoh ends every query at its timeout; a second more covers a link that dies meanwhile.
         # (Not wait_for: where the answer and a cancellation meet, Python 3.11's swallows the

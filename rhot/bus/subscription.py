@@ -15,7 +15,7 @@ import zenoh
 from rhot import clock
 from rhot.bus.buffer import Buffer
 from rhot.bus.stats import StreamStats
-from rhot.errors import BusError
+from rhot.errors import UNDECODABLE, BusError
 from rhot.topics import Topic
 
 T = TypeVar("T")
@@ -104,7 +104,7 @@ class Subscription(Generic[T]):
     def _decode(self, sample: Sample) -> T | None:
         try:
             message = self._decoder.decode(sample.payload)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        except UNDECODABLE:
             return None
         # A message that says another name than its key would be taken for another sender's.
         names = self._topic.names(sample.key) or {}

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from rhot.camera_messages import Calibration, ColorRange, Colors, Exposure
-from rhot.errors import CalibrationError
+from rhot.errors import UNDECODABLE, CalibrationError, writing
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName, default_hand
@@ -94,20 +94,29 @@ def load(path: Path, kind: type[S], command: str) -> S:
         raise CalibrationError(f"{path}: no such file; make it with `{command}`") from None
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read: {error}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except UNDECODABLE as error:
         raise CalibrationError(
             f"{path}: {error}; mend it or make it anew with `{command}`"
         ) from None
 
 
 def save(path: Path, calibration: msgspec.Struct) -> None:
-    """Write one calibration file atomically, readable, with its folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write one calibration file atomically, readable, with its folder.
+
+    Raises DiskFullError where there is no space for it; the old file stays.
+    """
     text = msgspec.json.format(msgspec.json.encode(calibration), indent=1)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, text + b"\n")
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write beside the file, and put it in its place once all is on the disk."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(text + b"\n")
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         # mkstemp makes files only their owner can read; calibrations are read by services of other

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import msgspec
 
-from rhot.errors import CaptureError
+from rhot.errors import UNDECODABLE, CaptureError, writing
 
 M = TypeVar("M", bound=msgspec.Struct)
 CSV_HEADER = ("frame", "stamp_ns", "row_time_ns")
@@ -83,8 +83,8 @@ def _stamp(path: Path, number: int, row: list[str]) -> FrameStamp:
 
 
 def write_stamps(path: Path, stamps: Iterable[FrameStamp]) -> None:
-    """Write a <camera>.csv."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    """Write a <camera>.csv. Raises DiskFullError."""
+    with writing(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(CSV_HEADER)
         writer.writerows((s.frame, s.stamp_ns, f"{s.row_time_ns:.10g}") for s in stamps)
@@ -102,7 +102,7 @@ def read_lines(path: Path, kind: type[M]) -> Iterator[M]:
                 if line.strip():
                     try:
                         yield decoder.decode(line)
-                    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+                    except UNDECODABLE as error:
                         raise CaptureError(
                             f"{path}: line {number}: not a {kind.__name__}: {error}"
                         ) from None
@@ -111,9 +111,9 @@ def read_lines(path: Path, kind: type[M]) -> Iterator[M]:
 
 
 def write_lines(path: Path, messages: Iterable[msgspec.Struct]) -> int:
-    """Write messages as .jsonl; returns how many."""
+    """Write messages as .jsonl; returns how many. Raises DiskFullError."""
     count = 0
-    with path.open("wb") as file:
+    with writing(path), path.open("wb") as file:
         for message in messages:
             file.write(msgspec.json.encode(message) + b"\n")
             count += 1

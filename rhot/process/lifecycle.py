@@ -25,7 +25,7 @@ import uvloop
 
 from rhot.bus.bus import open_bus
 from rhot.bus.security.credentials import client_endpoints
-from rhot.errors import RhotError, leaves
+from rhot.errors import RhotError, disk_full, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
 from rhot.process.calibration_watch import CalibrationChangedError
@@ -111,9 +111,10 @@ def run(
 def user_errors(error: Exception, program: str) -> list[RhotError]:
     """What the user can mend of an error or a group of them; empty if any of it is a bug.
 
-    program is the command's name. A missing extra is the user's to install, and says how.
+    program is the command's name. A missing extra is the user's to install, and says how; a full
+    disk is the user's to free, wherever it was met.
     """
-    found = [missing_extra(leaf, program) or leaf for leaf in leaves(error)]
+    found = [missing_extra(leaf, program) or disk_full(leaf) or leaf for leaf in leaves(error)]
     errors = [leaf for leaf in found if isinstance(leaf, RhotError)]
     return errors if len(errors) == len(found) else []
 
@@ -132,6 +133,7 @@ def _explain(error: Exception, name: str, instance: str) -> int:
     for one in errors:
         log.error("%s", one)
     if errors:
+        systemd.notify(f"STATUS={systemd.one_line('; '.join(map(str, errors)))}")
         return EXIT_USER
     log.error("%s %s failed", name, instance, exc_info=error)
     return EXIT_BUG
@@ -146,7 +148,7 @@ async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> No
             asyncio.TaskGroup() as tasks,
         ):
             service = Service(name, instance, config, bus, tasks)
-            company = (service.beat(), watch_certificate(service))
+            company = (service.beat(), service.listen(), watch_certificate(service))
             companions = [tasks.create_task(one) for one in company]
             await serve(service)
             # A source that ended (a file, a replay) ends its service; what keeps it company goes

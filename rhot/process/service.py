@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 import resource
+import socket
 import time
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -14,18 +16,24 @@ from pathlib import Path
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.bus.stats import StreamStats
+from rhot.bus.subscription import Subscription
 from rhot.files.config import RigConfig
 from rhot.health_messages import Health, StreamHealth
+from rhot.messages import Session
 from rhot.process import systemd
 from rhot.process.fault_log import FaultLog
+from rhot.process.namesakes import Namesakes
+from rhot.process.slow_streams import SlowStreams
 
 log = logging.getLogger("rhot.service")
 
 # The first two beats after the start hold parts of a second; what they would say of rates is not
 # true.
 _SETTLE_S = 2.0
-# One slow second is scheduling, three are a fault worth a line in the journal.
-_SLOW_BEATS = 3
+# Of these a rig has one, whatever their instance is called; of others one of each instance.
+_ONE_OF_A_KIND = {"fusion", "solver", "object_tracker", "simulator"}
+# How often is asked whether the session runs, while streams are slow and no broadcast says why.
+_ASK_SESSION_S = 5.0
 _PAGE_MB = resource.getpagesize() / 1e6
 
 
@@ -55,7 +63,17 @@ class Service:
     _started_s: float = field(default_factory=time.monotonic)
     _ready_s: float = float("inf")
     _told_status: str = ""
-    _slow_beats: dict[str, int] = field(default_factory=dict)
+    _slow: SlowStreams = field(default_factory=SlowStreams)
+    _session_running: bool = True
+
+    def __post_init__(self) -> None:
+        self.host = re.sub(r"[^A-Za-z0-9_.-]", "_", socket.gethostname())[:64]
+        self._namesakes = Namesakes(self.bus.session)
+
+    @property
+    def uptime_s(self) -> float:
+        """Since this service was made."""
+        return time.monotonic() - self._started_s
 
     def ready(self) -> None:
         """Initialised: tell systemd, and everybody who watches liveliness."""
@@ -81,9 +99,13 @@ class Service:
         self.errors += 1
         self.faults.event(code, text, text if subject is None else subject)
 
+    def second_clock(self, text: str | None) -> None:
+        """Report that more than one master answers, or with None that one does."""
+        self.faults.replace("second_clock", {} if text is None else {"": text})
+
     async def beat(self) -> None:
-        """Publish Health once a second, and log when a stream falls below its expected rate or
-        recovers.
+        """Publish Health once a second; report streams that are below their expected rate, and
+        another service of the same name.
         """
         publisher = self.bus.publisher(topics.HEALTH, service=self.name, instance=self.instance)
         last_s, last_cpu_s = time.monotonic(), time.process_time()
@@ -91,18 +113,54 @@ class Service:
             await asyncio.sleep(1.0)
             now_s, cpu_s = time.monotonic(), time.process_time()
             elapsed_s = now_s - last_s
-            streams = [
-                stats.beat(elapsed_s, self._expected_hz(stats))
-                for stats in self.bus.streams
-                if stats.topic is not topics.HEALTH
-            ]
+            told = [stats for stats in self.bus.streams if stats.topic is not topics.HEALTH]
+            streams = [stats.beat(elapsed_s, self._expected_hz(stats)) for stats in told]
+            steady = [s for s, stats in zip(streams, told, strict=True) if _is_steady(stats)]
+            self._find_faults(steady)
             publisher.put(self._health(streams, 100.0 * (cpu_s - last_cpu_s) / elapsed_s))
-            self._log_changes(streams)
             self._tell_status()
             last_s, last_cpu_s = now_s, cpu_s
 
+    async def listen(self) -> None:
+        """Hear what a service must know beside its own streams, for ever: others of its name, and
+        whether the session runs.
+        """
+        names = {} if self.name in _ONE_OF_A_KIND else {"instance": self.instance}
+        beats = self.bus.every(topics.HEALTH, 16, service=self.name, **names)
+        broadcasts = self.bus.latest(topics.SESSION)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._ask_session())
+            tasks.create_task(self._hear_namesakes(beats))
+            async for session in broadcasts:
+                self._take_session(session)
+
+    async def _hear_namesakes(self, beats: Subscription[Health]) -> None:
+        async for beat in beats:
+            self._namesakes.note(beat, time.monotonic())
+
+    async def _ask_session(self) -> None:
+        """A broadcast that was missed is asked for, once it would explain something."""
+        while True:
+            await asyncio.sleep(_ASK_SESSION_S)
+            if self._slow.any_slow or not self._session_running:
+                for session in await self.bus.get(topics.SESSION):
+                    self._take_session(session)
+
+    def _take_session(self, session: Session) -> None:
+        if session.running and not self._session_running:
+            # Streams begin anew, and so does the time they are given for it.
+            self._ready_s = time.monotonic()
+        self._session_running = session.running
+
+    def _find_faults(self, streams: list[StreamHealth]) -> None:
+        texts = self._namesakes.texts(self.config.rig.name, self.uptime_s, time.monotonic())
+        self.faults.replace("second_service", texts)
+        self.faults.replace("stream_slow", self._slow.beat(streams))
+
     def _tell_status(self) -> None:
-        status = self.status or self.state
+        """`systemctl status` shows the state, and what is wrong."""
+        texts = [fault.text for fault in self.faults.standing()]
+        status = systemd.one_line("; ".join([self.status or self.state, *texts]))
         if status != self._told_status:
             self._told_status = status
             systemd.notify(f"STATUS={status}")
@@ -114,7 +172,9 @@ class Service:
             stamp_ns=clock.now_ns(),
             version=rhot_version(),
             pid=os.getpid(),
-            uptime_s=round(time.monotonic() - self._started_s, 1),
+            host=self.host,
+            session=self.bus.session,
+            uptime_s=round(self.uptime_s, 1),
             state=self.state,
             streams=streams,
             errors=self.errors,
@@ -130,9 +190,10 @@ class Service:
     def _expected_hz(self, stats: StreamStats) -> float:
         """What the topics table and rig.toml lead to expect.
 
-        Of a pattern, the sum over its streams.
+        Of a pattern, the sum over its streams; nothing at first, nor while the session is stopped.
         """
-        if time.monotonic() - self._ready_s < _SETTLE_S:
+        settling = time.monotonic() - self._ready_s < _SETTLE_S
+        if settling or not self._session_running:
             return 0.0
         rate = stats.topic.rate
         if "camera" in stats.topic.fields:
@@ -153,24 +214,10 @@ class Service:
                 streams *= many.get(field_name, 1)
         return self.config.rate_hz(rate) * streams
 
-    def _log_changes(self, streams: list[StreamHealth]) -> None:
-        text = "%s %s: %.1f Hz of %.1f expected, %d dropped, %d rejected"
-        for stream in streams:
-            slow_before = self._slow_beats.get(stream.key, 0)
-            slow = 0 if stream.ok else slow_before + 1
-            self._slow_beats[stream.key] = slow
-            if slow == _SLOW_BEATS or (slow == 0 and slow_before >= _SLOW_BEATS):
-                level = logging.WARNING if slow else logging.INFO
-                log.log(
-                    level,
-                    text,
-                    stream.direction,
-                    stream.key,
-                    stream.rate_hz,
-                    stream.expected_hz,
-                    stream.dropped,
-                    stream.rejected,
-                )
+
+def _is_steady(stats: StreamStats) -> bool:
+    """Whether silence of a stream is a fault; there is no pose of a hand that nobody holds up."""
+    return stats.topic is not topics.POSE
 
 
 def _rss_mb() -> float:

@@ -8,6 +8,10 @@ from __future__ import annotations
 import os
 import socket
 
+from rhot.plain_text import printable
+
+# `systemctl status` shows a line; systemd takes some kB.
+_MAX_STATUS = 500
 # What systemd gives a start before it asks for more (TimeoutStartSec of the units).
 _START_S = 120
 
@@ -41,6 +45,13 @@ def ask_for_time() -> None:
     """
     if not _Start.over:
         notify(f"EXTEND_TIMEOUT_USEC={_START_S * 1_000_000}")
+
+
+def one_line(text: str) -> str:
+    """A text as a STATUS: a line break in it, such as a stranger's message may hold, would begin
+    another field.
+    """
+    return printable(text)[:_MAX_STATUS]
 
 
 def watchdog_s() -> float | None:

@@ -13,7 +13,7 @@ from typing import TypeVar
 import msgspec
 
 from rhot import topics
-from rhot.errors import CaptureError
+from rhot.errors import UNDECODABLE, CaptureError
 from rhot.files.capture import read_lines
 
 M = TypeVar("M", bound=msgspec.Struct)
@@ -36,5 +36,5 @@ def messages(recording: Path, topic: topics.Topic[M], kind: type[M], stream: str
             continue
         try:
             yield msgspec.json.decode(record.payload, type=kind)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except UNDECODABLE as error:
             raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None

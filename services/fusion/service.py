@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from rhot import clock, topics
+from rhot.bus.master_clock import watch_masters
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
@@ -21,10 +22,15 @@ from rhot.messages import ClockEcho
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.computer_watch import watch_computer
 from rhot.process.service import Service
+from services.fusion.faults import FusionFaults
 from services.fusion.health import HealthFigures
 from services.fusion.session_state import SessionState
 from services.fusion.step import FusionStep
 from services.fusion.warm import warm_up
+
+_LOOK_S = 1.0
+# A second master is there to stay; trackers, which ask each second, name it sooner.
+_ASK_MASTERS_S = 5.0
 
 
 async def serve(service: Service) -> None:
@@ -37,16 +43,28 @@ async def serve(service: Service) -> None:
     await asyncio.to_thread(warm_up, config, cameras, hands)
     publishers = {hand: service.bus.publisher(topics.POINTS, hand=hand) for hand in config.hand}
     frames = service.bus.every(topics.MARKERS, 64)
-    _serve_session_and_clock(service)
+    state = _serve_session_and_clock(service)
     service.tasks.create_task(_note_poses(service, step))
     service.tasks.create_task(watch_computer(service))
-    health = HealthFigures(step, service.values, service.error, time.monotonic())
+    health = HealthFigures(step, service.values, time.monotonic())
+    service.tasks.create_task(_look_every_second(service, step, health, state))
     service.ready()
     async for frame in frames:
         began_s = time.perf_counter()
         for points in step.step(frame):
             publishers[points.hand].put(points)
-        health.note_frame(time.perf_counter() - began_s, time.monotonic())
+        health.note_frame(time.perf_counter() - began_s)
+
+
+async def _look_every_second(
+    service: Service, step: FusionStep, health: HealthFigures, state: SessionState
+) -> None:
+    """Figures and faults, also while no frame comes."""
+    faults = FusionFaults(step, service.config, service.faults, time.monotonic())
+    while True:
+        await asyncio.sleep(_LOOK_S)
+        health.renew(time.monotonic())
+        faults.look(time.monotonic(), session_running=state.session.running)
 
 
 def _calibration_files(config: RigConfig) -> list[Path]:
@@ -77,7 +95,7 @@ async def _note_poses(service: Service, step: FusionStep) -> None:
         step.note_pose(pose)
 
 
-def _serve_session_and_clock(service: Service) -> None:
+def _serve_session_and_clock(service: Service) -> SessionState:
     """Be the master: broadcast the session, answer for session and clock.
 
     The broadcast is repeated to every tracker that comes.
@@ -87,7 +105,14 @@ def _serve_session_and_clock(service: Service) -> None:
     broadcasts = service.bus.latest(topics.SESSION)
     arrivals = service.bus.watch_alive()
     service.bus.answer(topics.SESSION, lambda: state.session)
-    service.bus.answer(topics.CLOCK, lambda: ClockEcho(master_ns=clock.now_ns()))
+    began_ns = time.monotonic_ns()
+
+    def echo() -> ClockEcho:
+        uptime_ns = time.monotonic_ns() - began_ns
+        return ClockEcho(master_ns=clock.now_ns(), session=me, host=host, uptime_ns=uptime_ns)
+
+    me, host = service.bus.session, service.host
+    service.bus.answer(topics.CLOCK, echo)
     publisher.put(state.session)
 
     async def follow_broadcasts() -> None:
@@ -101,3 +126,7 @@ def _serve_session_and_clock(service: Service) -> None:
 
     service.tasks.create_task(follow_broadcasts())
     service.tasks.create_task(repeat_to_trackers())
+    service.tasks.create_task(
+        watch_masters(service.bus, clock.now_ns, service.second_clock, _ASK_MASTERS_S)
+    )
+    return state

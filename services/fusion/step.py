@@ -24,11 +24,12 @@ from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
-from services.fusion.intake.observations import FrameRejection, ObservationBuilder
+from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
 from services.fusion.monitors.mirrored_view import MirrorMonitor
+from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import coherent, hand_reach_m
 from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.schedule import OutputSchedule
@@ -38,6 +39,9 @@ from services.fusion.paired.estimator import PairedMethod
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
 _DIGITS = 6
+# Reasons and cameras for which rejected frames are counted apart: a rig has four reasons for each
+# of some cameras.
+_MAX_REJECTED = 64
 
 
 class FusionStep:
@@ -53,6 +57,9 @@ class FusionStep:
         """
         _check(config, cameras, hands)
         self.refusals: Counter[str] = Counter()
+        # Of the same frames (reason, camera), and of those that had an effect; for the faults.
+        self.rejected: Counter[tuple[str, str]] = Counter()
+        self.admitted: Counter[str] = Counter()
         self._builder = ObservationBuilder(config, cameras)
         self._cameras = self._builder.cameras
         self._landmarks = self._builder.landmarks
@@ -75,26 +82,33 @@ class FusionStep:
             self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
         )
         self.mirrors = MirrorMonitor(self._cameras)
+        self.unseen_markers = UnseenMarkerMonitor(self._cameras, self._landmarks)
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
         self._admission = FrameAdmission(len(self._cameras))
         self._schedule = OutputSchedule(self._fps, self._lag_frames)
         self._epoch_ns = 0
         self._seq = 0
 
+    @property
+    def landmarks(self) -> tuple[Landmark, ...]:
+        """All landmarks of the rig's hands, in the order of their indices."""
+        return self._landmarks
+
     def step(self, frame: MarkerFrame) -> list[HandPoints]:
         """Take in one frame; the points that are due with it, one message per hand, or none."""
         view = self._builder.build(frame)
         if isinstance(view, FrameRejection):
-            self.refusals[view.value] += 1
-            return []
+            return self._reject(view.value, frame.camera)
         self.refusals["marker"] += view.ignored
-        verdict = self._admission.admit(view.camera, view.instant_ns)
+        stamp_ns = view.instant_ns + view.clock_offset_ns
+        verdict = self._admission.admit(view.camera, view.instant_ns, stamp_ns, frame.seq)
         if verdict in (Verdict.TWICE, Verdict.ASTRAY):
-            self.refusals[verdict.value] += 1
-            return []
+            return self._reject(verdict.value, frame.camera)
+        self.admitted[frame.camera] += 1
         if verdict is Verdict.RESTART:
             self._restart(view.instant_ns)
         self.mirrors.observe(view)
+        self.unseen_markers.observe(view)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.observe(view, times_s)
         white = dataclasses.replace(view, sigmas=self._systematic.white_sigmas(view))
@@ -114,6 +128,14 @@ class FusionStep:
         """The points still waiting for later frames, at the end of a recording."""
         waiting_ns = self._schedule.take_waiting()
         return [points for instant_ns in waiting_ns for points in self._points_at(instant_ns)]
+
+    def _reject(self, reason: str, camera: str) -> list[HandPoints]:
+        """Count a frame that has no other effect."""
+        self.refusals[reason] += 1
+        # Strangers' names come from the network; they must not fill the memory.
+        if (reason, camera) in self.rejected or len(self.rejected) < _MAX_REJECTED:
+            self.rejected[reason, camera] += 1
+        return []
 
     def _restart(self, instant_ns: int) -> None:
         """Forget everything.

@@ -44,7 +44,9 @@ async def serve(service: Service) -> None:
         source = sources.open_source(table, service.config, service.bus, start_ns)
         camera.attach(source)
         companions.append(
-            service.tasks.create_task(follow_master(service.bus, camera.offset, source.now_ns))
+            service.tasks.create_task(
+                follow_master(service.bus, camera.offset, source.now_ns, service.second_clock)
+            )
         )
         async with contextlib.aclosing(source.frames()) as frames:
             async for frame in frames:

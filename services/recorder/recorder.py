@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from rhot import topics
+from rhot.errors import UNDECODABLE
 from rhot.files.config import RigConfig
 from rhot.messages import Session
 from rhot.topics import Topic
@@ -147,5 +148,5 @@ class Recorder:
     def _session(self, payload: bytes) -> Session | None:
         try:
             return self._decoder.decode(payload)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        except UNDECODABLE:
             return None

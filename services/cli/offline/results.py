@@ -16,7 +16,7 @@ from typing import BinaryIO, Self
 
 import msgspec
 
-from rhot.errors import CaptureError, RhotError
+from rhot.errors import CaptureError, RhotError, disk_full, writing
 from services.cli.offline.track_summary import Summary
 
 STREAMS = ("markers", "points", "poses", "objects")
@@ -50,18 +50,28 @@ class ResultWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._stack.close()
-        if kind is not None and issubclass(kind, RhotError):
+        failed = error if isinstance(error, RhotError) else _no_space(error, self.folder)
+        try:
+            self._stack.close()
+        except OSError as unwritten:
+            # What was still in the buffers did not fit either; the first failure is the one told.
+            failed = failed or _no_space(unwritten, self.folder)
+            if failed is None and error is None:
+                raise
+        if failed is not None:
             for path in self.folder.glob(f"*{PARTIAL}"):
                 path.unlink()
             if not any(self.folder.iterdir()):
                 self.folder.rmdir()
+        if failed is not None and failed is not error:
+            raise failed from None
 
     def write(self, stream: str, messages: Iterable[msgspec.Struct]) -> None:
-        """Append messages, one a line."""
-        for message in messages:
-            self._files[stream].write(msgspec.json.encode(message) + b"\n")
-            self.counts[stream] += 1
+        """Append messages, one a line. Raises DiskFullError."""
+        with writing(self.folder):
+            for message in messages:
+                self._files[stream].write(msgspec.json.encode(message) + b"\n")
+                self.counts[stream] += 1
 
     def finish(self, summary: Summary) -> None:
         """Give the files their names and write summary.json."""
@@ -74,6 +84,10 @@ class ResultWriter:
         partial = self.folder / f"{SUMMARY}{PARTIAL}"
         partial.write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
         partial.replace(self.folder / SUMMARY)
+
+
+def _no_space(error: BaseException | None, folder: Path) -> RhotError | None:
+    return None if error is None else disk_full(error, folder)
 
 
 def check_result(folder: Path, *streams: str) -> None:

@@ -19,7 +19,7 @@ WINDOW_NS = 500_000_000
 # Frames of one camera in a row, with no others admitted meanwhile, that restart time: 3 are a tenth
 # of a second at 30 fps.
 _FRAMES_TO_RESTART = 3
-# Instants remembered for each camera to know a frame that comes twice: more than any queue holds.
+# Stamps remembered for each camera to know a frame that comes twice: more than any queue holds.
 _REMEMBERED = 64
 
 
@@ -28,7 +28,7 @@ class Verdict(Enum):
 
     ACCEPT = "accepted"
     RESTART = "restart"  # accept it, and forget everything before
-    TWICE = "twice"  # a duplicate
+    TWICE = "twice"  # a duplicate, or a stamp or number that stands still
     ASTRAY = "astray"  # its clock is off, or it is far too late
 
 
@@ -38,25 +38,39 @@ class FrameAdmission:
     def __init__(self, cameras: int) -> None:
         self.newest_ns: int | None = None
         self._known: list[deque[int]] = [deque(maxlen=_REMEMBERED) for _ in range(cameras)]
+        self._newest_seq: list[int | None] = [None] * cameras
         # By camera, since a frame was last admitted: its latest instant astray, and how many such
         # frames came in a row.
         self._astray: dict[int, tuple[int, int]] = {}
 
-    def admit(self, camera: int, instant_ns: int) -> Verdict:
-        """The verdict on one frame; only admitted ones move time."""
-        if instant_ns in self._known[camera]:
+    def admit(
+        self, camera: int, instant_ns: int, stamp_ns: int | None = None, seq: int | None = None
+    ) -> Verdict:
+        """The verdict on one frame; only admitted ones move time.
+
+        stamp_ns is the instant on the camera's own clock and seq the frame's number, by which a
+        frame is known again: its instant moves with the estimate of the clock's offset.
+        """
+        stamp_ns = instant_ns if stamp_ns is None else stamp_ns
+        if stamp_ns in self._known[camera] or (seq is not None and seq == self._newest_seq[camera]):
             return Verdict.TWICE
-        if self.newest_ns is None:
-            return self._restart(camera, instant_ns)
-        if abs(instant_ns - self.newest_ns) <= WINDOW_NS:
-            self.newest_ns = max(self.newest_ns, instant_ns)
-            self._known[camera].append(instant_ns)
+        verdict = self._by_instant(camera, instant_ns)
+        if verdict is not Verdict.ASTRAY:
+            self._known[camera].append(stamp_ns)
+            self._newest_seq[camera] = seq
             self._astray.clear()
+        return verdict
+
+    def _by_instant(self, camera: int, instant_ns: int) -> Verdict:
+        if self.newest_ns is not None and abs(instant_ns - self.newest_ns) <= WINDOW_NS:
+            self.newest_ns = max(self.newest_ns, instant_ns)
             return Verdict.ACCEPT
-        run = self._count_astray(camera, instant_ns)
-        if run >= _FRAMES_TO_RESTART or self._another_agrees(camera, instant_ns):
-            return self._restart(camera, instant_ns)
-        return Verdict.ASTRAY
+        if self.newest_ns is not None:
+            run = self._count_astray(camera, instant_ns)
+            if run < _FRAMES_TO_RESTART and not self._another_agrees(camera, instant_ns):
+                return Verdict.ASTRAY
+        self.newest_ns = instant_ns
+        return Verdict.RESTART
 
     def _count_astray(self, camera: int, instant_ns: int) -> int:
         """Note a frame far from the present; how many consistent ones its camera sent in a row."""
@@ -70,9 +84,3 @@ class FrameAdmission:
             other != camera and abs(other_ns - instant_ns) <= WINDOW_NS
             for other, (other_ns, _) in self._astray.items()
         )
-
-    def _restart(self, camera: int, instant_ns: int) -> Verdict:
-        self.newest_ns = instant_ns
-        self._known[camera].append(instant_ns)
-        self._astray.clear()
-        return Verdict.RESTART

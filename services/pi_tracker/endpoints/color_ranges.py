@@ -17,8 +17,7 @@ from pathlib import Path
 import msgspec
 
 from rhot import topics
-from rhot.bus.queries import UNDECODABLE
-from rhot.errors import CalibrationError, RefusalCode, RefusedError
+from rhot.errors import UNDECODABLE, CalibrationError, RefusalCode, RefusedError
 from rhot.files.calibration import Colors, load_colors
 from rhot.process.service import Service
 from services.pi_tracker.colors.light_drift import Drifted

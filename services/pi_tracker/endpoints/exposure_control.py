@@ -15,9 +15,8 @@ import time
 import msgspec
 
 from rhot import clock, topics
-from rhot.bus.queries import UNDECODABLE
 from rhot.camera_messages import ExposureControl
-from rhot.errors import CalibrationError, RefusalCode, RefusedError
+from rhot.errors import UNDECODABLE, CalibrationError, RefusalCode, RefusedError
 from rhot.files.calibration import Exposure, load_exposure
 from rhot.process.service import Service
 from services.pi_tracker.colors.settling import Settling

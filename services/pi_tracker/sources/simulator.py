@@ -14,7 +14,7 @@ import numpy as np
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, Sample
-from rhot.bus.queries import UNDECODABLE
+from rhot.errors import UNDECODABLE
 from rhot.simulator_messages import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls

@@ -14,13 +14,13 @@ from pathlib import Path
 import cv2
 import msgspec
 
-from rhot.errors import CaptureError
+from rhot.errors import CaptureError, DiskFullError
 from rhot.files.capture import Capture, FrameStamp, write_lines, write_stamps
 from rhot.files.config import RigConfig
 from rhot.messages import OpenVrPose
 from rhot.simulator_messages import Truth
 from services.simulator.camera.frame_source import FrameSource
-from services.simulator.files.mkv_ids import fix_identifiers
+from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off
 from services.simulator.files.rig_toml import rig_toml
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
@@ -122,6 +122,12 @@ def _write_pictures(
                     progress(done, total)
         finally:
             video.release()
+        # OpenCV does not tell when its writes fail.
+        if is_cut_off(capture.video(name)):
+            raise DiskFullError(
+                f"{capture.video(name)}: was cut off: no space left for it; free some space"
+                " (`df -h` shows where), or write elsewhere"
+            )
         fix_identifiers(capture.video(name), list(scene.clocks).index(name) + 1)
         write_stamps(capture.stamps(name), stamps)
         written += len(stamps)

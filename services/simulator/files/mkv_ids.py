@@ -15,8 +15,9 @@ from pathlib import Path
 _CRC32, _CLUSTER = 0xBF, 0x1F43B675
 # SegmentUID, TrackUID, TagTrackUID.
 _IDENTIFIERS = (0x73A4, 0x73C5, 0x63C5)
+_SEGMENT = 0x18538067
 # Elements that hold these: Segment, Info, Tracks, Tags, Tag, Targets, TrackEntry.
-_MASTERS = (0x18538067, 0x1549A966, 0x1654AE6B, 0x1254C367, 0x7373, 0x63C0, 0xAE)
+_MASTERS = (_SEGMENT, 0x1549A966, 0x1654AE6B, 0x1254C367, 0x7373, 0x63C0, 0xAE)
 # The header of a file with one video track has under 1 kB.
 _HEAD = 65536
 
@@ -32,6 +33,24 @@ def fix_identifiers(path: Path, number: int) -> None:
             return
         file.seek(0)
         file.write(head)
+
+
+def is_cut_off(path: Path) -> bool:
+    """Whether a finished file is shorter than its head says: the end did not fit on the disk."""
+    with path.open("rb") as file:
+        head = bytearray(file.read(_HEAD))
+    at, size = 0, path.stat().st_size
+    try:
+        while at < size:
+            identifier, at = _read_number(head, at, keep_marker=True)
+            length, at = _read_number(head, at, keep_marker=False)
+            at += length
+            if identifier == _SEGMENT:
+                break
+    except IndexError:
+        # Not even the head is whole.
+        return True
+    return at > size
 
 
 def _elements(data: bytearray, start: int, end: int) -> Iterator[tuple[int, int, int]]:

@@ -65,9 +65,10 @@ async def test_leads_the_rig_and_turns_markers_into_points(router, config):
             assert (await anext(aiter(heard))).running
             answers = await client.get(topics.SESSION)
             assert answers[0].running
-            exchange = await client.echo(clock.now_ns)
-            assert exchange is not None
-            assert exchange[0] <= exchange[1] <= exchange[2]
+            (exchange,) = await client.echoes(clock.now_ns)
+            asked_ns, master_ns, answered_ns = exchange.stamps
+            assert asked_ns <= master_ns <= answered_ns
+            assert exchange.echo.session == service.bus.session
             await feed(client, points)
             await stop(client)
             assert service.state == "running"
