@@ -4,25 +4,34 @@ files it writes.
 With [recorder] autostart everything is recorded from the beginning, and a session that starts opens
 a file of its own. Without, only sessions are recorded: messages between them are not kept. Late or
 undecodable payloads are kept as they came; a session message that does not decode starts and stops
-nothing.
+nothing. Sessions that follow each other faster than people start them share a file. A full disk
+raises DiskFullError: `suspend` then closes the file, and `resume` opens another once there is
+space.
 """
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from rhot import topics
-from rhot.errors import UNDECODABLE
+from rhot.errors import UNDECODABLE, CaptureError
 from rhot.files.config import RigConfig
 from rhot.messages import Session
 from rhot.topics import Topic
-from services.recorder.writer import RecordingWriter
+from services.recorder.rig_keys import RigKeys
+from services.recorder.writer import MIN_FREE_BYTES, RecordingWriter, check_space
 
 # A calibration file is some kB; a file larger than this is none.
 _MAX_ATTACHMENT_BYTES = 1_000_000
+# Sessions that may start or stop one after the other, and after how long another one may: people
+# need seconds for each, and a program gone mad must not open hundreds of files.
+_CHANGES, _CHANGE_NS = 4, 10_000_000_000
+# What must be free before recording goes on: enough that it does not stop again at once.
+_RESUME_BYTES = 2 * MIN_FREE_BYTES
 
 
 def recorded_topics(config: RigConfig) -> list[Topic]:
@@ -70,9 +79,9 @@ def attachments(config: RigConfig) -> dict[str, bytes]:
 class Recorder:
     """Takes every sample and keeps those that belong to a session.
 
-    messages, bytes and refused (messages on too many keys) count over all files; path is the file
-    being written, None between sessions. Without follow_sessions only start() and stop() open and
-    close files.
+    messages, bytes, refused (messages of too many strangers), lost (while suspended) and postponed
+    (sessions that came too fast) count over all files; path is the file being written, None between
+    sessions. Without follow_sessions only start() and stop() open and close files.
     """
 
     def __init__(
@@ -83,16 +92,29 @@ class Recorder:
         self._folder = folder
         self._version = version
         self._writer: RecordingWriter | None = None
+        self._keys = RigKeys(config)
+        # The session that is recorded, and the one that was announced last.
         self._session_ns: int | None = None
+        self._announced_ns: int | None = None
+        # When the latest sessions started or stopped: the oldest one makes room for a new one.
+        self._changed_ns = [-_CHANGE_NS * _CHANGES] * _CHANGES
         self._decoder = msgspec.json.Decoder(Session)
+        self.suspended = False
         self.messages = 0
         self.bytes = 0
         self.refused = 0
+        self.lost = 0
+        self.postponed = 0
 
     @property
     def path(self) -> Path | None:
         """The file being written."""
         return self._writer.path if self._writer else None
+
+    @property
+    def folder(self) -> Path:
+        """Where recordings go."""
+        return self._folder
 
     def start(self, start_ns: int, path: Path | None = None) -> Path:
         """Open a file for what starts at start_ns (closing the one before); raises CaptureError."""
@@ -104,46 +126,92 @@ class Recorder:
         return path
 
     def stop(self) -> None:
-        """Finish the file, if one is open; raises CaptureError if the disk is full."""
+        """Finish the file, if one is open; raises DiskFullError if the disk is full."""
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
 
-    def follow(self, session: Session) -> None:
+    def suspend(self) -> None:
+        """The disk is full: finish the file as far as that goes, and keep nothing until resume.
+
+        A file that cannot even be finished is restored at the recorder's next start.
+        """
+        self.suspended = True
+        with contextlib.suppress(CaptureError):
+            self.stop()
+
+    def resume(self, now_ns: int) -> None:
+        """Go on, in a new file, if there is something to record; raises DiskFullError if the disk
+        is still full.
+        """
+        check_space(self._folder, _RESUME_BYTES)
+        self.suspended = False
+        if self._session_ns is not None or self._config.recorder.autostart:
+            self.start(now_ns)
+
+    def follow(self, session: Session, now_ns: int) -> None:
         """Open and close files as sessions start and stop.
 
         The same session announced again changes nothing.
         """
-        if session.running and session.start_ns != self._session_ns:
-            self._session_ns = session.start_ns
-            self.start(session.start_ns)
-        elif not session.running and self._session_ns is not None:
-            self._session_ns = None
-            if not self._config.recorder.autostart:
-                self.stop()
+        announced_ns = session.start_ns if session.running else None
+        if announced_ns != self._announced_ns:
+            self._announced_ns = announced_ns
+            self._change_session(now_ns)
+            self.postponed += int(self._session_ns != announced_ns)
+
+    def _change_session(self, now_ns: int) -> None:
+        """Begin or end what was announced, unless the last few times were just now."""
+        if self._announced_ns == self._session_ns:
+            return
+        if now_ns - self._changed_ns[0] < _CHANGE_NS * _CHANGES:
+            return
+        self._changed_ns = [*self._changed_ns[1:], now_ns]
+        self._session_ns = self._announced_ns
+        if self.suspended:
+            return
+        if self._session_ns is not None:
+            self.start(self._session_ns)
+        elif not self._config.recorder.autostart:
+            self.stop()
 
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
         """Take one sample; it is kept if a file is open. Raises CaptureError."""
         follows = self._follow_sessions and topic is topics.SESSION
         session = self._session(payload) if follows else None
         if session is not None and session.running:
-            self.follow(session)
+            self.follow(session, log_time_ns)
         if self._writer is not None:
-            refused = self._writer.refused
-            self._writer.add(topic, key, payload, log_time_ns)
-            if self._writer.refused > refused:
-                self.refused += 1
-            else:
-                self.messages += 1
-                self.bytes += len(payload)
+            self._keep(self._writer, topic, key, payload, log_time_ns)
+        else:
+            self.lost += int(self.suspended)
         # The stop is the last message of its own recording.
         if session is not None and not session.running:
-            self.follow(session)
+            self.follow(session, log_time_ns)
 
-    def flush(self) -> None:
-        """Hand whole chunks to the system; raises CaptureError when the disk is nearly full."""
+    def _keep(
+        self, writer: RecordingWriter, topic: Topic, key: str, payload: bytes, log_time_ns: int
+    ) -> None:
+        refused = writer.refused
+        if key in writer.keys or self._keys.admits(topic, key):
+            writer.add(topic, key, payload, log_time_ns)
+        else:
+            self.refused += 1
+            return
+        if writer.refused > refused:
+            self.refused += 1
+            return
+        self.messages += 1
+        self.bytes += len(payload)
+
+    def flush(self, now_ns: int) -> None:
+        """Hand whole chunks to the system, and begin or end a session that had to wait.
+
+        Raises DiskFullError when the disk is nearly full.
+        """
         if self._writer is not None:
             self._writer.flush()
+        self._change_session(now_ns)
 
     def _session(self, payload: bytes) -> Session | None:
         try:

@@ -3,21 +3,21 @@ calibration.
 
 Payloads are kept as they came, even if they do not decode. Chunks are small, so that a killed
 recorder loses less than a second of a busy rig; `flush` hands whole chunks to the system. A full
-disk or an unwritable folder raises CaptureError. The file is locked while it is open, so that
-recovery leaves it alone.
+disk raises DiskFullError, an unwritable folder CaptureError. The file is locked while it is open,
+so that recovery leaves it alone.
 """
 
 from __future__ import annotations
 
 import fcntl
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.writer import CompressionType, Writer
 
-from rhot.errors import CaptureError
+from rhot.errors import CaptureError, DiskFullError, disk_full
 from rhot.topics import Topic
 from services.recorder.schemas import SCHEMA_ENCODING, json_schema, schema_name
 
@@ -35,7 +35,8 @@ MIN_FREE_BYTES = 50_000_000
 class RecordingWriter:
     """An open recording; use it as a context manager, which finishes the file.
 
-    messages, bytes and refused (messages on more keys than MAX_CHANNELS) count what came.
+    messages, bytes and refused (messages on more keys than MAX_CHANNELS) count what came; keys are
+    those that have a channel.
     """
 
     def __init__(
@@ -72,6 +73,11 @@ class RecordingWriter:
             _close(self._file)
             raise _failed(self.path, error) from None
 
+    @property
+    def keys(self) -> Collection[str]:
+        """The keys of which something was recorded."""
+        return self._channels.keys()
+
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
         """Write one payload as it is; log_time_ns is when it arrived, on this machine's clock."""
         channel = self._channels.get(key)
@@ -103,7 +109,7 @@ class RecordingWriter:
     def flush(self) -> None:
         """Hand whole chunks to the system.
 
-        Raises CaptureError when the disk is nearly full (the file can still be finished).
+        Raises DiskFullError when the disk is nearly full (the file can still be finished).
         """
         try:
             self._file.flush()
@@ -130,13 +136,13 @@ class RecordingWriter:
         self.close()
 
 
-def check_space(folder: Path) -> None:
-    """Raises CaptureError while less than MIN_FREE_BYTES are free in a folder."""
+def check_space(folder: Path, least_bytes: int = MIN_FREE_BYTES) -> None:
+    """Raises DiskFullError while less is free in a folder."""
     free = shutil.disk_usage(folder).free
-    if free < MIN_FREE_BYTES:
-        raise CaptureError(
-            f"{folder}: only {free / 1e6:.0f} MB free, recordings need"
-            f" {MIN_FREE_BYTES / 1e6:.0f}; delete old ones or set [recorder] folder"
+    if free < least_bytes:
+        raise DiskFullError(
+            f"{folder}: only {free / 1e6:.0f} MB free, recordings need {least_bytes / 1e6:.0f};"
+            " delete old ones or set [recorder] folder"
         )
 
 
@@ -159,7 +165,7 @@ def _close(file: object) -> None:
 
 
 def _failed(path: Path, error: OSError) -> CaptureError:
-    return CaptureError(
+    return disk_full(error, path) or CaptureError(
         f"{path}: cannot be recorded: {error.strerror or error};"
         " free the disk, or set [recorder] folder to one that can be written"
     )

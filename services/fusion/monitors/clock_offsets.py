@@ -39,6 +39,10 @@ _CLOCK_WALK_S, _HEIGHT_WALK_PX = 1e-4, 0.01
 # Innovations beyond this many sigmas are of two different things; so many more of them than good
 # ones mean that the clocks have changed.
 _GATE, _CONTRADICTIONS = 4.0, 24
+# So long without a common instant of two views, as their clocks are taken to be more than a frame
+# apart (interpolation reaches no further), means that they are not: a camera that is bumped and put
+# back drove them there.
+_LOST_S = 2.0
 # Share of a new squared residual in its running mean: over the last hundred or so observations.
 _NEW_RESIDUAL = 0.01
 
@@ -70,6 +74,7 @@ class ClockOffsetEstimator:
         cameras = len(self._names)
         self._tracks = [[RayTrack() for _ in range(cameras)] for _ in range(self._landmarks)]
         self._updated_s = dict.fromkeys(self._pairs, -np.inf)
+        self._compared_s = dict.fromkeys(self._pairs, np.inf)
         # By camera: its announced offset (ns) and how far that may be off (s).
         self._announced: list[tuple[int, float] | None] = [None] * cameras
         self._state = np.zeros(cameras + len(self._pairs))  # (C + P,)
@@ -136,7 +141,7 @@ class ClockOffsetEstimator:
                 if view.camera in pair and elapsed_s >= UPDATE_S * len(self._pairs):
                     self._predict(elapsed_s)
                     self._updated_s[pair] = newest_s
-                    self._update_pair(index, pair, view)
+                    self._update_pair(index, pair, view, newest_s)
         return float(self._state[view.camera]), self._pairing_sigma_s(view.camera)
 
     def _note_announced(self, view: View) -> None:
@@ -161,7 +166,9 @@ class ClockOffsetEstimator:
         for n, pair in enumerate(self._pairs.values(), start=len(self._names)):
             self._cov[n, n] += (_HEIGHT_WALK_PX / pair.focal_px) ** 2 * elapsed_s
 
-    def _update_pair(self, index: int, cameras: tuple[int, int], view: View) -> None:
+    def _update_pair(
+        self, index: int, cameras: tuple[int, int], view: View, newest_s: float
+    ) -> None:
         """Update by all landmarks of a view that the other camera of a pair has seen as well."""
         first, second = cameras
         pair = self._pairs[cameras]
@@ -171,8 +178,13 @@ class ClockOffsetEstimator:
             shift_s = float(self._state[second] - self._state[first])
             error = epipolar_error(pair, tracks[first], tracks[second], shift_s, period_s)
             if error is not None:
+                self._compared_s[cameras] = newest_s
                 self._moved.observe(index, abs(error.height) * pair.focal_px)
                 self._update(index, cameras, error)
+        apart_s = abs(float(self._state[second] - self._state[first]))
+        if newest_s - self._compared_s[cameras] > _LOST_S and apart_s > period_s:
+            self._state[:] = 0.0
+            self._cov = self._prior_cov()
 
     def _update(self, index: int, cameras: tuple[int, int], error: EpipolarError) -> None:
         """The Kalman update by one landmark's height difference."""
