@@ -207,6 +207,11 @@ _SERVICE = (
         "record to a faster disk",
     ),
     _warning(
+        "names_flooded",
+        "messages come under more names than a rig has: those of strangers are left out",
+        "see with `rhot top` who publishes; a secured bus refuses strangers",
+    ),
+    _warning(
         "object_unregistered",
         "an object's tracker is not registered to the rig: its poses are in the lighthouse's frame",
         "register it: `rhot calibrate objects`",

@@ -29,7 +29,14 @@ class StreamStats:
     count: int = 0
     dropped: int = 0
     rejected: int = 0
+    # Since the start; dropped counts anew with each beat.
+    dropped_before: int = 0
     latencies_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_LATENCIES))
+
+    @property
+    def dropped_in_all(self) -> int:
+        """Messages dropped since the start."""
+        return self.dropped_before + self.dropped
 
     def beat(self, elapsed_s: float, expected_hz: float) -> StreamHealth:
         """Health since the last beat, elapsed_s ago; starts counting anew."""
@@ -49,6 +56,7 @@ class StreamStats:
             latency_p50_ms=p50_ms,
             latency_p99_ms=p99_ms,
         )
+        self.dropped_before += self.dropped
         self.count = self.dropped = self.rejected = 0
         self.latencies_ns.clear()
         return health

@@ -27,9 +27,9 @@ from services.recorder.writer import MIN_FREE_BYTES, RecordingWriter, check_spac
 
 # A calibration file is some kB; a file larger than this is none.
 _MAX_ATTACHMENT_BYTES = 1_000_000
-# Sessions that may start or stop one after the other, and after how long another one may: people
-# need seconds for each, and a program gone mad must not open hundreds of files.
-_CHANGES, _CHANGE_NS = 4, 10_000_000_000
+# So often a session may start or stop in so long: people need seconds for each, and a program gone
+# mad must not open hundreds of files.
+_CHANGES, _WITHIN_NS = 8, 60_000_000_000
 # What must be free before recording goes on: enough that it does not stop again at once.
 _RESUME_BYTES = 2 * MIN_FREE_BYTES
 
@@ -96,8 +96,8 @@ class Recorder:
         # The session that is recorded, and the one that was announced last.
         self._session_ns: int | None = None
         self._announced_ns: int | None = None
-        # When the latest sessions started or stopped: the oldest one makes room for a new one.
-        self._changed_ns = [-_CHANGE_NS * _CHANGES] * _CHANGES
+        # When the latest sessions started or stopped.
+        self._changed_ns: list[int] = []
         self._decoder = msgspec.json.Decoder(Session)
         self.suspended = False
         self.messages = 0
@@ -164,9 +164,11 @@ class Recorder:
         """Begin or end what was announced, unless the last few times were just now."""
         if self._announced_ns == self._session_ns:
             return
-        if now_ns - self._changed_ns[0] < _CHANGE_NS * _CHANGES:
+        # A clock that was set back tells nothing about the time before.
+        self._changed_ns = [t for t in self._changed_ns if 0 <= now_ns - t < _WITHIN_NS]
+        if len(self._changed_ns) >= _CHANGES:
             return
-        self._changed_ns = [*self._changed_ns[1:], now_ns]
+        self._changed_ns.append(now_ns)
         self._session_ns = self._announced_ns
         if self.suspended:
             return

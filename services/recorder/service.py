@@ -1,20 +1,23 @@
 """The recorder: everything the topics table marks as recorded, into one MCAP file a session.
 
-Late or missing streams are recorded late or not at all. A full disk, or a folder that cannot be
-written, ends the service with a clear error. When it starts it restores recordings that were cut
-off by a crash.
+Late or missing streams are recorded late or not at all. While the disk is full nothing is recorded,
+and health says so; once there is space it goes on in a new file. A folder that cannot be written
+ends the service with a clear error. When it starts it restores recordings that were cut off by a
+crash.
 """
 
 from __future__ import annotations
 
 import asyncio
+import shutil
 from pathlib import Path
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.bus.subscription import RawSubscription
-from rhot.errors import CaptureError
+from rhot.errors import CaptureError, DiskFullError
 from rhot.files.config import RigConfig
+from rhot.messages import Session
 from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
 from services.recorder.recorder import Recorder, recorded_topics
@@ -24,6 +27,13 @@ from services.recorder.recover import recover, truncated_recordings
 # camera, and no memory to speak of.
 QUEUE = 512
 _FLUSH_S = 1.0
+# Between two tries to go on after a full disk; each opens a file.
+_RESUME_S = 5.0
+# An hour of a busy rig.
+_LOW_BYTES = 500_000_000
+# Samples that are dropped stand in health for so long after the last one.
+_BEHIND_S = 10.0
+Subscriptions = list[tuple[Topic, RawSubscription]]
 
 
 async def serve(service: Service) -> None:
@@ -32,23 +42,23 @@ async def serve(service: Service) -> None:
     folder = Path(config.folder) / config.recorder.folder
     for note in await asyncio.to_thread(recover_all, folder):
         service.error(note)
-    recorder = Recorder(config, folder, rhot_version())
+    keeper = _Keeper(service, Recorder(config, folder, rhot_version()))
     try:
         if config.recorder.autostart:
-            recorder.start(clock.now_ns())
+            keeper.start()
         subscriptions = subscribe(service.bus, config)
         for session in await service.bus.get(topics.SESSION):
-            recorder.follow(session)
+            keeper.follow(session)
         service.ready()
         async with asyncio.TaskGroup() as tasks:
             for topic, samples in subscriptions:
-                tasks.create_task(record_topic(recorder, topic, samples))
-            tasks.create_task(_flush_and_report(service, recorder))
+                tasks.create_task(keeper.record_topic(topic, samples))
+            tasks.create_task(keeper.look_every_second(subscriptions))
     finally:
-        recorder.stop()
+        keeper.recorder.stop()
 
 
-def subscribe(bus: Bus, config: RigConfig) -> list[tuple[Topic, RawSubscription]]:
+def subscribe(bus: Bus, config: RigConfig) -> Subscriptions:
     """Subscriptions to everything that is recorded."""
     return [(topic, bus.raw(topic, QUEUE)) for topic in recorded_topics(config)]
 
@@ -77,18 +87,88 @@ def recover_all(folder: Path) -> list[str]:
     return notes
 
 
-async def _flush_and_report(service: Service, recorder: Recorder) -> None:
-    """Keep the file and the service's health up to date, for ever."""
-    while True:
-        await asyncio.sleep(_FLUSH_S)
-        recorder.flush()
-        service.values.update(
+class _Keeper:
+    """A recorder as a service: it survives a full disk, and tells of what it could not keep."""
+
+    def __init__(self, service: Service, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self._service = service
+        self._refused = self._postponed = self._dropped = 0
+        self._tried_s = 0.0
+
+    def start(self) -> None:
+        """Record from now on."""
+        try:
+            self.recorder.start(clock.now_ns())
+        except DiskFullError as error:
+            self._suspend(error)
+
+    def follow(self, session: Session) -> None:
+        """Record that session, if it runs."""
+        try:
+            self.recorder.follow(session, clock.now_ns())
+        except DiskFullError as error:
+            self._suspend(error)
+
+    async def record_topic(self, topic: Topic, samples: RawSubscription) -> None:
+        """Record every sample of a topic, for ever; while the disk is full, lose it."""
+        while True:
+            try:
+                await record_topic(self.recorder, topic, samples)
+                return
+            except DiskFullError as error:
+                self._suspend(error)
+
+    def _suspend(self, error: DiskFullError) -> None:
+        self.recorder.suspend()
+        self._tried_s = asyncio.get_running_loop().time()
+        self._service.state = "waiting"
+        self._service.faults.report("disk_full", str(error), str(self.recorder.folder))
+
+    async def look_every_second(self, subscriptions: Subscriptions) -> None:
+        """Keep the file and the service's health up to date, for ever."""
+        while True:
+            await asyncio.sleep(_FLUSH_S)
+            try:
+                self._flush_or_resume()
+            except DiskFullError as error:
+                self._suspend(error)
+            self._report(sum(samples.stats.dropped_in_all for _, samples in subscriptions))
+
+    def _flush_or_resume(self) -> None:
+        recorder = self.recorder
+        if not recorder.suspended:
+            recorder.flush(clock.now_ns())
+        elif asyncio.get_running_loop().time() - self._tried_s >= _RESUME_S:
+            recorder.resume(clock.now_ns())
+            self._service.state = "running"
+            self._service.faults.clear("disk_full", str(recorder.folder))
+
+    def _report(self, dropped: int) -> None:
+        recorder, faults = self.recorder, self._service.faults
+        self._service.values.update(
             recording=float(recorder.path is not None),
             messages=recorder.messages,
             megabytes=recorder.bytes / 1e6,
+            refused=recorder.refused,
+            lost=recorder.lost + dropped,
         )
-        if recorder.refused > service.values.get("refused", 0):
-            service.error(
-                f"{recorder.refused} messages on too many different keys were not recorded"
-            )
-            service.values["refused"] = recorder.refused
+        if dropped > self._dropped:
+            text = f"{dropped} messages were lost, as the recorder could not keep up"
+            faults.event("recorder_behind", text, for_s=_BEHIND_S)
+        if recorder.refused > self._refused:
+            text = f"{recorder.refused} messages under unknown names were not recorded"
+            faults.event("names_flooded", text)
+        if recorder.postponed > self._postponed:
+            text = "sessions start and stop faster than people do: they share a recording"
+            faults.event("request_refused", text, "session")
+        self._dropped, self._refused = dropped, recorder.refused
+        self._postponed = recorder.postponed
+        self._report_low(recorder.folder)
+
+    def _report_low(self, folder: Path) -> None:
+        if not folder.exists():
+            return
+        free = shutil.disk_usage(folder).free
+        texts = {str(folder): f"{free / 1e6:.0f} MB are left for recordings in {folder}"}
+        self._service.faults.replace("disk_low", texts if free < _LOW_BYTES else {})

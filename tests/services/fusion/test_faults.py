@@ -58,6 +58,10 @@ def of_right(change: Callable[[MarkerFrame], MarkerFrame | None], from_s=0.0, to
     )
 
 
+def lost(_: MarkerFrame) -> None:
+    """The frame never arrives."""
+
+
 def moved(frame: MarkerFrame, **by: float) -> MarkerFrame:
     return replace(
         frame,
@@ -99,7 +103,7 @@ def test_all_is_well_where_nothing_is_wrong():
 )
 def test_a_camera_that_is_wrong_is_named_until_it_is_right(change, code, words):
     run = Run()
-    found = run.play(18, of_right(change, 2.0, 9.0))
+    found = run.play(22, of_right(change, 2.0, 9.0))
     assert code not in found[1]
     assert any(code in standing for standing in found[2:9])
     # What was named while it was wrong says what and what to do.
@@ -115,12 +119,13 @@ def test_a_camera_that_falls_silent_is_named_with_its_host():
     cameras = [replace(c, host=f"pi-{c.name}") for c in config.camera]
     run = Run(replace(config, camera=cameras))
     # Services start one after the other: the first ten seconds are nobody's fault.
-    found = run.play(16, of_right(lambda frame: None, 11.0, 15.0))
+    found = run.play(16, of_right(lost, 11.0, 15.0))
     assert "camera_silent" not in set().union(*found[:13])
     assert "camera_silent" in found[14]
     assert "camera_silent" not in found[15]
     assert run.look(30.0) == set(), "a process that stood still has heard nobody"
-    run.look(31.0), run.look(32.0), run.look(33.0)
+    for now_s in (31.0, 32.0, 33.0):
+        run.look(now_s)
     faults = run.log.standing()
     assert {fault.subject for fault in faults} == {"left", "right"}
     assert "pi-right" in faults[1].text
@@ -145,9 +150,7 @@ def test_a_camera_that_sends_the_same_frame_for_ever_is_silent_and_measures_noth
 
 
 def without(*colors: str) -> Callable[[MarkerFrame], MarkerFrame]:
-    return lambda frame: replace(
-        frame, markers=[m for m in frame.markers if m.color not in colors]
-    )
+    return lambda frame: replace(frame, markers=[m for m in frame.markers if m.color not in colors])
 
 
 def test_a_marker_that_is_lost_is_named_until_it_is_seen():

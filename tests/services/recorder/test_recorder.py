@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -24,8 +25,10 @@ def session(running: bool, start_ns: int = START_NS) -> bytes:
 
 
 @pytest.fixture
-def recorder(tmp_path: Path) -> Recorder:
-    return Recorder(RigConfig(folder=str(tmp_path)), tmp_path / "r")
+def recorder(tmp_path: Path) -> Iterator[Recorder]:
+    found = Recorder(RigConfig(folder=str(tmp_path)), tmp_path / "r")
+    yield found
+    found.stop()
 
 
 def say(recorder: Recorder, *payloads: bytes) -> None:
@@ -121,3 +124,42 @@ def test_attachments_are_the_configuration_and_the_calibration(tmp_path: Path) -
     files = attachments(config)
     assert set(files) == {"config.json", "calibration/rig.json"}
     assert msgspec.json.decode(files["config.json"], type=RigConfig) == config
+
+
+def test_a_storm_of_sessions_makes_a_few_files_and_loses_nothing(
+    recorder: Recorder, tmp_path: Path
+) -> None:
+    for number in range(3000):
+        payload = session(True, START_NS + number)
+        recorder.add(topics.SESSION, KEY, payload, START_NS + number * 1_000_000)
+    assert len(list((tmp_path / "r").glob("*.mcap"))) == 8
+    assert recorder.messages == 3000
+    assert recorder.postponed > 2900
+    # A minute later the last one gets the file it was to have.
+    recorder.flush(START_NS + 100 * 10**9)
+    recorder.flush(START_NS + 101 * 10**9)
+    assert len(list((tmp_path / "r").glob("*.mcap"))) == 9
+
+
+def test_a_clock_that_is_set_back_does_not_hold_sessions_up(recorder: Recorder) -> None:
+    for number in range(12):
+        hour_ns = (24 - number) * 3600 * 10**9
+        recorder.add(topics.SESSION, KEY, session(True, START_NS + number), START_NS + hour_ns)
+    assert recorder.postponed == 0
+
+
+@pytest.mark.parametrize("payload", [b"[" * 5000, b"[" * 60_000, b'{"running":' * 5000, b"\xff"])
+def test_a_session_that_does_not_decode_starts_nothing(recorder: Recorder, payload: bytes) -> None:
+    say(recorder, payload)
+    assert recorder.path is None
+
+
+def test_ten_thousand_names_leave_room_for_the_rigs_own(recorder: Recorder) -> None:
+    say(recorder, session(True))
+    for number in range(10_000):
+        key = f"rhot/desk/camera/c{number}/markers"
+        recorder.add(topics.MARKERS, key, b"{}", 6)
+    assert recorder.refused == 10_000 - 64
+    point(recorder)
+    assert recorder.refused == 10_000 - 64
+    assert recorder.messages == 1 + 64 + 1
