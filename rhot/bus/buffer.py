@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import threading
 from collections import deque
+from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
 from rhot.errors import BusError
@@ -19,6 +20,9 @@ S = TypeVar("S")
 _BURST = 32
 # Keys whose newest message `latest()` remembers: keys come from the network, memory must not.
 _MAX_KEYS = 256
+# What waits in one buffer, together: 512 samples of the largest message would be 32 MB for each of
+# a recorder's topics. A single item may be larger (a picture).
+MAX_BYTES = 8 << 20
 
 
 class Undeclarable(Protocol):
@@ -32,22 +36,35 @@ class Buffer(Generic[S]):
     per filling.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, capacity: int | None) -> None:
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        capacity: int | None,
+        size_of: Callable[[S], int] = lambda _: 0,
+    ) -> None:
+        """size_of tells the bytes that an item keeps, where items may be large."""
         if capacity is not None and capacity < 1:
             raise BusError(f"a queue of {capacity} holds nothing; it must be at least 1")
         self._loop = loop
         self._capacity = capacity
+        self._size_of = size_of
         self._lock = threading.Lock()
         self._queue: deque[S] = deque()
         self._newest: dict[str, S] = {}
+        self._bytes = 0
         self._woken = False
         self._closed = False
         self._waiter: asyncio.Future[None] | None = None
         self._burst = 0
         self._entity: Undeclarable | None = None
 
+    @property
+    def waiting_bytes(self) -> int:
+        """Size of all that waits."""
+        return self._bytes
+
     def push(self, key: str, item: S) -> int:
-        """Add an item from any thread; how many were dropped for it."""
+        """Add an item from any thread; how many were dropped for it, or 1 if it was itself."""
         with self._lock:
             dropped = self._push_locked(key, item)
             wake, self._woken = not self._woken, True
@@ -57,26 +74,38 @@ class Buffer(Generic[S]):
         return dropped
 
     def _push_locked(self, key: str, item: S) -> int:
+        size = self._size_of(item)
+        dropped = 0
         if self._capacity is None:
-            dropped = int(key in self._newest)
-            if not dropped and len(self._newest) >= _MAX_KEYS:
+            if key in self._newest:
+                # In its place in the order: a busy key must not wait behind each new one.
+                self._bytes += size - self._size_of(self._newest[key])
+                self._newest[key] = item
+                return 1
+            if len(self._newest) >= _MAX_KEYS or (self._newest and self._bytes + size > MAX_BYTES):
                 return 1
             self._newest[key] = item
-            return dropped
-        dropped = int(len(self._queue) >= self._capacity)
-        if dropped:
-            self._queue.popleft()
-        self._queue.append(item)
+        else:
+            while self._queue and (
+                len(self._queue) >= self._capacity or self._bytes + size > MAX_BYTES
+            ):
+                self._bytes -= self._size_of(self._queue.popleft())
+                dropped += 1
+            self._queue.append(item)
+        self._bytes += size
         return dropped
 
     def _pop(self) -> S | None:
         with self._lock:
             if self._queue:
-                return self._queue.popleft()
-            if self._newest:
-                return self._newest.pop(next(iter(self._newest)))
-            self._woken = False
-            return None
+                item = self._queue.popleft()
+            elif self._newest:
+                item = self._newest.pop(next(iter(self._newest)))
+            else:
+                self._woken = False
+                return None
+            self._bytes -= self._size_of(item)
+            return item
 
     def _wake(self) -> None:
         if self._waiter is not None and not self._waiter.done():

@@ -25,7 +25,7 @@ import msgspec
 import zenoh
 
 from rhot import topics
-from rhot.bus.clock_exchange import ClockExchange
+from rhot.bus.clock_exchange import ClockExchange, exchanges
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
@@ -41,8 +41,7 @@ from rhot.bus.security.tls_diagnosis import certificate_problem, exposed_key
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
-from rhot.errors import UNDECODABLE, BusError
-from rhot.messages import ClockEcho
+from rhot.errors import BusError
 from rhot.topics import Kind, Topic
 
 T = TypeVar("T")
@@ -231,12 +230,7 @@ class Bus:
         replies = await self._asker.replies(
             topics.CLOCK, key, timeout_s, now_ns=now_ns, all_of_one_key=True
         )
-        found = []
-        for reply in replies.good:
-            with contextlib.suppress(*UNDECODABLE):
-                echo = msgspec.json.decode(reply.payload, type=ClockEcho)
-                found.append(ClockExchange(asked_ns, reply.received_ns, echo))
-        return found
+        return exchanges(asked_ns, replies)
 
     @property
     def session(self) -> str:

@@ -7,9 +7,14 @@ that there are several.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
+
+from rhot.bus.queries import Replies
+from rhot.errors import UNDECODABLE
 from rhot.messages import ClockEcho
 
 # Exchanges in a row, one a second, without the master that is followed until another one is taken:
@@ -35,6 +40,16 @@ class ClockExchange:
     def offset_ns(self) -> int:
         """Own clock minus the master's, to half the time it took."""
         return (self.asked_ns + self.answered_ns) // 2 - self.echo.master_ns
+
+
+def exchanges(asked_ns: int, replies: Replies) -> list[ClockExchange]:
+    """What was answered to one question; what does not decode is left out."""
+    found = []
+    for reply in replies.good:
+        with contextlib.suppress(*UNDECODABLE):
+            echo = msgspec.json.decode(reply.payload, type=ClockEcho)
+            found.append(ClockExchange(asked_ns, reply.received_ns, echo))
+    return found
 
 
 class MasterChoice:

@@ -21,6 +21,12 @@ from rhot.topics import Topic
 T = TypeVar("T")
 
 
+# Of a sample without its content: the objects, and its key.
+_SAMPLE_BYTES = 512
+# What goes with a picture is a small message; larger ones are rejected unread, as payloads are.
+_MAX_ATTACHMENT_BYTES = 65_536
+
+
 @dataclass(frozen=True)
 class Sample:
     """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread."""
@@ -31,13 +37,17 @@ class Sample:
     received_ns: int
 
 
+def _size_of(sample: Sample) -> int:
+    return len(sample.payload) + len(sample.attachment) + _SAMPLE_BYTES
+
+
 class RawSubscription(Buffer[Sample]):
     """Undecoded samples of a key expression."""
 
     def __init__(
         self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None
     ) -> None:
-        super().__init__(loop, capacity)
+        super().__init__(loop, capacity, _size_of)
         self.stats = stats
 
     def declare(self, session: zenoh.Session, key: str) -> None:
@@ -45,7 +55,8 @@ class RawSubscription(Buffer[Sample]):
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         received_ns = clock.now_ns()
-        if len(sample.payload) > self.stats.topic.max_bytes:
+        attached = 0 if sample.attachment is None else len(sample.attachment)
+        if len(sample.payload) > self.stats.topic.max_bytes or attached > _MAX_ATTACHMENT_BYTES:
             self.stats.rejected += 1
             return
         attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
