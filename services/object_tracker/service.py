@@ -2,54 +2,83 @@
 
 Poses come from a source of its own (steamvr, libsurvive, replay) or from elsewhere on the bus
 (simulator, network). Either way they are published on the openvr topic, so that they can be seen
-and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. Uncalibrated:
-poses stay in the lighthouse frame with registered = false, and health says so.
+and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. A source that
+fails is tried again, and health says why. Uncalibrated: poses stay in the lighthouse frame with
+registered = false, and health says so; with a new objects.json the service starts anew.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import time
 
 from rhot import topics
 from rhot.bus.bus import Publisher
+from rhot.errors import SourceError
 from rhot.messages import OpenVrPose
+from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.registration import load_registration
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.step import ObjectStep
+from services.object_tracker.unknown_devices import UnknownDevices
 
 # OpenVR has 64 device slots; a source that names more devices is broken.
 _MAX_DEVICES = 64
+# SteamVR takes some seconds to start; trying is cheap.
+_RETRY_S = 3.0
+_LOOK_S = 1.0
 
 
 async def serve(service: Service) -> None:
     """Tracks the objects that rig.toml names, from SteamVR, libsurvive, a file or the bus."""
-    step = ObjectStep(service.config, load_registration(service.config))
-    if not step.registered and service.config.object:
-        service.error(
-            "no calibration/objects.json: poses stay in the lighthouse frame;"
-            " run `rhot calibrate objects`"
-        )
-    source = open_source(service.config, service.error)
+    config = service.config
+    path = config.calibration_dir / "objects.json"
+    step = load_and_watch(service, [path], lambda: ObjectStep(config, load_registration(config)))
+    if not step.registered and config.object:
+        names = ", ".join(item.name for item in config.object)
+        text = f"no calibration/objects.json: poses of {names} stay in the lighthouse frame"
+        service.faults.report("object_unregistered", text)
+    source = open_source(
+        config, lambda text: service.faults.report("object_unregistered", text, "moved")
+    )
     publishers = {
-        o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in service.config.object
+        o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in config.object
     }
     poses = service.bus.every(topics.OPENVR, 64)
+    unknown = UnknownDevices()
     if source is not None:
-        service.tasks.create_task(_publish_source(service, source))
+        service.tasks.create_task(_keep_source(service, source))
+    service.tasks.create_task(_name_unknown(service, unknown))
     service.ready()
     async for pose in poses:
         result = step.step(pose)
         if result is not None:
             publishers[result.object].put(result)
-        elif step.unknown == 1:
-            service.error(
-                f"device {pose.device.serial} is none of rig.toml's [[object]] tables;"
-                " its poses are ignored (and counted)"
-            )
+        elif config.object:
+            unknown.note(pose.device.serial, time.monotonic())
         service.values.update(
             registered=float(step.registered), lost=step.lost, unknown=step.unknown
         )
+
+
+async def _name_unknown(service: Service, unknown: UnknownDevices) -> None:
+    """Report the devices that rig.toml does not name, for ever."""
+    while True:
+        await asyncio.sleep(_LOOK_S)
+        service.faults.replace("device_unknown", unknown.texts(time.monotonic()))
+
+
+async def _keep_source(service: Service, source: PoseSource) -> None:
+    """Publish the poses of a source; one that fails is tried again, a file ends in peace."""
+    while True:
+        try:
+            await _publish_source(service, source)
+            return
+        except SourceError as error:
+            service.faults.report("source_lost", str(error), service.config.objects.source)
+            await asyncio.sleep(_RETRY_S)
 
 
 async def _publish_source(service: Service, source: PoseSource) -> None:
@@ -57,11 +86,13 @@ async def _publish_source(service: Service, source: PoseSource) -> None:
     publishers: dict[str, Publisher[OpenVrPose]] = {}
     async with contextlib.aclosing(source.poses()) as poses:
         async for pose in poses:
+            service.faults.clear("source_lost", service.config.objects.source)
             serial = pose.device.serial
             if serial not in publishers:
                 if len(publishers) >= _MAX_DEVICES:
                     service.error(
-                        f"the source names more than {_MAX_DEVICES} devices; {serial} is left out"
+                        f"the source names more than {_MAX_DEVICES} devices; the others are left"
+                        " out"
                     )
                     continue
                 publishers[serial] = service.bus.publisher(topics.OPENVR, serial=serial)

@@ -17,6 +17,7 @@ from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects, ObjectTable, RigTable
 from rhot.geometry.transforms import transform
 from rhot.messages import OpenVrPose
+from rhot.process.service import Service
 from services.object_tracker.service import serve
 
 MakePose = Callable[..., OpenVrPose]
@@ -66,8 +67,11 @@ async def test_poses_in_objects_out_with_garbage_between(
             False,
         )
         assert service.state == "running"
-        # Not calibrated, and a device that rig.toml does not name: both are told, once.
-        assert service.errors == 2
+        while "LHR-2" not in {fault.subject for fault in service.faults.standing()}:
+            await asyncio.sleep(0.05)
+        texts = {fault.code: fault.text for fault in service.faults.standing()}
+        assert texts.keys() == {"object_unregistered", "device_unknown"}
+        assert "poses of cup stay" in texts["object_unregistered"]
 
 
 async def test_a_source_feeds_the_bus(
@@ -84,10 +88,28 @@ async def test_a_source_feeds_the_bus(
         assert (await anext(raw)).device.serial == "LHR-1"
 
 
-async def test_a_source_that_fails_ends_the_service(
-    running: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+async def test_a_source_that_fails_is_tried_again(
+    running: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, vive: Path
 ) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+
+    def lost(service: Service) -> list[str]:
+        return [f.text for f in service.faults.standing() if f.code == "source_lost"]
+
+    async with running("object_tracker", serve, rig(tmp_path, "libsurvive")) as (service, _):
+        while not lost(service):
+            await asyncio.sleep(0.05)
+        assert "install libsurvive" in lost(service)[0]
+        assert service.state == "running"
+        # It is installed, and its first poses end the fault.
+        command = tmp_path / "survive-cli"
+        command.write_text(f"#!/bin/sh\nzcat {vive}/libsurvive/tracker-cal-attempt.rec.gz\nsleep 60\n")
+        command.chmod(0o755)
+        while lost(service):
+            await asyncio.sleep(0.05)
+
+
+async def test_an_unknown_source_ends_the_service(running: Callable, tmp_path: Path) -> None:
     with pytest.RaisesGroup(SourceError):
-        async with running("object_tracker", serve, rig(tmp_path, "libsurvive")):
+        async with running("object_tracker", serve, rig(tmp_path, "lighthouse")):
             await asyncio.Event().wait()
