@@ -75,7 +75,8 @@ async def _stop(process: Process) -> None:
     with contextlib.suppress(ProcessLookupError):
         process.terminate()
     try:
-        await asyncio.wait_for(process.wait(), _TERMINATE_S)
+        # Its pipe is read to the end: one that nobody reads would stay open.
+        await asyncio.wait_for(process.communicate(), _TERMINATE_S)
     except TimeoutError:
         with contextlib.suppress(ProcessLookupError):
             process.kill()

@@ -103,7 +103,9 @@ async def test_a_source_that_fails_is_tried_again(
         assert service.state == "running"
         # It is installed, and its first poses end the fault.
         command = tmp_path / "survive-cli"
-        command.write_text(f"#!/bin/sh\nzcat {vive}/libsurvive/tracker-cal-attempt.rec.gz\nsleep 60\n")
+        command.write_text(
+            f"#!/bin/sh\nzcat {vive}/libsurvive/tracker-cal-attempt.rec.gz\nexec sleep 60\n"
+        )
         command.chmod(0o755)
         while lost(service):
             await asyncio.sleep(0.05)
