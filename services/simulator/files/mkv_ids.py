@@ -46,11 +46,11 @@ def is_cut_off(path: Path) -> bool:
             length, at = _read_number(head, at, keep_marker=False)
             at += length
             if identifier == _SEGMENT:
-                break
+                return at > size
     except IndexError:
-        # Not even the head is whole.
-        return True
-    return at > size
+        pass
+    # Not even the head is whole.
+    return True
 
 
 def _elements(data: bytearray, start: int, end: int) -> Iterator[tuple[int, int, int]]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-import resource
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -26,15 +24,6 @@ KEY = "rhot/desk/camera/left/markers"
 CONFIG = RigConfig(camera=[CameraTable(name="left")], recorder=RecorderTable(autostart=True))
 
 
-@pytest.fixture
-def small_files() -> Iterator[None]:
-    """No file may grow beyond 300 kB: the system refuses writes, as on a full disk."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
 def test_a_write_that_fails_is_one_line_and_another_file_goes_on(
     tmp_path: Path, small_files: None
 ) -> None:
@@ -52,22 +41,6 @@ def test_a_write_that_fails_is_one_line_and_another_file_goes_on(
     recorder.stop()
     second = tmp_path / "rhot-desk-20010909-014640-2.mcap"
     assert [record.payload for record in read(second)] == [b"kept"]
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A real file system of 160 MB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=160m", "tmpfs", str(folder)],
-        capture_output=True,
-        check=False,
-    )
-    if mounted.returncode:
-        pytest.skip("mounting a file system needs root")
-    yield folder
-    subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 async def until(condition: Callable[[], object], act: Callable[[], None]) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
-from rhot.errors import CaptureError
+from rhot.errors import CaptureError, DiskFullError
 from rhot.messages import Session
 from services.cli.offline.results import STREAMS, ResultWriter, check_result
 from services.cli.offline.track_summary import Summary
@@ -92,3 +93,22 @@ def test_what_is_missing_is_named(tmp_path):
     (tmp_path / "points.jsonl").unlink()
     with pytest.raises(CaptureError, match=r"points\.jsonl"):
         check_result(tmp_path, "poses", "points")
+
+
+@pytest.mark.parametrize("lines", [20_000, 200], ids=["while writing", "at the end"])
+def test_a_disk_that_is_full_is_one_line_and_leaves_nothing(tmp_path, small_files, lines):
+    """Some lines wait in a buffer, and do not fit when the file is closed."""
+    folder = tmp_path / "out"
+    line = msgspec.defstruct("Line", [("text", str)])("x" * 2_000)
+    with (
+        pytest.raises(DiskFullError, match=r"out: cannot be written: .*df -h"),
+        ResultWriter(folder) as writer,
+    ):
+        writer.write("poses", [line] * lines)
+        writer.finish(summary(**writer.counts))
+    assert not folder.exists()
+
+
+def test_a_full_disk_does_not_hide_a_bug(tmp_path, small_files):
+    with pytest.raises(ZeroDivisionError), ResultWriter(tmp_path / "out") as writer:
+        writer.write("poses", [LINE] * (1 // 0))

@@ -182,3 +182,19 @@ def test_replay_refuses(tmp_path: Path, recording: Path, invoke: Invoke) -> None
         invoke("replay", tmp_path / "missing.mcap")
     with pytest.raises(CaptureError, match="no recorded topic is called 'marker'"):
         invoke("replay", recording, "--only", "marker")
+
+
+def test_a_disk_that_is_full_is_one_line(talking: str, small_disk: Path) -> None:
+    """In a process of its own, as a person sees it."""
+    (small_disk / "filler").write_bytes(bytes(130_000_000))
+    program = [sys.executable, "-m", "services.cli", "record", "--seconds", "20"]
+    done = subprocess.run(
+        [*program, "--out", str(small_disk / "a.mcap"), "--connect", talking],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "MB free, recordings need 50" in line

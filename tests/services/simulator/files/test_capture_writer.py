@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot.errors import CaptureError
+from rhot.errors import CaptureError, DiskFullError
 from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
 from rhot.messages import OpenVrPose
 from rhot.simulator_messages import Truth
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.capture_writer import START_NS, write_capture
-from services.simulator.files.mkv_ids import fix_identifiers
+from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off
 from services.simulator.scene.scene import Scene
 
 SECONDS = 0.5
@@ -131,3 +131,18 @@ def test_truth_lines_are_plain_json(folder):
     assert len(right["points_m"]["index_tip"]) == 3
     assert set(right["angles_rad"]["index"]) >= {"abduction", "mcp", "pip", "dip"}
     assert set(first["objects"]["cup"]) == {"position_m", "orientation_wxyz"}
+
+
+def test_a_video_that_does_not_fit_on_the_disk_is_one_line(fist, tmp_path, small_files):
+    """OpenCV says nothing when its writes fail."""
+    with pytest.raises(DiskFullError, match=r"\.mkv: was cut off: no space left"):
+        write_capture(fist, SECONDS, tmp_path / "capture")
+
+
+def test_a_video_that_is_cut_off_is_known(folder, fist, tmp_path):
+    whole = Capture(folder).video(next(iter(fist.cameras)))
+    assert not is_cut_off(whole)
+    content = whole.read_bytes()
+    for length in (0, 10, 300, len(content) // 2, len(content) - 1):
+        (tmp_path / "cut.mkv").write_bytes(content[:length])
+        assert is_cut_off(tmp_path / "cut.mkv"), length
