@@ -27,7 +27,6 @@ _STEP_NS = 2_000_000
 _READINGS = 4
 
 
-
 async def follow_master(
     bus: Bus, estimator: OffsetEstimator, own_ns: Callable[[], int], tell: Tell | None = None
 ) -> None:
