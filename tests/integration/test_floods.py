@@ -25,8 +25,9 @@ pytestmark = pytest.mark.integration
 START_S = 60.0
 FLOOD_S = 120.0
 RATE_HZ = 30.0
-# A frame may wait for a busy machine's scheduler; that many are lost to no limit.
-MAX_LOST = 0.05
+# Zenoh drops live data rather than wait for a machine that is busy with the flood itself; a link that
+# were stalled would lose nearly all.
+MAX_LOST = 0.2
 _MORE = """
 [viewer]
 port = 0
