@@ -61,7 +61,7 @@ async def test_the_fastest_camera_keeps_its_rate(buses):
 
 async def test_a_rig_of_simulated_cameras_and_many_devices_keeps_its_rate(buses, rig):
     """All at one instant from one program, on loopback, where no rates are limited."""
-    here, left = buses
+    here, _ = buses
     async with open_bus("desk", rig.open) as simulator:
         cameras, serials, rounds = ("left", "right"), [f"LHR-{n}" for n in range(8)], 40
         images = here.raw(topics.SIM_FRAME, 1024)

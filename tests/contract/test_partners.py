@@ -18,16 +18,21 @@ DEADLINE_S = 30.0
 HAND = {"hand": "right"}
 
 
-@pytest.fixture
-async def joined(tmp_path):
+def two_rigs(folder, partners_of_lab: list[str]) -> tuple[SecuredRig, SecuredRig]:
     """desk, whose router connects to lab's; each believes in both authorities."""
-    lab = SecuredRig(tmp_path / "lab", "lab", partners=["desk"])
+    lab = SecuredRig(folder / "lab", "lab", partners=partners_of_lab)
     desk = SecuredRig(
-        tmp_path / "desk", "desk", partners=["lab"], routers=[f"tls/127.0.0.1:{lab.port}"]
+        folder / "desk", "desk", partners=["lab"], routers=[f"tls/127.0.0.1:{lab.port}"]
     )
     both = desk.authority.certificate_pem + lab.authority.certificate_pem
     for rig in (desk, lab):
         (rig.hosts.host("master") / "ca.pem").write_bytes(both)
+    return desk, lab
+
+
+@pytest.fixture
+async def joined(tmp_path):
+    desk, lab = two_rigs(tmp_path, ["desk"])
     async with contextlib.AsyncExitStack() as stack:
         for rig in (lab, desk):
             await stack.enter_async_context(
@@ -101,3 +106,17 @@ async def test_who_is_no_partner_sees_nothing(tmp_path):
         open_bus("lab", desk.open) as at_desk,
     ):
         assert not await arrives(lab_master, topics.POSE, at_desk, 2.0, **HAND)
+
+
+async def test_a_router_does_not_wait_for_a_partner_that_is_away(tmp_path):
+    """The partner may come a week later."""
+    desk, lab = two_rigs(tmp_path, ["desk"])
+    async with contextlib.AsyncExitStack() as stack:
+        async with asyncio.timeout(DEADLINE_S):
+            await stack.enter_async_context(
+                running_router(router_endpoints(desk.config), desk.config)
+            )
+            desk_master = await stack.enter_async_context(open_bus("desk", desk.open))
+        await stack.enter_async_context(running_router(router_endpoints(lab.config), lab.config))
+        seen = await stack.enter_async_context(open_bus("desk", lab.open))
+        assert await arrives(desk_master, topics.POSE, seen, DEADLINE_S, **HAND)

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.integration
 START_S = 60.0
 FLOOD_S = 120.0
 RATE_HZ = 30.0
-# Zenoh drops live data rather than wait for a machine that is busy with the flood itself; a link that
-# were stalled would lose nearly all.
+# Zenoh drops live data rather than wait for a machine that is busy with the flood itself; a link
+# that were stalled would lose nearly all.
 MAX_LOST = 0.2
 _MORE = """
 [viewer]
