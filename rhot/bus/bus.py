@@ -17,7 +17,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, TypeVar
 
@@ -26,6 +25,7 @@ import zenoh
 
 from rhot import topics
 from rhot.bus.clock_exchange import ClockExchange, exchanges
+from rhot.bus.connecting import connected
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
@@ -36,8 +36,6 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
-from rhot.bus.security.credentials import credentials_in, plain
-from rhot.bus.security.tls_diagnosis import certificate_problem, exposed_key
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
@@ -58,14 +56,6 @@ __all__ = [
     "router_config",
 ]
 
-# Between attempts to reach a router that is not there yet: short, so that services are up as soon
-# as it is.
-_RETRY_S = 0.25
-# A router that starts together with its clients takes a second or two, which is no news; one that
-# is late is.
-_SILENT_ATTEMPTS = 10
-# Between two looks at the certificates while no router answers: a handshake with each of them.
-_LOOK_AGAIN_S = 10.0
 # A session that does not close in this time belongs to a wedged link; the process goes on without
 # it.
 _CLOSE_S = 3.0
@@ -82,7 +72,7 @@ async def open_bus(
     keeps the session from opening is a line in the log at once, and waited for like the router: it
     may be renewed. Without despite_certificates it raises BusError.
     """
-    session = await _connect(connect, despite_certificates)
+    session = await connected(connect, despite_certificates)
     bus = Bus(rig, session)
     try:
         yield bus
@@ -92,41 +82,6 @@ async def open_bus(
             # Shielded: a second cancellation must not leave the session open, which would keep the
             # process alive for ever.
             await asyncio.shield(asyncio.wait_for(asyncio.to_thread(session.close), _CLOSE_S))
-
-
-async def _connect(connect: Sequence[str], despite_certificates: bool) -> zenoh.Session:
-    config = client_config(connect)
-    for endpoint in connect:
-        # It works, and somebody should mend it; a router with such a key does not start.
-        files = credentials_in(endpoint)
-        if files is not None and (warning := exposed_key(files)):
-            log.warning("%s", warning)
-    attempts, refused, look_s = 0, None, 0.0
-    while True:
-        try:
-            return await asyncio.to_thread(zenoh.open, config)
-        except zenoh.ZError as error:
-            attempts += 1
-            if time.monotonic() >= look_s:
-                before, refused = refused, await _refusal_of(connect, despite_certificates)
-                look_s = time.monotonic() + _LOOK_AGAIN_S
-                if refused and refused != before:
-                    log.error("%s [certificate_refused]", refused)
-            if attempts == _SILENT_ATTEMPTS and not refused:
-                log.warning(
-                    "no router at %s yet, waiting for it: %s",
-                    ", ".join(map(plain, connect)),
-                    str(error).partition(" [")[0],
-                )
-            await asyncio.sleep(_RETRY_S)
-
-
-async def _refusal_of(connect: Sequence[str], despite_certificates: bool) -> str | None:
-    """What a certificate has to do with a session that does not open; None if nothing."""
-    problem = await asyncio.to_thread(certificate_problem, list(connect), time.time())
-    if problem is not None and not despite_certificates:
-        raise BusError(problem)
-    return problem
 
 
 class Bus:

@@ -138,6 +138,9 @@ def _router_problem(address: str, files: Credentials) -> str | None:
     except ssl.SSLCertVerificationError as error:
         return f"the router at {address} is not to be trusted: {_untrusted(error, host, files)}"
     except ssl.SSLError as error:
+        # A router that dies meanwhile ends the handshake, too, but without a verdict.
+        if "alert" not in _reason(error):
+            return None
         return (
             f"the router at {address} refuses this host's certificate {files.certificate} "
             f"({_reason(error)}): it believes in another authority, or its clock is wrong; "
