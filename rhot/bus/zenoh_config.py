@@ -66,12 +66,12 @@ def router_config(listen: Sequence[str], rig: RigConfig | None = None) -> zenoh.
 
 def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict[str, Any]:
     """What router_config is made of, for Zenoh's own router to read from a file."""
-    bounds = limits(rig)
-    settings = {
+    bounds = {} if rig is None else limits(rig)
+    settings: dict[str, Any] = {
         "mode": "router",
         "listen": {"endpoints": list(listen)},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": _transport(bounds.pop("max_message_size")),
+        "transport": _transport(bounds.pop("max_message_size", None)),
         "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
         **bounds,
     }

@@ -29,25 +29,25 @@ _STREAM_HZ = 20_000.0
 _SLOW_HZ = 200.0
 
 
-def limits(config: RigConfig | None) -> dict[str, Any]:
-    """Zenoh's filters and bounds for a rig's router; without a rig, those of the largest camera."""
+def limits(config: RigConfig) -> dict[str, Any]:
+    """Zenoh's filters and bounds for a rig's router."""
     largest = max(_largest_message(topic, config) for topic in topics.TOPICS)
     return {
         "low_pass_filter": _sizes(config),
-        "downsampling": [] if config is None else _rates(config),
+        "downsampling": _rates(config),
         "max_message_size": largest + _OVERHEAD_BYTES,
     }
 
 
-def _largest_message(topic: Topic, config: RigConfig | None) -> int:
+def _largest_message(topic: Topic, config: RigConfig) -> int:
     """Bytes of the largest message of a topic: of pictures, that of the rig's largest camera."""
-    if topic.message is not None or config is None or not config.camera:
+    if topic.message is not None or not config.camera:
         return topic.max_bytes
     pixels = max(width * height for width, height in (c.size_px for c in config.camera))
     return min(topic.max_bytes, round(pixels * _BYTES_PER_PIXEL) + _OVERHEAD_BYTES)
 
 
-def _sizes(config: RigConfig | None) -> list[dict[str, Any]]:
+def _sizes(config: RigConfig) -> list[dict[str, Any]]:
     by_size: dict[int, list[str]] = {}
     for topic in topics.TOPICS:
         if topic.kind is not Kind.TOKEN:
