@@ -393,6 +393,15 @@ put_certificates() {
     done
 }
 
+# A machine without the certificate that its rig.toml calls for gets no session.
+check_certificates() {
+    if [[ -n $DRY_RUN || ! -f $ETC/rig.toml || -f $ETC/pki/own.key ]]; then return; fi
+    if [[ -n $(rig_says secured "$ETC/rig.toml") ]]; then
+        say "  ! $ETC/rig.toml has a tls endpoint, and $ETC/pki holds no certificate of this machine:"
+        say "    make it with \`rhot pki init\`, and give its folder with --pki"
+    fi
+}
+
 # What --master says against what rig.toml says: a Pi that looks for another master never speaks.
 check_master() {
     if [[ -z $MASTER || -n $DRY_RUN || ! -f $ETC/rig.toml ]]; then return; fi
@@ -499,6 +508,7 @@ install_all() {
     make_version "$VERSION"
     put_config
     put_certificates
+    check_certificates
     check_master
     warm_kernels "$VERSION"
     switch_to "$VERSION"

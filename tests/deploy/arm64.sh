@@ -65,7 +65,7 @@ echo "$again"
 echo "== what is installed"
 inside_offline /opt/rhot/current/bin/rhot-pi-tracker --version
 inside_offline /opt/rhot/current/bin/python -c \
-    'import cv2, numpy, platform, zenoh; print(platform.machine(), "cv2", cv2.__version__, "numpy", numpy.__version__, "zenoh", zenoh.__version__)'
+    'import cv2, numpy, platform, zenoh; print(platform.machine(), "cv2", cv2.__version__, "numpy", numpy.__version__)'
 inside systemctl is-enabled rhot-pi.target rhot-pi-tracker@left.service
 echo "== a tracker on a folder of pictures, with a router beside it"
 inside_offline env PYTHONPATH=/srv/proof /opt/rhot/current/bin/python /srv/proof/arm64_tracker.py

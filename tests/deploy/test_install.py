@@ -159,6 +159,8 @@ def test_the_tracker_runs_in_its_sandbox(pi):
     status = pi.run("cat", f"/proc/{pid}/status")
     assert re.search(r"^Seccomp:\t2$", status, re.MULTILINE), status
     assert re.search(r"^CapBnd:\t0+$", status, re.MULTILINE), status
+    video = pi.run("getent", "group", "video").split(":")[2]
+    assert re.search(rf"^Groups:.*\b{video}\b", status, re.MULTILINE), status
     assert pi.run("ps", "-o", "user=", "-p", pid).strip() == "rhot"
     assert pi.show(UNIT, "WatchdogUSec")["WatchdogUSec"] == "10s"
 

@@ -1,7 +1,7 @@
 """Which systemd units a rig.toml asks for on the master, for deploy/install.sh.
 
-`python -m services.cli.deploy.rig_units check|connect|units rig.toml` prints one answer a line. It
-needs no extra of the package: a Pi's installation has no typer.
+`python -m services.cli.deploy.rig_units check|connect|secured|units rig.toml` prints one answer a
+line. It needs no extra of the package: a Pi's installation has no typer.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from rhot.bus.security.credentials import is_secured
 from rhot.errors import RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process.lifecycle import EXIT_OK, EXIT_USER
@@ -39,6 +40,7 @@ def answer(question: str, config: RigConfig) -> list[str]:
     return {
         "check": list[str],
         "connect": lambda: list(config.bus.connect),
+        "secured": lambda: [one for one in config.bus.connect if is_secured(one)],
         "units": lambda: master_units(config),
     }[question]()
 

@@ -37,6 +37,7 @@ def test_install_sh_gets_lines(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text('[bus]\nconnect = ["tcp/a:1", "tls/b:2"]\n[recorder]\nautostart = true\n')
     assert asked("connect", path).stdout.split() == ["tcp/a:1", "tls/b:2"]
+    assert asked("secured", path).stdout.split() == ["tls/b:2"]
     assert asked("units", path).stdout.split() == [
         "rhot-router.service",
         "rhot-fusion.service",
