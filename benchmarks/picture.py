@@ -7,7 +7,6 @@ default (services.simulator.camera.processing.py, a model that was not compared 
     sharpened    libcamera's Sharpness 1, its default
     denoised     0.75, as the tuning files have it
     both         what picamera2's video configuration delivers unless it is told otherwise
-    strong       four times the sharpening and all of the denoising: where the cost would show
     full_range   plain, with luma in 0..255
 Of a single 9 px tip at 5 grey levels of noise, as in tracker.py: the disparity's RMS between two
 independently noisy views, the error against the truth, that over sigma_px, and the share that is
@@ -48,7 +47,6 @@ VARIANTS = {
     "sharpened": Simulator(sharpen=1.0),
     "denoised": Simulator(denoise=0.75),
     "both": Simulator(sharpen=1.0, denoise=0.75),
-    "strong": Simulator(sharpen=4.0, denoise=1.0),
     "full_range": Simulator(full_range=True),
 }
 VIEWS, NOISE = 240, 5.0
@@ -155,7 +153,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seconds", type=float, default=4.0, help="of the moving hand")
+    parser.add_argument("--seconds", type=float, default=3.0, help="of the moving hand")
     parser.add_argument("--seeds", type=int, default=2, help="hands and walls")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 
+from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.files.calibration import Exposure
 from rhot.files.config import load_rig
@@ -129,6 +130,9 @@ async def desk() -> AsyncIterator[Desk]:
             async with asyncio.timeout(START_S):
                 while sum(" ready" in line for line in logged) < len(children) - 1:
                     await asyncio.sleep(0.1)
+                # Its first pose has run every compiled function once.
+                async with open_bus("desk", list(rig.bus.connect)) as bus:
+                    await anext(bus.latest(topics.POSE))
             yield Desk(config, *ports)
 
 
