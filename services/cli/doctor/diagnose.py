@@ -107,7 +107,7 @@ def _service(config: RigConfig, row: ServiceRow, seen: Observations) -> Link:
 
 
 def _where(config: RigConfig, row: ServiceRow) -> str:
-    told = getattr(row.health, "host", "")
+    told = row.health.host if row.health is not None else ""
     return told or host_of(config, row.service, row.instance)
 
 

@@ -90,7 +90,7 @@ def count_beat(beats: dict[str, dict[str, int]], beat: Health) -> None:
     if name not in beats and len(beats) >= 4 * _MAX_PLACES:
         return
     places = beats.setdefault(name, {})
-    place = f"process {beat.pid}"
+    place = f"process {beat.pid} on {beat.host or 'a nameless host'}"
     if place in places or len(places) < _MAX_PLACES:
         places[place] = places.get(place, 0) + 1
 
@@ -107,5 +107,8 @@ def plausible(pose: HandPose) -> bool:
 async def _ask(bus: Bus, seen: Observations) -> None:
     sessions = await bus.get(topics.SESSION)
     seen.session_running = sessions[0].running if sessions else None
-    clocks = await bus.get(topics.CLOCK)
-    seen.clock_masters = ["fusion"] * len(clocks)
+    masters = {
+        one.echo.session: one.echo.host or "a nameless host"
+        for one in await bus.echoes(clock.now_ns)
+    }
+    seen.clock_masters = sorted(masters.values())
