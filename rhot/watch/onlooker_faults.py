@@ -88,7 +88,7 @@ def unit(row: ServiceRow) -> str:
 
 def _absent(who: str, host: str, unit: str) -> tuple[str, str]:
     return (
-        f"{who} is not running: nothing has been heard of it",
+        f"{who} is not running, or hangs: nothing has been heard of it",
         f"start it on {host}: `systemctl start {unit}`, or `rhot up rig.toml` for all on one host",
     )
 

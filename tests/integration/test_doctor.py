@@ -214,13 +214,13 @@ class Rig:
         keeper.cancel()
         await asyncio.gather(keeper, return_exceptions=True)
 
-    async def named(self, code: str) -> Link:
-        """The first broken link, once it has this code."""
-        async with self.patience(f"the doctor does not name {code}"):
+    async def named(self, *codes: str) -> Link:
+        """The first broken link, once it has one of these codes."""
+        async with self.patience(f"the doctor does not name {' or '.join(codes)}"):
             while True:
                 self.last = await links_of(self.config, self.endpoint)
                 cause = first_cause(self.last)
-                if cause is not None and cause.code == code:
+                if cause is not None and cause.code in codes:
                     return cause
         raise AssertionError
 
@@ -321,9 +321,10 @@ async def test_a_camera_picture_is_wrong(rig: Rig, planted: str, code: str) -> N
 async def test_a_camera_is_slow(rig: Rig) -> None:
     rig.feed.cameras["right"].every = 3
     try:
-        cause = await rig.named("camera_slow")
-        assert cause.name == "camera right"
-        assert "of 10" in cause.text
+        await rig.named("camera_slow")
+        # On a machine with much to do the other one may be slow as well.
+        slow = {link.name: link.text for link in rig.last if link.code == "camera_slow"}
+        assert "of 10" in slow["camera right"]
     finally:
         rig.feed.cameras["right"].well()
     await rig.well()
@@ -373,7 +374,8 @@ async def test_a_tracker_is_absent(rig: Rig) -> None:
 async def test_a_tracker_hangs(rig: Rig) -> None:
     os.kill(rig.supervisor.pids["pi_tracker/right"], signal.SIGSTOP)
     try:
-        cause = await rig.named("service_silent")
+        # Its token is gone with the router's patience: who looks then has never heard of it.
+        cause = await rig.named("service_silent", "service_gone", "service_absent")
         assert cause.name == "pi_tracker/right"
     finally:
         os.kill(rig.supervisor.pids["pi_tracker/right"], signal.SIGCONT)

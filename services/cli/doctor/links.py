@@ -21,6 +21,10 @@ _EXPLAINS = {
     "session_stopped",
     "camera_unknown",
 }
+# A slow camera makes poses late and few; it hides nothing that keeps them away.
+_SLOW = ("camera_slow", "stream_slow")
+# Seen from outside, of what other links are the reason for.
+_CONSEQUENCES = ("no_points", "no_pose", "pose_implausible")
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,7 +53,7 @@ def broken(name: str, code: str, text: str, action: str = "", subject: str = "")
 
 def from_faults(name: str, faults: Iterable[Fault]) -> Link | None:
     """A link of what services say of it: the worst fault, with a count of the others."""
-    found = sorted(faults, key=lambda fault: (not breaks(fault), fault.since_ns))
+    found = sorted(faults, key=lambda f: (not breaks(f), f.code in _SLOW, f.since_ns))
     if not found:
         return None
     worst = found[0]
@@ -77,5 +81,10 @@ def breaks(fault: Fault) -> bool:
 
 
 def first_cause(links: Iterable[Link]) -> Link | None:
-    """The first broken link: what comes after it may only follow from it."""
-    return next((link for link in links if link.state == "broken"), None)
+    """The first broken link: what comes after it may only follow from it.
+
+    A slow camera is the cause only where nothing but its consequences is broken, too.
+    """
+    found = [link for link in links if link.state == "broken"]
+    strong = (link for link in found if link.code not in (*_SLOW, *_CONSEQUENCES))
+    return next(strong, found[0] if found else None)

@@ -106,16 +106,30 @@ def _markers(camera: str, frames: CameraSeen, colors: Sequence[str]) -> Link:
 def hand_links(seen: Observations, hand: str) -> list[Link]:
     """Points and poses of one hand."""
     found = seen.hands.get(hand, HandSeen())
-    return [_points(hand, found), _poses(hand, found)]
+    return [_points(seen, hand, found), _poses(hand, found)]
 
 
-def _points(hand: str, found: HandSeen) -> Link:
+def _points(seen: Observations, hand: str, found: HandSeen) -> Link:
     name = f"points of {hand} hand"
     if found.points < _MIN_MESSAGES:
         return broken(name, "no_points", "fusion publishes no points at all")
     if found.measured < _SEEN * found.points:
+        if _seen_by_two(seen):
+            text = "cameras see the same markers, and their views do not fit together"
+            action = "is a camera mirrored, moved or at another size? `rhot check` knows the sizes"
+            return broken(name, "no_points", text, action)
         return broken(name, "no_points", "no marker is seen by two cameras at once")
     return holds(name, f"{found.measured} of {found.points} messages with a measured point")
+
+
+def _seen_by_two(seen: Observations) -> bool:
+    """Whether some colour is in many pictures of two cameras."""
+    often = [
+        {color for color, count in camera.colors.items() if count > 0.5 * camera.frames}
+        for camera in seen.cameras.values()
+    ]
+    colors = [color for colors in often for color in colors]
+    return len(colors) > len(set(colors))
 
 
 def _poses(hand: str, found: HandSeen) -> Link:

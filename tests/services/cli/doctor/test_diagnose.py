@@ -116,6 +116,21 @@ def test_the_cause_comes_before_what_follows_from_it():
     assert text.count("->") == 1
 
 
+def test_a_slow_camera_does_not_hide_why_there_is_no_pose():
+    slow = fault("camera_slow", "7 pictures a second", "left", since_s=60)
+    white = fault("camera_saturated", "white", "left")
+    assert cause({"pi_tracker/left": [slow, white]}).code == "camera_saturated"
+    mirrored = fault("cameras_mirrored", "mirrored", "left and right")
+    assert cause({"pi_tracker/left": [slow], "fusion": [mirrored]}).code == "cameras_mirrored"
+    nothing = {"right": HandSeen(points=120)}
+    assert cause({"pi_tracker/left": [slow]}, hands=nothing).code == "camera_slow"
+
+
+def test_views_that_do_not_fit_are_told_from_markers_out_of_view():
+    nothing = {"right": HandSeen(points=120)}
+    assert "do not fit together" in cause(hands=nothing).text
+
+
 def test_a_hint_does_not_hide_what_is_broken():
     hint = fault("camera_automatic", "exposure is automatic", "left")
     found = cause({"pi_tracker/left": [hint]}, cameras={"right": observations().cameras["right"]})
