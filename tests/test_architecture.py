@@ -35,7 +35,13 @@ IMPURE_MODULES = {
     "threading",
     "subprocess",
 }
-IMPURE_FILES = {"service.py", "__main__.py", "rhot/clock.py", "rhot/client.py"}
+IMPURE_FILES = {
+    "service.py",
+    "__main__.py",
+    "rhot/clock.py",
+    "rhot/client.py",
+    "rhot/watch/follow.py",
+}
 IMPURE_ROOMS = {
     "rhot/bus",
     "rhot/process",
@@ -44,6 +50,7 @@ IMPURE_ROOMS = {
     "services/object_tracker/sources",
     "services/recorder/sources",
     "services/viewer/calibration/page.py",
+    "rhot/watch/follow.py",
     "services/cli",
 }
 # Rooms of the command that work on files alone: what they find must not depend on when they run.

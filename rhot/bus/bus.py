@@ -97,13 +97,8 @@ class Bus:
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
-    def connected(self) -> bool:
-        """Whether a router is at the other end now; a lost one is noticed within two seconds."""
-        return bool(self.routers)
-
-    @property
     def routers(self) -> list[str]:
-        """Ids of the routers at the other end."""
+        """Ids of the routers at the other end now; a lost one is noticed within two seconds."""
         return sorted(str(zid) for zid in self._session.info.routers_zid())
 
     def publisher(self, topic: Topic[T], **names: str) -> Publisher[T]:
@@ -248,8 +243,7 @@ class Bus:
         """End one subscription before the session ends; its stream leaves health with it."""
         subscription.undeclare()
         self._open = [entity for entity in self._open if entity is not subscription]
-        own = getattr(subscription, "stats", None)
-        self.streams[:] = [stats for stats in self.streams if stats is not own]
+        self.streams[:] = [s for s in self.streams if s is not getattr(subscription, "stats", None)]
 
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""

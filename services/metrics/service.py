@@ -19,8 +19,8 @@ from prometheus_client.registry import Collector, CollectorRegistry
 from rhot import clock
 from rhot.errors import BusError
 from rhot.process import systemd
-from rhot.process.rig_watch import watching
 from rhot.process.service import Service
+from rhot.watch.follow import watching
 from services.metrics.counting_monitor import CountingMonitor
 from services.metrics.families import families
 

@@ -17,9 +17,9 @@ from typing import Any
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.process.calibration_watch import load_and_watch
-from rhot.process.rig_watch import watching
 from rhot.process.service import Service
 from rhot.topics import Topic
+from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.calibration.page import CalibrationPage
 from services.viewer.live.gui import LivePanel

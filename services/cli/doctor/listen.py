@@ -12,7 +12,7 @@ from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
 from rhot.health_messages import Health
 from rhot.messages import HandPose
-from rhot.process.rig_watch import watching
+from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.cli.doctor.observations import CameraSeen, HandSeen, ObjectSeen, Observations
 

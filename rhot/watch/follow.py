@@ -31,7 +31,7 @@ async def watching(bus: Bus, monitor: RigMonitor) -> AsyncIterator[None]:
 
     async def connection() -> None:
         while True:
-            monitor.connected(bus.connected, clock.now_ns())
+            monitor.connected(bool(bus.routers), clock.now_ns())
             await asyncio.sleep(_POLL_S)
 
     async with asyncio.TaskGroup() as tasks:
