@@ -22,8 +22,8 @@ from rhot.health_messages import Health, StreamHealth
 from rhot.messages import Session
 from rhot.process import systemd
 from rhot.process.fault_log import FaultLog
-from rhot.process.namesakes import Namesakes
-from rhot.process.slow_streams import SlowStreams
+from rhot.process.health.namesakes import Namesakes
+from rhot.process.health.slow_streams import SlowStreams
 
 log = logging.getLogger("rhot.service")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from rhot.health_messages import Health
-from rhot.process.namesakes import Namesakes
+from rhot.process.health.namesakes import Namesakes
 
 OTHER = Health(
     service="fusion",

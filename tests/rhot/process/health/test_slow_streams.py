@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rhot.health_messages import StreamHealth
-from rhot.process.slow_streams import SlowStreams
+from rhot.process.health.slow_streams import SlowStreams
 
 
 def stream(rate_hz: float, dropped: int = 0) -> StreamHealth:
