@@ -27,6 +27,6 @@ class UnknownDevices:
             if now_s - heard_s < _GONE_S
         }
         return {
-            serial: f"device {serial} is none of rig.toml's [[object]] tables; its poses are ignored"
+            serial: f"device {serial} is no [[object]] of rig.toml: its poses are ignored"
             for serial in self._heard_s
         }
