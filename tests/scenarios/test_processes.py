@@ -89,7 +89,8 @@ class Feed:
 
     async def health(self) -> None:
         async for message in self._bus.every(topics.HEALTH, 16):
-            self.last_error = message.last_error or self.last_error
+            for fault in message.faults:
+                self.last_error = f"{fault.text}; {fault.action}"
 
     def full_since(self, instant_s: float) -> bool:
         return any(at_s >= instant_s and measured == 6 for at_s, measured in self.arrivals)
