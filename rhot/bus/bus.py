@@ -91,6 +91,8 @@ class Bus:
         self.rig = rig
         self.streams: list[StreamStats] = []
         self._session = session
+        # The id of this Zenoh session, as the router lists it.
+        self.session = str(session.zid())
         self._loop = asyncio.get_running_loop()
         self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
@@ -182,11 +184,6 @@ class Bus:
         )
         return exchanges(asked_ns, replies)
 
-    @property
-    def session(self) -> str:
-        """The id of this Zenoh session, as the router lists it."""
-        return str(self._session.zid())
-
     def answer(self, topic: Topic[Any], handler: Handler, **names: str) -> None:
         """Answer queries for the rest of the session.
 
@@ -220,11 +217,8 @@ class Bus:
 
     def alive(self, service: str, instance: str) -> None:
         """Declare this service alive until the session ends."""
-        self._open.append(
-            self._session.liveliness().declare_token(
-                topics.ALIVE.key(self.rig, service=service, instance=instance)
-            )
-        )
+        key = topics.ALIVE.key(self.rig, service=service, instance=instance)
+        self._open.append(self._session.liveliness().declare_token(key))
 
     def watch_alive(self) -> AliveWatch:
         """Services coming and going, beginning with those that are there."""
@@ -235,9 +229,8 @@ class Bus:
 
     def put_raw(self, key: str, payload: Payload, encoding: str = "application/json") -> None:
         """Publish bytes on a full key, for replay."""
-        self._session.put(
-            key, payload, encoding=encoding, congestion_control=zenoh.CongestionControl.DROP
-        )
+        drop = zenoh.CongestionControl.DROP
+        self._session.put(key, payload, encoding=encoding, congestion_control=drop)
 
     def close(self, subscription: Subscription[Any] | RawSubscription | AliveWatch) -> None:
         """End one subscription before the session ends; its stream leaves health with it."""

@@ -9,7 +9,6 @@ crash.
 from __future__ import annotations
 
 import asyncio
-import shutil
 from pathlib import Path
 
 from rhot import clock, topics
@@ -29,8 +28,6 @@ QUEUE = 512
 _FLUSH_S = 1.0
 # Between two tries to go on after a full disk; each opens a file.
 _RESUME_S = 5.0
-# An hour of a busy rig.
-_LOW_BYTES = 500_000_000
 # Samples that are dropped stand in health for so long after the last one.
 _BEHIND_S = 10.0
 Subscriptions = list[tuple[Topic, RawSubscription]]
@@ -164,11 +161,3 @@ class _Keeper:
             faults.event("request_refused", text, "session")
         self._dropped, self._refused = dropped, recorder.refused
         self._postponed = recorder.postponed
-        self._report_low(recorder.folder)
-
-    def _report_low(self, folder: Path) -> None:
-        if not folder.exists():
-            return
-        free = shutil.disk_usage(folder).free
-        texts = {str(folder): f"{free / 1e6:.0f} MB are left for recordings in {folder}"}
-        self._service.faults.replace("disk_low", texts if free < _LOW_BYTES else {})

@@ -22,7 +22,7 @@ class SetClock:
 
 
 async def test_a_clock_that_is_set_is_followed_before_the_next_exchange_is_due(router):
-    """On either side; the offset is the own clock minus the master's. How well is for another test."""
+    """On either side; the offset is the own clock minus the master's."""
     own, master, estimator = SetClock(), SetClock(), OffsetEstimator()
 
     async def reads(offset_ns: int) -> None:
