@@ -4,7 +4,10 @@ scouting.
 
 from __future__ import annotations
 
+import re
+import resource
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -20,6 +23,12 @@ from rhot.files.config import RigConfig
 # 480. Zenoh's own 16 MB, one pool in the sender and its image in each receiver, brought a tracker
 # that gets simulated pictures to 137 MB.
 _POOL_BYTES = 4 << 20
+# Only pictures: JSON is at most 64 kB, and as quick without.
+_SHARED_FROM_BYTES = 65_537
+# Zenoh locks each pool that it maps: its own, and in a router those of all who send pictures.
+# Where the limit is reached (8 MB for most users) messages are lost without a word.
+_LOCKED_BYTES = 16 * _POOL_BYTES
+_CAP_IPC_LOCK = 14
 # Back within half a second of the other side's return.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
@@ -36,8 +45,27 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
     return {
         "link": link,
         "unicast": {"qos": {"enabled": True}},
-        "shared_memory": {"transport_optimization": {"pool_size": _POOL_BYTES}},
+        "shared_memory": {
+            "enabled": may_lock(_LOCKED_BYTES),
+            "transport_optimization": {
+                "pool_size": _POOL_BYTES,
+                "message_size_threshold": _SHARED_FROM_BYTES,
+            },
+        },
     }
+
+
+def may_lock(size_bytes: int) -> bool:
+    """Whether this process may lock so much memory (LimitMEMLOCK of a unit, or the capability)."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    if limit == resource.RLIM_INFINITY or limit >= size_bytes:
+        return True
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return False
+    effective = re.search(r"^CapEff:\s*(\w+)$", status, re.MULTILINE)
+    return bool(effective and int(effective[1], 16) >> _CAP_IPC_LOCK & 1)
 
 
 def client_config(connect: Sequence[str]) -> zenoh.Config:
