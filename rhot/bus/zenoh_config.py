@@ -29,6 +29,9 @@ _SHARED_FROM_BYTES = 65_537
 # Where the limit is reached (8 MB for most users) messages are lost without a word.
 _LOCKED_BYTES = 16 * _POOL_BYTES
 _CAP_IPC_LOCK = 14
+# A connection that is begun while a cable is out is not answered, and TCP asks again only after 1,
+# 3, 7, 15 s: a new attempt is sooner. Long enough for a TLS handshake on a busy Pi 3.
+_OPEN_MS = 1500
 # Back within half a second of the other side's return.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
@@ -44,7 +47,7 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
         link["rx"] = {"max_message_size": max_message_bytes}
     return {
         "link": link,
-        "unicast": {"qos": {"enabled": True}},
+        "unicast": {"qos": {"enabled": True}, "open_timeout": _OPEN_MS},
         "shared_memory": {
             "enabled": may_lock(_LOCKED_BYTES),
             "transport_optimization": {
