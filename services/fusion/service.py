@@ -20,7 +20,7 @@ from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
 from rhot.messages import ClockEcho
 from rhot.process.calibration_watch import load_and_watch
-from rhot.process.computer_watch import watch_computer
+from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
 from services.fusion.faults import FusionFaults
 from services.fusion.health import HealthFigures

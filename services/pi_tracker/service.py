@@ -16,7 +16,7 @@ from rhot import topics
 from rhot.bus.master_clock import follow_master
 from rhot.clock import OffsetEstimator
 from rhot.messages import MarkerFrame
-from rhot.process.computer_watch import watch_computer
+from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
 from services.pi_tracker import sources
 from services.pi_tracker.endpoints.camera_faults import CameraFaults

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot.process.computer import Computer, faults_of, read_computer, values_of
+from rhot.process.computer.readings import Computer, faults_of, read_computer, values_of
 
 HEALTHY = {"computer_hot": {}, "computer_throttled": {}, "disk_low": {}}
 

@@ -12,7 +12,7 @@ import re
 import socket
 from pathlib import Path
 
-from rhot.process.computer import faults_of, read_computer, values_of
+from rhot.process.computer.readings import faults_of, read_computer, values_of
 from rhot.process.service import Service
 
 # Nothing of it changes faster.

@@ -8,8 +8,8 @@ import pytest
 
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import RigTable
-from rhot.process import computer_watch
-from rhot.process.computer_watch import watch_computer
+from rhot.process.computer import watch
+from rhot.process.computer.watch import watch_computer
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ async def until(condition):
 
 
 async def test_one_of_two_tells_and_the_other_takes_over(running, hot, monkeypatch):
-    monkeypatch.setattr(computer_watch, "_PERIOD_S", 0.05)
+    monkeypatch.setattr(watch, "_PERIOD_S", 0.05)
 
     async def serve(service):
         await asyncio.Event().wait()
