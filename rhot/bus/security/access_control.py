@@ -149,8 +149,10 @@ def _camera(config: RigConfig, certificate: str, cameras: list[str]) -> _Subject
         return [topic.key(rig, service="pi_tracker", instance=camera) for camera in cameras]
 
     settings = keys(topics.COLORS, topics.EXPOSURE)
-    heard = [topics.SESSION.key(rig), *settings, *keys(topics.SIM_FRAME)]
-    subject.publishes([*keys(topics.MARKERS, topics.PREVIEW), *service(topics.HEALTH)])
+    # Its own name's health: a service that has a namesake says so.
+    own = service(topics.HEALTH)
+    heard = [topics.SESSION.key(rig), *settings, *keys(topics.SIM_FRAME), *own]
+    subject.publishes([*keys(topics.MARKERS, topics.PREVIEW), *own])
     subject.subscribes(heard)
     subject.receives(heard)
     subject.answers([*settings, *keys(topics.FIT, topics.FRAME)])
