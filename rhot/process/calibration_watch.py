@@ -35,13 +35,16 @@ class CalibrationChangedError(Exception):
 def load_and_watch(service: Service, paths: Iterable[Path], load: Callable[[], T]) -> T:
     """What load() makes of the files at paths, some of which may not be there yet.
 
-    As long as the service lives: once the files have changed, and load() still takes them, the
+    As long as the calling task runs: once the files have changed, and load() still takes them, the
     service ends with CalibrationChangedError.
     """
     # Before they are read: a change while the service starts, which may take a minute, counts.
     loaded = _stamps(paths)
     result = load()
-    service.tasks.create_task(_end_on_change(service, loaded, load))
+    watch = service.tasks.create_task(_end_on_change(service, loaded, load))
+    if (caller := asyncio.current_task()) is not None:
+        # A service that has done its work must not be kept alive by its watch.
+        caller.add_done_callback(lambda _: watch.cancel())
     return result
 
 
