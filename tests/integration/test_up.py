@@ -25,7 +25,7 @@ from services.cli.live.working_copy import working_copy
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 RHOT = str(Path(sys.executable).parent / "rhot")
 # numba's first compilation on a loaded machine takes most of the start.
-START_S, SOON_S = 300.0, 60.0
+START_S, SOON_S = 240.0, 60.0
 
 
 class Up:
@@ -107,6 +107,12 @@ async def up() -> AsyncIterator[Up]:
             yield found
 
 
+async def a_pose(up: Up) -> None:
+    """Wait for one that is published from now on."""
+    async with open_bus("sim", [f"tcp/127.0.0.1:{up.port}"]) as bus, asyncio.timeout(SOON_S):
+        assert (await anext(bus.latest(topics.POSE))).hand == "right"
+
+
 async def test_a_port_in_use_is_named_with_its_process_and_once(up):
     reason = rf"no router can listen at tcp/127.0.0.1:{up.port}: \S+ \(process \d+\) listens"
     await up.until(rf"\[router\] error: {reason}")
@@ -137,8 +143,7 @@ async def test_a_calibration_that_comes_brings_the_rig_up(up):
     rig_json = up.calibration / "rig.json"
     rig_json.with_suffix(".away").rename(rig_json)
     await up.until(r"rig 'sim' is up after \d+ s", START_S)
-    async with open_bus("sim", [f"tcp/127.0.0.1:{up.port}"]) as bus, asyncio.timeout(SOON_S):
-        assert (await anext(bus.latest(topics.POSE))).hand == "right"
+    await a_pose(up)
 
 
 async def test_new_calibrations_start_anew_who_uses_them(up):
@@ -147,7 +152,7 @@ async def test_new_calibrations_start_anew_who_uses_them(up):
     rig_json.write_text(json.dumps(json.loads(rig_json.read_text())))
     await up.until(r"\[fusion\] note: rig.json changed: starting again", since=since)
     await up.until(r"\[viewer\] note: rig.json changed: starting again", since=since)
-    await up.until(r"rig 'sim' is up again", START_S, since)
+    await a_pose(up)
     assert "[solver] note" not in up.text[since:]
     since = len(up.text)
     save(up.calibration / "hand.right.json", default_hand("right", 1.02))
