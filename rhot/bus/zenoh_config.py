@@ -31,7 +31,9 @@ _LOCKED_BYTES = 16 * _POOL_BYTES
 _CAP_IPC_LOCK = 14
 # A connection that is begun while a cable is out is not answered, and TCP asks again only after 1,
 # 3, 7, 15 s: a new attempt is sooner. Long enough for a TLS handshake on a busy Pi 3.
-_OPEN_MS = 1500
+_CONNECT_MS = 1500
+# Each endpoint in turn, once; without it Zenoh tries the first one for ever.
+_ONCE = "retry_period_init_ms=0"
 # Back within half a second of the other side's return.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
@@ -47,7 +49,7 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
         link["rx"] = {"max_message_size": max_message_bytes}
     return {
         "link": link,
-        "unicast": {"qos": {"enabled": True}, "open_timeout": _OPEN_MS},
+        "unicast": {"qos": {"enabled": True}},
         "shared_memory": {
             "enabled": may_lock(_LOCKED_BYTES),
             "transport_optimization": {
@@ -71,14 +73,18 @@ def may_lock(size_bytes: int) -> bool:
     return bool(effective and int(effective[1], 16) >> _CAP_IPC_LOCK & 1)
 
 
+def _tried_once(endpoint: str) -> str:
+    return f"{endpoint}{';' if '#' in endpoint else '#'}{_ONCE}"
+
+
 def client_config(connect: Sequence[str]) -> zenoh.Config:
     """A client of the routers at `connect`, back within half a second of their return."""
     return _config(
         {
             "mode": "client",
             "connect": {
-                "endpoints": list(connect),
-                "timeout_ms": 0,
+                "endpoints": [_tried_once(endpoint) for endpoint in connect],
+                "timeout_ms": _CONNECT_MS,
                 "retry": _RETRY,
             },
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},

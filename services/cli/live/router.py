@@ -19,6 +19,7 @@ import zenoh
 
 from rhot.bus.security.credentials import credentials_in, is_secured, plain, with_certificates
 from rhot.bus.security.tls_diagnosis import own_problem
+from rhot.bus.stalled_links import give_up_stalled_connections
 from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
 from rhot.files.config import RigConfig, load_rig
@@ -47,6 +48,7 @@ async def running_router(
         session = await asyncio.to_thread(zenoh.open, router_config(listen, rig))
     except zenoh.ZError as error:
         raise BusError(_why_not(listen, error)) from None
+    give_up_stalled_connections()
     try:
         yield
     finally:
