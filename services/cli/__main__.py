@@ -21,9 +21,13 @@ def main() -> None:
         return
     try:
         logs.set_up_command(PROGRAM)
-        # Not above: where typer is missing, this import fails, and the user gets one line.
-        from services.cli.application import application
-
+        # Not above: where typer is missing, these imports fail, and the user gets one line.
+        if sys.argv[1:2] == ["router"]:
+            # All wait for the router when it has died: the other commands' imports take as long
+            # again as its own start.
+            from services.cli.live.router import application
+        else:
+            from services.cli.application import application
         application()()
     except Exception as error:
         errors = user_errors(error, PROGRAM)

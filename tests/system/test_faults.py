@@ -13,7 +13,7 @@ import pytest
 
 from rhot import topics
 from testing.hosts.hosted_rig import MASTER
-from testing.hosts.planted import planted
+from testing.hosts.planted import HANG_S, planted
 from testing.hosts.rig_files import NAME
 
 # The first test waits for the installation, and kernels take minutes where none are kept.
@@ -95,20 +95,21 @@ def test_a_pis_clock_is_set(rig, watch, table, step_ns):
 
 def test_the_recorders_disk_is_full(rig, watch, table):
     """Poses go on, the recorder says why it records nothing, and records again on a free disk."""
-    recordings = "/var/lib/rhot/recordings"
-    unit, master = "rhot-recorder.service", rig.master
+    folder, unit, master = "/var/lib/rhot/recordings", "rhot-recorder.service", rig.master
     master.run("systemctl", "stop", unit)
-    master.run(
-        "mount", "-t", "tmpfs", "-o", "size=2m,mode=2775,uid=rhot,gid=rhot", "none", recordings
-    )
-    with planted(rig, watch, table, "the recorder's disk full", PROCESS_S) as fault:
-        master.run("systemctl", "start", "--no-block", unit)
-        assert watch.wait_fault("recorder", "disk_full", 120.0), rig.journals()
-        fault.cured()
-        master.run("sh", "-c", f"rm -f {recordings}/*")
-    assert watch.wait_value("recorder", "recording", 1.0, 60.0), rig.journals()
+    options = "size=80m,mode=2775,uid=rhot,gid=rhot"
+    master.run("mount", "-t", "tmpfs", "-o", options, "none", folder)
+    master.run("systemctl", "start", unit)
+    assert watch.wait_value("recorder", "recording", 1.0, HANG_S), rig.journals()
+    with planted(rig, watch, table, "the recorder's disk full", PROCESS_S):
+        # As somebody else's files do; the command fails once the disk is full.
+        master.try_run("dd", "if=/dev/zero", f"of={folder}/other", "bs=1M", "count=100")
+        assert watch.wait_fault("recorder", "disk_full", HANG_S), rig.journals()
+        master.run("rm", f"{folder}/other")
+        assert watch.wait_value("recorder", "recording", 1.0, HANG_S), rig.journals()
+    assert table.rows[-1].restarts == 0
     master.run("systemctl", "stop", unit)
-    master.run("umount", "-l", recordings)
+    master.run("umount", "-l", folder)
     master.run("systemctl", "start", unit)
 
 

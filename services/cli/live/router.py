@@ -26,6 +26,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
 from rhot.process.lifecycle import EXIT_USER, cancelled_by, fed_watchdog, stop_on_signals
 from rhot.process.restart_hold import hold_back
+from services.cli.options import menu
 from services.cli.rig.ports import taken_ports
 
 _LOOPBACK = "tcp/127.0.0.1:7447"
@@ -92,6 +93,19 @@ def router(
         typer.echo(f"rhot: error: {error}", err=True)
         hold_back(error, time.monotonic() - started_s, [config] if config else [])
         raise typer.Exit(EXIT_USER) from None
+
+
+def application() -> typer.Typer:
+    """`rhot` with this command alone."""
+    app = menu("rhot", "Real-time hand and object tracking from low-cost parts.")
+
+    @app.callback()
+    def _keep_its_name() -> None:
+        # typer leaves the name of a single command out.
+        pass
+
+    app.command()(router)
+    return app
 
 
 def _settings(config: Path | None, listen: list[str] | None) -> tuple[list[str], RigConfig | None]:
