@@ -56,7 +56,7 @@ def planted(
             counts_from="the fault" if fault.cured_s is None else "its end",
             poses_s=None if back_s is None else round(max(0.0, back_s - from_s), 3),
             wanted_s=wanted_s,
-            service_s=round(max(told), 3) if told else None,
+            service_s=round(max(0.0, *told), 3) if told else None,
             restarts=max(0, rig.restarts() - restarts),
             wrong_poses=sum(pose.live and pose.wrong for pose in watch.since(fault.began_s)),
             hung=hung,

@@ -1,8 +1,9 @@
 """Looks at a rig's poses beside the simulator's truth: `python -m testing.hosts.pose_watch`.
 
 A process of its own, since it has to live in the network of a host. One JSON object a line on
-standard output: {"at_s", "stamp_ns", "age_s", "measured", "error_m"} for each pose, where at_s is
-CLOCK_MONOTONIC, which all of this machine shares; {"at_s", "health": Health} for each beat.
+standard output: {"at_s", "age_s", "measured", "error_m"} for each pose, a little later than it
+came, where at_s is CLOCK_MONOTONIC, which all of this machine shares; {"at_s", "health": Health}
+for each beat.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from rhot.simulator_messages import Truth
 
 # Of truth, at 15 to 60 instants a second: poses are never that late and still of use.
 _REMEMBERED = 600
+# The truth of a pose's instant comes after the pose, as the simulator sends it at a camera's rate.
+TRUTH_LATE_S = 0.25
 _COMPARED = ("wrist", "thumb_tip", "index_tip", "middle_tip", "ring_tip", "little_tip")
 
 
@@ -63,23 +66,23 @@ def _between(a: Iterable[float], b: Iterable[float], share: float) -> list[float
 
 
 def _say(line: dict[str, object]) -> None:
-    sys.stdout.buffer.write(msgspec.json.encode({"at_s": time.monotonic(), **line}) + b"\n")
+    sys.stdout.buffer.write(msgspec.json.encode(line) + b"\n")
     sys.stdout.buffer.flush()
 
 
 async def _poses(bus: Bus, track: TruthTrack) -> None:
+    loop = asyncio.get_running_loop()
+
+    def judge(pose: HandPose, line: dict[str, object]) -> None:
+        _say({**line, "error_m": track.error_m(pose)})
+
     async for pose in bus.every(topics.POSE, 64):
-        now_ns = clock.now_ns()
-        # The truth of a pose's instant may be on its way yet.
-        await asyncio.sleep(0.0)
-        _say(
-            {
-                "stamp_ns": pose.stamp_ns,
-                "age_s": (now_ns - pose.stamp_ns) * 1e-9,
-                "measured": sum(joint.source == "measured" for joint in pose.joints),
-                "error_m": track.error_m(pose),
-            }
-        )
+        line: dict[str, object] = {
+            "at_s": time.monotonic(),
+            "age_s": (clock.now_ns() - pose.stamp_ns) * 1e-9,
+            "measured": sum(joint.source == "measured" for joint in pose.joints),
+        }
+        loop.call_later(TRUTH_LATE_S, judge, pose, line)
 
 
 async def _truth(bus: Bus, track: TruthTrack) -> None:
@@ -89,7 +92,7 @@ async def _truth(bus: Bus, track: TruthTrack) -> None:
 
 async def _health(bus: Bus) -> None:
     async for health in bus.every(topics.HEALTH, 64):
-        _say({"health": health})
+        _say({"at_s": time.monotonic(), "health": health})
 
 
 async def _watch(rig: str, endpoint: str) -> None:

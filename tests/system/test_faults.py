@@ -49,7 +49,7 @@ def test_everything_runs_as_installed(rig, watch):
         assert shown["User"] == "rhot"
         assert shown["WatchdogUSec"] not in ("", "0", "infinity"), unit
     errors_m = [pose.error_m for pose in watch.poses if pose.live and pose.error_m is not None]
-    assert len(errors_m) >= 10
+    assert len(errors_m) >= 10, watch.poses[-20:]
     assert sorted(errors_m)[len(errors_m) // 2] < 0.03
 
 
@@ -97,13 +97,14 @@ def test_the_recorders_disk_is_full(rig, watch, table):
     """Poses go on, the recorder says why it records nothing, and records again on a free disk."""
     folder, unit, master = "/var/lib/rhot/recordings", "rhot-recorder.service", rig.master
     master.run("systemctl", "stop", unit)
-    options = "size=80m,mode=2775,uid=rhot,gid=rhot"
+    # More than what must be free for it to go on (services/recorder/recorder.py).
+    options = "size=160m,mode=2775,uid=rhot,gid=rhot"
     master.run("mount", "-t", "tmpfs", "-o", options, "none", folder)
     master.run("systemctl", "start", unit)
     assert watch.wait_value("recorder", "recording", 1.0, HANG_S), rig.journals()
     with planted(rig, watch, table, "the recorder's disk full", PROCESS_S):
         # As somebody else's files do; the command fails once the disk is full.
-        master.try_run("dd", "if=/dev/zero", f"of={folder}/other", "bs=1M", "count=100")
+        master.try_run("dd", "if=/dev/zero", f"of={folder}/other", "bs=1M", "count=200")
         assert watch.wait_fault("recorder", "disk_full", HANG_S), rig.journals()
         master.run("rm", f"{folder}/other")
         assert watch.wait_value("recorder", "recording", 1.0, HANG_S), rig.journals()
@@ -114,13 +115,13 @@ def test_the_recorders_disk_is_full(rig, watch, table):
 
 
 def test_the_master_is_rebooted(rig, watch, table):
-    """From the moment it is up again: the Pis find it, nothing on them restarts."""
+    """Counted from the power button; the Pis find it again, nothing on them restarts."""
     pis = [host for name, host in rig.hosts.items() if name != MASTER]
     before = sum(host.restarts() for host in pis)
     with planted(rig, watch, table, "the master rebooted", None) as fault:
         rig.master.power_off()
-        rig.master.boot()
         fault.cured()
+        rig.master.boot()
         fault.services += [
             (rig.master, f"{unit}.service") for host, unit in UNITS if host == MASTER
         ]
