@@ -5,19 +5,19 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # What a machine can check of the house without running it.
 HOUSE := tests/test_architecture.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
-QUICK := not browser and not wheel and not integration and not system
+QUICK := not browser and not wheel and not integration and not field and not system
 SHELL := /bin/bash
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench soak format docs figures clean system install browser wheel test-system wheels test-arm64
+.PHONY: demo test check bench soak format docs figures clean system install browser wheel test-field test-system wheels test-arm64
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
 
-# Everything but the suites that need more than Python: `make browser`, `make wheel`. What starts
-# processes and watches their rates has the machine to itself; the rest shares two cores. (5: of
-# the tests that ARGS names, none is of that kind.)
+# Everything but the suites that need more than Python or minutes: `make browser`, `make wheel`,
+# `make test-field`, `make test-system`. What starts processes and watches their rates has the machine
+# to itself; the rest shares two cores. (5: of the tests that ARGS names, none is of that kind.)
 test: $(STAMP)
 	$(BIN)/pytest -n 2 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS) || [ $$? -eq 5 ]
 	$(BIN)/pytest --durations=10 -m integration $(ARGS) || [ $$? -eq 5 ]
@@ -53,6 +53,11 @@ wheels: $(STAMP)
 test-arm64: $(STAMP)
 	$(BIN)/python -m testing.collect_wheels pi
 	tests/deploy/arm64.sh
+
+# A rig as it is used: planted faults and what `rhot doctor` says of them, floods on a secured bus,
+# two Pis as network namespaces, every command of docs/guide/operations.md. Ten minutes.
+test-field: $(STAMP)
+	$(BIN)/pytest -q --durations=10 -m field tests $(ARGS)
 
 # A master and two Pis as containers with systemd, installed by deploy/install.sh; faults are planted
 # and a table is printed (and written to build/system.json). Needs root and systemd-container; the

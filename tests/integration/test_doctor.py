@@ -67,7 +67,7 @@ from services.cli.pki.certificates import issue, make_authority
 from services.cli.pki.folders import PkiFolder
 from testing.picture_feed import PictureFeed
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.field, pytest.mark.timeout(600)]
 # numba's first compilation on a loaded machine takes most of it; the doctor itself takes 6 s.
 START_S, NAMED_S = 300.0, 90.0
 # Slow enough for two cores that run other tests, too.

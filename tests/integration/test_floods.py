@@ -20,7 +20,7 @@ from rhot.health_messages import Health
 from rhot.messages import MarkerFrame
 from testing.secured_rig import SecuredRig
 
-pytestmark = pytest.mark.integration
+pytestmark = pytest.mark.field
 
 START_S = 60.0
 FLOOD_S = 120.0

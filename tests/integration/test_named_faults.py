@@ -16,7 +16,7 @@ import pytest_asyncio
 from rhot import topics
 from rhot.health_messages import Fault, Health
 
-pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 
 START_S = 180.0
 # A hue that nothing in the scene has, and no picture's noise reaches.

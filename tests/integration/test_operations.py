@@ -30,7 +30,7 @@ from services.pi_tracker.sources.simulator import SimulatorSource
 from testing.page_commands import Command, commands, run, setup
 from tests.integration.conftest import START_S, all_running
 
-pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "guide" / "operations.md").read_text(encoding="utf-8")

@@ -23,7 +23,7 @@ from testing.hosts.commands import run
 from testing.hosts.network import Network, lan
 
 pytestmark = [
-    pytest.mark.integration,
+    pytest.mark.field,
     pytest.mark.skipif(
         os.geteuid() != 0 or not shutil.which("ip"),
         reason="needs root and iproute2 for network namespaces",

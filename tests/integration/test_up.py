@@ -22,7 +22,7 @@ from rhot.files.calibration import save
 from rhot.hand import default_hand
 from services.cli.live.working_copy import working_copy
 
-pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 RHOT = str(Path(sys.executable).parent / "rhot")
 # numba's first compilation on a loaded machine takes most of the start.
 START_S, SOON_S = 240.0, 60.0
