@@ -28,12 +28,23 @@ def give_up_stalled_connections() -> int:
     if option is None:
         return 0
     found = 0
-    for entry in list(Path("/proc/self/fd").iterdir()):
-        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(entry.name))) as one:
+    for number in _open_sockets():
+        # A copy, which this closes: the socket itself is Zenoh's.
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(number)) as one:
             if one.family in (socket.AF_INET, socket.AF_INET6) and _listens(one):
                 one.setsockopt(socket.IPPROTO_TCP, option, _SILENT_MS)
                 found += 1
     return found
+
+
+def _open_sockets() -> list[int]:
+    """Descriptors of this process's sockets: a copy of anything else would be left open."""
+    numbers = []
+    for entry in list(Path("/proc/self/fd").iterdir()):
+        with contextlib.suppress(OSError):
+            if str(entry.readlink()).startswith("socket:"):
+                numbers.append(int(entry.name))
+    return numbers
 
 
 def _listens(one: socket.socket) -> bool:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -21,3 +23,16 @@ def test_accepted_connections_have_the_limit_and_others_have_not():
         # The sockets are still the server's own: looking has closed none of them.
         with socket.create_connection(server.getsockname()):
             pass
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="descriptors are listed in /proc")
+def test_looking_leaves_no_descriptor_open(tmp_path):
+    """Files and pipes, which are no sockets, are among them."""
+    ends = os.pipe()
+    with (tmp_path / "file").open("w"):
+        before = len(list(Path("/proc/self/fd").iterdir()))
+        for _ in range(10):
+            give_up_stalled_connections()
+        assert len(list(Path("/proc/self/fd").iterdir())) == before
+    for end in ends:
+        os.close(end)
