@@ -29,11 +29,6 @@ _SHARED_FROM_BYTES = 65_537
 # Where the limit is reached (8 MB for most users) messages are lost without a word.
 _LOCKED_BYTES = 16 * _POOL_BYTES
 _CAP_IPC_LOCK = 14
-# A connection that is begun while a cable is out is not answered, and TCP asks again only after 1,
-# 3, 7, 15 s: a new attempt is sooner. Long enough for a TLS handshake on a busy Pi 3.
-_CONNECT_MS = 1500
-# Each endpoint in turn, once; without it Zenoh tries the first one for ever.
-_ONCE = "retry_period_init_ms=0"
 # Back within half a second of the other side's return.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
@@ -73,18 +68,14 @@ def may_lock(size_bytes: int) -> bool:
     return bool(effective and int(effective[1], 16) >> _CAP_IPC_LOCK & 1)
 
 
-def _tried_once(endpoint: str) -> str:
-    return f"{endpoint}{';' if '#' in endpoint else '#'}{_ONCE}"
-
-
 def client_config(connect: Sequence[str]) -> zenoh.Config:
     """A client of the routers at `connect`, back within half a second of their return."""
     return _config(
         {
             "mode": "client",
             "connect": {
-                "endpoints": [_tried_once(endpoint) for endpoint in connect],
-                "timeout_ms": _CONNECT_MS,
+                "endpoints": list(connect),
+                "timeout_ms": 0,
                 "retry": _RETRY,
             },
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
