@@ -81,19 +81,23 @@ async def run(
                     break
     except TimeoutError:
         output += f"\n[still running after {deadline_s:g} s]"
-    if process.returncode is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGINT)
     return await _ended(process), output
 
 
 async def _ended(process: asyncio.subprocess.Process) -> int:
-    """The exit code; a shell that was interrupted counts as the command that it ran."""
-    try:
-        async with asyncio.timeout(10.0):
-            code = await process.wait()
-    except TimeoutError:
-        os.killpg(process.pid, signal.SIGKILL)
-        await process.wait()
-        return 1
-    return 0 if code in (-signal.SIGINT, 128 + signal.SIGINT) else code
+    """Interrupt a shell that has not ended; its exit code, or that of the command that it ran.
+
+    Again after a second, as a person would: bash ignores an interrupt that meets a command of a
+    loop at its very end.
+    """
+    for _ in range(10):
+        with contextlib.suppress(ProcessLookupError):
+            if process.returncode is None:
+                os.killpg(process.pid, signal.SIGINT)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(1.0):
+                code = await process.wait()
+                return 0 if code in (-signal.SIGINT, 128 + signal.SIGINT) else code
+    os.killpg(process.pid, signal.SIGKILL)
+    await process.wait()
+    return 1
