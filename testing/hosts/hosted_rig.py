@@ -157,8 +157,10 @@ def _keep(host: Container, folder: str, kept: Path) -> None:
     """Keep a folder of a host; what was kept of older wheels goes."""
     if kept.exists() and kept.stem != "kernels":
         return
-    for old in kept.parent.glob(f"{kept.name.partition('-')[0]}-*.tar*"):
-        old.unlink(missing_ok=True)
-    new = kept.with_suffix(f".tar.{host.name}")
+    role, new = kept.name.partition("-")[0], kept.with_suffix(f".tar.{host.name}")
+    # What another host of the same role is writing at this moment stays.
+    for pattern in (f"{role}-*.tar", f"{role}-*.tar.{host.name}"):
+        for old in kept.parent.glob(pattern):
+            old.unlink(missing_ok=True)
     run(["tar", "-C", host.disk, "-c", "-f", new, "--numeric-owner", folder], _INSTALL_S)
     new.replace(kept)
