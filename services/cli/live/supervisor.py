@@ -22,7 +22,7 @@ from rhot.process import logs
 from rhot.process.lifecycle import EXIT_AGAIN, EXIT_USER
 from services.cli.rig.child_output import ChildOutput
 
-# As systemd's RestartSec of the installed units: poses are back within a second of a crash.
+# Poses are back within two seconds of a crash, and a rig that cannot start is readable.
 _RESTART_S = 0.5
 # A service that ended with a message for the user would end with the same one at once; a new try
 # every five seconds is enough.
