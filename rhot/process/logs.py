@@ -12,6 +12,7 @@ import json
 import logging
 import os
 import sys
+from abc import ABC, abstractmethod
 from typing import TextIO
 
 from rhot.errors import ConfigError
@@ -90,11 +91,12 @@ class _JsonLines(logging.Formatter):
         return json.dumps(line, ensure_ascii=False)
 
 
-class _Lines(logging.Formatter):
+class _Lines(logging.Formatter, ABC):
     """The record's line, and those of its traceback, each behind the same beginning."""
 
+    @abstractmethod
     def start(self, record: logging.LogRecord) -> str:
-        raise NotImplementedError
+        """What stands before each line."""
 
     def format(self, record: logging.LogRecord) -> str:
         lines = [record.getMessage()]

@@ -1,10 +1,10 @@
 """How a service holds itself back before it ends with an error, so that systemd does not spin.
 
-systemd starts a service again at once, which is right for a crash, and wrong for a
-file that is missing: that would be two tries a second for ever, each with its lines in the journal
-(and systemd 252 of Debian 12 cannot wait longer from try to try). So an error of a file waits until
-a file changes, and whatever else ends a service in its first seconds waits a little. Meanwhile
-`systemctl status` shows the error. Units set $RHOT_HOLD_S, the longest wait; nothing else does.
+systemd starts a service again at once, which is right for a crash, and wrong for a file that is
+missing: that would be a try a second for ever, each with its lines in the journal (and systemd 252
+of Debian 12 cannot wait longer from try to try). So an error of a file waits until a file changes,
+and whatever else ends a service in its first seconds waits a little. Meanwhile `systemctl status`
+shows the error. Units set $RHOT_HOLD_S, the longest wait; nothing else does.
 """
 
 from __future__ import annotations
