@@ -41,7 +41,7 @@ from rhot.bus.bus import Bus, open_bus
 from rhot.bus.zenoh_config import router_config
 from rhot.files.calibration import save
 from rhot.messages import Session
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from testing import synthetic_images
 
 RIG, CAMERA, SIZE, FPS = "footprint", "left", (640, 480), 30.0

@@ -21,11 +21,12 @@ from rhot.bus.bus import Bus, open_bus
 from rhot.bus.liveliness import AliveWatch
 from rhot.bus.security.credentials import with_certificates
 from rhot.bus.subscription import Subscription
-from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
 from rhot.hand import HandName
-from rhot.health_messages import Health
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose, Session
+from rhot.messages import HandPoints, HandPose, MarkerFrame, Session
+from rhot.messages.camera import Colors, ExposureControl
+from rhot.messages.health import Health
+from rhot.messages.objects import ObjectPose
 from rhot.topics import Topic
 
 T = TypeVar("T")

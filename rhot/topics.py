@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
-import rhot.camera_messages as c
-import rhot.health_messages as h
 import rhot.messages as m
-import rhot.simulator_messages as s
+import rhot.messages.camera as c
+import rhot.messages.health as h
+import rhot.messages.objects as o
+import rhot.messages.simulator as s
 from rhot.errors import BusError
 
 T = TypeVar("T")
@@ -136,9 +137,24 @@ MARKERS = _stream(
 POINTS = _stream("hand/{hand}/points", m.HandPoints, Rate.HAND, "3D landmarks")
 POSE = _stream("hand/{hand}/pose", m.HandPose, Rate.HAND, "the full hand")
 OPENVR = _stream(
-    "openvr/{serial}/pose", m.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them"
+    "openvr/{serial}/pose", o.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them"
 )
-OBJECT = _stream("object/{object}/pose", m.ObjectPose, Rate.OBJECT, "objects in the rig frame")
+OBJECT = _stream("object/{object}/pose", o.ObjectPose, Rate.OBJECT, "objects in the rig frame")
+OPENVR_EVENT = Topic(
+    "openvr/{host}/event",
+    o.OpenVrEvent,
+    Kind.STREAM,
+    Rate.DEMAND,
+    Priority.DATA,
+    recorded=True,
+    about="what SteamVR says of devices and of its origin",
+)
+CONTACTS = _stream(
+    "object/{object}/contacts",
+    o.ObjectContacts,
+    Rate.HAND,
+    "who touches an object, and who holds it",
+)
 TRUTH = _stream("sim/truth", s.Truth, Rate.CAMERA, "the simulator's ground truth")
 SIM_CLOCK = _query(
     "sim/{camera}/clock",
@@ -239,7 +255,9 @@ TOPICS: tuple[Topic, ...] = (
     POINTS,
     POSE,
     OPENVR,
+    OPENVR_EVENT,
     OBJECT,
+    CONTACTS,
     TRUTH,
     SIM_CLOCK,
     PREVIEW,

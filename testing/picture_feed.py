@@ -16,8 +16,8 @@ import numpy as np
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig, load_rig
+from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
-from rhot.simulator_messages import SimFrame
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.scene.scene import load_scene
 

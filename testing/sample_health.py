@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rhot.health_messages import Fault, Health, StreamHealth
+from rhot.messages.health import Fault, Health, StreamHealth
 from rhot.watch.onlooker_faults import fault_of
 
 NOW_NS = 1_700_000_000_000_000_000

@@ -61,8 +61,7 @@ PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offli
 FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
     {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises"},
-    {"rhot/messages", "rhot/camera_messages", "rhot/simulator_messages"},
-    {"rhot/health_messages"},
+    {"rhot/messages"},
     {"rhot/topics", "rhot/faults"},
     {"rhot/files", "rhot/bus"},
     {"rhot/process", "rhot/watch"},

@@ -8,10 +8,11 @@ from types import ModuleType
 import msgspec
 from msgspec import inspect
 
-import rhot.camera_messages
-import rhot.health_messages
 import rhot.messages
-import rhot.simulator_messages
+import rhot.messages.camera
+import rhot.messages.health
+import rhot.messages.objects
+import rhot.messages.simulator
 from docs.generate.markdown import generated_from, paragraphs, table, wrapped
 from docs.generate.type_words import default_of, in_words
 from rhot.topics import TOPICS
@@ -22,7 +23,13 @@ name; `3 x number` is a list of three numbers. `stamp_ns` is CLOCK_REALTIME at t
 content describes, `sent_ns` the instant of sending on the sender's own clock (0 in files). Frames
 and angles: [frames](frames.md). Keys and rates: [topics](topics.md)."""
 
-_MODULES = (rhot.messages, rhot.health_messages, rhot.camera_messages, rhot.simulator_messages)
+_MODULES = (
+    rhot.messages,
+    rhot.messages.objects,
+    rhot.messages.health,
+    rhot.messages.camera,
+    rhot.messages.simulator,
+)
 
 # End of a field's name -> unit; the longest that fits counts.
 _UNITS = {

@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rhot.health_messages import StreamHealth
+from rhot.messages.health import StreamHealth
 from rhot.topics import Topic
 
 # A beat of 1 s at 1 kHz keeps every second latency; more would cost more than the percentiles are

@@ -16,11 +16,11 @@ from typing import Annotated, TypeVar
 import msgspec
 import numpy as np
 
-from rhot.camera_messages import Calibration, ColorRange, Colors, Exposure
 from rhot.errors import UNDECODABLE, CalibrationError, writing
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName, default_hand
+from rhot.messages.camera import Calibration, ColorRange, Colors, Exposure
 
 __all__ = [
     "Calibration",
@@ -72,17 +72,29 @@ class RigGeometry(Calibration, frozen=True, kw_only=True):
 
 
 class ObjectPlace(msgspec.Struct, frozen=True, kw_only=True):
-    """The object's origin in its tracker's frame, and how late the tracker's stamps are."""
+    """The object's origin in its tracker's frame, and how late the tracker's stamps are.
+
+    marker_m is the middle of the paint on the tracker, in the tracker's frame; None if unknown.
+    """
 
     offset_m: Row3 = (0.0, 0.0, 0.0)
     orientation_wxyz: Row4 = (1.0, 0.0, 0.0, 0.0)
     time_offset_ns: int = 0
+    marker_m: Row3 | None = None
 
 
 class Objects(Calibration, frozen=True, kw_only=True):
     """objects.json"""
 
     T_rig_from_lighthouse: Matrix4
+    # OpenVrPose.universe of the poses that it was made of: another universe is another frame. Empty
+    # where unknown.
+    universe: str = ""
+    # Standard deviation of T_rig_from_lighthouse, None where unknown: of its turn, of its
+    # shift at the middle of the volume, and that middle in the rig frame.
+    sigma_rad: float | None = None
+    sigma_m: float | None = None
+    middle_m: Row3 | None = None
     objects: dict[str, ObjectPlace] = msgspec.field(default_factory=dict)
 
 

@@ -82,8 +82,9 @@ class RigConfig(Table, frozen=True, kw_only=True):
 
     @property
     def colors(self) -> list[str]:
-        """Every colour some hand's marker uses."""
-        return sorted({color for hand in self.hand.values() for color in hand.markers.values()})
+        """Every colour some marker uses: those of the hands, and of the objects' trackers."""
+        of_hands = {color for hand in self.hand.values() for color in hand.markers.values()}
+        return sorted(of_hands | {item.marker for item in self.object if item.marker})
 
     def rate_hz(self, rate: Rate, camera: str | None = None) -> float:
         """Expected rate of a stream; 0 where there is none."""
@@ -157,10 +158,42 @@ def _check(config: RigConfig, path: Path) -> None:
             )
         _unique(list(table.markers.values()), f"colour in [hand.{hand}.markers]", path)
     _unique(
-        [c for h in HANDS if h in config.hand for c in config.hand[h].markers.values()],
-        "colour of both hands together",
+        [
+            *(c for h in HANDS if h in config.hand for c in config.hand[h].markers.values()),
+            *(item.marker for item in config.object if item.marker),
+        ],
+        "colour of all hands and objects together",
         path,
     )
+    for item in config.object:
+        wrong = shape_problem(item)
+        if wrong:
+            raise ConfigError(f"{path}: [[object]] {item.name!r}: {wrong}")
+
+
+# How many lengths size_m has, and what they are.
+_SIZES = {
+    "box": (3, "[x, y, z]"),
+    "cylinder": (2, "[diameter, height along y]"),
+    "sphere": (1, "[diameter]"),
+}
+
+
+def shape_problem(item: ObjectTable) -> str | None:
+    """What is wrong with an object's shape, size_m and mesh together; None if nothing is."""
+    if item.mesh and item.shape != "mesh":
+        return f'has mesh = {item.mesh!r} and shape = {item.shape!r}; write shape = "mesh"'
+    if item.shape == "mesh" and not item.mesh:
+        return 'shape = "mesh" needs mesh = "FILE.glb" (or .stl), relative to rig.toml'
+    count, meaning = _SIZES.get(item.shape, (0, "nothing"))
+    if len(item.size_m) != count:
+        kind = f"shape = {item.shape!r}" if item.shape else "no shape"
+        return (
+            f"size_m has {len(item.size_m)} lengths; with {kind} it has {count}: {meaning}"
+            if count
+            else f"size_m has {len(item.size_m)} lengths; with {kind} there are none"
+        )
+    return None
 
 
 def _unique(names: list[str], what: str, path: Path) -> None:

@@ -149,6 +149,18 @@ class ObjectTable(Table, frozen=True, kw_only=True):
     name: Name
     # Of its tracker, as SteamVR shows it: LHR-...
     serial: Name
+    # Colour of a dab of paint on its tracker, for registration and for the watch on drift. No
+    # hand's marker may have it.
+    marker: Name | None = None
+    # What it looks like, for touch, view and simulation; empty: unknown, and nothing touches it.
+    shape: Literal["", "box", "cylinder", "sphere", "mesh"] = ""
+    # Box: along x, y and z. Cylinder: diameter, and height along y. Sphere: diameter. The object's
+    # origin is the middle.
+    size_m: Annotated[
+        tuple[Annotated[float, msgspec.Meta(gt=0.0, le=10.0)], ...], msgspec.Meta(max_length=3)
+    ] = ()
+    # GLB or STL file of a mesh, relative to rig.toml, in metres and in the object's own frame.
+    mesh: str = ""
 
 
 class Objects(Table, frozen=True, kw_only=True):

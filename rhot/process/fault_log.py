@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from rhot.faults import fault_kind
-from rhot.health_messages import MAX_FAULTS, MAX_TEXT, Fault
+from rhot.messages.health import MAX_FAULTS, MAX_TEXT, Fault
 
 log = logging.getLogger("rhot.faults")
 

@@ -18,8 +18,8 @@ from rhot.bus.bus import Bus
 from rhot.bus.stats import StreamStats
 from rhot.bus.subscription import Subscription
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health, StreamHealth
 from rhot.messages import Session
+from rhot.messages.health import Health, StreamHealth
 from rhot.process import systemd
 from rhot.process.fault_log import FaultLog
 from rhot.process.health.namesakes import Namesakes

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from rhot import topics
 from rhot.hand import HANDS
-from rhot.health_messages import Health, StreamHealth
+from rhot.messages.health import Health, StreamHealth
 from rhot.topics import Topic
 from rhot.watch.rig_state import Ages
 

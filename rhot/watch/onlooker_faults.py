@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 
 from rhot.faults import fault_kind
 from rhot.files.config import RigConfig
-from rhot.health_messages import MAX_TEXT, Fault
+from rhot.messages.health import MAX_TEXT, Fault
 from rhot.watch.rig_state import MISSING, ServiceRow
 
 # What a service is to a person, where its name alone does not say it.

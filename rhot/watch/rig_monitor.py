@@ -12,7 +12,7 @@ from collections.abc import Iterable
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 from rhot.watch.ages import ages_of
 from rhot.watch.onlooker_faults import missing_services, router_lost
 from rhot.watch.rig_state import CameraRow, RigState, ServiceRow, StandingFault

@@ -9,7 +9,7 @@ from typing import Literal
 
 import msgspec
 
-from rhot.health_messages import Fault, Health
+from rhot.messages.health import Fault, Health
 
 # absent: expected and never heard; gone: its token is; silent: alive, but without a beat.
 MISSING = ("absent", "gone", "silent")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 from rhot.watch.rig_monitor import RigMonitor
 
 # A rig of two Pis has some thirty streams; keys come from the network, memory must not.

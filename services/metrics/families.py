@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from rhot.faults import FAULTS
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 from rhot.plain_text import clipped
 from rhot.watch.rig_state import MISSING, RigState, ServiceRow
 from services.metrics.counting_monitor import CountingMonitor, StreamName

@@ -16,7 +16,7 @@ import time
 from rhot import topics
 from rhot.bus.bus import Publisher
 from rhot.errors import SourceError
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.registration import load_registration

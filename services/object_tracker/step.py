@@ -19,7 +19,8 @@ from rhot.geometry.transforms import (
     rotation_from_quaternion,
     transform,
 )
-from rhot.messages import ObjectPose, ObjectTracking, OpenVrPose, Quat, Vec3
+from rhot.messages import Quat, Vec3
+from rhot.messages.objects import ObjectPose, ObjectTracking, OpenVrPose
 from services.object_tracker.registration import Placement, Registration, is_rotation, register
 
 # ETrackingResult of openvr.h; every other value (1 is Uninitialized) is "lost".

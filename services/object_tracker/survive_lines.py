@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhot.geometry.transforms import Array, rotation_from_quaternion
-from rhot.messages import OpenVrDevice, OpenVrPose, Vec3
+from rhot.messages import Vec3
+from rhot.messages.objects import OpenVrDevice, OpenVrPose
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
 _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{0,63})"')

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from rhot.simulator_messages import SimClock
+from rhot.messages.simulator import SimClock
 
 
 class ComputerClocks:

@@ -20,8 +20,8 @@ import cv2
 
 from rhot import topics
 from rhot.files.config import RigConfig
+from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
-from rhot.simulator_messages import SimFrame
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.computer_clocks import ComputerClocks
 from services.simulator.scene.scene import Scene, load_scene

@@ -23,7 +23,7 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.hand import JOINTS
 from rhot.messages import HandPose
-from rhot.simulator_messages import Truth
+from rhot.messages.simulator import Truth
 
 # Of truth, at 15 to 60 instants a second: poses are never that late and still of use.
 _REMEMBERED = 600

@@ -25,7 +25,7 @@ from rhot import topics
 from rhot.bus.bus import client_config
 from rhot.files.calibration import load_colors
 from rhot.messages import MarkerFrame, Session
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from testing.synthetic_images import PAINTS, Tip, clean, frame_of, noisy
 
 pytestmark = pytest.mark.browser

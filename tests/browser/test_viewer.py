@@ -23,7 +23,8 @@ from rhot.bus.bus import client_config
 from rhot.files.config import RigConfig, load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_x, rotation_z
 from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, default_hand, forward, joint_radii_m
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, ObjectPose, WristPose
+from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from rhot.messages.objects import ObjectPose
 from testing.sample_health import beat, fault
 
 pytestmark = pytest.mark.browser

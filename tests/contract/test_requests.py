@@ -10,8 +10,8 @@ import pytest
 
 from rhot import topics
 from rhot.bus.bus import open_bus
-from rhot.camera_messages import FitRequest, FitResult
 from rhot.errors import BusError, CalibrationError, RefusedError
+from rhot.messages.camera import FitRequest, FitResult
 
 
 @pytest.fixture

@@ -18,8 +18,8 @@ import msgspec
 import pytest
 
 import rhot
-from rhot.camera_messages import Colors
 from rhot.errors import BusError
+from rhot.messages.camera import Colors
 
 pytestmark = pytest.mark.integration
 

@@ -16,8 +16,8 @@ import pytest
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
-from rhot.health_messages import Health
 from rhot.messages import MarkerFrame
+from rhot.messages.health import Health
 from testing.secured_rig import SecuredRig
 
 pytestmark = pytest.mark.field

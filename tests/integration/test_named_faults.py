@@ -14,7 +14,7 @@ import pytest
 import pytest_asyncio
 
 from rhot import topics
-from rhot.health_messages import Fault, Health
+from rhot.messages.health import Fault, Health
 
 pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 

@@ -165,8 +165,9 @@ def _camera(config: RigConfig, certificate: str, cameras: list[str]) -> _Subject
 def _object_source(config: RigConfig, name: str) -> _Subject:
     subject = _holder(config, "objects", name)
     rig = config.rig.name
-    names = {"service": "object_tracker", "instance": name}
-    subject.publishes([topics.OPENVR.key(rig), topics.HEALTH.key(rig, **names)])
+    names = {"service": "openvr_bridge", "instance": name}
+    poses = [topics.OPENVR.key(rig), topics.OPENVR_EVENT.key(rig, host=name)]
+    subject.publishes([*poses, topics.HEALTH.key(rig, **names)])
     subject.asks(topic.key(rig) for topic in ASKED)
     subject.is_alive([topics.ALIVE.key(rig, **names)])
     subject.hears_of_others()

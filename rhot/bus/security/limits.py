@@ -92,7 +92,7 @@ def _keys_of(topic: Topic, config: RigConfig) -> list[str]:
         "serial": [item.serial for item in config.object],
         "object": [item.name for item in config.object],
     }
-    if len(topic.fields) == 1:
+    if len(topic.fields) == 1 and topic.fields[0] in names:
         (field,) = topic.fields
         return [topic.key(config.rig.name, **{field: name}) for name in names[field]]
     return [topic.key(config.rig.name)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 
 # A beat comes each second: three of them missing, and the other is gone.
 GONE_S = 3.5

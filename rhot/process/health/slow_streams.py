@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from rhot.health_messages import StreamHealth
+from rhot.messages.health import StreamHealth
 
 # One slow second is scheduling, three are a fault; and three good ones its end, so that a stream at
 # the limit does not come and go each second.

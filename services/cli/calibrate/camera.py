@@ -15,10 +15,10 @@ from typing import Annotated
 import typer
 import uvloop
 
-from rhot.camera_messages import ExposureControl
 from rhot.client import RigClient
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
+from rhot.messages.camera import ExposureControl
 from services.cli.calibrate import options
 from services.cli.calibrate.pointing_options import PointingOptions
 from services.cli.option_groups import grouped

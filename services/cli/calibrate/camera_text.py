@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from rhot.camera_messages import ExposureControl
 from rhot.files.calibration import ColorRange, Colors
+from rhot.messages.camera import ExposureControl
 from services.pi_tracker.colors.exposure_advice import ExposureStatistics
 from services.pi_tracker.colors.fit import TrainingSet
 from services.pi_tracker.colors.paint_names import Suggestion

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rhot.camera_messages import ExposureControl
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
+from rhot.messages.camera import ExposureControl
 from services.cli.check.colors import color_problems
 from services.cli.check.problems import Problem, note, warning
 from services.cli.rig.answers import Answers

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rhot.faults import FAULTS
 from rhot.files.config import RigConfig
-from rhot.health_messages import Fault
+from rhot.messages.health import Fault
 from rhot.watch.onlooker_faults import about, host_of
 from rhot.watch.rig_state import MISSING, RigState, ServiceRow, StandingFault
 from services.cli.doctor.links import Link, broken, from_faults, holds

@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 
 from rhot.faults import FAULTS
-from rhot.health_messages import Fault
+from rhot.messages.health import Fault
 
 LinkState = Literal["ok", "worse", "broken"]
 
@@ -30,7 +30,7 @@ _CONSEQUENCES = ("no_points", "no_pose", "pose_implausible")
 class Link(msgspec.Struct, frozen=True, kw_only=True):
     """One link: ok; worse: it holds, but something should be mended; or broken.
 
-    code is that of rhot/faults.py, "" where the link is ok.
+    code is that of rhot/faults/, "" where the link is ok.
     """
 
     name: str

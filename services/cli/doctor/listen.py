@@ -10,8 +10,8 @@ from typing import Any
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
 from rhot.messages import HandPose
+from rhot.messages.health import Health
 from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.cli.doctor.observations import CameraSeen, HandSeen, ObjectSeen, Observations

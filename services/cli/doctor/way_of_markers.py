@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
-from rhot.health_messages import Fault
+from rhot.messages.health import Fault
 from rhot.watch.rig_state import RigState
 from services.cli.doctor.links import Link, broken, from_faults, holds, judged
 from services.cli.doctor.observations import CameraSeen, HandSeen, Observations

@@ -18,8 +18,9 @@ from rhot.errors import CaptureError
 from rhot.files.capture import Capture, read_lines
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
-from rhot.simulator_messages import Truth
+from rhot.messages import HandPoints, HandPose, MarkerFrame
+from rhot.messages.objects import ObjectPose
+from rhot.messages.simulator import Truth
 from services.cli.evaluate.interpolation import Stamps
 from services.cli.evaluate.plot_figures import (
     Track,

@@ -12,7 +12,8 @@ import numpy as np
 
 from rhot.errors import CaptureError
 from rhot.hand import JOINT_INDEX, TIPS, HandModel
-from rhot.messages import HandPose, ObjectPose
+from rhot.messages import HandPose
+from rhot.messages.objects import ObjectPose
 from services.cli.evaluate.interpolation import Stamps
 from services.cli.evaluate.score_statistics import (
     angle_errors,

@@ -13,8 +13,9 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.capture import Capture, read_lines
 from rhot.files.config import RigConfig, load_rig
 from rhot.hand import HANDS, HandModel, HandName
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
-from rhot.simulator_messages import Truth
+from rhot.messages import HandPoints, HandPose, MarkerFrame
+from rhot.messages.objects import ObjectPose
+from rhot.messages.simulator import Truth
 from rhot.topics import Rate
 from services.cli.evaluate.score_math import score_hand, score_object
 from services.cli.evaluate.score_types import ObjectScore, Score, Stages

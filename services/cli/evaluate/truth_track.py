@@ -18,7 +18,7 @@ from rhot.errors import CaptureError
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS, TIPS
 from rhot.messages import FingerAngles
-from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
+from rhot.messages.simulator import HandTruth, ObjectTruth, Truth
 from services.cli.evaluate.interpolation import Stamps, cubic, linear, slerp
 
 

@@ -14,7 +14,7 @@ from rhot.bus.stats import percentiles_ms
 from rhot.geometry.transforms import Array
 from rhot.hand import JOINT_INDEX, TIPS
 from rhot.messages import HandPose
-from rhot.simulator_messages import Truth
+from rhot.messages.simulator import Truth
 from services.cli.live.demo_summary import Summary
 
 # Truth kept: two seconds at 90 Hz, far longer than any pose takes.

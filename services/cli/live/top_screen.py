@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 
 from rhot import topics
-from rhot.health_messages import StreamHealth
+from rhot.messages.health import StreamHealth
 from rhot.plain_text import clipped
 from rhot.watch.rig_state import Ages, RigState, ServiceRow, StandingFault
 

@@ -21,8 +21,9 @@ import uvloop
 from rhot import clock, topics
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
+from rhot.messages import HandPoints, HandPose, MarkerFrame
+from rhot.messages.health import Health
+from rhot.messages.objects import ObjectPose
 from rhot.plain_text import printable
 from rhot.process.lifecycle import cancelled_by, stop_on_signals
 from rhot.topics import Topic

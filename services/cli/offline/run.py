@@ -11,7 +11,7 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import load_colors, load_lens, load_objects
 from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from services.cli.offline.inputs import Job
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
 from services.cli.offline.results import ResultWriter

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from rhot import topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.bus.security.credentials import client_endpoints
-from rhot.camera_messages import Colors, ExposureControl
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
+from rhot.messages.camera import Colors, ExposureControl
 
 # A router on the same network answers within milliseconds, a busy one within half a second.
 _ROUTER_S = 2.0

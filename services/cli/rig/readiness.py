@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rhot.bus.liveliness import Alive
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 
 Who = tuple[str, str]
 

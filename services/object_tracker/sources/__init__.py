@@ -13,7 +13,7 @@ from typing import Protocol
 
 from rhot.errors import SourceError
 from rhot.files.config import RigConfig
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from services.object_tracker.sources.libsurvive import LibSurvive
 from services.object_tracker.sources.replay import Replay
 from services.object_tracker.sources.steamvr import SteamVr

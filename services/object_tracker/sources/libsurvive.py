@@ -14,7 +14,7 @@ from collections.abc import AsyncGenerator, Sequence
 
 from rhot import clock
 from rhot.errors import SourceError
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from services.object_tracker.survive_lines import RunClock, SurviveParser, openvr_pose
 
 # A device's CONFIG line is some 6 kB; a line longer than this is damaged and is skipped.

@@ -11,7 +11,7 @@ from collections.abc import AsyncGenerator
 from pathlib import Path
 
 from rhot.files.capture import read_lines
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 
 # A longer gap is a pause of the recording, or a broken stamp: it is shortened to this.
 _LONGEST_GAP_NS = 5_000_000_000

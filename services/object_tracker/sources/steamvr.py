@@ -18,7 +18,7 @@ from typing import Any
 
 from rhot import clock
 from rhot.errors import SourceError
-from rhot.messages import OpenVrDevice, OpenVrPose
+from rhot.messages.objects import OpenVrDevice, OpenVrPose
 
 _CLASSES = {1: "HMD", 2: "Controller", 3: "GenericTracker"}
 # ETrackingUniverseOrigin: raw does not follow when the user recentres. EVRApplicationType:

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import msgspec
 
 from rhot import topics
-from rhot.camera_messages import FitRequest, FitResult, Patch
 from rhot.errors import UNDECODABLE, CalibrationError
 from rhot.files.calibration import ColorRange, Colors
+from rhot.messages.camera import FitRequest, FitResult, Patch
 from rhot.process.service import Service
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer

@@ -15,9 +15,9 @@ import time
 import msgspec
 
 from rhot import clock, topics
-from rhot.camera_messages import ExposureControl
 from rhot.errors import UNDECODABLE, CalibrationError, RefusalCode, RefusedError
 from rhot.files.calibration import Exposure, load_exposure
+from rhot.messages.camera import ExposureControl
 from rhot.process.service import Service
 from services.pi_tracker.colors.settling import Settling
 from services.pi_tracker.endpoints.latest_change import LatestChange, write_setting

@@ -10,8 +10,8 @@ import asyncio
 from collections import OrderedDict
 
 from rhot.bus.bus import Bus
-from rhot.camera_messages import picture_name
 from rhot.errors import CalibrationError
+from rhot.messages.camera import picture_name
 from services.pi_tracker.endpoints.preview import Preview, png
 from services.pi_tracker.image.frame import Frame
 

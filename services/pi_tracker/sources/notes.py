@@ -1,4 +1,4 @@
-"""What a source could not do as it was asked, as faults that begin and end (codes: rhot/faults.py).
+"""What a source could not do as it was asked, as faults that begin and end (codes: rhot/faults/).
 
 A mailbox between the thread that reads frames and the event loop that tells health.
 """

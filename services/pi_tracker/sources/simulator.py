@@ -15,7 +15,7 @@ import numpy as np
 from rhot import clock, topics
 from rhot.bus.bus import Bus, Sample
 from rhot.errors import UNDECODABLE
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources.controls import Controls
 from services.pi_tracker.sources.notes import Notes

@@ -17,8 +17,8 @@ import msgspec
 from rhot.errors import CaptureError, DiskFullError
 from rhot.files.capture import Capture, FrameStamp, write_lines, write_stamps
 from rhot.files.config import RigConfig
-from rhot.messages import OpenVrPose
-from rhot.simulator_messages import Truth
+from rhot.messages.objects import OpenVrPose
+from rhot.messages.simulator import Truth
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off
 from services.simulator.files.rig_toml import rig_toml

@@ -21,7 +21,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, rotation_x, rotation_z, transform
 from rhot.hand import HANDS, HandName
-from rhot.simulator_messages import Truth
+from rhot.messages.simulator import Truth
 from services.simulator.camera_clock import CameraClock, camera_clock
 from services.simulator.scene.actors import (
     GRIP_M,

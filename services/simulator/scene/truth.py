@@ -5,7 +5,7 @@ from __future__ import annotations
 from rhot.geometry.transforms import Array, quaternion_from_rotation
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandName
 from rhot.messages import FingerAngles, WristPose
-from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
+from rhot.messages.simulator import HandTruth, ObjectTruth, Truth
 from services.simulator.scene.actors import Hand, HandState
 
 

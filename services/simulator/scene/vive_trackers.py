@@ -11,7 +11,7 @@ import zlib
 import numpy as np
 
 from rhot.geometry.transforms import Array, inverse, rotation_from_vector, vector_from_rotation
-from rhot.messages import OpenVrDevice, OpenVrPose
+from rhot.messages.objects import OpenVrDevice, OpenVrPose
 from services.simulator.scene.actors import SceneObject
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.truth import rounded_vector

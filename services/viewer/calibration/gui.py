@@ -16,8 +16,8 @@ from typing import Any, Literal
 import numpy as np
 import viser
 
-from rhot.camera_messages import ColorRange
 from rhot.files.config import RigConfig
+from rhot.messages.camera import ColorRange
 from services.viewer.calibration.picture import Image
 
 # Middle of the plane in the rig frame, and its height; the rig is around the origin.

@@ -13,7 +13,7 @@ from typing import TypeGuard
 
 import msgspec
 
-from rhot.camera_messages import ColorRange, Colors, FitRequest, FitResult, PointedAt
+from rhot.messages.camera import ColorRange, Colors, FitRequest, FitResult, PointedAt
 
 # What sliders begin with for a colour that was not clicked yet: everything saturated.
 _ANY = ColorRange(hsv_low=(0, 80, 40), hsv_high=(179, 255, 255))

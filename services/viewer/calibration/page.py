@@ -14,9 +14,9 @@ import time
 import viser
 
 from rhot import topics
-from rhot.camera_messages import FitRequest, FitResult, picture_name
 from rhot.client import RigClient
 from rhot.errors import RhotError
+from rhot.messages.camera import FitRequest, FitResult, picture_name
 from rhot.process.service import Service
 from services.viewer.calibration import text
 from services.viewer.calibration.gui import CalibrationControls, UserAction

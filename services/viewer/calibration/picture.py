@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rhot.camera_messages import ColorRange, Patch
+from rhot.messages.camera import ColorRange, Patch
 from services.viewer.live.palette import Rgb
 
 Image = npt.NDArray[Any]

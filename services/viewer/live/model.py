@@ -16,8 +16,9 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
-from rhot.health_messages import Health
-from rhot.messages import HandPoints, HandPose, ObjectPose
+from rhot.messages import HandPoints, HandPose
+from rhot.messages.health import Health
+from rhot.messages.objects import ObjectPose
 
 K = TypeVar("K")
 V = TypeVar("V")

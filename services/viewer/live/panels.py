@@ -14,8 +14,8 @@ import numpy as np
 from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
-from rhot.health_messages import Health, StreamHealth
 from rhot.messages import HandPose
+from rhot.messages.health import Health, StreamHealth
 from services.viewer.live.model import View
 from services.viewer.live.palette import SOURCE_RGB
 

@@ -13,8 +13,8 @@ import pytest_asyncio
 
 from rhot import topics
 from rhot.bus.bus import open_bus
-from rhot.camera_messages import Exposure
 from rhot.files.calibration import save
+from rhot.messages.camera import Exposure
 from rhot.process.lifecycle import EXIT_AGAIN
 
 DEADLINE_S = 30.0

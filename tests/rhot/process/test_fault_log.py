@@ -6,7 +6,7 @@ import pytest
 
 from rhot.errors import RhotError
 from rhot.faults import FAULTS
-from rhot.health_messages import MAX_FAULTS
+from rhot.messages.health import MAX_FAULTS
 from rhot.process.fault_log import EVENT_S, FaultLog, one_line
 
 S = 1_000_000_000

@@ -15,7 +15,7 @@ from rhot.files.config import load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, forward, joint_radii_m
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
-from rhot.simulator_messages import HandTruth, ObjectTruth, Truth
+from rhot.messages.simulator import HandTruth, ObjectTruth, Truth
 from services.cli.defaults import sim_toml
 from services.cli.offline.inputs import job_of
 from services.cli.offline.run import run

@@ -13,7 +13,7 @@ import pytest
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import Array
-from rhot.messages import OpenVrDevice, OpenVrPose
+from rhot.messages.objects import OpenVrDevice, OpenVrPose
 
 
 @pytest.fixture

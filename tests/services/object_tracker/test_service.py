@@ -16,7 +16,7 @@ from rhot.files.capture import write_lines
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects, ObjectTable, RigTable
 from rhot.geometry.transforms import transform
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from rhot.process.service import Service
 from services.object_tracker.service import serve
 

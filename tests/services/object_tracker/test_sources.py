@@ -16,7 +16,7 @@ from rhot.errors import CaptureError, SourceError
 from rhot.files.capture import write_lines
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.sources.libsurvive import LibSurvive
 from services.object_tracker.sources.replay import Replay

@@ -24,7 +24,7 @@ from rhot.geometry.transforms import (
     rotation_from_vector,
     transform,
 )
-from rhot.messages import ObjectPose, OpenVrDevice, OpenVrPose
+from rhot.messages.objects import ObjectPose, OpenVrDevice, OpenVrPose
 from services.object_tracker.registration import load_registration
 from services.object_tracker.step import ObjectStep
 

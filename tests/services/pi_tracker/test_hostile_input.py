@@ -18,11 +18,11 @@ import zenoh
 
 from rhot import topics
 from rhot.bus.bus import client_config, open_bus
-from rhot.camera_messages import ExposureControl, FitRequest, FitResult, picture_name
 from rhot.client import RigClient
 from rhot.files.calibration import load_colors, save
 from rhot.messages import ClockEcho, Refusal, Session
-from rhot.simulator_messages import SimFrame
+from rhot.messages.camera import ExposureControl, FitRequest, FitResult, picture_name
+from rhot.messages.simulator import SimFrame
 
 SIZE = (640, 480)
 FPS = 30.0

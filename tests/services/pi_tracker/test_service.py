@@ -18,8 +18,8 @@ from rhot.files.calibration import save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, HandTable, RigTable
 from rhot.messages import Session
+from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
-from rhot.simulator_messages import SimFrame
 from services.pi_tracker.endpoints import preview
 from services.pi_tracker.service import serve
 

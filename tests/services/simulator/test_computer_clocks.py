@@ -11,8 +11,8 @@ import pytest
 from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.errors import RefusedError
+from rhot.messages.simulator import SimClock, SimFrame
 from rhot.process.service import Service
-from rhot.simulator_messages import SimClock, SimFrame
 from services.simulator.computer_clocks import ComputerClocks
 from services.simulator.service import serve
 

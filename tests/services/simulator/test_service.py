@@ -16,9 +16,9 @@ from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError
 from rhot.files.rig_tables import CameraTable, Objects
-from rhot.messages import OpenVrPose
+from rhot.messages.objects import OpenVrPose
+from rhot.messages.simulator import SimFrame, Truth
 from rhot.process.service import Service
-from rhot.simulator_messages import SimFrame, Truth
 from services.simulator.scene.scene import load_scene
 from services.simulator.service import SceneClock, serve
 

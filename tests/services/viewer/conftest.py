@@ -16,7 +16,6 @@ from websockets.sync.client import ClientConnection, connect
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, HandTable, ObjectTable, RigTable, Viewer
 from rhot.hand import DIGITS, JOINTS, default_hand, forward, joint_radii_m
-from rhot.health_messages import Health, StreamHealth
 from rhot.messages import (
     FingerAngles,
     FingerPose,
@@ -24,9 +23,10 @@ from rhot.messages import (
     HandPoint,
     HandPoints,
     HandPose,
-    ObjectPose,
     WristPose,
 )
+from rhot.messages.health import Health, StreamHealth
+from rhot.messages.objects import ObjectPose
 
 STAMP_NS = 1_700_000_000_000_000_000
 IDENTITY = (1.0, 0.0, 0.0, 0.0)

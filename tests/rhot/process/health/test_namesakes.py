@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from rhot.health_messages import Health
+from rhot.messages.health import Health
 from rhot.process.health.namesakes import Namesakes
 
 OTHER = Health(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rhot.health_messages import StreamHealth
+from rhot.messages.health import StreamHealth
 from rhot.process.health.slow_streams import SlowStreams
 
 

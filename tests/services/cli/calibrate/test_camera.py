@@ -19,8 +19,8 @@ from rhot.errors import BusError, CalibrationError, CaptureError, RefusedError
 from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import load_rig
 from rhot.messages import Session
+from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
-from rhot.simulator_messages import SimFrame
 from services.cli.application import application
 from services.pi_tracker.service import serve
 from testing.synthetic_images import Tip, clean, frame_of, noisy

@@ -7,7 +7,7 @@ import pytest
 
 from rhot.errors import CaptureError
 from rhot.hand import DIGIT_ANGLES, DIGITS
-from rhot.messages import ObjectPose
+from rhot.messages.objects import ObjectPose
 from services.cli.evaluate.score_math import score_hand, score_object
 from services.cli.evaluate.truth_track import hand_track, object_track
 

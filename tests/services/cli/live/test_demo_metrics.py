@@ -7,7 +7,7 @@ import pytest
 
 from rhot import hand as h
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
-from rhot.simulator_messages import HandTruth, Truth
+from rhot.messages.simulator import HandTruth, Truth
 from services.cli.live.demo_metrics import DemoMetrics
 from services.cli.live.demo_summary import summary_text
 

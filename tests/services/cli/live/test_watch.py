@@ -8,7 +8,6 @@ import pytest
 
 from rhot import topics
 from rhot.errors import BusError
-from rhot.health_messages import Fault, Health, StreamHealth
 from rhot.messages import (
     FingerAngles,
     FingerPose,
@@ -18,10 +17,11 @@ from rhot.messages import (
     HandPose,
     Marker,
     MarkerFrame,
-    ObjectPose,
     Session,
     WristPose,
 )
+from rhot.messages.health import Fault, Health, StreamHealth
+from rhot.messages.objects import ObjectPose
 from services.cli.live.watch import _topic, table
 
 NOW_NS = 5_000_000_000

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from rhot.errors import ConfigError
 from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
-from rhot.simulator_messages import Truth
+from rhot.messages.simulator import Truth
 from services.cli.application import application
 from services.simulator.scene.catalog import SCENES
 

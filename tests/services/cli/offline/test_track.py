@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.capture import read_lines
-from rhot.messages import HandPoints, HandPose, MarkerFrame, ObjectPose
+from rhot.messages import HandPoints, HandPose, MarkerFrame
+from rhot.messages.objects import ObjectPose
 from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS

@@ -13,7 +13,7 @@ from rhot.files.calibration import save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, HandTable, RigTable
 from rhot.messages import Session
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from services.pi_tracker.service import serve
 
 SIZE = (240, 160)

@@ -12,7 +12,7 @@ import pytest
 
 from rhot import topics
 from rhot.messages import ClockEcho, Session
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from services.pi_tracker.service import serve
 
 SIZE = (240, 160)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from rhot import topics
-from rhot.camera_messages import FitRequest, FitResult, PointedAt, picture_name
+from rhot.messages.camera import FitRequest, FitResult, PointedAt, picture_name
 from services.pi_tracker.endpoints import picture_cache
 
 FIT_S = 10.0

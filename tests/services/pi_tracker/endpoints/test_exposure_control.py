@@ -8,10 +8,10 @@ import contextlib
 import pytest
 
 from rhot import topics
-from rhot.camera_messages import ExposureControl
 from rhot.client import RigClient
 from rhot.errors import RefusedError
 from rhot.files.calibration import Exposure, load_exposure, save
+from rhot.messages.camera import ExposureControl
 from services.pi_tracker.endpoints.exposure_control import ExposureEndpoint
 from services.pi_tracker.sources.controls import Controls
 

@@ -15,7 +15,7 @@ from rhot.errors import ConfigError, SourceError
 from rhot.files.calibration import Exposure, save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
-from rhot.simulator_messages import SimFrame
+from rhot.messages.simulator import SimFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.sources import ThreadedSource, is_file, open_reader
 from services.pi_tracker.sources.notes import Notes

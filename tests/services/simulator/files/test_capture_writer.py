@@ -13,8 +13,8 @@ import pytest
 from rhot.errors import CaptureError, DiskFullError
 from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
-from rhot.messages import OpenVrPose
-from rhot.simulator_messages import Truth
+from rhot.messages.objects import OpenVrPose
+from rhot.messages.simulator import Truth
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.capture_writer import START_NS, write_capture
 from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot.camera_messages import ColorRange, Colors, FitResult, Patch
+from rhot.messages.camera import ColorRange, Colors, FitResult, Patch
 from services.viewer.calibration import text
 from services.viewer.calibration.model import ColorCalibration
 from services.viewer.calibration.picture import annotated, decoded, mask_of

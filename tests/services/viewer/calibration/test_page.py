@@ -14,8 +14,8 @@ import numpy as np
 from viser import _messages
 
 from rhot import topics
-from rhot.camera_messages import ColorRange, Colors, FitRequest, FitResult, Patch, picture_name
 from rhot.files.config import RigConfig
+from rhot.messages.camera import ColorRange, Colors, FitRequest, FitResult, Patch, picture_name
 from rhot.process.service import Service
 from services.viewer.service import serve
 

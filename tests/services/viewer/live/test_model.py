@@ -10,8 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rhot.health_messages import Health
-from rhot.messages import HandPoints, HandPose, ObjectPose
+from rhot.messages import HandPoints, HandPose
+from rhot.messages.health import Health
+from rhot.messages.objects import ObjectPose
 from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
 
 STAMP_NS = 1_700_000_000_000_000_000

@@ -11,8 +11,9 @@ import msgspec
 import pytest
 
 from rhot.files.config import RigConfig
-from rhot.health_messages import Health
-from rhot.messages import FingerAngles, HandPoints, HandPose, ObjectPose
+from rhot.messages import FingerAngles, HandPoints, HandPose
+from rhot.messages.health import Health
+from rhot.messages.objects import ObjectPose
 from services.viewer.live import panels
 from services.viewer.live.model import ViewModel
 

@@ -1,7 +1,8 @@
 import msgspec
 import pytest
 
-from rhot.messages import FingerAngles, Marker, MarkerFrame, OpenVrDevice
+from rhot.messages import FingerAngles, Marker, MarkerFrame
+from rhot.messages.objects import OpenVrDevice
 
 FRAME = MarkerFrame(
     camera="left",

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.camera_messages import ExposureControl, FitRequest, Patch, PointedAt, picture_name
 from rhot.files.calibration import Colors, Exposure
+from rhot.messages.camera import ExposureControl, FitRequest, Patch, PointedAt, picture_name
 
 
 def test_a_colours_file_is_a_message_as_it_is(repository):

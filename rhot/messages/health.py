@@ -1,6 +1,6 @@
 """What a service tells of itself once a second: its streams, its figures, and what is wrong.
 
-The codes of faults, and what each one asks a person to do, are in rhot/faults.py.
+The codes of faults, and what each one asks a person to do, are in rhot/faults/.
 """
 
 from __future__ import annotations

@@ -183,64 +183,6 @@ class HandPose(Message, frozen=True, kw_only=True):
     sent_ns: Stamp = 0
 
 
-class OpenVrDevice(Message, frozen=True, kw_only=True, rename={"device_class": "class"}):
-    """What SteamVR knows of a device beside its pose."""
-
-    index: int
-    serial: Name
-    device_class: str
-    model: str
-    battery: float
-    charging: bool
-
-
-Row4 = tuple[float, float, float, float]
-
-
-class OpenVrPose(Message, frozen=True, kw_only=True):
-    """A TrackedDevicePose_t under Valve's own field names, with what it lacks: device, universe,
-    stamp.
-
-    mDeviceToAbsoluteTracking is 3x4 row by row, column 3 the translation in metres, in the
-    `lighthouse` frame.
-    """
-
-    v: int
-    seq: Count
-    stamp_ns: Stamp
-    universe: str
-    device: OpenVrDevice
-    mDeviceToAbsoluteTracking: tuple[Row4, Row4, Row4]  # noqa: N815 - Valve's name
-    vVelocity: Vec3  # noqa: N815
-    vAngularVelocity: Vec3  # noqa: N815
-    eTrackingResult: int  # noqa: N815
-    bPoseIsValid: bool  # noqa: N815
-    bDeviceIsConnected: bool  # noqa: N815
-    sent_ns: Stamp = 0
-
-
-ObjectTracking = Literal["ok", "out_of_range", "rotation_only", "calibrating", "lost"]
-
-
-class ObjectPose(Message, frozen=True, kw_only=True):
-    """A tracked object.
-
-    In the rig frame if registered is true, else still in the lighthouse frame.
-    """
-
-    object: Name
-    serial: Name
-    seq: Count
-    stamp_ns: Stamp
-    position_m: Vec3
-    orientation_wxyz: Quat
-    velocity_m_s: Vec3
-    angular_velocity_rad_s: Vec3
-    tracking: ObjectTracking
-    registered: bool
-    sent_ns: Stamp = 0
-
-
 class Session(Message, frozen=True, kw_only=True):
     """The start broadcast: trackers work while running; start_ns is on the master's clock."""
 
