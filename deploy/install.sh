@@ -12,6 +12,7 @@ readonly HERE
 readonly PYTHON=/usr/bin/python3
 readonly ROOT=/opt/rhot ETC=/etc/rhot STATE=/var/lib/rhot CACHE=/var/cache/rhot
 readonly UNITS=/etc/systemd/system SYSUSERS=/etc/sysusers.d/rhot.conf COMMAND=/usr/local/bin/rhot
+readonly SYSCTL=/etc/sysctl.d/60-rhot.conf
 readonly KEEP_VERSIONS=3
 
 usage() {
@@ -130,6 +131,15 @@ make_user() {
     put "$HERE/sysusers.d/rhot.conf" "$SYSUSERS" 644 root
     if id -u rhot >/dev/null 2>&1; then return; fi
     change "make the user rhot" systemd-sysusers "$SYSUSERS"
+}
+
+# Applied to interfaces that appear later, too: udev does so.
+set_network() {
+    local before=$CHANGES
+    put "$HERE/sysctl.d/rhot.conf" "$SYSCTL" 644 root
+    if ((CHANGES > before)) && booted && [[ -z $DRY_RUN ]]; then
+        systemctl restart systemd-sysctl.service || say "  ! $SYSCTL holds from the next start on"
+    fi
 }
 
 make_folders() {
@@ -498,6 +508,7 @@ install_all() {
     check_machine
     install_packages
     make_user
+    set_network
     make_folders
     if [[ -n $DRY_RUN && -z $WHEELS$WHEEL ]]; then
         VERSION=new
@@ -660,7 +671,7 @@ uninstall() {
         change "forget its units" forget_units "${units[@]}"
     fi
     if [[ -L $COMMAND && $(readlink -- "$COMMAND") == "$ROOT"/* ]]; then change "remove $COMMAND" rm -f -- "$COMMAND"; fi
-    for file in "$ROOT" "$CACHE" "$SYSUSERS"; do
+    for file in "$ROOT" "$CACHE" "$SYSUSERS" "$SYSCTL"; do
         if [[ -e $file ]]; then change "remove $file" rm -rf -- "$file"; fi
     done
     if [[ -z $purge ]]; then

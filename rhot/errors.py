@@ -43,7 +43,14 @@ class CaptureError(RhotError):
 
 
 class DiskFullError(CaptureError):
-    """A file could not be written for want of space; what was written of it may be incomplete."""
+    """A file could not be written for want of space; what was written of it may be incomplete.
+
+    cause says so without advice, for who gives that anyway (the fault `disk_full`).
+    """
+
+    def __init__(self, cause: str) -> None:
+        super().__init__(f"{cause}; free some space (`df -h` shows where), or write elsewhere")
+        self.cause = cause
 
 
 class SourceError(RhotError):
@@ -79,10 +86,7 @@ def disk_full(error: BaseException, path: Path | None = None) -> DiskFullError |
     if not isinstance(error, OSError) or error.errno not in _FULL:
         return None
     where = path or error.filename or "a file"
-    return DiskFullError(
-        f"{where}: cannot be written: {error.strerror}; free some space (`df -h` shows where), "
-        "or write elsewhere"
-    )
+    return DiskFullError(f"{where}: cannot be written: {error.strerror}")
 
 
 @contextlib.contextmanager

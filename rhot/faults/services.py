@@ -19,7 +19,7 @@ SERVICE = (
     error(
         "disk_full",
         "a file could not be written: the disk is full",
-        "free some space; `df -h` shows where",
+        "free some space (`df -h` shows where), or write to another disk",
     ),
     warning("disk_low", "the disk is nearly full", "free some space; `df -h` shows where"),
     warning(

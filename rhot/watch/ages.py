@@ -29,9 +29,12 @@ def ages_of(beats: Iterable[Health]) -> list[Ages]:
         if names["hand"] in found or names["hand"] not in HANDS:
             continue
         pose_ms = stream.latency_p50_ms
-        until_points_ms = points_ms.get(names["hand"], 0.0)
+        # The figures are of each service's own last seconds: on a computer that stutters what lies
+        # behind may seem younger than what it is made of. No stage took less than nothing.
+        until_points_ms = min(points_ms.get(names["hand"], 0.0), pose_ms)
         # Points are due with the frames of one camera, of the first to arrive.
         until_markers_ms = min(markers_ms, default=0.0)
+        until_markers_ms = min(until_markers_ms, until_points_ms or pose_ms)
         found[names["hand"]] = Ages(
             hand=names["hand"],
             tracker_ms=round(until_markers_ms, 3),

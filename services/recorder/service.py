@@ -120,7 +120,7 @@ class _Keeper:
         self.recorder.suspend()
         self._tried_s = asyncio.get_running_loop().time()
         self._service.state = "waiting"
-        self._service.faults.report("disk_full", str(error), str(self.recorder.folder))
+        self._service.faults.report("disk_full", error.cause, str(self.recorder.folder))
 
     async def look_every_second(self, subscriptions: Subscriptions) -> None:
         """Keep the file and the service's health up to date, for ever."""

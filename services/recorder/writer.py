@@ -141,8 +141,7 @@ def check_space(folder: Path, least_bytes: int = MIN_FREE_BYTES) -> None:
     free = shutil.disk_usage(folder).free
     if free < least_bytes:
         raise DiskFullError(
-            f"{folder}: only {free / 1e6:.0f} MB free, recordings need {least_bytes / 1e6:.0f};"
-            " delete old ones or set [recorder] folder"
+            f"{folder}: only {free / 1e6:.0f} MB free, recordings need {least_bytes / 1e6:.0f}"
         )
 
 

@@ -43,6 +43,11 @@ _ENVIRONMENT = {
     "SYSTEMD_PAGER": "",
     "SYSTEMD_COLORS": "0",
 }
+# The network's settings are the namespace's own: a host sets them as a computer does.
+_NSPAWN = {
+    "SYSTEMD_NSPAWN_UNIFIED_HIERARCHY": "1",
+    "SYSTEMD_NSPAWN_API_VFS_WRITABLE": "network",
+}
 _BOOT_S, _STOP_S = 60.0, 40.0
 # The overlay is mounted below the mount point $1 from the disk $2; what follows becomes nspawn.
 _MOUNT_AND_BOOT = """
@@ -111,7 +116,7 @@ class Container:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
-            env=_ENVIRONMENT | {"SYSTEMD_NSPAWN_UNIFIED_HIERARCHY": "1"},
+            env=_ENVIRONMENT | _NSPAWN,
             start_new_session=True,
         )
         log.close()

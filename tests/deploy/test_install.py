@@ -139,6 +139,9 @@ def test_a_pi_is_installed_without_a_network(pi):
     assert pi.run("/opt/rhot/current/bin/rhot-pi-tracker", "--version").strip()
     assert pi.run("stat", "-c", "%U %a", "/var/lib/rhot/calibration").strip() == "rhot 2775"
     assert pi.run("systemctl", "is-enabled", "rhot-pi.target", UNIT).split() == ["enabled"] * 2
+    # 250, in the kernel's own steps.
+    asked_ms = int(pi.run("cat", "/proc/sys/net/ipv4/neigh/eth0/retrans_time_ms"))
+    assert 240 <= asked_ms <= 260
 
 
 def test_the_tracker_waits_for_its_router_and_for_its_colours(pi):
@@ -305,6 +308,7 @@ def test_uninstall_leaves_the_data_and_purge_nothing(pi):
     assert "/var/lib/rhot" in pi.run(RUNS, "uninstall")
     assert pi.processes("rhot") == []
     pi.run("test", "!", "-e", "/opt/rhot")
+    pi.run("test", "!", "-e", "/etc/sysctl.d/60-rhot.conf")
     pi.run("test", "-f", "/etc/rhot/rig.toml")
     assert "rhot-" not in pi.run("systemctl", "list-unit-files", "--no-legend")
     assert "rhot is removed" in pi.run(INSTALL, "uninstall", "--purge")

@@ -7,25 +7,22 @@ not found.
 from __future__ import annotations
 
 import contextlib
-import socket
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-# State of a listening socket in /proc/net/tcp, and how a link to a socket begins.
-_LISTENING, _SOCKET = "0A", "socket:["
+from services.cli.rig.listening_sockets import ListeningSocket, inodes_of, listening_sockets
 
 
 def router_endpoints(proc: Path = Path("/proc")) -> list[str]:
     """`tcp/HOST:PORT` of every Zenoh router that this user may see."""
-    listening = _listening(proc)
+    listening = {one.inode: one for one in listening_sockets(proc)}
     found = {
-        address
+        _endpoint(listening[inode])
         for process in _routers(proc)
-        for inode in _sockets(process)
-        if (address := listening.get(inode)) is not None
+        for inode in inodes_of(process)
+        if inode in listening
     }
-    return sorted(f"tcp/{address}" for address in found)
+    return sorted(found)
 
 
 def _routers(proc: Path) -> Iterator[Path]:
@@ -37,30 +34,6 @@ def _routers(proc: Path) -> Iterator[Path]:
                 yield process
 
 
-def _sockets(process: Path) -> Iterator[str]:
-    with contextlib.suppress(OSError):
-        for link in (process / "fd").iterdir():
-            with contextlib.suppress(OSError):
-                target = str(link.readlink())
-                if target.startswith(_SOCKET):
-                    yield target[len(_SOCKET) : -1]
-
-
-def _listening(proc: Path) -> dict[str, str]:
-    """Inode of every listening TCP socket -> HOST:PORT."""
-    found: dict[str, str] = {}
-    for name, family in (("tcp", socket.AF_INET), ("tcp6", socket.AF_INET6)):
-        with contextlib.suppress(OSError):
-            for line in (proc / "net" / name).read_text().splitlines()[1:]:
-                fields = line.split()
-                if fields[3] == _LISTENING:
-                    found[fields[9]] = _address(fields[1], family)
-    return found
-
-
-def _address(written: str, family: socket.AddressFamily) -> str:
-    """HOST:PORT of `0100007F:1D17`: 32-bit words in this machine's order."""
-    host, _, port = written.partition(":")
-    words = [int(host[k : k + 8], 16) for k in range(0, len(host), 8)]
-    name = socket.inet_ntop(family, struct.pack(f"={len(words)}I", *words))
-    return f"{f'[{name}]' if ':' in name else name}:{int(port, 16)}"
+def _endpoint(one: ListeningSocket) -> str:
+    host = f"[{one.host}]" if ":" in one.host else one.host
+    return f"tcp/{host}:{one.port}"

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import socket
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
+from services.cli.rig.listening_sockets import inodes_of, listening_sockets
 from services.cli.rig.place import host_and_port
-
-# State of a listening socket in /proc/net/tcp.
-_LISTENING = "0A"
 
 
 def taken_ports(endpoints: Iterable[str]) -> dict[int, str]:
@@ -41,20 +39,10 @@ def owner_of(port: int) -> str:
 
     "" if there is none, or it is another user's and so cannot be seen.
     """
-    inodes = {f"socket:[{inode}]" for inode in _listeners(port)}
+    inodes = {one.inode for one in listening_sockets() if one.port == port}
     for process in Path("/proc").glob("[0-9]*") if inodes else ():
-        # Processes end, and those of other users do not show their files.
+        # Processes end meanwhile.
         with contextlib.suppress(OSError):
-            if any(str(file.readlink()) in inodes for file in (process / "fd").iterdir()):
+            if not inodes.isdisjoint(inodes_of(process)):
                 return f"{(process / 'comm').read_text().strip()} (process {process.name})"
     return ""
-
-
-def _listeners(port: int) -> Iterator[str]:
-    """Inodes of the sockets that listen at a port."""
-    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
-        with contextlib.suppress(OSError):
-            for line in Path(table).read_text().splitlines()[1:]:
-                fields = line.split()
-                if fields[3] == _LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
-                    yield fields[9]

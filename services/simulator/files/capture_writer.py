@@ -124,10 +124,7 @@ def _write_pictures(
             video.release()
         # OpenCV does not tell when its writes fail.
         if is_cut_off(capture.video(name)):
-            raise DiskFullError(
-                f"{capture.video(name)}: was cut off: no space left for it; free some space"
-                " (`df -h` shows where), or write elsewhere"
-            )
+            raise DiskFullError(f"{capture.video(name)}: was cut off: no space left for it")
         fix_identifiers(capture.video(name), list(scene.clocks).index(name) + 1)
         write_stamps(capture.stamps(name), stamps)
         written += len(stamps)

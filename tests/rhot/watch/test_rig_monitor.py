@@ -112,6 +112,19 @@ def test_ages_add_up_to_the_age_of_the_pose(all_well):
     assert state.glass_to_pose_ms == {"right": (21.0, 35.0)}
 
 
+def test_no_stage_of_a_computer_that_stutters_took_less_than_nothing(all_well):
+    """Each service's figure is of its own last seconds: points may seem younger than markers."""
+    for camera, age_ms in (("left", 102.0), ("right", 104.0)):
+        markers = stream(f"camera/{camera}/markers", latency_p50_ms=age_ms)
+        all_well.beat(beat("pi_tracker", camera, streams=[markers]), NOW_NS)
+    all_well.beat(
+        beat("fusion", streams=[stream("hand/right/points", latency_p50_ms=84.0)]), NOW_NS
+    )
+    (ages,) = all_well.state(NOW_NS).ages
+    assert (ages.tracker_ms, ages.fusion_ms, ages.solver_ms) == (21.0, 0.0, 0.0)
+    assert ages.tracker_ms + ages.fusion_ms + ages.solver_ms == ages.pose_ms
+
+
 def test_markers_seen_of_expected_by_camera(all_well):
     values = {"markers": 1.0}
     markers = stream("camera/left/markers")

@@ -67,6 +67,8 @@ async def test_a_full_disk_is_a_fault_that_ends_with_space(
         await until(lambda: service.values.get("messages", 0) > 10, publish)
         filler.write_bytes(bytes(120_000_000))
         await until(lambda: "disk_full" in codes(), publish)
+        # What to do about it is the fault's own line, once.
+        assert "free some space" not in service.faults.standing()[0].text
         assert service.values["messages"] > 0
         filler.unlink()
         await until(lambda: "disk_full" not in codes(), publish)
