@@ -29,20 +29,26 @@ class Faults:
         self._random = random.Random(seed)
         self._session = bus.publisher(topics.SESSION)
 
-    def pick(self, *, lethal: bool) -> tuple[str, Fault]:
-        """A fault by its name."""
+    def pick_lethal(self) -> tuple[str, Fault]:
+        """The end of some process."""
         process = self._random.choice(sorted(self._pids))
-        if lethal:
-            return f"kill -9 {process}", lambda: self._kill(process)
+        return f"kill -9 {process}", lambda: self._kill(process)
+
+    def pick(self) -> tuple[str, Fault]:
+        """A fault that leaves all processes alive, by its name."""
+        return self._random.choice(self.every_kind())
+
+    def every_kind(self) -> list[tuple[str, Fault]]:
+        """One of each kind that leaves all processes alive."""
+        process = self._random.choice(sorted(self._pids))
         seconds = round(self._random.uniform(0.5, 4.0), 1)
-        kinds: list[tuple[str, Fault]] = [
+        return [
             (f"{process} stopped for {seconds} s", lambda: self._stop(process, seconds)),
             ("session stopped for 2 s", self._session_off),
             ("2,000 messages of garbage", self._garbage),
             ("JSON nested 32,000 deep on every stream", self._nested),
             ("100 pictures asked for", self._pictures),
         ]
-        return self._random.choice(kinds)
 
     async def _kill(self, process: str) -> None:
         os.kill(self._pids[process], signal.SIGKILL)
@@ -93,6 +99,7 @@ class Faults:
             "object": "cup",
             "service": "fusion",
             "instance": "main",
+            "host": "desk",
         }
         return [
             topic.key(self._bus.rig, **{field: names[field] for field in topic.fields})

@@ -41,7 +41,7 @@ def markdown(run: Run, command: str) -> str:
             f"{last:.1f} ms in the last ({ratio:.2f} times)."
         ),
         "",
-        f"Memory after the first minute (wanted: less than {LIMIT_MB_PER_HOUR:g} MB/h):",
+        f"Memory after warming up (wanted: less than {LIMIT_MB_PER_HOUR:g} MB/h):",
         "",
         "| process | minutes | MB at the end | MB/h | 95 % | restarts |",
         "|---|---|---|---|---|---|",

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import theilslopes
 
-# A process fills its caches in its first minute; what it grows by later would go on growing.
+# A process fills its caches in its first minute, and when it first meets a fault of each kind; what
+# it grows by later would go on growing.
 WARM_UP_S = 60.0
 # A slope needs a stretch of time: over less, allocator steps of a megabyte are all one sees.
 SHORTEST_S = 180.0
@@ -39,6 +40,8 @@ class Run:
     recoveries: list[Recovery] = field(default_factory=list)
     restarts: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
+    # When every kind of fault had been met.
+    warm_s: float = 0.0
     left_over: int = 0
 
 
@@ -58,7 +61,8 @@ def growths(run: Run) -> list[Growth]:
     """The longest life of each process, if it was long enough to tell."""
     longest: dict[str, list[tuple[float, float]]] = {}
     for (process, _), samples in run.memory.items():
-        warm = [sample for sample in samples if sample[0] >= samples[0][0] + WARM_UP_S]
+        from_s = max(run.warm_s, samples[0][0] + WARM_UP_S)
+        warm = [sample for sample in samples if sample[0] >= from_s]
         if len(warm) > len(longest.get(process, [])):
             longest[process] = warm
     found = []

@@ -29,9 +29,9 @@ _SHARED_FROM_BYTES = 65_537
 # Where the limit is reached (8 MB for most users) messages are lost without a word.
 _LOCKED_BYTES = 16 * _POOL_BYTES
 _CAP_IPC_LOCK = 14
-# Tried again so soon that a link's return waits for the neighbour table and for little else: after 8
-# s without a cable at most 1.13 s where ARP asks once a second, 0.47 s where install.sh has set it
-# to four times (deploy/sysctl.d); with pauses of 500 ms 1.22 and 0.71 s.
+# Tried again so soon that a link's return waits for the neighbour table and for little else: after
+# 8 s without a cable at most 1.13 s where ARP asks once a second, 0.47 s where install.sh has set
+# it to four times (deploy/sysctl.d); with pauses of 500 ms 1.22 and 0.71 s.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
 
 

@@ -209,6 +209,11 @@ class Recorder(Table, frozen=True, kw_only=True):
     folder: str = "recordings"
     # Record from the start of `rhot up` on.
     autostart: bool = False
+    # A longer recording goes on in a new file, without a gap: the index of a file is held in memory
+    # until it is finished (20 MB an hour), and a part is easier to copy than a day.
+    part_minutes: Annotated[float, msgspec.Meta(gt=0.0, le=1440.0)] = 60.0
+    # The same for its size.
+    part_mb: Annotated[float, msgspec.Meta(ge=1.0, le=1e6)] = 2000.0
 
 
 class Metrics(Table, frozen=True, kw_only=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 import os
 import re
@@ -37,6 +38,7 @@ _ASK_SESSION_S = 5.0
 _PAGE_MB = resource.getpagesize() / 1e6
 
 
+@functools.cache
 def rhot_version() -> str:
     """Installed version of rhot."""
     try:

@@ -4,9 +4,9 @@ files it writes.
 With [recorder] autostart everything is recorded from the beginning, and a session that starts opens
 a file of its own. Without, only sessions are recorded: messages between them are not kept. Late or
 undecodable payloads are kept as they came; a session message that does not decode starts and stops
-nothing. Sessions that follow each other faster than people start them share a file. A full disk
-raises DiskFullError: `suspend` then closes the file, and `resume` opens another once there is
-space.
+nothing. Sessions that follow each other faster than people start them share a file; a long one has
+several (part_minutes, part_mb). A full disk raises DiskFullError: `suspend` then closes the file,
+and `resume` opens another once there is space.
 """
 
 from __future__ import annotations
@@ -52,7 +52,10 @@ def recording_path(folder: Path, rig: str, start_ns: int) -> Path:
     """`rhot-<rig>-YYYYmmdd-HHMMSS.mcap` of a start (UTC), with -2, -3 ... if that name is taken."""
     iso = str(np.datetime64(start_ns // 10**9, "s"))
     day, _, clock = iso.replace("-", "").replace(":", "").partition("T")
-    stem = f"rhot-{rig}-{day}-{clock}"
+    return _free_path(folder, f"rhot-{rig}-{day}-{clock}")
+
+
+def _free_path(folder: Path, stem: str) -> Path:
     path, number = folder / f"{stem}.mcap", 1
     while path.exists():
         number += 1
@@ -92,6 +95,10 @@ class Recorder:
         self._folder = folder
         self._version = version
         self._writer: RecordingWriter | None = None
+        # When the part that is being written began, and what `bytes` was then.
+        self._part_ns = 0
+        self._part_bytes = 0
+        self._named: Path | None = None
         self._keys = RigKeys(config)
         # The session that is recorded, and the one that was announced last.
         self._session_ns: int | None = None
@@ -119,7 +126,10 @@ class Recorder:
     def start(self, start_ns: int, path: Path | None = None) -> Path:
         """Open a file for what starts at start_ns (closing the one before); raises CaptureError."""
         self.stop()
+        self._named = path
         path = path or recording_path(self._folder, self._config.rig.name, start_ns)
+        # The first look at the clock says when it began: a session's start may be long ago.
+        self._part_ns, self._part_bytes = 0, self.bytes
         self._writer = RecordingWriter(
             path, self._config.rig.name, self._version, attachments(self._config)
         )
@@ -207,13 +217,31 @@ class Recorder:
         self.bytes += len(payload)
 
     def flush(self, now_ns: int) -> None:
-        """Hand whole chunks to the system, and begin or end a session that had to wait.
+        """Hand whole chunks to the system, begin another part where this one is long enough, and
+        begin or end a session that had to wait.
 
         Raises DiskFullError when the disk is nearly full.
         """
         if self._writer is not None:
             self._writer.flush()
+            if self._part_is_full(now_ns):
+                self._begin_part(now_ns)
         self._change_session(now_ns)
+
+    def _part_is_full(self, now_ns: int) -> bool:
+        # A clock that was set back says nothing of how long this part is.
+        self._part_ns = min(self._part_ns or now_ns, now_ns)
+        limits = self._config.recorder
+        return (
+            now_ns - self._part_ns >= limits.part_minutes * 60e9
+            or self.bytes - self._part_bytes >= limits.part_mb * 1e6
+        )
+
+    def _begin_part(self, now_ns: int) -> None:
+        # Parts of a file that somebody named are called after it.
+        named = self._named
+        self.start(now_ns, None if named is None else _free_path(named.parent, named.stem))
+        self._named, self._part_ns = named, now_ns
 
     def _session(self, payload: bytes) -> Session | None:
         try:

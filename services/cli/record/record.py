@@ -86,5 +86,8 @@ async def _record_all(bus: Bus, rig: RigConfig, recorder: Recorder, terminal: Te
             tasks.create_task(record_topic(recorder, topic, samples))
         while True:
             await asyncio.sleep(_STATUS_PERIOD_S)
+            before = recorder.path
             recorder.flush(clock.now_ns())
+            if recorder.path != before:
+                terminal.line(f"going on in {recorder.path}")
             terminal.status(f"{recorder.messages} messages, {recorder.bytes / 1e6:.2f} MB")

@@ -163,3 +163,43 @@ def test_ten_thousand_names_leave_room_for_the_rigs_own(recorder: Recorder) -> N
     point(recorder)
     assert recorder.refused == 10_000 - 64
     assert recorder.messages == 1 + 64 + 1
+
+
+def parts(tmp_path: Path, **limits: float) -> Recorder:
+    config = RigConfig(folder=str(tmp_path), recorder=RecorderTable(**limits))
+    return Recorder(config, tmp_path, follow_sessions=False)
+
+
+def test_a_long_recording_goes_on_in_another_file_without_a_gap(tmp_path: Path) -> None:
+    recorder = parts(tmp_path, part_minutes=1.0)
+    recorder.start(START_NS)
+    for second in range(150):
+        recorder.add(topics.POINTS, "rhot/desk/hand/right/points", b"%d" % second, second)
+        recorder.flush(START_NS + second * 10**9)
+    recorder.stop()
+    files = sorted(tmp_path.glob("*.mcap"))
+    assert [path.name[-11:-5] for path in files] == ["221320", "221420", "221520"]
+    kept = [int(record.payload) for path in files for record in read(path)]
+    assert kept == list(range(150))
+
+
+def test_parts_by_size_of_a_file_with_a_name_are_called_after_it(tmp_path: Path) -> None:
+    recorder = parts(tmp_path, part_mb=1.0)
+    recorder.start(START_NS, tmp_path / "mine.mcap")
+    for second in range(5):
+        recorder.add(topics.POINTS, "rhot/desk/hand/right/points", b"x" * 600_000, second)
+        recorder.flush(START_NS + second)
+    recorder.stop()
+    files = [tmp_path / name for name in ("mine.mcap", "mine-2.mcap", "mine-3.mcap")]
+    assert [len(list(read(path))) for path in files] == [2, 2, 1]
+
+
+def test_a_clock_that_is_set_back_begins_no_part_early_and_none_never(tmp_path: Path) -> None:
+    recorder = parts(tmp_path, part_minutes=1.0)
+    recorder.start(START_NS)
+    for at_s in (0, -3600, -3600 + 59):
+        recorder.flush(START_NS + at_s * 10**9)
+    assert len(list(tmp_path.glob("*.mcap"))) == 1
+    recorder.flush(START_NS + (-3600 + 61) * 10**9)
+    assert len(list(tmp_path.glob("*.mcap"))) == 2
+    recorder.stop()
