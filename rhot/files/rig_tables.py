@@ -164,11 +164,17 @@ class ObjectTable(Table, frozen=True, kw_only=True):
 
 
 class Objects(Table, frozen=True, kw_only=True):
-    # steamvr, libsurvive, replay:FILE, simulator, or network (poses arrive on the bus from
-    # elsewhere).
+    # steamvr, libsurvive, replay:FILE (any recording of poses), playback:FILE.rec.gz (by
+    # libsurvive), simulator, or network (poses arrive on the bus from elsewhere).
     source: str = "simulator"
     # Poses a second; SteamVR's own rate is 90.
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 90.0
+    # Further arguments of libsurvive's survive-cli: ["--lighthouse-gen", "2"].
+    arguments: list[str] = []
+    # Of a replay: 2 plays it in half its time, and poses are stamped as of now.
+    speed: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)] = 1.0
+    # Of a replay: begin anew at its end; poses are stamped as of now.
+    loop: bool = False
 
 
 class HandTable(Table, frozen=True, kw_only=True):

@@ -21,13 +21,12 @@ from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.registration import load_registration
 from services.object_tracker.sources import PoseSource, open_source
+from services.object_tracker.sources.retry_pause import RetryPause
 from services.object_tracker.step import ObjectStep
 from services.object_tracker.unknown_devices import UnknownDevices
 
 # OpenVR has 64 device slots; a source that names more devices is broken.
 _MAX_DEVICES = 64
-# SteamVR takes some seconds to start; trying is cheap.
-_RETRY_S = 3.0
 _LOOK_S = 1.0
 
 
@@ -72,21 +71,23 @@ async def _name_unknown(service: Service, unknown: UnknownDevices) -> None:
 
 async def _keep_source(service: Service, source: PoseSource) -> None:
     """Publish the poses of a source; one that fails is tried again, a file ends in peace."""
+    pause = RetryPause()
     while True:
         try:
-            await _publish_source(service, source)
+            await _publish_source(service, source, pause)
             return
         except SourceError as error:
             service.faults.report("source_lost", str(error), service.config.objects.source)
-            await asyncio.sleep(_RETRY_S)
+            await asyncio.sleep(pause.after_failure())
 
 
-async def _publish_source(service: Service, source: PoseSource) -> None:
+async def _publish_source(service: Service, source: PoseSource, pause: RetryPause) -> None:
     """Publish the poses of a source, one stream for each device."""
     publishers: dict[str, Publisher[OpenVrPose]] = {}
     async with contextlib.aclosing(source.poses()) as poses:
         async for pose in poses:
             service.faults.clear("source_lost", service.config.objects.source)
+            pause.succeeded()
             serial = pose.device.serial
             if serial not in publishers:
                 if len(publishers) >= _MAX_DEVICES:

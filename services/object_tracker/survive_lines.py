@@ -5,8 +5,10 @@ Pure. Lines of interest (metres, seconds, wxyz, z up):
     t object CONFIG {json}                 the device's own configuration, with its serial number
     t object POSE x y z qw qx qy qz
     t object VELOCITY vx vy vz wx wy wz    follows the POSE of the same instant, usually
-Everything else (raw light, IMU, logs) and every malformed line is skipped; malformed POSE lines are
-counted. When libsurvive loses a device it prints no more lines for it.
+    t object DISCONNECT                    the device is gone: unplugged, switched off
+    t INFO LOG text                        what libsurvive has to say
+Everything else (raw light, IMU) and every malformed line is skipped; malformed POSE lines are
+counted. A device that sees no light has no lines of its own.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -37,7 +40,8 @@ class SurvivePose:
     """One POSE line with its VELOCITY (zero if there was none), in libsurvive's z-up frame.
 
     time_s counts from the start of survive-cli; serial is the device's own if its CONFIG line came
-    before, else its code name.
+    before, else its code name. tracking is "lost" for a device without a pose just now, and "gone"
+    after its DISCONNECT line; the numbers are then neutral.
     """
 
     time_s: float
@@ -47,6 +51,16 @@ class SurvivePose:
     orientation_wxyz: tuple[float, float, float, float]
     velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
+    tracking: Literal["ok", "lost", "gone"] = "ok"
+
+
+def without_pose(
+    pose: SurvivePose, time_s: float, tracking: Literal["lost", "gone"]
+) -> SurvivePose:
+    """The same device at another time, without a pose."""
+    return SurvivePose(
+        time_s, pose.device, pose.serial, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tracking=tracking
+    )
 
 
 class SurviveParser:
@@ -59,7 +73,7 @@ class SurviveParser:
 
     def feed(self, line: str) -> SurvivePose | None:
         """The pose completed by this line, if any."""
-        time, _, rest = line.partition(" ")
+        time, _, rest = line.rstrip().partition(" ")
         device, _, rest = rest.partition(" ")
         word, _, rest = rest.partition(" ")
         if word == "VELOCITY" and self._pending is not None and self._pending.device == device:
@@ -68,6 +82,8 @@ class SurviveParser:
         if word == "POSE":
             self._pending = self._pose(time, device, rest)
             self.malformed += self._pending is None
+        elif word == "DISCONNECT":
+            self._pending = self._gone(time, device)
         elif (
             word == "CONFIG"
             and _DEVICE.match(device)
@@ -94,10 +110,20 @@ class SurviveParser:
             t, device, self._serials.get(device, device), (x, y, z), (qw, qx, qy, qz)
         )
 
+    def _gone(self, time: str, device: str) -> SurvivePose | None:
+        numbers = _numbers(time, 1)
+        if numbers is None or numbers[0] < 0.0 or not _DEVICE.match(device):
+            return None
+        serial = self._serials.get(device, device)
+        nowhere = SurvivePose(numbers[0], device, serial, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        return without_pose(nowhere, numbers[0], "gone")
+
     def _with_velocity(self, time: str, rest: str) -> SurvivePose | None:
         done = self.flush()
         numbers = _numbers(f"{time} {rest}", 7)
         if done is None or numbers is None or numbers[0] != done.time_s:
+            return done
+        if done.tracking != "ok":
             return done
         _, vx, vy, vz, wx, wy, wz = numbers
         return replace(done, velocity_m_s=(vx, vy, vz), angular_velocity_rad_s=(wx, wy, wz))
@@ -152,7 +178,11 @@ class RunClock:
 
 
 def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
-    """The same pose as SteamVR would report it: y up, OpenVR's field names, Running_OK."""
+    """The same pose as SteamVR would report it: y up, OpenVR's field names, Running_OK.
+
+    A device without a pose is Running_OutOfRange and not valid, one that is gone not connected
+    either.
+    """
     R = R_LIGHTHOUSE_FROM_SURVIVE
     rotation = (R @ rotation_from_quaternion(pose.orientation_wxyz)).tolist()
     position = (R @ np.array(pose.position_m)).tolist()
@@ -173,7 +203,7 @@ def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
         mDeviceToAbsoluteTracking=rows,  # type: ignore[arg-type]
         vVelocity=tuple((R @ np.array(pose.velocity_m_s)).tolist()),
         vAngularVelocity=tuple((R @ np.array(pose.angular_velocity_rad_s)).tolist()),
-        eTrackingResult=200,
-        bPoseIsValid=True,
-        bDeviceIsConnected=True,
+        eTrackingResult=200 if pose.tracking == "ok" else 201,
+        bPoseIsValid=pose.tracking == "ok",
+        bDeviceIsConnected=pose.tracking != "gone",
     )

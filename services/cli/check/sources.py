@@ -5,14 +5,17 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
+from rhot.errors import RhotError
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from services.cli.check.problems import Problem, error, warning
+from services.object_tracker.recorded.recording import UNNAMED, kind_of, read_poses
+from services.object_tracker.sources.survive_command import survive_command
 
 _CAMERA_SOURCES = (
     "picamera2[:N], v4l2:N or v4l2:/dev/..., video:FILE, folder:DIR, capture:DIR, simulator"
 )
-_OBJECT_SOURCES = "steamvr, libsurvive, replay:FILE, simulator, network"
+_OBJECT_SOURCES = "steamvr, libsurvive, replay:FILE, playback:FILE.rec.gz, simulator, network"
 
 
 def check_camera_source(
@@ -62,10 +65,11 @@ def check_object_source(config: RigConfig, path: Path) -> list[Problem]:
         return []
     kind, _, detail = config.objects.source.partition(":")
     where = f"[objects] source = {config.objects.source!r}"
-    if kind == "replay" and detail:
-        target = Path(config.folder) / detail
-        return [] if target.is_file() else [error(path, f"{where}: there is no file {target}")]
-    if detail or kind not in ("steamvr", "libsurvive", "simulator", "network"):
+    if kind in ("replay", "playback") and detail:
+        return _check_recording(config, kind, Path(config.folder) / detail, where, path)
+    if kind == "libsurvive" and not detail:
+        return _check_survive(where, path)
+    if detail or kind not in ("steamvr", "simulator", "network"):
         return [error(path, f"{where}: is no source; valid: {_OBJECT_SOURCES}")]
     if kind == "simulator" and not any(camera.source == "simulator" for camera in config.camera):
         text = (
@@ -73,4 +77,37 @@ def check_object_source(config: RigConfig, path: Path) -> list[Problem]:
             f"valid: {_OBJECT_SOURCES}"
         )
         return [warning(path, text)]
+    return []
+
+
+def _check_recording(
+    config: RigConfig, kind: str, target: Path, where: str, path: Path
+) -> list[Problem]:
+    """Whether a recording of poses is there and of a known kind, and names its devices."""
+    if not target.exists():
+        return [error(path, f"{where}: there is no file {target}")]
+    try:
+        found = kind_of(target)
+        first = next(iter(read_poses(target))) if kind == "replay" else None
+    except RhotError as wrong:
+        return [error(path, f"{where}: {wrong}")]
+    if kind == "playback":
+        if found != "libsurvive":
+            return [error(path, f"{where}: this is no recording of libsurvive; use replay:FILE")]
+        return _check_survive(where, path)
+    if first is not None and first.device.serial == UNNAMED and len(config.object) > 1:
+        text = (
+            f"{where}: the recording names no device, and there is more than one [[object]]; give"
+            f" one of them the serial {UNNAMED!r}"
+        )
+        return [warning(path, text)]
+    return []
+
+
+def _check_survive(where: str, path: Path) -> list[Problem]:
+    """Whether libsurvive can be run on this machine (it need not be the one that has trackers)."""
+    try:
+        survive_command()
+    except RhotError as wrong:
+        return [warning(path, f"{where}: {wrong}")]
     return []

@@ -8,7 +8,6 @@ before them, and CSV files whose header says what is in them.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -109,9 +108,8 @@ def time_scale(time: float) -> float:
 
 
 def _unit_of(word: str) -> tuple[str, float]:
-    """A name without its unit, and the unit; `x_m`, `time [ms]` and `t (s)` have one."""
-    plain = re.sub(r"\s*[\[(](\w+)[\])]\Z", r"_\1", word)
+    """A name without its unit, and the unit, as in `x_mm`."""
     for ending, scale in _UNITS.items():
-        if plain.endswith(ending) and len(plain) > len(ending):
-            return plain.removesuffix(ending), scale
-    return plain, 1.0
+        if word.endswith(ending) and len(word) > len(ending):
+            return word.removesuffix(ending), scale
+    return word, 1.0

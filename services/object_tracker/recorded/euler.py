@@ -26,7 +26,10 @@ def rotation_from_triad_angles(yaw_deg: float, pitch_deg: float, roll_deg: float
     """
     yaw, pitch, roll = np.radians([yaw_deg, pitch_deg, roll_deg])
     cos_yaw, cos_pitch = float(np.cos(yaw)), float(np.cos(pitch))
-    if abs(cos_pitch) < _LEAST_COSINE or cos_yaw * np.sign(cos_pitch) < -_ROUNDING:
+    # Written so that NaN fails it.
+    if not abs(cos_pitch) >= _LEAST_COSINE or not np.isfinite([cos_yaw, roll]).all():
+        return None
+    if cos_yaw * np.sign(cos_pitch) < -_ROUNDING:
         return None
     theta = -float(np.arctan(cos_yaw * np.sin(pitch) / cos_pitch))
     rotation: Array = rotation_z(yaw) @ rotation_y(theta) @ rotation_x(roll)

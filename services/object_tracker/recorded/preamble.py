@@ -11,6 +11,8 @@ from services.object_tracker.recorded.columns import Columns, columns_of_header,
 _SEPARATORS = re.compile(r"[\s,;\[\]()]+")
 _FREQUENCY = re.compile(r"\bFreq: *([0-9]{1,5}(?:\.[0-9]{1,5})?)")
 _BEGAN = re.compile(r"\bcurrent Time: *(\d{4})-(\d\d)-(\d\d)[-T ](\d\d):(\d\d):(\d\d)")
+# A column's unit in brackets: `x [mm]`.
+_UNIT = re.compile(r"\s*[\[(](\w{1,2})[\])]")
 # What triad_openvr's print_discovered_objects says of a tracker; its scripts read tracker_1.
 _TRACKER = re.compile(r"\s*tracker_1 \(([A-Za-z0-9][A-Za-z0-9_.-]{0,63}),")
 # triad_openvr's own scripts sample at 250 Hz.
@@ -35,12 +37,13 @@ class Preamble:
         if began := _BEGAN.search(line):
             self.began_s = float(calendar.timegm(tuple(map(int, began.groups()))))
         comment = line.lstrip().startswith("#")
-        words = words_of(line.lstrip("# \t").partition(" Freq:")[0])
+        names = line.lstrip("# \t").partition(" Freq:")[0]
+        words = words_of(names)
         numbers = [number_of(word) for word in row_words(words)]
         if numbers and not comment and None not in numbers:
             self.columns = columns_of_row([number for number in numbers if number is not None])
             return self.columns is not None
-        self.columns = columns_of_header(words)
+        self.columns = columns_of_header(words_of(_UNIT.sub(r"_\1", names)))
         return False
 
 

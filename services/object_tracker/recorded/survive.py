@@ -20,11 +20,12 @@ def read_survive(path: Path) -> Iterator[OpenVrPose]:
     parser, seq = SurviveParser(), 0
     for _, line in text_lines(path):
         pose = parser.feed(line)
-        if pose is not None:
+        # Devices are told to be gone when the recording ends: that is no news of them.
+        if pose is not None and pose.tracking == "ok":
             yield openvr_pose(pose, seq, round(min(pose.time_s, 9e9) * 1e9))
             seq += 1
     last = parser.flush()
-    if last is not None:
+    if last is not None and last.tracking == "ok":
         yield openvr_pose(last, seq, round(min(last.time_s, 9e9) * 1e9))
     elif seq == 0:
         raise CaptureError(

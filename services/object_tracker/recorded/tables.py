@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,8 @@ _LONGEST_PREAMBLE = 100
 # A quaternion whose length is off by more than this is no rotation (near 180 deg triad_openvr
 # divides noise by noise: 4 w).
 _UNIT_TOLERANCE = 1e-3
+# Year 2255: what a stamp in nanoseconds can hold; a later time, or none at all, becomes 0.
+_LATEST_S = 9e9
 
 
 def read_table(path: Path, serial: str) -> Iterator[OpenVrPose]:
@@ -137,15 +140,13 @@ class _Rows:
         if text is None:
             return round((self._preamble.began_s + self.count / self._preamble.rate_hz) * 1e9)
         time = numbers["time"]
-        if not np.isfinite(time):
-            return 0
         if self._time_scale == 0.0:
             scale = self._columns.scale("time")
             self._time_scale = scale if scale else time_scale(time)
-        # float64 holds nanoseconds since 1970 to a quarter of a microsecond only.
-        if self._time_scale == 1e-9 and text.isdecimal():
-            return int(text)
-        return round(time * self._time_scale * 1e9)
+        if not abs(time * self._time_scale) < _LATEST_S:
+            return 0
+        # Decimal: float64 holds nanoseconds since 1970 to a quarter of a microsecond only.
+        return round(Decimal(text) * round(self._time_scale * 1e9))
 
     def _transform(self, numbers: dict[str, float], survive: bool) -> Array | None:
         """T_lighthouse_from_tracker (3, 4); None if these numbers are no rotation."""

@@ -1,8 +1,8 @@
 """Sources of tracked devices' poses behind one interface; `[objects] source` of rig.toml chooses.
 
-steamvr and libsurvive read real lighthouses, replay reads an objects.jsonl. With simulator and
-network the poses are on the bus already. A source that cannot be opened, or fails for good, raises
-SourceError; systemd (or `rhot up`) tries again.
+steamvr and libsurvive read real lighthouses, replay a recording's poses, playback has libsurvive
+solve its own recording again. With simulator and network the poses are on the bus already. A source
+that cannot be opened, or fails for good, raises SourceError; systemd (or `rhot up`) tries again.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import Protocol
 from rhot.errors import SourceError
 from rhot.files.config import RigConfig
 from rhot.messages.objects import OpenVrPose
-from services.object_tracker.sources.libsurvive import LibSurvive
+from services.object_tracker.recorded.recording import UNNAMED
+from services.object_tracker.sources.libsurvive import LibSurvive, Playback
 from services.object_tracker.sources.replay import Replay
 from services.object_tracker.sources.steamvr import SteamVr
 
@@ -35,17 +36,23 @@ def open_source(config: RigConfig, report: Report) -> PoseSource | None:
     report takes warnings: what a user should know although the source goes on. Raises SourceError
     for an unknown name.
     """
-    kind, _, detail = config.objects.source.partition(":")
+    table = config.objects
+    kind, _, detail = table.source.partition(":")
     match kind:
         case "simulator" | "network" if not detail:
             return None
         case "steamvr" if not detail:
             return SteamVr(config.objects.rate_hz, report)
         case "libsurvive" if not detail:
-            return LibSurvive()
+            return LibSurvive(table.arguments)
+        case "playback" if detail:
+            return Playback(Path(config.folder) / detail, table.arguments)
         case "replay" if detail:
-            return Replay(Path(config.folder) / detail)
+            # A recording that names no device is of the rig's one object.
+            serial = config.object[0].serial if len(config.object) == 1 else UNNAMED
+            path = Path(config.folder) / detail
+            return Replay(path, serial, speed=table.speed, loop=table.loop)
     raise SourceError(
-        f"[objects] source = {config.objects.source!r} is unknown;"
-        " valid: steamvr, libsurvive, replay:FILE (an objects.jsonl), simulator, network"
+        f"[objects] source = {table.source!r} is unknown;"
+        " valid: steamvr, libsurvive, replay:FILE, playback:FILE.rec.gz, simulator, network"
     )

@@ -1,83 +1,151 @@
 """Poses from libsurvive: runs its `survive-cli --record-stdout` and parses the lines it prints.
 
-If survive-cli is missing or ends, SourceError is raised. A device that libsurvive loses sends no
-more poses. Its own log goes to our standard error, that is, to the journal. Cancelling ends the
-subprocess.
+If survive-cli is missing, ends, or hangs, SourceError says so with its last words; who called tries
+again. A device that libsurvive loses gets poses that are not valid: at once when it is unplugged,
+after a fifth of a second when it sees no light. Cancelling ends the child process.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-from asyncio.subprocess import PIPE, Process
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Iterator, Sequence
+from pathlib import Path
 
 from rhot import clock
 from rhot.errors import SourceError
 from rhot.messages.objects import OpenVrPose
-from services.object_tracker.survive_lines import RunClock, SurviveParser, openvr_pose
+from services.object_tracker.sources.child_process import ChildProcess, start
+from services.object_tracker.sources.survive_command import INSTALL, OUTPUT, survive_command
+from services.object_tracker.survive_lines import (
+    RunClock,
+    SurviveParser,
+    SurvivePose,
+    openvr_pose,
+    without_pose,
+)
 
-# A device's CONFIG line is some 6 kB; a line longer than this is damaged and is skipped.
-_LONGEST_LINE = 1 << 20
-# survive-cli ends within a fraction of a second of SIGTERM; one that hangs is killed.
-_TERMINATE_S = 2.0
+# A device prints its motion 1000 times a second, whether it sees light or not; without a device
+# nothing comes. Starting again costs nothing then, and is what a survive-cli that hangs needs.
+_SILENT_S = 30.0
+# Poses come every 8 ms (vive/libsurvive), with gaps of up to 60 ms.
+_LOST_AFTER_S = 0.2
+# libsurvive names a few devices at most.
+_MOST_DEVICES = 64
 
 
 class LibSurvive:
-    """survive-cli as a source; `command` starts it."""
+    """survive-cli as a source. `command` starts it (None: what is installed here); `arguments` are
+    further ones of survive-cli.
+    """
 
-    def __init__(self, command: Sequence[str] = ("survive-cli", "--record-stdout")) -> None:
-        self._command = tuple(command)
+    def __init__(
+        self,
+        arguments: Sequence[str] = (),
+        command: Sequence[str] | None = None,
+        silent_s: float = _SILENT_S,
+    ) -> None:
+        self._arguments = tuple(arguments)
+        self._command = command
+        self._silent_s = silent_s
 
     async def poses(self) -> AsyncGenerator[OpenVrPose]:
-        """Poses of every device libsurvive tracks; its run time is converted to wall-clock time."""
-        process = await self._start()
-        try:
-            parser, run_clock, seq = SurviveParser(), RunClock(), 0
-            while line := await _next_line(process):
-                arrival_ns = clock.now_ns()
-                pose = parser.feed(line.decode("utf-8", "replace"))
-                if pose is not None:
-                    yield openvr_pose(pose, seq, run_clock.stamp_ns(pose.time_s, arrival_ns))
-                    seq += 1
-            code = await process.wait()
-        finally:
-            await _stop(process)
-        raise SourceError(
-            f"{self._command[0]} ended with exit code {code}; see its messages above,"
-            " check the tracker's USB and run `survive-cli` by itself"
-        )
+        """Poses of every device libsurvive tracks, stamped with this machine's clock.
 
-    async def _start(self) -> Process:
-        try:
-            return await asyncio.create_subprocess_exec(
-                *self._command, stdout=PIPE, limit=_LONGEST_LINE
-            )
-        except OSError as error:
+        Ends only by SourceError.
+        """
+        command = survive_command() if self._command is None else tuple(self._command)
+        child = await start([*command, *OUTPUT, *self._arguments], INSTALL)
+        async with contextlib.aclosing(_poses(child, self._silent_s)) as poses:
+            async for pose in poses:
+                yield pose
+        raise SourceError(f"survive-cli {_told('ended', child)}")
+
+
+class Playback:
+    """A recording of libsurvive's, solved again by survive-cli in real time."""
+
+    def __init__(self, path: Path, arguments: Sequence[str] = ()) -> None:
+        self._path = path
+        self._arguments = ("--playback", str(path), "--playback-factor", "1", *arguments)
+
+    async def poses(self) -> AsyncGenerator[OpenVrPose]:
+        """Poses as libsurvive computes them; ends with the recording.
+
+        Raises SourceError if survive-cli fails, or computes none.
+        """
+        if not self._path.is_file():
+            raise SourceError(f"there is no file {self._path}; correct [objects] source")
+        child = await start([*survive_command(), *OUTPUT, *self._arguments], INSTALL)
+        count = 0
+        async with contextlib.aclosing(_poses(child, _SILENT_S)) as poses:
+            async for pose in poses:
+                count += pose.bPoseIsValid
+                yield pose
+        if count == 0:
             raise SourceError(
-                f"cannot start {self._command[0]}: {error.strerror}; install libsurvive so that"
-                " `survive-cli` is on the PATH, or choose another [objects] source"
-            ) from None
+                f"libsurvive computed no pose from {self._path}: it needs light and motion (lines"
+                " W or C, and i or I); if the file has POSE lines, play them with"
+                f' source = "replay:{self._path.name}"'
+            )
 
 
-async def _next_line(process: Process) -> bytes:
-    """The next line, empty at the end; over-long ones are skipped."""
-    while True:
-        try:
-            return await process.stdout.readline() if process.stdout else b""
-        except ValueError:
-            continue
-
-
-async def _stop(process: Process) -> None:
-    if process.returncode is not None:
-        return
-    with contextlib.suppress(ProcessLookupError):
-        process.terminate()
+async def _poses(child: ChildProcess, silent_s: float) -> AsyncGenerator[OpenVrPose]:
+    """What a run of libsurvive tells, until it ends with code 0; SourceError for any other end."""
+    reader, end = _Reader(child), ""
     try:
-        # Its pipe is read to the end: one that nobody reads would stay open.
-        await asyncio.wait_for(process.communicate(), _TERMINATE_S)
-    except TimeoutError:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+        async with contextlib.aclosing(child.lines(silent_s)) as groups:
+            async for lines in groups:
+                for pose in reader.read(lines, clock.now_ns()):
+                    yield pose
+        for pose in reader.read([], clock.now_ns()):
+            yield pose
+    except SourceError as error:
+        end = str(error)
+    finally:
+        how = await child.stop()
+    if end or child.code != 0:
+        raise SourceError(f"survive-cli {_told(end or how, child)}")
+
+
+def _told(what: str, child: ChildProcess) -> str:
+    words = "; ".join(child.last_words) or "nothing"
+    return (
+        f"{what}; it said: {words}. Check the tracker's USB and udev rules, and run `survive-cli`"
+        " by itself"
+    )
+
+
+class _Reader:
+    """Lines of one run of libsurvive, to poses; devices that fell silent, too."""
+
+    def __init__(self, child: ChildProcess) -> None:
+        self._child = child
+        self._parser, self._run_clock, self._seq = SurviveParser(), RunClock(), 0
+        # The newest pose of each device that has one, and when it came.
+        self._tracked: dict[str, tuple[SurvivePose, int]] = {}
+
+    def read(self, lines: Sequence[str], now_ns: int) -> Iterator[OpenVrPose]:
+        """What lines that came together say."""
+        for line in lines:
+            pose = self._parser.feed(line)
+            if " LOG " in line[:40]:
+                self._child.note(line.partition(" LOG ")[2])
+            if pose is None:
+                continue
+            if pose.tracking != "ok":
+                self._tracked.pop(pose.device, None)
+            elif pose.device in self._tracked or len(self._tracked) < _MOST_DEVICES:
+                self._tracked[pose.device] = pose, now_ns
+            yield self._message(pose, now_ns)
+        if not lines and (waiting := self._parser.flush()) is not None:
+            yield self._message(waiting, now_ns)
+        for device, (pose, came_ns) in list(self._tracked.items()):
+            silent_s = 1e-9 * (now_ns - came_ns)
+            if silent_s > _LOST_AFTER_S:
+                del self._tracked[device]
+                yield self._message(without_pose(pose, pose.time_s + silent_s, "lost"), now_ns)
+
+    def _message(self, pose: SurvivePose, now_ns: int) -> OpenVrPose:
+        message = openvr_pose(pose, self._seq, self._run_clock.stamp_ns(pose.time_s, now_ns))
+        self._seq += 1
+        return message

@@ -96,17 +96,18 @@ async def test_a_source_that_fails_is_tried_again(
     def lost(service: Service) -> list[str]:
         return [f.text for f in service.faults.standing() if f.code == "source_lost"]
 
+    command = tmp_path / "survive-cli"
+    command.write_text("#!/bin/sh\necho no access to USB >&2\nexit 3\n")
+    command.chmod(0o755)
     async with running("object_tracker", serve, rig(tmp_path, "libsurvive")) as (service, _):
         while not lost(service):
             await asyncio.sleep(0.05)
-        assert "install libsurvive" in lost(service)[0]
+        assert "ended with exit code 3; it said: no access to USB" in lost(service)[0]
         assert service.state == "running"
-        # It is installed, and its first poses end the fault.
-        command = tmp_path / "survive-cli"
+        # It is mended, and its first poses end the fault.
         command.write_text(
             f"#!/bin/sh\nzcat {vive}/libsurvive/tracker-cal-attempt.rec.gz\nexec sleep 60\n"
         )
-        command.chmod(0o755)
         while lost(service):
             await asyncio.sleep(0.05)
 

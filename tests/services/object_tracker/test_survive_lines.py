@@ -35,6 +35,7 @@ def test_real_recording(vive: Path) -> None:
         poses = [pose for line in file if (pose := parser.feed(line)) is not None]
     with gzip.open(vive / "libsurvive" / "poses_tracker-cal-attempt.csv.gz", "rt") as file:
         expected = [row for row in csv.DictReader(file) if row["kind"] == "POSE"]
+    assert poses.pop().tracking == "gone"  # its last line of the device: DISCONNECT
     assert len(poses) == len(expected) == 4407
     assert parser.malformed == 0
     assert {pose.serial for pose in poses} == {"LHR-BAB3D7B1"}
@@ -67,6 +68,24 @@ def test_a_pose_is_given_at_the_next_line_of_any_kind() -> None:
     assert parser.feed("1.0 WM0 POSE 1 2 3 1 0 0 0") is None
     assert parser.feed("1.0 T20 POSE 1 2 3 1 0 0 0").device == "WM0"  # type: ignore[union-attr]
     assert parser.feed("1.0 WM0 VELOCITY 1 1 1 1 1 1").device == "T20"  # type: ignore[union-attr]
+
+
+def test_a_device_that_is_gone() -> None:
+    """Its pose before comes out first; its serial stays; a message of it is no valid pose."""
+    pose, gone = read(
+        [
+            '0.1 WM0 CONFIG {"device_serial_number": "LHR-1"}',
+            "1.5 WM0 POSE 1 2 3 1 0 0 0",
+            "1.6 WM0 DISCONNECT\r\n",
+            "1.6 WM0 VELOCITY 1 2 3 4 5 6",
+        ]
+    )
+    assert (pose.tracking, gone.tracking, gone.serial, gone.time_s) == ("ok", "gone", "LHR-1", 1.6)
+    assert gone.velocity_m_s == (0.0, 0.0, 0.0)
+    message = openvr_pose(gone, 0, 0)
+    assert not message.bPoseIsValid
+    assert not message.bDeviceIsConnected
+    assert read(["x WM0 DISCONNECT", "-1 WM0 DISCONNECT", "1 ../W DISCONNECT"]) == []
 
 
 @pytest.mark.parametrize(
