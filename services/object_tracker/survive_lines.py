@@ -5,6 +5,7 @@ Pure. Lines of interest (metres, seconds, wxyz, z up):
     t object CONFIG {json}                 the device's own configuration, with its serial number
     t object POSE x y z qw qx qy qz
     t object VELOCITY vx vy vz wx wy wz    follows the POSE of the same instant, usually
+    t channel LH_POSE x y z qw qx qy qz id where it has found a lighthouse
     t object DISCONNECT                    the device is gone: unplugged, switched off
     t INFO LOG text                        what libsurvive has to say
 Everything else (raw light, IMU) and every malformed line is skipped; malformed POSE lines are
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import math
 import re
+import zlib
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,12 +27,17 @@ from rhot.messages import Vec3
 from rhot.messages.objects import OpenVrDevice, OpenVrPose
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
+# Lighthouses of the second generation have 16 channels.
+_CHANNEL = re.compile(r"1?[0-9]\Z")
 _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{0,63})"')
 # libsurvive's z-up world to the `lighthouse` frame of docs/reference/frames.md (x right, y up, -z
 # forward): -90 deg about x.
 R_LIGHTHOUSE_FROM_SURVIVE: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 # libsurvive names a few devices at most; more names are damaged lines.
 _MAX_DEVICES = 64
+# The VELOCITY of a pose was printed 20 to 60 us after it (0.1 ms on a busy machine) by libsurvive
+# 1.1.21 live, and at the same time in a recording; poses are 4 ms apart at least.
+_SAME_S = 2e-3
 # libsurvive rounds to 1e-6; a quaternion whose length is off by more than this is no rotation.
 _UNIT_TOLERANCE = 1e-3
 
@@ -68,6 +75,7 @@ class SurviveParser:
 
     def __init__(self) -> None:
         self._serials: dict[str, str] = {}
+        self._lighthouses: dict[str, str] = {}
         self._pending: SurvivePose | None = None
         self.malformed = 0
 
@@ -82,6 +90,8 @@ class SurviveParser:
         if word == "POSE":
             self._pending = self._pose(time, device, rest)
             self.malformed += self._pending is None
+        elif word == "LH_POSE" and _CHANNEL.match(device):
+            self._lighthouses[device] = rest
         elif word == "DISCONNECT":
             self._pending = self._gone(time, device)
         elif (
@@ -93,6 +103,17 @@ class SurviveParser:
             if serial:
                 self._serials[device] = serial[1]
         return done
+
+    @property
+    def universe(self) -> str:
+        """The name of the frame that poses are in: another one when a lighthouse is elsewhere.
+
+        libsurvive's world is where its lighthouses are, and each of its calibrations moves it.
+        """
+        if not self._lighthouses:
+            return "libsurvive"
+        places = "\n".join(sorted(f"{name} {rest}" for name, rest in self._lighthouses.items()))
+        return f"libsurvive:{zlib.crc32(places.encode('utf-8', 'replace')):08x}"
 
     def flush(self) -> SurvivePose | None:
         """The pose that is still waiting when the lines end."""
@@ -121,7 +142,7 @@ class SurviveParser:
     def _with_velocity(self, time: str, rest: str) -> SurvivePose | None:
         done = self.flush()
         numbers = _numbers(f"{time} {rest}", 7)
-        if done is None or numbers is None or numbers[0] != done.time_s:
+        if done is None or numbers is None or not 0.0 <= numbers[0] - done.time_s < _SAME_S:
             return done
         if done.tracking != "ok":
             return done
@@ -177,7 +198,9 @@ class RunClock:
         return max(0, time_ns + min(self._least_ns, previous_ns))
 
 
-def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
+def openvr_pose(
+    pose: SurvivePose, seq: int, stamp_ns: int, universe: str = "libsurvive"
+) -> OpenVrPose:
     """The same pose as SteamVR would report it: y up, OpenVR's field names, Running_OK.
 
     A device without a pose is Running_OutOfRange and not valid, one that is gone not connected
@@ -191,7 +214,7 @@ def openvr_pose(pose: SurvivePose, seq: int, stamp_ns: int) -> OpenVrPose:
         v=1,
         seq=seq,
         stamp_ns=stamp_ns,
-        universe="libsurvive",
+        universe=universe,
         device=OpenVrDevice(
             index=0,
             serial=pose.serial,

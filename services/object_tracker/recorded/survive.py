@@ -22,11 +22,11 @@ def read_survive(path: Path) -> Iterator[OpenVrPose]:
         pose = parser.feed(line)
         # Devices are told to be gone when the recording ends: that is no news of them.
         if pose is not None and pose.tracking == "ok":
-            yield openvr_pose(pose, seq, round(min(pose.time_s, 9e9) * 1e9))
+            yield openvr_pose(pose, seq, round(min(pose.time_s, 9e9) * 1e9), parser.universe)
             seq += 1
     last = parser.flush()
     if last is not None and last.tracking == "ok":
-        yield openvr_pose(last, seq, round(min(last.time_s, 9e9) * 1e9))
+        yield openvr_pose(last, seq, round(min(last.time_s, 9e9) * 1e9), parser.universe)
     elif seq == 0:
         raise CaptureError(
             f"{path}: no POSE lines: libsurvive recorded light and motion, but no poses;"

@@ -146,6 +146,7 @@ class _Reader:
                 yield self._message(without_pose(pose, pose.time_s + silent_s, "lost"), now_ns)
 
     def _message(self, pose: SurvivePose, now_ns: int) -> OpenVrPose:
-        message = openvr_pose(pose, self._seq, self._run_clock.stamp_ns(pose.time_s, now_ns))
+        stamp_ns = self._run_clock.stamp_ns(pose.time_s, now_ns)
+        message = openvr_pose(pose, self._seq, stamp_ns, self._parser.universe)
         self._seq += 1
         return message

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,9 @@ def test_velocity_belongs_to_the_pose_before_it() -> None:
             "1.7 WM0 VELOCITY 9 9 9 9 9 9",
         ]
     )
+    # As libsurvive prints it live: a little later.
+    (live,) = read(["3.809800 SM0 POSE 1 2 3 1 0 0 0", "3.809828 SM0 VELOCITY 1 0 0 0 0 0"])
+    assert live.velocity_m_s == (1.0, 0.0, 0.0)
     assert (first.velocity_m_s, first.angular_velocity_rad_s) == ((0.1, 0.2, 0.3), (4.0, 5.0, 6.0))
     assert second.velocity_m_s == (0.0, 0.0, 0.0)  # of another instant
 
@@ -68,6 +72,25 @@ def test_a_pose_is_given_at_the_next_line_of_any_kind() -> None:
     assert parser.feed("1.0 WM0 POSE 1 2 3 1 0 0 0") is None
     assert parser.feed("1.0 T20 POSE 1 2 3 1 0 0 0").device == "WM0"  # type: ignore[union-attr]
     assert parser.feed("1.0 WM0 VELOCITY 1 1 1 1 1 1").device == "T20"  # type: ignore[union-attr]
+
+
+def test_the_universe_is_where_the_lighthouses_are() -> None:
+    """One name for one calibration, however often it is printed; another one after the next."""
+    parser = SurviveParser()
+    assert parser.universe == "libsurvive"
+    names = []
+    for line in (
+        "0.1 0 LH_POSE -3.0 0.0 1.0 -0.707107 0.0 0.707107 0.0  1",
+        "0.1 1 LH_POSE 3.0 0.0 1.0 0.707107 0.0 0.707107 0.0  2\r\n",
+        "9.1 0 LH_POSE -3.0 0.0 1.0 -0.707107 0.0 0.707107 0.0  1",
+        "9.2 ../x LH_POSE -3.0 0.0 1.1 -0.707107 0.0 0.707107 0.0  1",
+        "9.3 0 LH_POSE -3.0 0.0 1.1 -0.707107 0.0 0.707107 0.0  1",
+    ):
+        parser.feed(line)
+        names.append(parser.universe)
+    first, both, again, other, moved = names
+    assert first != both == again == other != moved
+    assert re.fullmatch(r"libsurvive:[0-9a-f]{8}", both)
 
 
 def test_a_device_that_is_gone() -> None:

@@ -109,7 +109,7 @@ async def test_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, take) ->
 
 async def test_simulated_tracker_of_the_real_libsurvive(simulated: list[str], take) -> None:
     """Half a second after its start libsurvive has solved where its own simulated tracker is."""
-    poses = await take(LibSurvive(simulated), 200)
+    poses = await take(LibSurvive(simulated), 300)
     assert {pose.device.serial for pose in poses} == {"SM0"}
     assert all(pose.bPoseIsValid for pose in poses)
     rows = np.array([pose.mDeviceToAbsoluteTracking for pose in poses])
@@ -118,6 +118,10 @@ async def test_simulated_tracker_of_the_real_libsurvive(simulated: list[str], ta
     # For its first 2 s the simulated tracker lies at the origin. z up is y up here: the lighthouses
     # at 1 m height see it there within their own noise.
     assert np.abs(np.median(rows[:100, :, 3], axis=0)).max() < 0.01
+    # Then it flies, at some 0.5 m/s.
+    speeds = np.linalg.norm([pose.vVelocity for pose in poses[-50:]], axis=1)
+    assert np.median(speeds) > 0.1
+    assert {pose.universe for pose in poses} == {poses[0].universe} != {"libsurvive"}
     stamps = np.diff([pose.stamp_ns for pose in poses])
     assert np.all(stamps > 0)
     assert np.median(stamps) == pytest.approx(10e6, rel=0.2)  # its simulator's step
