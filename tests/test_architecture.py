@@ -48,6 +48,8 @@ IMPURE_ROOMS = {
     "services/pi_tracker/endpoints",
     "services/pi_tracker/sources",
     "services/object_tracker/sources",
+    "services/openvr_bridge/endpoints",
+    "services/openvr_bridge/sources",
     "services/recorder/sources",
     "services/viewer/calibration/page.py",
     "rhot/watch/follow.py",
@@ -220,6 +222,10 @@ ROOMS_TESTED_AS_A_WHOLE = {
         (
             "services.object_tracker.service",
             {"scipy", "numba", "viser", "cv2", "mcap", "matplotlib"},
+        ),
+        (
+            "services.openvr_bridge.service",
+            {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib", "uvloop", "resource"},
         ),
         (
             "rhot.client",

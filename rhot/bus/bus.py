@@ -130,6 +130,14 @@ class Bus:
         self._open.append(subscription)
         return subscription
 
+    def others(self, topic: Topic[T], n: int, **names: str) -> RawSubscription:
+        """As raw(), of what other sessions publish alone; it is no stream of health."""
+        key = topic.key(self.rig, **names)
+        subscription = RawSubscription(self._loop, StreamStats(topic, key, names, "in"), n)
+        subscription.declare(self._session, key, zenoh.Locality.REMOTE)
+        self._open.append(subscription)
+        return subscription
+
     def _subscribe(self, topic: Topic[T], n: int | None, names: dict[str, str]) -> Subscription[T]:
         key = topic.key(self.rig, **names)
         subscription = Subscription(self._loop, topic, self._stats(topic, key, names, "in"), n)
@@ -232,11 +240,11 @@ class Bus:
         drop = zenoh.CongestionControl.DROP
         self._session.put(key, payload, encoding=encoding, congestion_control=drop)
 
-    def close(self, subscription: Subscription[Any] | RawSubscription | AliveWatch) -> None:
-        """End one subscription before the session ends; its stream leaves health with it."""
-        subscription.undeclare()
-        self._open = [entity for entity in self._open if entity is not subscription]
-        self.streams[:] = [s for s in self.streams if s is not getattr(subscription, "stats", None)]
+    def close(self, one: Subscription[Any] | RawSubscription | AliveWatch | Publisher[Any]) -> None:
+        """End one subscription or publisher before the session ends; its stream leaves health."""
+        one.undeclare()
+        self._open = [entity for entity in self._open if entity is not one]
+        self.streams[:] = [s for s in self.streams if s is not getattr(one, "stats", None)]
 
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""

@@ -28,7 +28,7 @@ class Publisher(Generic[T]):
         self, session: zenoh.Session, topic: Topic[T], key: str, stats: StreamStats
     ) -> None:
         self.key = key
-        self._stats = stats
+        self.stats = stats
         self._encoder = msgspec.json.Encoder()
         self._message = topic.message
         self._publisher = session.declare_publisher(
@@ -57,7 +57,7 @@ class Publisher(Generic[T]):
             message = msgspec.structs.replace(message, sent_ns=now_ns)  # type: ignore[type-var]
         payload = self._encoder.encode(message)
         if b"null" in payload and not self._decodes(payload):
-            self._stats.rejected += 1
+            self.stats.rejected += 1
             return
         stamp_ns = getattr(message, "stamp_ns", 0)
         self._count(now_ns - stamp_ns if stamp_ns else None)
@@ -78,9 +78,9 @@ class Publisher(Generic[T]):
         )
 
     def _count(self, latency_ns: int | None) -> None:
-        self._stats.count += 1
+        self.stats.count += 1
         if latency_ns is not None:
-            self._stats.latencies_ns.append(latency_ns)
+            self.stats.latencies_ns.append(latency_ns)
 
     def undeclare(self) -> None:
         self._publisher.undeclare()

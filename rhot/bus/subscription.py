@@ -50,8 +50,13 @@ class RawSubscription(Buffer[Sample]):
         super().__init__(loop, capacity, _size_of)
         self.stats = stats
 
-    def declare(self, session: zenoh.Session, key: str) -> None:
-        self._entity = session.declare_subscriber(key, self._on_sample)
+    def declare(
+        self,
+        session: zenoh.Session,
+        key: str,
+        origin: zenoh.Locality = zenoh.Locality.ANY,
+    ) -> None:
+        self._entity = session.declare_subscriber(key, self._on_sample, allowed_origin=origin)
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         received_ns = clock.now_ns()

@@ -5,7 +5,6 @@ scouting.
 from __future__ import annotations
 
 import re
-import resource
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -58,7 +57,14 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
 
 
 def may_lock(size_bytes: int) -> bool:
-    """Whether this process may lock so much memory (LimitMEMLOCK of a unit, or the capability)."""
+    """Whether this process may lock so much memory (LimitMEMLOCK of a unit, or the capability).
+
+    On Windows, which has no such limit to ask for, no: what runs there sends no pictures.
+    """
+    try:
+        import resource
+    except ImportError:
+        return False
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit == resource.RLIM_INFINITY or limit >= size_bytes:
         return True

@@ -32,6 +32,11 @@ OBJECTS = (
         "charge it",
     ),
     warning(
+        "base_station_gone",
+        "a base station that SteamVR used is not seen any more",
+        "see that it has power and that trackers see it",
+    ),
+    warning(
         "device_misread",
         "poses of a tracked device cannot be right, and are left out",
         "see that nothing reflects or hides the lighthouses; see its text",

@@ -164,11 +164,15 @@ class ObjectTable(Table, frozen=True, kw_only=True):
 
 
 class Objects(Table, frozen=True, kw_only=True):
-    # steamvr, libsurvive, replay:FILE (any recording of poses), playback:FILE.rec.gz (by
-    # libsurvive), simulator, or network (poses arrive on the bus from elsewhere).
+    # steamvr (rhot-openvr-bridge sends what SteamVR tracks), libsurvive, replay:FILE (any recording
+    # of poses), playback:FILE.rec.gz (by libsurvive), simulator, or network (poses arrive on the
+    # bus from elsewhere).
     source: str = "simulator"
-    # Poses a second; SteamVR's own rate is 90.
-    rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 90.0
+    # Of steamvr: host that SteamVR and rhot-openvr-bridge run on; empty: the machine of `rhot up`.
+    host: str = ""
+    # Poses a second of each tracker; SteamVR has a new one some 250 times a second. Four for each
+    # picture of a 30 Hz camera.
+    rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 120.0
     # Further arguments of libsurvive's survive-cli: ["--lighthouse-gen", "2"].
     arguments: list[str] = []
     # Of a replay: 2 plays it in half its time, and poses are stamped as of now.

@@ -14,14 +14,12 @@ import asyncio
 import contextlib
 import importlib
 import logging
-import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from pathlib import Path
 
 import msgspec
-import uvloop
 
 from rhot.bus.bus import open_bus
 from rhot.bus.security.credentials import client_endpoints
@@ -30,6 +28,7 @@ from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
 from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.certificate_watch import watch_certificate
+from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
 from rhot.process.restart_hold import hold_back
 from rhot.process.service import Service, rhot_version
@@ -97,7 +96,7 @@ def run(
                 config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect))
             )
         files = [config_path, config.calibration_dir]
-        uvloop.run(_live(name, instance, config, serve))
+        run_loop(_live(name, instance, config, serve))
     except Exception as error:
         code = _explain(error, name, instance)
         if code != EXIT_AGAIN:
@@ -155,32 +154,6 @@ async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> No
             # too.
             for task in companions:
                 task.cancel()
-
-
-def stop_on_signals() -> asyncio.Event:
-    """SIGTERM and SIGINT cancel the current task; the event tells that they did."""
-    stopping = asyncio.Event()
-    task = asyncio.current_task()
-    loop = asyncio.get_running_loop()
-
-    def stop() -> None:
-        stopping.set()
-        if task is not None:
-            task.cancel()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop)
-    return stopping
-
-
-@contextlib.contextmanager
-def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
-    """Swallow the cancellation that a signal asked for, and no other."""
-    try:
-        yield
-    except asyncio.CancelledError:
-        if not stopping.is_set():
-            raise
 
 
 @contextlib.asynccontextmanager

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import functools
 import logging
+import mmap
 import os
 import re
-import resource
 import socket
 import time
 from dataclasses import dataclass, field
@@ -35,7 +35,7 @@ _SETTLE_S = 2.0
 _ONE_OF_A_KIND = {"fusion", "solver", "object_tracker", "simulator"}
 # How often is asked whether the session runs, while streams are slow and no broadcast says why.
 _ASK_SESSION_S = 5.0
-_PAGE_MB = resource.getpagesize() / 1e6
+_PAGE_MB = mmap.PAGESIZE / 1e6
 
 
 @functools.cache
@@ -223,5 +223,8 @@ def _is_steady(stats: StreamStats) -> bool:
 
 
 def _rss_mb() -> float:
-    """Resident memory in MB."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE_MB
+    """Resident memory in MB; 0 on Windows, which does not tell it in a file."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE_MB
+    except FileNotFoundError:
+        return 0.0

@@ -19,6 +19,7 @@ _ABOUT = {
     "fusion": "fusion",
     "solver": "the solver",
     "object_tracker": "the object tracker",
+    "openvr_bridge": "the bridge to SteamVR",
     "simulator": "the simulator",
     "viewer": "the viewer",
     "recorder": "the recorder",
@@ -63,7 +64,8 @@ def router_lost(endpoints: Iterable[str], since_ns: int) -> Fault:
 def host_of(config: RigConfig, service: str, instance: str) -> str:
     """The computer that rig.toml has a service run on, in words."""
     cameras = {camera.name: camera.host for camera in config.camera}
-    host = cameras.get(instance, "") if service == "pi_tracker" else ""
+    hosts = {"pi_tracker": cameras.get(instance, ""), "openvr_bridge": config.objects.host}
+    host = hosts.get(service, "")
     return host or "the master"
 
 

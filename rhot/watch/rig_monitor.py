@@ -34,7 +34,15 @@ def expected_services(config: RigConfig) -> list[tuple[str, str]]:
     expected += [(name, "main") for name in ("fusion", "solver")[: 1 + config.has_depth]]
     if any(camera.source == "simulator" for camera in config.camera):
         expected.insert(0, ("simulator", "main"))
+    if config.object and config.objects.source == "steamvr":
+        expected.append(("openvr_bridge", bridge_instance(config)))
     return expected + ([("object_tracker", "main")] if config.object else [])
+
+
+def bridge_instance(config: RigConfig) -> str:
+    """What rhot-openvr-bridge is called: on a machine of its own as its certificate is."""
+    sources = config.bus.object_sources
+    return sources[0] if config.objects.host and sources else "main"
 
 
 class RigMonitor:

@@ -1,4 +1,4 @@
-"""rhot-object-tracker: tracks objects by SteamVR, libsurvive, a file or the bus."""
+"""rhot-object-tracker: tracks objects by libsurvive, a file or the bus."""
 
 from __future__ import annotations
 

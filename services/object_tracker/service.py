@@ -1,8 +1,8 @@
 """The object tracker: tracker poses as OpenVR reports them in, object poses in the rig frame out.
 
-Poses come from a source of its own (steamvr, libsurvive, replay) or from elsewhere on the bus
-(simulator, network). Either way they are published on the openvr topic, so that they can be seen
-and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. A source that
+Poses come from a source of its own (libsurvive, replay) or from elsewhere on the bus (the bridge to
+SteamVR, simulator, network). Either way they are published on the openvr topic, so that they can be
+seen and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. A source that
 fails is tried again, and health says why. Uncalibrated: poses stay in the lighthouse frame with
 registered = false, and health says so; with a new objects.json the service starts anew.
 """
@@ -31,7 +31,7 @@ _LOOK_S = 1.0
 
 
 async def serve(service: Service) -> None:
-    """Tracks the objects that rig.toml names, from SteamVR, libsurvive, a file or the bus."""
+    """Tracks the objects that rig.toml names, from libsurvive, a file or the bus."""
     config = service.config
     path = config.calibration_dir / "objects.json"
     step = load_and_watch(service, [path], lambda: ObjectStep(config, load_registration(config)))
@@ -39,9 +39,7 @@ async def serve(service: Service) -> None:
         names = ", ".join(item.name for item in config.object)
         text = f"no calibration/objects.json: poses of {names} stay in the lighthouse frame"
         service.faults.report("object_unregistered", text)
-    source = open_source(
-        config, lambda text: service.faults.report("object_unregistered", text, "moved")
-    )
+    source = open_source(config)
     publishers = {
         o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in config.object
     }

@@ -166,8 +166,12 @@ def _object_source(config: RigConfig, name: str) -> _Subject:
     subject = _holder(config, "objects", name)
     rig = config.rig.name
     names = {"service": "openvr_bridge", "instance": name}
-    poses = [topics.OPENVR.key(rig), topics.OPENVR_EVENT.key(rig, host=name)]
-    subject.publishes([*poses, topics.HEALTH.key(rig, **names)])
+    poses, own = topics.OPENVR.key(rig), topics.HEALTH.key(rig, **names)
+    # Who else sends poses, or runs under its name, it says.
+    heard = [topics.SESSION.key(rig), poses, own]
+    subject.publishes([poses, topics.OPENVR_EVENT.key(rig, host=name), own])
+    subject.subscribes(heard)
+    subject.receives(heard)
     subject.asks(topic.key(rig) for topic in ASKED)
     subject.is_alive([topics.ALIVE.key(rig, **names)])
     subject.hears_of_others()

@@ -76,7 +76,12 @@ def read_own_certificate(files: Credentials) -> OwnCertificate:
 
 
 def exposed_key(files: Credentials) -> str | None:
-    """What is wrong if everybody on this computer may read the private key; else None."""
+    """What is wrong if everybody on this computer may read the private key; else None.
+
+    Windows has other rights, which a file's mode does not tell.
+    """
+    if os.name != "posix":
+        return None
     with contextlib.suppress(OSError):  # missing: found where it is read
         if files.key.stat().st_mode & 0o007:
             return (

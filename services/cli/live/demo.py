@@ -21,7 +21,7 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.errors import ConfigError
 from rhot.files.config import load_rig
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.live.demo_metrics import DemoMetrics
 from services.cli.live.demo_summary import Summary, summary_text
 from services.cli.live.supervisor import Supervisor

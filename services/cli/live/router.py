@@ -24,7 +24,8 @@ from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
-from rhot.process.lifecycle import EXIT_USER, cancelled_by, fed_watchdog, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
+from rhot.process.lifecycle import EXIT_USER, fed_watchdog
 from rhot.process.restart_hold import hold_back
 from services.cli.options import menu
 from services.cli.rig.ports import taken_ports

@@ -19,7 +19,7 @@ import uvloop
 
 from rhot import clock
 from rhot.files.config import RigConfig
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from rhot.watch.rig_state import RigState

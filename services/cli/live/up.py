@@ -16,7 +16,7 @@ import typer
 import uvloop
 
 from rhot.files.config import RigConfig, load_rig
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.options import VerboseOption
 from services.cli.rig.watch import RigWatch
@@ -46,6 +46,8 @@ def children_of(
         children.append(Child(name, service_argv(name, *common)))
     if config.object:
         children.append(Child("object_tracker", service_argv("object_tracker", *common)))
+    if config.object and config.objects.source == "steamvr" and not config.objects.host:
+        children.append(Child("openvr_bridge", service_argv("openvr_bridge", *common)))
     if viewer:
         children.append(Child("viewer", service_argv("viewer", *common)))
     if config.recorder.autostart:

@@ -25,7 +25,7 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.health import Health
 from rhot.messages.objects import ObjectPose
 from rhot.plain_text import printable
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.topics import Topic
 from services.cli.live.alternate_screen import alternate_screen, size
 from services.cli.options import ConnectOption, RunningRigOption

@@ -14,7 +14,7 @@ from rhot import clock
 from rhot.bus.bus import Bus
 from rhot.errors import CaptureError
 from rhot.files.config import RigConfig
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.process.service import rhot_version
 from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import rig_and_endpoints, router_session

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 import uvloop
 
-from rhot.process.lifecycle import cancelled_by, stop_on_signals
+from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints, router_session
 from services.cli.terminal import Terminal

@@ -1,13 +1,14 @@
 """Sources of tracked devices' poses behind one interface; `[objects] source` of rig.toml chooses.
 
-steamvr and libsurvive read real lighthouses, replay a recording's poses, playback has libsurvive
-solve its own recording again. With simulator and network the poses are on the bus already. A source
-that cannot be opened, or fails for good, raises SourceError; systemd (or `rhot up`) tries again.
+libsurvive reads real lighthouses, replay a recording's poses, playback has libsurvive solve its own
+recording again. With steamvr (rhot-openvr-bridge sends), simulator and network the poses are on the
+bus already. A source that cannot be opened, or fails for good, raises SourceError; systemd (or
+`rhot up`) tries again.
 """
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import Protocol
 
@@ -17,9 +18,6 @@ from rhot.messages.objects import OpenVrPose
 from services.object_tracker.recorded.recording import UNNAMED
 from services.object_tracker.sources.libsurvive import LibSurvive, Playback
 from services.object_tracker.sources.replay import Replay
-from services.object_tracker.sources.steamvr import SteamVr
-
-Report = Callable[[str], None]
 
 
 class PoseSource(Protocol):
@@ -30,19 +28,16 @@ class PoseSource(Protocol):
         ...
 
 
-def open_source(config: RigConfig, report: Report) -> PoseSource | None:
+def open_source(config: RigConfig) -> PoseSource | None:
     """The source that rig.toml names, or None if poses are on the bus already.
 
-    report takes warnings: what a user should know although the source goes on. Raises SourceError
-    for an unknown name.
+    Raises SourceError for an unknown name.
     """
     table = config.objects
     kind, _, detail = table.source.partition(":")
     match kind:
-        case "simulator" | "network" if not detail:
+        case "steamvr" | "simulator" | "network" if not detail:
             return None
-        case "steamvr" if not detail:
-            return SteamVr(config.objects.rate_hz, report)
         case "libsurvive" if not detail:
             return LibSurvive(table.arguments)
         case "playback" if detail:

@@ -1,0 +1,53 @@
+"""The event loop of a process, and the signals that end it, on Linux and on Windows."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+from collections.abc import Coroutine, Iterator
+from typing import Any
+
+
+def run_loop(main: Coroutine[Any, Any, None]) -> None:
+    """asyncio.run() on uvloop; without uvloop, which there is none of for Windows, on asyncio's."""
+    try:
+        import uvloop
+    except ModuleNotFoundError:
+        asyncio.run(main)
+    else:
+        uvloop.run(main)
+
+
+def stop_on_signals() -> asyncio.Event:
+    """SIGTERM and SIGINT cancel the current task, on Windows Ctrl-Break, too; the event tells that
+    they did.
+    """
+    stopping = asyncio.Event()
+    task = asyncio.current_task()
+    loop = asyncio.get_running_loop()
+
+    def stop() -> None:
+        stopping.set()
+        if task is not None:
+            task.cancel()
+
+    for name in ("SIGTERM", "SIGINT", "SIGBREAK"):
+        number = getattr(signal, name, None)
+        if number is None:
+            continue
+        try:
+            loop.add_signal_handler(number, stop)
+        except NotImplementedError:  # Windows: Python's own handler, which wakes the loop
+            signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop))
+    return stopping
+
+
+@contextlib.contextmanager
+def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
+    """Swallow the cancellation that a signal asked for, and no other."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        if not stopping.is_set():
+            raise
