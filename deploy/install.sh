@@ -11,8 +11,8 @@ readonly HERE
 # Raspberry Pi OS and Debian build picamera2 for this Python, so no other will do.
 readonly PYTHON=/usr/bin/python3
 readonly ROOT=/opt/rhot ETC=/etc/rhot STATE=/var/lib/rhot CACHE=/var/cache/rhot
-readonly UNITS=/etc/systemd/system SYSUSERS=/etc/sysusers.d/rhot.conf COMMAND=/usr/local/bin/rhot
-readonly SYSCTL=/etc/sysctl.d/60-rhot.conf
+readonly UNITS=/etc/systemd/system USER_UNITS=/etc/systemd/user COMMAND=/usr/local/bin/rhot
+readonly SYSUSERS=/etc/sysusers.d/rhot.conf SYSCTL=/etc/sysctl.d/60-rhot.conf
 readonly KEEP_VERSIONS=3
 
 usage() {
@@ -298,6 +298,7 @@ run_warm() {
 switch_to() {
     link "$ROOT/versions/$1" "$ROOT/current"
     put_units "$ROOT/versions/$1/deploy/systemd"
+    if has_role master; then put_user_units "$ROOT/versions/$1/deploy/systemd-user"; fi
     if has_role master; then link "$ROOT/current/bin/rhot" "$COMMAND"; fi
 }
 
@@ -308,6 +309,15 @@ put_units() {
     while IFS= read -r -d '' file; do
         put "$from/$file" "$UNITS/$file" 644 root
     done < <(cd "$from" && find . -type f -printf '%P\0' | sort -z)
+}
+
+# Units that each user may start: SteamVR belongs to who is logged in.
+put_user_units() {
+    local from=$1 file
+    if [[ -n $DRY_RUN ]]; then from=$HERE/systemd-user; fi
+    for file in "$from"/*.service; do
+        if [[ -f $file ]]; then put "$file" "$USER_UNITS/${file##*/}" 644 root; fi
+    done
 }
 
 remember() {
@@ -551,11 +561,19 @@ next_steps() {
     elif has_role master; then
         say "  rhot check $ETC/rig.toml          is everything there?"
         say "  rhot top --config $ETC/rig.toml   what runs, at what rate"
+        user_steps
     else
         say "  on the master: rhot top --config $ETC/rig.toml shows this camera within seconds"
     fi
     say "  journalctl -fu 'rhot-*'                what the services say"
     say "  sudo $ROOT/current/deploy/install.sh status | rollback | uninstall"
+}
+
+user_steps() {
+    local unit
+    for unit in $(rig_says user-units "$ETC/rig.toml"); do
+        say "  systemctl --user enable --now $unit   as the user of SteamVR"
+    done
 }
 
 install_role() {
@@ -671,7 +689,7 @@ uninstall() {
         change "forget its units" forget_units "${units[@]}"
     fi
     if [[ -L $COMMAND && $(readlink -- "$COMMAND") == "$ROOT"/* ]]; then change "remove $COMMAND" rm -f -- "$COMMAND"; fi
-    for file in "$ROOT" "$CACHE" "$SYSUSERS" "$SYSCTL"; do
+    for file in "$ROOT" "$CACHE" "$SYSUSERS" "$SYSCTL" "$USER_UNITS"/rhot-*.service; do
         if [[ -e $file ]]; then change "remove $file" rm -rf -- "$file"; fi
     done
     if [[ -z $purge ]]; then

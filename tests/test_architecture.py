@@ -209,6 +209,7 @@ ROOMS_TESTED_AS_A_WHOLE = {
     "services/pi_tracker/sources": {"files", "sources"},
     "services/calibrator/rig": {"calibrate_real"},
     "services/object_tracker/sources": {"sources"},
+    "services/openvr_bridge": {"golden", "portable", "secured"},
 }
 
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any
 
 
 def run_loop(main: Coroutine[Any, Any, None]) -> None:
     """asyncio.run() on uvloop; without uvloop, which there is none of for Windows, on asyncio's."""
-    try:
+    run: Callable[[Coroutine[Any, Any, None]], None] = asyncio.run
+    with contextlib.suppress(ModuleNotFoundError):
         import uvloop
-    except ModuleNotFoundError:
-        asyncio.run(main)
-    else:
-        uvloop.run(main)
+
+        run = uvloop.run
+    run(main)
 
 
 def stop_on_signals() -> asyncio.Event:

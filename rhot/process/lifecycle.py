@@ -1,4 +1,5 @@
-"""The life of a service: from the command line over uvloop, signals and systemd to a clean end.
+"""The life of a service: from the command line over the event loop, signals and systemd to a clean
+end.
 
 A service is one coroutine, `serve(service)`. It runs in one TaskGroup together with the health beat
 and the watchdog; whatever fails there ends the process with a message and a code (2: the user can

@@ -4,6 +4,7 @@ the name of the universe that a pose is in. Pure.
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Mapping
@@ -17,14 +18,18 @@ CLASSES = {1: "HMD", 2: "Controller", 3: "GenericTracker"}
 BASE_STATION = 4
 # Of a text that SteamVR tells.
 _LONGEST = 64
+# Slots, twice over: a device changes seldom, and is asked for with every pose.
+_KEPT = 128
 
 
+@functools.lru_cache(_KEPT)
 def key_name(serial: str, slot: int) -> str:
     """A serial as part of a key: other characters become underscores; device<slot> without any."""
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", serial)[:_LONGEST]
     return name if re.match(r"[A-Za-z0-9]", name) else f"device{slot}"
 
 
+@functools.lru_cache(_KEPT)
 def message_device(slot: int, device: Device) -> OpenVrDevice:
     """What a message says of the device in a slot."""
     known = math.isfinite(device.battery) and 0.0 <= device.battery <= 1.0

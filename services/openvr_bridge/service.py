@@ -33,6 +33,9 @@ log = logging.getLogger("rhot.openvr_bridge")
 _RETRY_S = 3.0
 _LOOK_S = 1.0
 _SUBJECT = "steamvr"
+# Whether Valve's client always tells that its server has died is not documented: one without a
+# single device for so long is connected anew, which takes a moment.
+_ALONE_S = 30.0
 
 
 async def serve(service: Service) -> None:
@@ -66,12 +69,16 @@ class Bridge:
         self._slowest_s = 0.0
 
     async def run(self, connect: Callable[[], Connection]) -> None:
-        """Send what one connection gives, until it fails (SourceError) or is stuck (StuckError)."""
+        """Send what one connection gives, until it fails (SourceError), is stuck (StuckError), or
+        has had no device for long.
+        """
         try:
             with polling(connect, self._service.config.objects.rate_hz) as poll:
-                look_s = 0.0
-                while True:
+                look_s, company_s = 0.0, time.monotonic()
+                while time.monotonic() - company_s < _ALONE_S:
                     sweep = await poll.next()
+                    if sweep.poses["bDeviceIsConnected"].any():
+                        company_s = time.monotonic()
                     self._service.faults.clear("source_lost", _SUBJECT)
                     poses = self._take(sweep)
                     if time.monotonic() - look_s >= _LOOK_S:
@@ -79,6 +86,8 @@ class Bridge:
                         self._look(sweep, poses, poll)
         finally:
             self._streams.close()
+            for code in ("device_twice", "device_battery", "base_station_gone"):
+                self._service.faults.replace(code, {})
 
     def _take(self, sweep: Sweep) -> list[OpenVrPose]:
         offset = self.offset.at(sweep.stamp_ns)

@@ -93,6 +93,10 @@ ALLOWED = [
     ("here", topics.SIM_FRAME, RIGHT, "right"),
     ("here", topics.POSE, HAND, "laptop"),
     ("steamvr", topics.OPENVR, {"serial": "LHR-1"}, "here"),
+    ("steamvr", topics.OPENVR_EVENT, {"host": "steamvr"}, "here"),
+    ("steamvr", topics.HEALTH, {"service": "openvr_bridge", "instance": "steamvr"}, "here"),
+    ("here", topics.OPENVR, {"serial": "LHR-1"}, "steamvr"),
+    ("here", topics.SESSION, {}, "steamvr"),
 ]
 FORBIDDEN = [
     ("left", topics.MARKERS, RIGHT, "here"),
@@ -113,6 +117,9 @@ FORBIDDEN = [
     ("laptop", topics.MARKERS, LEFT, "here"),
     ("steamvr", topics.OBJECT, {"object": "cup"}, "here"),
     ("steamvr", topics.MARKERS, LEFT, "here"),
+    ("steamvr", topics.OPENVR_EVENT, {"host": "left"}, "here"),
+    ("steamvr", topics.HEALTH, {"service": "openvr_bridge", "instance": "main"}, "here"),
+    ("left", topics.OPENVR, {"serial": "LHR-1"}, "here"),
     ("here", topics.POSE, HAND, "steamvr"),
 ]
 

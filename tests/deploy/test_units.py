@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -11,7 +12,7 @@ import pytest
 
 from testing.source_tree import ROOT
 
-UNITS = ROOT / "deploy" / "systemd"
+UNITS, USER_UNITS = ROOT / "deploy" / "systemd", ROOT / "deploy" / "systemd-user"
 SERVICES = sorted(path.name for path in UNITS.glob("*.service"))
 TARGETS = sorted(path.name for path in UNITS.glob("*.target"))
 # `systemd-analyze security` on its scale of 0 to 10, times 10.
@@ -23,9 +24,16 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def analyze(*words: str | Path) -> subprocess.CompletedProcess[str]:
+def analyze(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     command = ["systemd-analyze", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, **environment},
+    )
 
 
 @pytest.fixture
@@ -87,3 +95,20 @@ def test_only_what_reads_cameras_and_usb_trackers_gets_devices(name):
     has_devices = "DeviceAllow=" in text
     assert has_devices == (name in ("rhot-pi-tracker@.service", "rhot-object-tracker.service"))
     assert has_devices != ("PrivateDevices=yes" in text)
+
+
+def test_the_bridge_is_a_unit_of_the_user_who_is_logged_in(tmp_path):
+    (path,) = USER_UNITS.glob("*")
+    assert path.name == "rhot-openvr-bridge.service"
+    text = path.read_text()
+    command = "ExecStart=/opt/rhot/current/bin/rhot-openvr-bridge --config /etc/rhot/rig.toml\n"
+    assert command in text
+    # What a user's manager lacks the right to, it would refuse at the start, not here.
+    assert not re.search(r"^(User|Group|Private\w+|Protect\w+|DynamicUser)=", text, re.MULTILINE)
+    here = tmp_path / path.name
+    here.write_text(re.sub(r"^ExecStart=\S+", "ExecStart=/bin/true", text, flags=re.MULTILINE))
+    done = analyze("--user", "verify", here, XDG_RUNTIME_DIR=str(tmp_path))
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+    here.write_text(here.read_text().replace("NoNewPrivileges", "NoNewPrivilegs"))
+    done = analyze("--user", "verify", here, XDG_RUNTIME_DIR=str(tmp_path))
+    assert "NoNewPrivilegs" in done.stderr

@@ -100,6 +100,7 @@ def test_a_service_names_the_extra_it_lacks(without, program, module, extra):
     [
         ("services.pi_tracker.service", ["pi"]),
         ("services.object_tracker.service", []),
+        ("services.openvr_bridge.service", []),
         ("rhot.client", []),
     ],
 )

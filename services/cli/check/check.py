@@ -14,7 +14,7 @@ import typer
 from services.cli.check.problems import Report, report
 from services.cli.rig.answers import Answers, ask_rig
 from services.cli.rig.certificates import certificate_problem
-from services.cli.rig.machine import addresses_of, is_this_machine
+from services.cli.rig.machine import addresses_of, is_this_machine, steamvr_registry
 from services.cli.rig.place import place_of
 from services.cli.rig.ports import taken_ports
 
@@ -58,7 +58,8 @@ def check_config(config: Path) -> Report:
     questions = questions_to(rig, place)
     asks = questions or taken or not place.master
     answers = ask_rig(rig, questions) if asks else Answers()
-    problems += check_rig(rig, config, place) + check_calibration(rig, place)
+    problems += check_rig(rig, config, place, steamvr_registry())
+    problems += check_calibration(rig, place)
     problems += check_hosts(rig, config, place, addresses_of)
     problems += check_certificates(rig, certificate_problem(rig, place))
     if place.master:

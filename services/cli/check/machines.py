@@ -37,6 +37,10 @@ def check_hosts(
                 "knows: is it switched on, is its name right? NAME.local needs libnss-mdns here"
             )
             problems.append(warning(path, text))
+    host = config.objects.host
+    if host and place.master and not addresses_of(host):
+        text = f"[objects]: there is no host {host!r} as far as this machine knows: is it on?"
+        problems.append(warning(path, text))
     return problems
 
 

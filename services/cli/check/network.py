@@ -42,17 +42,18 @@ def check_bus(config: RigConfig, path: Path) -> list[Problem]:
                 ' or, in a network of your own, set [bus] access = "open"'
             )
             problems.append(error(path, text))
-    remote = sorted({camera.host for camera in config.camera if camera.host})
+    trackers = config.objects.host if config.objects.source == "steamvr" else ""
+    remote = sorted({*(camera.host for camera in config.camera), trackers} - {""})
     if remote and all(map(_is_loopback, config.bus.listen)):
         text = (
-            "[bus] listen: only this machine can reach the router, but there are cameras on "
+            "[bus] listen: only this machine can reach the router, but the rig has other hosts: "
             f"{', '.join(remote)}"
         )
         problems.append(error(path, text))
     if remote and not network_hosts(config.bus.connect):
         text = (
             "[bus] connect: names no address of the master that other machines can reach, but "
-            f"there are cameras on {', '.join(remote)}; add e.g. tls/master.local:7448"
+            f"the rig has other hosts: {', '.join(remote)}; add e.g. tls/master.local:7448"
         )
         problems.append(error(path, text))
     return problems

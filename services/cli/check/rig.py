@@ -15,6 +15,7 @@ from rhot.files.config import RigConfig
 from services.cli.check.network import check_bus, check_viewer
 from services.cli.check.problems import Problem, error, note, warning
 from services.cli.check.sources import check_camera_source, check_object_source
+from services.cli.check.steamvr import check_steamvr
 from services.cli.rig.place import Place
 from services.simulator.scene.catalog import scene_spec
 
@@ -22,12 +23,16 @@ from services.simulator.scene.catalog import scene_spec
 _DEVICES = ("picamera2", "v4l2")
 
 
-def check_rig(config: RigConfig, path: Path, place: Place) -> list[Problem]:
-    """Problems of everything but calibration/; of devices and files only those of this machine."""
+def check_rig(config: RigConfig, path: Path, place: Place, steamvr: Path) -> list[Problem]:
+    """Problems of everything but calibration/; of devices and files only those of this machine.
+
+    steamvr is the file in which SteamVR would note where it is here.
+    """
     problems = _cameras(config, path) + _same_device(config, path)
     for camera in config.camera:
         here = camera.name in place.cameras
         problems += check_camera_source(config, camera, path, here=here)
+    problems += check_steamvr(config, path, place, steamvr)
     problems += _world(config, path) + check_bus(config, path) + _simulator(config, path)
     if place.master:
         problems += check_object_source(config, path) + check_viewer(config, path)

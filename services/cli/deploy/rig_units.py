@@ -1,7 +1,7 @@
 """Which systemd units a rig.toml asks for on the master, for deploy/install.sh.
 
-`python -m services.cli.deploy.rig_units check|connect|secured|units rig.toml` prints one answer a
-line. It needs no extra of the package: a Pi's installation has no typer.
+`python -m services.cli.deploy.rig_units check|connect|secured|units|user-units rig.toml` prints one
+answer a line. It needs no extra of the package: a Pi's installation has no typer.
 """
 
 from __future__ import annotations
@@ -32,6 +32,12 @@ def master_units(config: RigConfig) -> list[str]:
     return units
 
 
+def user_units(config: RigConfig) -> list[str]:
+    """Units of whoever is logged in on the master: SteamVR is that user's."""
+    steamvr = config.object and config.objects.source == "steamvr" and not config.objects.host
+    return ["rhot-openvr-bridge.service"] if steamvr else []
+
+
 def answer(question: str, config: RigConfig) -> list[str]:
     """Lines for one question: "check" has none, its answer is that the file can be read.
 
@@ -42,6 +48,7 @@ def answer(question: str, config: RigConfig) -> list[str]:
         "connect": lambda: list(config.bus.connect),
         "secured": lambda: [one for one in config.bus.connect if is_secured(one)],
         "units": lambda: master_units(config),
+        "user-units": lambda: user_units(config),
     }[question]()
 
 

@@ -78,5 +78,7 @@ async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -
             remote = sorted({camera.host for camera in config.camera if camera.host})
             if remote:
                 terminal.line(f"cameras expected from {', '.join(remote)}")
+            if config.objects.host and config.object:
+                terminal.line(f"SteamVR's trackers expected from {config.objects.host}")
             watch = RigWatch(config, path, [child.name for child in children], terminal.line)
             await watch.run(supervisor.reasons)

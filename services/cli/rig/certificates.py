@@ -24,7 +24,7 @@ def certificate_problem(config: RigConfig, place: Place) -> str | None:
         return problem
     found = read_own_certificate(files).common_name
     wanted = wanted_names(config, place)
-    if found in wanted:
+    if found in wanted or not wanted:
         return None
     return (
         f"this machine's certificate is {found}, and rig.toml calls for {' or '.join(wanted)} "
@@ -36,8 +36,12 @@ def wanted_names(config: RigConfig, place: Place) -> list[str]:
     """Common names of which this machine's certificate must have one."""
     if place.master:
         return [common_name(config.rig.name, "master", MASTER)]
-    return [
+    wanted = [
         common_name(config.rig.name, "camera", name)
         for name, cameras in cameras_by_certificate(config).items()
         if place.cameras & set(cameras)
     ]
+    if place.steamvr:
+        names = config.bus.object_sources
+        wanted += [common_name(config.rig.name, "objects", name) for name in names]
+    return wanted

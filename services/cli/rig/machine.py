@@ -6,8 +6,11 @@ Resolving may take as long as a name server is away; nobody waits longer than RE
 from __future__ import annotations
 
 import functools
+import os
 import socket
+import sys
 import threading
+from pathlib import Path
 
 RESOLVE_S = 3.0
 
@@ -55,6 +58,14 @@ def own_address(towards: str = "") -> str:
             if not address.startswith("127.") and address != "::1":
                 return address
     return ""
+
+
+def steamvr_registry() -> Path:
+    """The file in which SteamVR notes where it is, for this user (openvr's vrpathregistry)."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", ".")) / "openvr" / "openvrpaths.vrpath"
+    folder = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(folder) / "openvr" / "openvrpaths.vrpath"
 
 
 # Reserved for documentation (RFC 5737): whatever leads there is the default route.

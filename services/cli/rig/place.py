@@ -16,7 +16,9 @@ from rhot.files.config import RigConfig
 
 @dataclass(frozen=True)
 class Place:
-    """What runs here: fusion, solver and the like if master; the trackers of these cameras."""
+    """What runs here: fusion, solver and the like if master; the trackers of these cameras; the
+    bridge to SteamVR.
+    """
 
     master: bool
     cameras: frozenset[str]
@@ -25,6 +27,7 @@ class Place:
     # False if nothing in rig.toml names this machine: it is taken for the master, where the user
     # runs the command.
     certain: bool = True
+    steamvr: bool = False
 
 
 def place_of(config: RigConfig, is_here: Callable[[str], bool]) -> Place:
@@ -32,9 +35,17 @@ def place_of(config: RigConfig, is_here: Callable[[str], bool]) -> Place:
     hosts = network_hosts((*config.bus.connect, *config.bus.listen))
     on_pi = frozenset(c.name for c in config.camera if c.host and is_here(c.host))
     named = any(is_here(host) for host in hosts)
-    master = named or not on_pi
+    bridge = config.objects.source == "steamvr" and bool(config.object)
+    apart = bridge and bool(config.objects.host) and is_here(config.objects.host)
+    master = named or not (on_pi or apart)
     beside = frozenset(c.name for c in config.camera if not c.host) if master else frozenset()
-    return Place(master, on_pi | beside, hosts, certain=named or bool(on_pi) or not hosts)
+    return Place(
+        master,
+        on_pi | beside,
+        hosts,
+        certain=named or bool(on_pi) or apart or not hosts,
+        steamvr=apart or (bridge and master and not config.objects.host),
+    )
 
 
 def network_hosts(endpoints: Iterable[str]) -> tuple[str, ...]:

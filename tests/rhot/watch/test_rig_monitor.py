@@ -6,8 +6,15 @@ import pytest
 
 from rhot.faults import FAULTS
 from rhot.files.config import RigConfig
-from rhot.files.rig_tables import CameraTable, HandTable, RigTable
-from rhot.watch.rig_monitor import RigMonitor
+from rhot.files.rig_tables import (
+    Bus,
+    CameraTable,
+    HandTable,
+    Objects,
+    ObjectTable,
+    RigTable,
+)
+from rhot.watch.rig_monitor import RigMonitor, expected_services
 from testing.sample_health import NOW_NS, SECOND_NS, beat, fault, stream
 
 CONFIG = RigConfig(
@@ -152,3 +159,27 @@ def test_strangers_are_listed_but_bounded(all_well):
 def test_every_code_an_onlooker_may_say_is_in_the_list():
     for code in ("router_unreachable", "service_absent", "service_gone", "service_silent"):
         assert code in FAULTS
+
+
+@pytest.mark.parametrize(
+    ("host", "sources", "expected"),
+    [
+        ("", (), ("openvr_bridge", "main")),
+        ("", ("steamvr",), ("openvr_bridge", "main")),
+        ("gaming-pc", ("steamvr", "other"), ("openvr_bridge", "steamvr")),
+        ("gaming-pc", (), ("openvr_bridge", "main")),
+    ],
+)
+def test_steamvrs_bridge_is_expected_under_its_name(host, sources, expected):
+    config = RigConfig(
+        bus=Bus(object_sources=sources),
+        object=[ObjectTable(name="cup", serial="LHR-1")],
+        objects=Objects(source="steamvr", host=host),
+    )
+    assert expected in expected_services(config)
+    absent = [one.fault for one in RigMonitor(config, NOW_NS).state(NOW_NS + SECOND_NS).faults]
+    (bridge,) = [fault for fault in absent if fault.subject.startswith("openvr_bridge")]
+    assert "the bridge to SteamVR" in bridge.text
+    assert (host or "the master") in bridge.action
+    others = RigConfig(object=config.object, objects=Objects(source="libsurvive"))
+    assert "openvr_bridge" not in dict(expected_services(others))

@@ -64,6 +64,7 @@ async def test_steamvr_that_quits_is_tried_again(running, steamvr, rig, monkeypa
         assert (await anext(events)).name == "Quit"
         await until(lambda: "source_lost steamvr" in faults(service))
         assert (steamvr.acknowledged, steamvr.closed) == (1, 1)
+        assert faults(service).keys() == {"source_lost steamvr"}
         # Nobody expects poses meanwhile.
         assert not [one for one in service.bus.streams if "pose" in one.key]
         steamvr.init_error = None
@@ -102,6 +103,18 @@ async def test_what_is_wrong_with_devices_is_told(running, steamvr, rig):
             await asyncio.sleep(0.02)
         assert "another program" in faults(service)["device_twice LHR-1"]
         await until(lambda: "device_twice LHR-1" not in faults(service))
+
+
+async def test_a_steamvr_without_any_device_is_connected_anew(running, steamvr, rig, monkeypatch):
+    monkeypatch.setattr(bridge, "_ALONE_S", 0.3)
+    steamvr.slots[3].connected = False
+    async with running("openvr_bridge", serve, rig) as (service, bus):
+        poses = bus.every(topics.OPENVR, 64)
+        await until(lambda: steamvr.opened >= 3)
+        assert (steamvr.closed >= 2, faults(service)) == (True, {})
+        steamvr.slots[3].connected = True
+        while not (await anext(poses)).bDeviceIsConnected:
+            pass
 
 
 async def test_a_slow_steamvr_is_polled_as_it_can(running, steamvr, rig):

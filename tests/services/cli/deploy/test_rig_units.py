@@ -9,7 +9,7 @@ import pytest
 
 from rhot.files.config import load_rig
 from services.cli.defaults import config_dir
-from services.cli.deploy.rig_units import master_units
+from services.cli.deploy.rig_units import master_units, user_units
 from services.cli.live.up import children_of
 
 
@@ -30,7 +30,23 @@ def test_a_master_runs_what_rhot_up_runs(name, tmp_path):
     rig = load_rig(path)
     children = children_of(rig, path, viewer=True)
     names = (child.name.replace("_", "-").replace("/", "@") for child in children)
-    assert {*master_units(rig)} - {"rhot-pi.target"} == {f"rhot-{name}.service" for name in names}
+    units = {*master_units(rig), *user_units(rig)}
+    assert units - {"rhot-pi.target"} == {f"rhot-{name}.service" for name in names}
+
+
+@pytest.mark.parametrize(
+    ("objects", "units"),
+    [
+        ('source = "steamvr"', ["rhot-openvr-bridge.service"]),
+        ('source = "steamvr"\nhost = "gaming-pc"', []),
+        ('source = "libsurvive"', []),
+    ],
+)
+def test_steamvr_on_the_master_is_its_users(objects, units, tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(f'[objects]\n{objects}\n[[object]]\nname = "cup"\nserial = "LHR-1"\n')
+    assert asked("user-units", path).stdout.split() == units
+    assert "rhot-openvr-bridge.service" not in asked("units", path).stdout
 
 
 def test_install_sh_gets_lines(tmp_path):

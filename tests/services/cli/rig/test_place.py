@@ -65,3 +65,21 @@ def test_hosts_that_others_can_reach():
     local = ("tcp/localhost:1", "tcp/[::1]:1", "tls/[::]:1", "tcp/127.0.0.9:1", "unixsock-stream/x")
     assert network_hosts(local) == ()
     assert network_hosts(("tls/10.0.0.1:1", "tcp/10.0.0.1:2", "tcp/h:1")) == ("10.0.0.1", "h")
+
+
+@pytest.mark.parametrize(
+    ("own", "host", "master", "steamvr"),
+    [
+        ({"master.local"}, "", True, True),
+        ({"master.local"}, "gaming-pc", True, False),
+        ({"gaming-pc"}, "gaming-pc", False, True),
+        ({"master.local", "gaming-pc"}, "gaming-pc", True, True),
+        ({"pi-left"}, "", False, False),
+    ],
+)
+def test_steamvr_runs_where_rig_toml_says(own, host, master, steamvr):
+    objects = {"source": "steamvr", "host": host}
+    tables = {"bus": LAN, "camera": PIS, "object": [{"name": "cup", "serial": "LHR-1"}]}
+    config = msgspec.convert({**tables, "objects": objects}, RigConfig)
+    found = place_of(config, lambda name: name in own)
+    assert (found.master, found.steamvr, found.certain) == (master, steamvr, True)
