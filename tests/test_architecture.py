@@ -64,7 +64,7 @@ FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
     {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises"},
     {"rhot/messages"},
-    {"rhot/topics", "rhot/faults"},
+    {"rhot/topics", "rhot/faults", "rhot/object_motion"},
     {"rhot/files", "rhot/bus"},
     {"rhot/process", "rhot/watch"},
     {"rhot/client"},

@@ -12,11 +12,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
+from collections.abc import Callable
 
 from rhot import topics
 from rhot.bus.bus import Publisher
 from rhot.errors import SourceError
-from rhot.messages.objects import OpenVrPose
+from rhot.messages.objects import ObjectPose, OpenVrPose
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.registration import load_registration
@@ -40,9 +41,7 @@ async def serve(service: Service) -> None:
         text = f"no calibration/objects.json: poses of {names} stay in the lighthouse frame"
         service.faults.report("object_unregistered", text)
     source = open_source(config)
-    publishers = {
-        o.name: service.bus.publisher(topics.OBJECT, object=o.name) for o in config.object
-    }
+    outlet = Outlet(service)
     poses = service.bus.every(topics.OPENVR, 64)
     unknown = UnknownDevices()
     if source is not None:
@@ -52,12 +51,30 @@ async def serve(service: Service) -> None:
     async for pose in poses:
         result = step.step(pose)
         if result is not None:
-            publishers[result.object].put(result)
+            outlet.put(result)
         elif config.object:
             unknown.note(pose.device.serial, time.monotonic())
         service.values.update(
             registered=float(step.registered), lost=step.lost, unknown=step.unknown
         )
+
+
+class Outlet:
+    """Where every ObjectPose goes: onto the bus, and to who watches objects in this process."""
+
+    def __init__(self, service: Service) -> None:
+        self._publishers = {
+            item.name: service.bus.publisher(topics.OBJECT, object=item.name)
+            for item in service.config.object
+        }
+        # Called with each published pose, in this order; quick, and without exceptions.
+        self.consumers: list[Callable[[ObjectPose], None]] = []
+
+    def put(self, pose: ObjectPose) -> None:
+        """Publish a pose, and show it to the consumers."""
+        self._publishers[pose.object].put(pose)
+        for consumer in self.consumers:
+            consumer(pose)
 
 
 async def _name_unknown(service: Service, unknown: UnknownDevices) -> None:
