@@ -1,4 +1,4 @@
-"""The last poses of one object, to know it at the instant of something else, a hand's pose. Pure."""
+"""The last poses of one object, so that it is known at the instant of a hand's pose. Pure."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ CalibrationError, never repaired.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,9 @@ import numpy as np
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ObjectPlace, Objects, load_objects
 from rhot.files.config import RigConfig
+from rhot.geometry.quaternions import Quat, from_rows, normalized
 from rhot.geometry.transforms import Array, rotation_from_quaternion, transform
+from rhot.messages import Vec3
 
 # A matrix typed with five digits passes, a scaled or mirrored one does not.
 _RIGID_TOLERANCE = 1e-4
@@ -27,6 +30,11 @@ class Placement:
 
     name: str
     T_tracker_from_object: Array  # (4, 4)
+    # The same as plain numbers.
+    offset_m: Vec3
+    orientation_wxyz: Quat
+    # From the tracker's origin to the object's.
+    lever_m: float
     # How late the tracker's stamps are.
     time_offset_ns: int
 
@@ -38,6 +46,14 @@ class Registration:
     registered: bool
     T_rig_from_lighthouse: Array  # (4, 4), identity while registered is false
     placements: dict[str, Placement]
+    # The transform as plain numbers.
+    position_m: Vec3 = (0.0, 0.0, 0.0)
+    orientation_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
+    # Standard deviations of the transform: of its turn, and of its shift at middle_m (rig frame);
+    # 0 and None where objects.json tells none.
+    sigma_rad: float = 0.0
+    sigma_m: float = 0.0
+    middle_m: Vec3 | None = None
 
 
 def register(config: RigConfig, objects: Objects | None) -> Registration:
@@ -55,7 +71,18 @@ def register(config: RigConfig, objects: Objects | None) -> Registration:
         return Registration(
             registered=False, T_rig_from_lighthouse=np.eye(4), placements=placements
         )
-    return Registration(True, _rigid(np.array(objects.T_rig_from_lighthouse)), placements)
+    T = _rigid(np.array(objects.T_rig_from_lighthouse))
+    x, y, z = T[:3, 3].tolist()
+    return Registration(
+        registered=True,
+        T_rig_from_lighthouse=T,
+        placements=placements,
+        position_m=(x, y, z),
+        orientation_wxyz=from_rows(objects.T_rig_from_lighthouse[:3]),
+        sigma_rad=_sigma(objects.sigma_rad),
+        sigma_m=_sigma(objects.sigma_m),
+        middle_m=objects.middle_m,
+    )
 
 
 def load_registration(config: RigConfig) -> Objects | None:
@@ -82,7 +109,19 @@ def _placement(name: str, place: ObjectPlace) -> Placement:
             f"objects.json: {name!r} needs a finite offset_m and a unit quaternion wxyz;"
             " run `rhot calibrate objects` again"
         )
-    return Placement(name, transform(rotation_from_quaternion(q), offset_m), place.time_offset_ns)
+    return Placement(
+        name=name,
+        T_tracker_from_object=transform(rotation_from_quaternion(q), offset_m),
+        offset_m=place.offset_m,
+        orientation_wxyz=normalized(place.orientation_wxyz),
+        lever_m=math.hypot(*place.offset_m),
+        time_offset_ns=place.time_offset_ns,
+    )
+
+
+def _sigma(sigma: float | None) -> float:
+    """A standard deviation of the file, as far as it can be one."""
+    return sigma if sigma is not None and 0.0 <= sigma < math.inf else 0.0
 
 
 def _rigid(T: Array) -> Array:

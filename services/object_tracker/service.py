@@ -2,9 +2,11 @@
 
 Poses come from a source of its own (libsurvive, replay) or from elsewhere on the bus (the bridge to
 SteamVR, simulator, network). Either way they are published on the openvr topic, so that they can be
-seen and recorded. Late: each pose keeps its own stamp. Missing: nothing is published. A source that
-fails is tried again, and health says why. Uncalibrated: poses stay in the lighthouse frame with
-registered = false, and health says so; with a new objects.json the service starts anew.
+seen and recorded. Late: each pose keeps its own stamp; one older than the last is left out, and
+counted. Missing: a device that has stopped is "lost", told once a second until it is back. A source
+that fails is tried again, and health says why. Uncalibrated, or in another universe than
+registered: poses stay in the lighthouse frame with registered = false, and health says so; with a
+new objects.json the service starts anew.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ import contextlib
 import time
 from collections.abc import Callable
 
-from rhot import topics
+from rhot import clock, topics
 from rhot.bus.bus import Publisher
+from rhot.bus.subscription import Subscription
 from rhot.errors import SourceError
-from rhot.messages.objects import ObjectPose, OpenVrPose
+from rhot.messages.objects import ObjectPose, OpenVrEvent, OpenVrPose
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.registration import load_registration
@@ -29,6 +32,9 @@ from services.object_tracker.unknown_devices import UnknownDevices
 # OpenVR has 64 device slots; a source that names more devices is broken.
 _MAX_DEVICES = 64
 _LOOK_S = 1.0
+# Poses that may wait: a tenth of a second of 16 trackers at 250 Hz and more, for when something
+# else takes the processor.
+_QUEUE = 1024
 
 
 async def serve(service: Service) -> None:
@@ -42,21 +48,21 @@ async def serve(service: Service) -> None:
         service.faults.report("object_unregistered", text)
     source = open_source(config)
     outlet = Outlet(service)
-    poses = service.bus.every(topics.OPENVR, 64)
+    poses = service.bus.every(topics.OPENVR, _QUEUE)
+    events = service.bus.every(topics.OPENVR_EVENT, 64)
     unknown = UnknownDevices()
+    service.values.update(step.values())
     if source is not None:
         service.tasks.create_task(_keep_source(service, source))
-    service.tasks.create_task(_name_unknown(service, unknown))
+    service.tasks.create_task(_hear_events(service, step, events))
+    service.tasks.create_task(_look_after(service, step, outlet, unknown))
     service.ready()
     async for pose in poses:
-        result = step.step(pose)
+        result = step.step(pose, clock.now_ns())
         if result is not None:
             outlet.put(result)
-        elif config.object:
+        elif config.object and not step.knows(pose.device.serial):
             unknown.note(pose.device.serial, time.monotonic())
-        service.values.update(
-            registered=float(step.registered), lost=step.lost, unknown=step.unknown
-        )
 
 
 class Outlet:
@@ -77,11 +83,29 @@ class Outlet:
             consumer(pose)
 
 
-async def _name_unknown(service: Service, unknown: UnknownDevices) -> None:
-    """Report the devices that rig.toml does not name, for ever."""
+async def _hear_events(
+    service: Service, step: ObjectStep, events: Subscription[OpenVrEvent]
+) -> None:
+    """Take in what SteamVR says of its frame, for ever."""
+    async for event in events:
+        warning = step.event(event)
+        if warning is not None:
+            service.error(warning, subject="openvr")
+
+
+async def _look_after(
+    service: Service, step: ObjectStep, outlet: Outlet, unknown: UnknownDevices
+) -> None:
+    """Once a second: the devices that have stopped, what is wrong, and the counts; for ever."""
     while True:
         await asyncio.sleep(_LOOK_S)
+        now_ns = clock.now_ns()
+        for lost in step.silent(now_ns):
+            outlet.put(lost)
+        for code, texts in step.faults(now_ns).items():
+            service.faults.replace(code, texts)
         service.faults.replace("device_unknown", unknown.texts(time.monotonic()))
+        service.values.update(step.values())
 
 
 async def _keep_source(service: Service, source: PoseSource) -> None:

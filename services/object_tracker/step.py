@@ -1,46 +1,33 @@
 """One tracker pose as OpenVR reports it in, one object pose in the rig frame out.
 
-Pure. A pose that cannot be right (not valid, disconnected, not finite, not a rotation, beyond
-100 m) gives an ObjectPose with tracking "lost" and neutral numbers: the last good pose is not held,
-nothing is extrapolated. A device that rig.toml does not name gives None and is counted. Without
-calibration/objects.json poses stay in the lighthouse frame with registered = false. Late poses are
-not reordered: each keeps its own stamp.
+Pure. What a device says of itself (not valid, disconnected, uninitialised) gives an ObjectPose with
+tracking "lost" and neutral numbers: the last good pose is not held, nothing is extrapolated. What
+cannot be right (misread, of another time, of a second sender, an outlier) gives None and is
+counted. A device that rig.toml does not name gives None and is counted. Without
+calibration/objects.json, or where it no longer holds, poses stay in the lighthouse frame with
+registered = false, and what would be "ok" is "unregistered". A device that falls silent is told as
+"lost" by `silent`.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from collections import Counter
 
 from rhot.files.calibration import Objects
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import (
-    Array,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-    transform,
-)
-from rhot.messages import Quat, Vec3
-from rhot.messages.objects import ObjectPose, ObjectTracking, OpenVrPose
-from services.object_tracker.registration import Placement, Registration, is_rotation, register
+from rhot.geometry.quaternions import Quat, multiply, normalized, rotate
+from rhot.messages import Vec3
+from rhot.messages.objects import ObjectPose, OpenVrEvent, OpenVrPose
+from services.object_tracker.device import Device, Where
+from services.object_tracker.intake.frames import FrameWatch
+from services.object_tracker.intake.reading import LOST
+from services.object_tracker.registration import Placement, Registration, register
 
-# ETrackingResult of openvr.h; every other value (1 is Uninitialized) is "lost".
-_TRACKING: dict[int, ObjectTracking] = {
-    100: "calibrating",  # Calibrating_InProgress
-    101: "calibrating",  # Calibrating_OutOfRange
-    200: "ok",  # Running_OK
-    201: "out_of_range",  # Running_OutOfRange
-    300: "rotation_only",  # Fallback_RotationOnly
-}
-# 20 minutes of SteamVR poses (vive/marvin) stay within 2e-7 of a rotation (float32); 1e-3 still
-# excludes any real scale or shear.
-_ROTATION_TOLERANCE = 1e-3
-# Lighthouses reach 10 m; SteamVR was seen to jump some metres when it locates them again. What is
-# beyond 100 m is no pose.
-_MAX_DISTANCE_M = 100.0
-# A thrown tracker stays under 30 m/s and a spun one under 60 rad/s; ten times that is no velocity.
-_MAX_SPEED = 600.0
 # Serials kept so that people can see what to write into rig.toml; OpenVR has 64 slots.
 _MAX_UNKNOWN = 64
+# The slowest source sends 90 poses a second; after half a second it has stopped.
+_SILENT_NS = 500_000_000
 _LATEST_STAMP_NS = 2**63 - 1
 
 
@@ -54,97 +41,157 @@ class ObjectStep:
 
     def __init__(self, config: RigConfig, objects: Objects | None) -> None:
         self._registration: Registration = register(config, objects)
+        self._frames = FrameWatch(objects.universe if objects else "")
+        leash_m = config.objects.filter_mm * 1e-3
+        self._devices = {serial: Device(leash_m) for serial in self._registration.placements}
         self.unknown = 0
         self.unknown_serials: set[str] = set()
         self.lost = 0
 
     @property
     def registered(self) -> bool:
-        """Whether poses come out in the rig frame."""
+        """Whether objects.json is there; `faults` tells where it no longer holds."""
         return self._registration.registered
 
-    def step(self, pose: OpenVrPose) -> ObjectPose | None:
-        """The object's pose at the same instant, less the tracker's own delay.
+    def knows(self, serial: str) -> bool:
+        """Whether rig.toml names that device."""
+        return serial in self._devices
 
-        None for a device that rig.toml does not name. T_rig_from_object = T_rig_from_lighthouse @
+    def step(self, pose: OpenVrPose, arrival_ns: int | None = None) -> ObjectPose | None:
+        """The object's pose at the instant of the tracker's, on the master's clock.
+
+        arrival_ns is CLOCK_REALTIME as the message came, None where a file is read. None for a
+        message that is left out. T_rig_from_object = T_rig_from_lighthouse @
         T_lighthouse_from_tracker @ T_tracker_from_object. The velocity is that of the object's
         origin, v + w x r with r from the tracker to it (rigid body); v and w are in the rig frame.
         """
-        placement = self._registration.placements.get(pose.device.serial)
-        if placement is None:
+        serial = pose.device.serial
+        device = self._devices.get(serial)
+        if device is None:
             self.unknown += 1
             if len(self.unknown_serials) < _MAX_UNKNOWN:
-                self.unknown_serials.add(pose.device.serial)
+                self.unknown_serials.add(serial)
             return None
-        tracking = _TRACKING.get(pose.eTrackingResult)
-        T_lighthouse_from_tracker = _valid_transform(pose)
-        if tracking is None or T_lighthouse_from_tracker is None:
-            self.lost += 1
-            return self._message(pose, placement, "lost", np.eye(4), np.zeros(3), np.zeros(3))
-        T_rig_from_lighthouse = self._registration.T_rig_from_lighthouse
-        R_rig_from_lighthouse = T_rig_from_lighthouse[:3, :3]
-        lever_lighthouse = (
-            T_lighthouse_from_tracker[:3, :3] @ placement.T_tracker_from_object[:3, 3]
-        )  # (3,)
-        w_lighthouse = np.array(pose.vAngularVelocity)
-        v_lighthouse = np.array(pose.vVelocity) + np.cross(w_lighthouse, lever_lighthouse)
-        T_rig_from_object = (
-            T_rig_from_lighthouse @ T_lighthouse_from_tracker @ placement.T_tracker_from_object
-        )
-        return self._message(
-            pose,
-            placement,
-            tracking,
-            T_rig_from_object,
-            R_rig_from_lighthouse @ v_lighthouse,
-            R_rig_from_lighthouse @ w_lighthouse,
-        )
+        where = device.take(pose, arrival_ns)
+        if where is None:
+            return None
+        holds = self._frames.holds(serial, pose.universe) and self._registration.registered
+        return self._message(serial, pose.seq, where, holds=holds)
 
-    def _message(
-        self,
-        pose: OpenVrPose,
-        placement: Placement,
-        tracking: ObjectTracking,
-        T: Array,
-        velocity_m_s: Array,
-        angular_velocity_rad_s: Array,
-    ) -> ObjectPose:
+    def event(self, event: OpenVrEvent) -> str | None:
+        """Takes in what SteamVR says of its frame; a warning to tell, or None."""
+        return self._frames.event(event)
+
+    def silent(self, now_ns: int) -> list[ObjectPose]:
+        """A "lost" for each object whose tracker has sent before, and has stopped.
+
+        now_ns is on the clock of the arrivals. Stamps go on from the last one's.
+        """
+        lost = []
+        for serial, device in self._devices.items():
+            if device.arrived_ns is None or now_ns - device.arrived_ns < _SILENT_NS:
+                continue
+            where = Where(device.stamp_ns + now_ns - device.arrived_ns, LOST, None, None)
+            lost.append(self._message(serial, 0, where, holds=self._registration.registered))
+        return lost
+
+    def faults(self, now_ns: int) -> dict[str, dict[str, str]]:
+        """What is wrong with devices and with the registration: texts by code and by subject."""
+        stale = self._frames.texts() if self._registration.registered else {}
+        found: dict[str, dict[str, str]] = {
+            "registration_stale": {
+                subject: f"{text}: objects stay in the lighthouse frame"
+                for subject, text in stale.items()
+            },
+            "device_misread": {},
+            "device_twice": {},
+            "device_battery": {},
+        }
+        for serial, device in self._devices.items():
+            for code, text in device.faults(serial, now_ns).items():
+                found[code][serial] = text
+        return found
+
+    def values(self) -> dict[str, float]:
+        """Counts for health: what was left out, by its reason."""
+        reasons: Counter[str] = Counter()
+        for device in self._devices.values():
+            reasons.update(device.left_out)
+        holds = self.registered and not self._frames.texts()
+        counts = {f"left_out_{reason}": float(n) for reason, n in reasons.items()}
+        return {"registered": float(holds), "lost": self.lost, "unknown": self.unknown} | counts
+
+    def _message(self, serial: str, seq: int, where: Where, *, holds: bool) -> ObjectPose:
+        placement = self._registration.placements[serial]
+        tracking, position_m, orientation, velocity, spin = where.reading
+        sigma_m = sigma_rad = None
+        if tracking == "lost":
+            self.lost += 1
+        else:
+            lever = rotate(orientation, placement.offset_m)
+            position_m = _sum(position_m, lever)
+            velocity = _sum(velocity, _cross(spin, lever))
+            orientation = multiply(orientation, placement.orientation_wxyz)
+            if holds:
+                known = self._registration
+                turn = known.orientation_wxyz
+                position_m = _sum(known.position_m, rotate(turn, position_m))
+                orientation = multiply(turn, orientation)
+                velocity, spin = rotate(turn, velocity), rotate(turn, spin)
+            elif tracking == "ok":
+                tracking = "unregistered"
+            if where.sigma_m is not None and where.sigma_rad is not None:
+                sigma_m, sigma_rad = self._sigmas(where, placement, position_m, holds=holds)
+        stamp_ns = where.stamp_ns - placement.time_offset_ns
         return ObjectPose(
             object=placement.name,
-            serial=pose.device.serial,
-            seq=pose.seq,
-            stamp_ns=min(max(pose.stamp_ns - placement.time_offset_ns, 0), _LATEST_STAMP_NS),
-            position_m=_vec3(T[:3, 3]),
-            orientation_wxyz=_quat(quaternion_from_rotation(T[:3, :3])),
-            velocity_m_s=_vec3(velocity_m_s),
-            angular_velocity_rad_s=_vec3(angular_velocity_rad_s),
+            serial=serial,
+            seq=seq,
+            stamp_ns=min(max(stamp_ns, 0), _LATEST_STAMP_NS),
+            position_m=_rounded(position_m),
+            orientation_wxyz=_rounded_turn(orientation),
+            velocity_m_s=_rounded(velocity),
+            angular_velocity_rad_s=_rounded(spin),
             tracking=tracking,
-            registered=self._registration.registered,
+            registered=holds,
+            sigma_m=sigma_m,
+            sigma_rad=sigma_rad,
+        )
+
+    def _sigmas(
+        self, where: Where, placement: Placement, position_m: Vec3, *, holds: bool
+    ) -> tuple[float, float]:
+        """Of the tracker, and of the registration as far as objects.json tells it."""
+        sigma_m, sigma_rad = where.sigma_m or 0.0, where.sigma_rad or 0.0
+        known = self._registration
+        turn_rad = known.sigma_rad if holds else 0.0
+        shift_m = known.sigma_m if holds else 0.0
+        away_m = math.dist(position_m, known.middle_m) if holds and known.middle_m else 0.0
+        of_lever_m = sigma_rad * placement.lever_m
+        return (
+            round(math.hypot(sigma_m, of_lever_m, shift_m, turn_rad * away_m), 6),
+            round(math.hypot(sigma_rad, turn_rad), 6),
         )
 
 
-def _valid_transform(pose: OpenVrPose) -> Array | None:
-    """T_lighthouse_from_tracker (4, 4), made exactly rigid; None if the pose cannot be right."""
-    if not pose.bPoseIsValid or not pose.bDeviceIsConnected:
-        return None
-    rows = np.array(pose.mDeviceToAbsoluteTracking, dtype=np.float64)  # (3, 4)
-    speeds = np.array([pose.vVelocity, pose.vAngularVelocity], dtype=np.float64)
-    # Comparisons written so that NaN fails them.
-    if not np.all(np.abs(rows[:, 3]) <= _MAX_DISTANCE_M) or not np.all(
-        np.abs(speeds) <= _MAX_SPEED
-    ):
-        return None
-    if not is_rotation(rows[:, :3], _ROTATION_TOLERANCE):
-        return None
-    return transform(rotation_from_quaternion(quaternion_from_rotation(rows[:, :3])), rows[:, 3])
+def _sum(a: Vec3, b: Vec3) -> Vec3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def _vec3(values: Array) -> Vec3:
-    """Rounded to the micrometre (or um/s, urad/s): a thousandth of what lighthouses resolve."""
-    x, y, z = (round(v, 6) + 0.0 for v in values.tolist())
-    return (x, y, z)
+def _cross(a: Vec3, b: Vec3) -> Vec3:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
-def _quat(values: Array) -> Quat:
-    w, x, y, z = (round(v, 6) + 0.0 for v in values.tolist())
-    return (w, x, y, z)
+def _rounded(values: Vec3) -> Vec3:
+    """To the micrometre (or um/s, urad/s): a thousandth of what lighthouses resolve; no -0."""
+    x, y, z = values
+    return round(x, 6) + 0.0, round(y, 6) + 0.0, round(z, 6) + 0.0
+
+
+def _rounded_turn(q: Quat) -> Quat:
+    w, x, y, z = normalized(q)
+    return round(w, 6) + 0.0, round(x, 6) + 0.0, round(y, 6) + 0.0, round(z, 6) + 0.0

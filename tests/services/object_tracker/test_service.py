@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -50,7 +51,9 @@ async def test_poses_in_objects_out_with_garbage_between(
             ):
                 bus.put_raw("rhot/desk/openvr/LHR-1/pose", payload)
             unknown.put(make_pose(serial="LHR-2"))
-            known.put(make_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
+            at_ns = time.time_ns()
+            T = transform(np.eye(3), [0.1, 0.2, 0.3])
+            known.put(make_pose(T, stamp_ns=at_ns, seq=at_ns))
 
         objects = bus.every(topics.OBJECT, 8)
         with sending(send):
@@ -63,7 +66,7 @@ async def test_poses_in_objects_out_with_garbage_between(
         assert (result.object, result.position_m, result.tracking, result.registered) == (
             "cup",
             (0.1, 0.2, 0.3),
-            "ok",
+            "unregistered",
             False,
         )
         assert service.state == "running"
