@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -31,11 +31,24 @@ class HandTruth(Message, frozen=True, kw_only=True):
     angles_rad: dict[str, FingerAngles]
 
 
+# A part of one hand: `right.thumb`, ..., `left.palm` (HandPart of rhot/messages/objects.py).
+PartOfHand = Annotated[
+    str, msgspec.Meta(pattern=r"^(left|right)\.(thumb|index|middle|ring|little|palm)$")
+]
+
+
 class ObjectTruth(Message, frozen=True, kw_only=True):
-    """What the simulator knows of one object, in the rig frame."""
+    """What the simulator knows of one object, in the rig frame.
+
+    contacts is how far the skin of each hand's part is from the object's surface, in metres,
+    negative where they overlap; empty where the object has no shape. held_by is the hand that
+    carries the object, empty if it rests.
+    """
 
     position_m: Vec3
     orientation_wxyz: Quat
+    contacts: dict[PartOfHand, float] = msgspec.field(default_factory=dict)
+    held_by: Literal["", "left", "right"] = ""
 
 
 class Truth(Message, frozen=True, kw_only=True):
