@@ -62,7 +62,7 @@ PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offli
 # The floors of rhot/, from the lowest: each uses only what is named, and what lies below it.
 FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
-    {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises"},
+    {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises", "rhot/hand_skin"},
     {"rhot/messages"},
     {"rhot/topics", "rhot/faults", "rhot/object_motion"},
     {"rhot/files", "rhot/bus"},
