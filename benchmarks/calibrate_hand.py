@@ -24,9 +24,9 @@ from rhot.hand_exercises import CYCLE_S
 from rhot.messages import HandPoints, HandPose
 from services.calibrator.hand.fit import fit_hand
 from services.calibrator.hand.recording import sort_exercises
-from services.simulator.scene.calibration_exercises import guided
-from services.simulator.scene.gestures import MOTIONS, Motion
-from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.hands.calibration_exercises import guided
+from services.simulator.hands.gestures import MOTIONS, Motion
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 from services.solver.step import SolverStep
 from testing.synthetic_hands import hand_message, noisy_points, with_bone_factors, wrist_rotation
 

@@ -19,7 +19,7 @@ from solver_hands import FRAMES, RATE_HZ, Motion, errors_of, moving, with_painte
 
 from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
-from services.simulator.scene.gestures import CURVED, FIST, OPEN, LimitScaling, bump
+from services.simulator.hands.gestures import CURVED, FIST, OPEN, LimitScaling, bump
 
 _JOINTS = ("proximal", "intermediate")
 CANDIDATES = (

@@ -12,7 +12,7 @@ import numpy as np
 from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, HandModel, forward, landmark_point
 from rhot.messages import HandPoint, HandPoints
-from services.simulator.scene.gestures import Gesture
+from services.simulator.hands.gestures import Gesture
 
 # Noise of each coordinate, one standard deviation.
 NOISE_M = 1e-3

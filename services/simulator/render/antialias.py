@@ -30,7 +30,7 @@ from services.simulator.render.ray_capsule import (
 from services.simulator.render.sample_patterns import MAX_SAMPLES, MIN_SAMPLES
 from services.simulator.render.shade import Hits, identify, shade
 from services.simulator.render.trace import empty_hits
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 # A step of 1.5 px between instants vanishes in the lens blur.
 _STEP_PX = 1.5

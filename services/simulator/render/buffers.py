@@ -16,7 +16,7 @@ from rhot.geometry.transforms import Array
 from services.simulator.render.projection import Array32, lens_parameters
 from services.simulator.render.ray_capsule import FAR
 from services.simulator.render.sample_patterns import sample_patterns
-from services.simulator.scene.bodies import Ints, ShapeArrays
+from services.simulator.hands.bodies import Ints, ShapeArrays
 
 
 class FrameTiming(NamedTuple):

@@ -17,7 +17,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.simulator.render.projection import Array32
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 # The sRGB curve as a table over the square root of light: nearly a line, so 1024 steps are exact to
 # 0.05 grey levels.

@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.simulator.render.buffers import FrameBuffers
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 # Neighbours further apart in depth than this are different things: half a finger.
 _STEP_M = 4e-3

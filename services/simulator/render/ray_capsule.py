@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.simulator.render.projection import Array32
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 # Fields of a placed capsule (PLACED,). First what depends on the instant, written by
 # `place_capsule`: the balls' centres a and b and the axis b - a (xyz each), the radii ...

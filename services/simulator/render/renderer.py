@@ -37,7 +37,7 @@ from services.simulator.render.projection import Array32, pixel_rays
 from services.simulator.render.ray_capsule import FAR
 from services.simulator.render.trace import trace
 from services.simulator.scene.backdrop import backdrop, vignette, wall_texture
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.scene_shapes import scene_shapes
 

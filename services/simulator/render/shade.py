@@ -44,7 +44,7 @@ from services.simulator.render.ray_capsule import (
     SLANT_SQUARED,
     SURFACE,
 )
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 # Skin lets light in: the shadow's edge is soft by this much.
 _WRAP = 0.25

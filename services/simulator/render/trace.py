@@ -20,7 +20,7 @@ from services.simulator.render.ray_capsule import (
     write_attributes,
 )
 from services.simulator.render.shade import Hits, identify, shade
-from services.simulator.scene.bodies import Ints
+from services.simulator.hands.bodies import Ints
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -20,9 +20,9 @@ from rhot.geometry.transforms import (
     vector_from_rotation,
 )
 from rhot.hand import HandModel, HandName
-from services.simulator.scene.gestures import TAU, Motion
-from services.simulator.scene.hand_kinematics import Skeleton
-from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.hands.gestures import TAU, Motion
+from services.simulator.hands.hand_kinematics import Skeleton
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 
 # The middle of an open hand in the wrist frame: at its longest it reaches 0.19 m beyond the wrist.
 _MIDDLE_M = np.array([0.0, 0.0, -0.09])

@@ -34,11 +34,11 @@ from services.simulator.scene.actors import (
     lateral_offset_m,
     place_hand,
 )
-from services.simulator.scene.calibration_exercises import guided
+from services.simulator.hands.calibration_exercises import guided
 from services.simulator.scene.catalog import SceneSpec, scene_spec
-from services.simulator.scene.gestures import MOTIONS
-from services.simulator.scene.hand_kinematics import Skeleton
-from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.hands.gestures import MOTIONS
+from services.simulator.hands.hand_kinematics import Skeleton
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 from services.simulator.scene.truth import truth_message
 
 # Without objects.json the lighthouse frame is taken to lie half a metre below and behind the

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.simulator.scene.bodies import HAND_FRAMES, ShapeArrays, ShapeBuilder, add_hand
+from services.simulator.hands.bodies import HAND_FRAMES, ShapeArrays, ShapeBuilder, add_hand
 from services.simulator.scene.paints import CUP, SKIN, TRACKER, Surface, paint
 from services.simulator.scene.scene import Scene
 

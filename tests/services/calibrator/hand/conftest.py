@@ -11,9 +11,9 @@ from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import HandModel, HandName, default_hand
 from rhot.hand_exercises import CYCLE_S
 from rhot.messages import HandPoints
-from services.simulator.scene.calibration_exercises import guided
-from services.simulator.scene.gestures import MOTIONS
-from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.hands.calibration_exercises import guided
+from services.simulator.hands.gestures import MOTIONS
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 from testing.synthetic_hands import hand_message, noisy_points, with_bone_factors, wrist_rotation
 
 _GUIDED_FPS, _RANDOM_FPS = 15.0, 30.0

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot.hand import HandModel, default_hand
-from services.simulator.scene.gestures import MOTIONS, bump, smootherstep
+from services.simulator.hands.gestures import MOTIONS, bump, smootherstep
 
 
 def narrow_hand() -> HandModel:

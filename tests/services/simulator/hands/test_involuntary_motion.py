@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rhot.hand import default_hand
-from services.simulator.scene.gestures import MOTIONS
-from services.simulator.scene.involuntary_motion import InvoluntaryMotion
+from services.simulator.hands.gestures import MOTIONS
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 
 
 def test_the_hand_sways_a_little_and_never_stops():

@@ -6,7 +6,7 @@ import numpy as np
 
 from rhot.hand import default_hand
 from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES
-from services.simulator.scene.calibration_exercises import guided
+from services.simulator.hands.calibration_exercises import guided
 
 
 def test_it_stays_in_the_limits_and_does_not_jump() -> None:

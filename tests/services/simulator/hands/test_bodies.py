@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.hand import JOINT_INDEX, TIPS, default_hand, forward
-from services.simulator.scene.bodies import ARM, HAND_FRAMES, ShapeBuilder, add_hand
+from services.simulator.hands.bodies import ARM, HAND_FRAMES, ShapeBuilder, add_hand
 
 
 @pytest.mark.parametrize("hand", ["left", "right"])

@@ -10,7 +10,7 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel
-from services.simulator.scene.gestures import TAU
+from services.simulator.hands.gestures import TAU
 
 # Amplitudes of the hand's three slow waves and of its tremor: turn 0.4 and 0.05 deg, shift 1.2 and
 # 0.1 mm.

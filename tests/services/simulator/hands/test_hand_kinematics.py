@@ -7,7 +7,7 @@ import pytest
 
 from rhot.geometry.transforms import rotation_from_quaternion
 from rhot.hand import HANDS, default_hand, forward
-from services.simulator.scene.hand_kinematics import Skeleton
+from services.simulator.hands.hand_kinematics import Skeleton
 
 
 @pytest.mark.parametrize("hand", HANDS)

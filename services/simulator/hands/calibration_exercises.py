@@ -11,7 +11,7 @@ import numpy as np
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel
 from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES, Exercise
-from services.simulator.scene.gestures import Gesture, LimitScaling, Motion, bump, smootherstep
+from services.simulator.hands.gestures import Gesture, LimitScaling, Motion, bump, smootherstep
 
 # Standard deviation of a straight finger per exercise (abduction, two flexions), and of the resting
 # thumb.
