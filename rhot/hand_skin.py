@@ -3,7 +3,7 @@
 A finger touches with its last bone, from the joint before it to the skin at its end, so the pad
 counts as the very tip does. The palm is the bones of the hand with the balls of thumb and little
 finger and the pads below the fingers. A capsule is all balls between its two end balls. The skin of
-the simulator's hands (services/simulator/scene/bodies.py) is made of the same ones. Pure.
+the simulator's hands (services/simulator/hands/bodies.py) is made of the same ones. Pure.
 """
 
 from __future__ import annotations

@@ -206,6 +206,22 @@ class Simulator(Table, frozen=True, kw_only=True):
     denoise: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
     # Live pictures with Y in 0..255 instead of 16..235.
     full_range: bool = False
+    # Jitter of the simulated Vive trackers: that of daily use. The laser-tracker study in the real
+    # recordings leaves 5.65 mm RMS over a room.
+    tracker_noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=0.1)] = 1e-3
+    # Of their turn.
+    tracker_noise_deg: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.3
+    # Share of their poses that are 20 to 200 mm off.
+    tracker_outliers: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    # Share of the time in which a tracker is out of the base stations' sight, 0.4 s at a time.
+    tracker_dropouts: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    # How much later than their instants the trackers' stamps are.
+    tracker_late_ms: Annotated[float, msgspec.Meta(ge=-500.0, le=500.0)] = 0.0
+    # Somebody moves the base stations after so many seconds, by so much, to see whether it is
+    # noticed.
+    lighthouse_moves_s: NonNegative = 0.0
+    lighthouse_shift_m: Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)] = 0.0
+    lighthouse_turn_deg: Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)] = 0.0
 
 
 class Viewer(Table, frozen=True, kw_only=True):

@@ -23,6 +23,8 @@ PAINT_HUES: dict[str, float] = {
     "violet": 134.0,
     "magenta": 161.0,
 }
+# Names that only a rig.toml gives: between two usual paints, for a seventh one.
+_RARE_HUES: dict[str, float] = {"leaf": 53.0}
 # A name is not given to a hue further from it than this.
 _MAX_NAME_DISTANCE = 16.0
 # A marker's patch is at least this saturated and this bright, and stands out from the cells around
@@ -52,10 +54,11 @@ def paint_name(hue: float, preferred: Sequence[str], taken: set[str]) -> str:
 
     A hue no name is near to, or a name twice, gets its number.
     """
+    hues = PAINT_HUES | _RARE_HUES
     for names in (preferred, PAINT_HUES):
-        free = [name for name in names if name in PAINT_HUES and name not in taken]
-        nearest = min(free, key=lambda name: abs(hue_difference(hue, PAINT_HUES[name])), default="")
-        if nearest and abs(hue_difference(hue, PAINT_HUES[nearest])) <= _MAX_NAME_DISTANCE:
+        free = [name for name in names if name in hues and name not in taken]
+        nearest = min(free, key=lambda name: abs(hue_difference(hue, hues[name])), default="")
+        if nearest and abs(hue_difference(hue, hues[nearest])) <= _MAX_NAME_DISTANCE:
             return nearest
     return f"hue{round(hue) % 180}"
 

@@ -42,7 +42,8 @@ def sample_pixels(renderer: Renderer, frames: Iterable[int]) -> tuple[dict[int, 
         hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV).astype(np.int64)
         labels = renderer.labels(renderer.clock.time_s(frame))
         paint = np.zeros(labels.shape, np.uint8)
-        for surface in renderer.shapes.paint_surfaces.values():
+        shapes = renderer.shapes
+        for surface in (*shapes.paint_surfaces.values(), *shapes.marker_surfaces.values()):
             mask = (labels == 1 + surface).astype(np.uint8)
             paint |= mask
             painted.setdefault(surface, []).append(hsv[cv2.erode(mask, kernel) > 0])

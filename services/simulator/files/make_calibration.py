@@ -22,18 +22,19 @@ from rhot.files.calibration import (
     Colors,
     Exposure,
     Lens,
-    ObjectPlace,
     Objects,
     RigGeometry,
     save,
 )
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import CameraTable
+from rhot.files.shapes import solid_of
 from rhot.geometry.camera import pinhole
-from rhot.geometry.transforms import Array, rotation_from_vector, rotation_x, rotation_y, transform
+from rhot.geometry.transforms import Array, rotation_from_vector, transform
 from services.simulator.files.fit_colors import Samples, fit_ranges, sample_pixels
 from services.simulator.render.renderer import Renderer
 from services.simulator.scene.scene import load_scene
+from services.simulator.scene.tracker_mounts import LIGHTHOUSE, simulated_place
 
 # A label that is stored in every calibration file, not a path: it keeps its value, so that files
 # made again are the same bytes.
@@ -43,11 +44,11 @@ _HFOV_RAD = np.deg2rad(62.5)
 _BASELINE_M = 0.075
 # Barrel distortion of a Raspberry Pi camera's lens after the usual calibration.
 _K1, _K2 = -0.055, 0.020
-# Origin of the lighthouse frame in the rig frame.
-_LIGHTHOUSE_M = (0.6, 0.9, 1.4)
 
 # Scenes and frames that show every paint from many sides, in light and shade.
 _SCENES, _FRAMES = ("fist", "piano", "random", "wave"), tuple(range(5, 200, 13))
+# And where the rig has objects whose trackers are painted, that paint.
+_OBJECT_SCENE = "registration"
 
 
 def lens(camera: CameraTable, date: str) -> Lens:
@@ -91,15 +92,9 @@ def geometry(cameras: list[CameraTable], date: str) -> RigGeometry:
 
 def objects(config: RigConfig, date: str) -> Objects:
     """The pose of the lighthouse frame, and how the trackers are fixed to their objects."""
-    T = transform(rotation_x(np.pi) @ rotation_y(0.6) @ rotation_x(0.15), _LIGHTHOUSE_M)
-    # A tracker sits at the lower end of its object, 75 mm from the middle.
-    places = {
-        o.name: ObjectPlace(
-            offset_m=(0.075, 0.0, 0.0), orientation_wxyz=(0.70710678, 0.0, 0.0, -0.70710678)
-        )
-        for o in config.object
-    }
-    return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=_matrix_rows(T), objects=places)
+    places = {o.name: simulated_place(o, solid_of(o, Path(config.folder))) for o in config.object}
+    T = _matrix_rows(LIGHTHOUSE)
+    return Objects(date=date, tool=TOOL, T_rig_from_lighthouse=T, objects=places)
 
 
 def write_all(config: RigConfig, date: str = "") -> list[Path]:
@@ -132,13 +127,18 @@ def colors(config: RigConfig, camera: str, date: str) -> Colors:
     """
     painted: dict[str, list[Samples]] = {}
     others = []
-    for name in _SCENES:
+    painted_objects = any(item.marker for item in config.object)
+    for name in (*_SCENES, _OBJECT_SCENE) if painted_objects else _SCENES:
         renderer = Renderer(load_scene(config, name), camera)
         surfaces, rest = sample_pixels(renderer, _FRAMES)
         others.append(rest)
         for (hand, landmark), surface in renderer.shapes.paint_surfaces.items():
             color = config.hand[hand].markers[landmark]  # type: ignore[index]
             painted.setdefault(color, []).append(surfaces[surface])
+        for item in config.object:
+            if item.marker:
+                surface = renderer.shapes.marker_surfaces[item.name]
+                painted.setdefault(item.marker, []).append(surfaces[surface])
     by_color = {name: np.concatenate(rows) for name, rows in painted.items()}
     return fit_ranges(by_color, np.concatenate(others), date, TOOL)
 

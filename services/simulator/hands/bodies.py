@@ -1,5 +1,5 @@
-"""The bodies of the simulated world: tapered capsules fixed to moving body frames, and dabs of
-paint on them. Pure data.
+"""The bodies of the simulated world: tapered capsules and solids fixed to moving body frames, and
+dabs of paint on them. Pure data.
 
 A body frame is an OpenXR joint of a hand, its forearm, or an object. All lengths are in metres, all
 offsets in the axes of the body frame they belong to. A left hand is the mirror image of a right
@@ -22,19 +22,28 @@ Ints = npt.NDArray[np.int64]
 HAND_FRAMES = 27
 ARM = 26
 
+# Which solid a row of the table is: a tapered capsule, a cylinder with flat ends, a box, or one of
+# the meshes, by number from MESH on.
+CAPSULE, CYLINDER, BOX, MESH = 0, 1, 2, 3
+
 Vec3 = tuple[float, float, float]
 _O: Vec3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeArrays:
-    """c capsules and d dabs as arrays."""
+    """c capsules and solids, and d dabs, as arrays.
+
+    A solid has the capsule that holds it, along one of its axes.
+    """
 
     frame: Ints  # (c, 2) which body frame either end is fixed to
     offset: Array  # (c, 2, 3) m
     radius: Array  # (c, 2) m
-    kind: Ints  # (c, 3) surface, surface of the painted end or -1, whether dabs stick to it
+    # (c, 4) surface, surface of the painted end or -1, whether dabs stick to it, which solid
+    kind: Ints
     end_m: Array  # (c,) painted length
+    half: Array  # (c, 2) m, half a box along the body's y and z
     dab_frame: Ints  # (d,)
     dab_offset: Array  # (d, 3) m
     dab_radius: Array  # (d,) m
@@ -54,6 +63,8 @@ class ShapeBuilder:
     end_surface: list[int] = field(default_factory=list)
     end_m: list[float] = field(default_factory=list)
     dabbed: list[bool] = field(default_factory=list)
+    solid: list[int] = field(default_factory=list)
+    half: list[tuple[float, float]] = field(default_factory=list)
     dab_frame: list[int] = field(default_factory=list)
     dab_offset: list[Vec3] = field(default_factory=list)
     dab_radius: list[float] = field(default_factory=list)
@@ -79,6 +90,26 @@ class ShapeBuilder:
         self.end_surface.append(end[0])
         self.end_m.append(end[1])
         self.dabbed.append(dabbed)
+        self.solid.append(CAPSULE)
+        self.half.append((0.0, 0.0))
+
+    def cylinder(
+        self, frame: int, ends_m: tuple[Vec3, Vec3], radius_m: float, surface: int
+    ) -> None:
+        """Add a cylinder with flat ends, whose middles are ends_m."""
+        a, b = ends_m
+        self.capsule((frame, a, radius_m), (frame, b, radius_m), surface)
+        self.solid[-1] = CYLINDER
+
+    def block(
+        self, frame: int, low_m: Array, high_m: Array, surface: int, solid: int = BOX
+    ) -> None:
+        """Add a box along the axes of its body frame, or a mesh that fills it."""
+        middle, half = 0.5 * (low_m + high_m), 0.5 * (high_m - low_m)
+        radius = float(np.hypot(half[1], half[2]))
+        a, b = (float(low_m[0]), *middle[1:].tolist()), (float(high_m[0]), *middle[1:].tolist())
+        self.capsule((frame, a, radius), (frame, b, radius), surface)
+        self.solid[-1], self.half[-1] = solid, (float(half[1]), float(half[2]))
 
     def dab(self, frame: int, offset_m: Vec3, diameter_m: float, surface: int) -> None:
         """Add paint on all skin within half the diameter of a point."""
@@ -89,13 +120,15 @@ class ShapeBuilder:
 
     def arrays(self) -> ShapeArrays:
         """What was added so far."""
-        kind = [np.array(values) for values in (self.surface, self.end_surface, self.dabbed)]
+        columns = (self.surface, self.end_surface, self.dabbed, self.solid)
+        kind = [np.array(values) for values in columns]
         return ShapeArrays(
             frame=np.array(self.frame, dtype=np.int64).reshape(-1, 2),
             offset=np.array(self.offset).reshape(-1, 2, 3),
             radius=np.array(self.radius).reshape(-1, 2),
             kind=np.stack(kind, axis=1).astype(np.int64),
             end_m=np.array(self.end_m, dtype=np.float64),
+            half=np.array(self.half).reshape(-1, 2),
             dab_frame=np.array(self.dab_frame, dtype=np.int64),
             dab_offset=np.array(self.dab_offset).reshape(-1, 3),
             dab_radius=np.array(self.dab_radius, dtype=np.float64),

@@ -11,7 +11,10 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.simulator.hands.bodies import CAPSULE, CYLINDER, Ints
 from services.simulator.render.buffers import (
+    MAX_SAMPLES,
+    MIN_SAMPLES,
     CapsulePaths,
     FrameBuffers,
     FrameTiming,
@@ -27,10 +30,15 @@ from services.simulator.render.ray_capsule import (
     place_capsule,
     write_attributes,
 )
-from services.simulator.render.sample_patterns import MAX_SAMPLES, MIN_SAMPLES
+from services.simulator.render.ray_solid import (
+    SHAPE,
+    intersect_cylinder,
+    intersect_solid,
+    place_solid,
+)
 from services.simulator.render.shade import Hits, identify, shade
 from services.simulator.render.trace import empty_hits
-from services.simulator.hands.bodies import Ints
+from services.simulator.scene.object_bodies import Meshes
 
 # A step of 1.5 px between instants vanishes in the lens blur.
 _STEP_PX = 1.5
@@ -42,6 +50,7 @@ class RowCapsules(NamedTuple):
     placed: Array  # (instants, c, PLACED) of all capsules; only those of this row are up to date
     active: Ints  # (n,) which ones touch the row
     columns: Ints  # (n, 2) first and last column of each of these
+    meshes: Meshes
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -56,10 +65,10 @@ def supersample(
     width = buffers.depth.shape[1]
     count = capsules.ends.shape[0]
     instants = 1 if longest <= STILL_PX else _sample_count(longest)
-    g = np.empty((instants, count, PLACED))
+    g = np.zeros((instants, count, PLACED))
     write_attributes(capsules.palms, capsules.kind, capsules.end_m, g)
     flat = g.reshape(instants * count, PLACED)
-    room = RowCapsules(g, np.empty(count, np.int64), np.empty((count, 2), np.int64))
+    room = RowCapsules(g, np.empty(count, np.int64), np.empty((count, 2), np.int64), scene.meshes)
     dab_centres = np.empty((instants, dabs.paths.shape[0], 3))
     hits = empty_hits(MAX_SAMPLES * width)
     pixels = np.empty((width, 3), np.int64)
@@ -112,8 +121,12 @@ def _place_in_row(
         for k in range(instants):
             at = _instant(u, k, instants, exposure)
             place_capsule(capsules.ends[c], capsules.radius[c], at, placed[k, c])
+            if capsules.kind[c, 3] != CAPSULE:
+                place_solid(
+                    capsules.kind[c, 3], capsules.half[c], capsules.palms[c], at, placed[k, c]
+                )
         n += 1
-    return RowCapsules(placed, active[:n], columns[:n])
+    return RowCapsules(placed, active[:n], columns[:n], room.meshes)
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -145,7 +158,13 @@ def _cast_rays(
                 if x < columns[i, 0] or x > columns[i, 1]:
                     continue
                 c = active[i]
-                t, along = intersect(placed[instant, c], dx, dy, dz)
+                solid = placed[instant, c, SHAPE]
+                if solid == CAPSULE:
+                    t, along = intersect(placed[instant, c], dx, dy, dz)
+                elif solid == CYLINDER:
+                    t, along = intersect_cylinder(placed[instant, c], dx, dy, dz)
+                else:
+                    t, along = intersect_solid(placed[instant, c], dx, dy, dz, touching.meshes)
                 if t < nearest:
                     nearest = t
                     hits.distance[n], hits.along[n] = t, along

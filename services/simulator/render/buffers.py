@@ -13,10 +13,16 @@ import numpy.typing as npt
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from services.simulator.hands.bodies import Ints, ShapeArrays
 from services.simulator.render.projection import Array32, lens_parameters
 from services.simulator.render.ray_capsule import FAR
-from services.simulator.render.sample_patterns import sample_patterns
-from services.simulator.hands.bodies import Ints, ShapeArrays
+from services.simulator.scene.object_bodies import Meshes
+
+# Samples a pixel at the outline of something still, and at most. Measured on a drifting finger tip:
+# 4 samples move its centroid by 0.037 px RMS, 6 by under 0.015, 12 no less.
+MIN_SAMPLES, MAX_SAMPLES = 6, 12
+# Random arrangements tried for each number of samples.
+_TRIES = 300
 
 
 class FrameTiming(NamedTuple):
@@ -41,6 +47,7 @@ class Surfaces(NamedTuple):
     materials: Array  # (m, 7)
     lights: Array  # (8, 3)
     texture: Array32  # (TEXELS, TEXELS)
+    facets: Array  # (f, 3) normals of the meshes' triangles
 
 
 class CapsulePaths(NamedTuple):
@@ -52,8 +59,10 @@ class CapsulePaths(NamedTuple):
     frame: Ints  # (c, 2) which body frame either end is fixed to
     offset: Array  # (c, 2, 3) m, in that frame
     radius: Array  # (c, 2) m
-    kind: Ints  # (c, 3) surface, surface of the painted end or -1, whether dabs stick to it
+    # (c, 4) surface, surface of the painted end or -1, whether dabs stick to it, which solid
+    kind: Ints
     end_m: Array  # (c,) painted length
+    half: Array  # (c, 2) m, of a box along its second and third axis
     ends: Array  # (c, 2, 3, 3) centres of both ends in the camera frame, m
     palms: Array  # (c, 3, 3) palmar direction of the first end's body frame
     tracks: Array  # (c, 2, 3, 3) x, y and radius of both ends in the picture, px
@@ -76,6 +85,7 @@ class SceneArrays(NamedTuple):
     capsules: CapsulePaths
     dabs: DabPaths
     surfaces: Surfaces
+    meshes: Meshes
 
 
 class FrameBuffers(NamedTuple):
@@ -115,6 +125,7 @@ def capsule_paths(shapes: ShapeArrays) -> CapsulePaths:
         radius=shapes.radius,
         kind=shapes.kind,
         end_m=shapes.end_m,
+        half=shapes.half,
         ends=np.empty((count, 2, 3, 3)),
         palms=np.empty((count, 3, 3)),
         tracks=np.empty((count, 2, 3, 3)),
@@ -148,3 +159,29 @@ def frame_buffers(rays: Array32, vignette: Array32, backdrop: Array32) -> FrameB
         columns=np.zeros((height, 2), np.int64),
         light=backdrop.copy(),
     )
+
+
+def sample_patterns() -> Array:
+    """Patterns of n samples: x and y from the pixel's middle in px, and rank in time 0..n-1.
+
+    (MAX_SAMPLES + 1, MAX_SAMPLES, 3), of which [n, :n] is the pattern of n. Latin squares: each
+    row, column and instant of a pixel divided n-fold is used once, so that the mean lies exactly in
+    the middle (an uneven pattern would shift every outline). Of many arrangements the one is taken
+    whose samples keep furthest apart.
+    """
+    rng = np.random.default_rng(1)
+    table = np.zeros((MAX_SAMPLES + 1, MAX_SAMPLES, 3))
+    for n in range(MIN_SAMPLES, MAX_SAMPLES + 1):
+        in_order = np.tile(np.arange(n), (_TRIES, 1))  # (tries, n)
+        shuffled = [rng.permuted(in_order, axis=1) for _ in ("y", "time")]
+        tries = np.stack([in_order, *shuffled], 2)  # (tries, n, 3)
+        apart = np.abs(tries[:, :, None] - tries[:, None, :])  # (tries, n, n, 3)
+        # Patterns repeat from pixel to pixel: distances wrap round.
+        apart = np.minimum(apart, n - apart)
+        in_space = np.sum(apart[..., :2] ** 2, axis=3)
+        in_space_and_time = np.sum(apart**2, axis=3)
+        score = np.min((in_space + 0.5 * in_space_and_time) + 1e6 * np.eye(n), axis=(1, 2))
+        best = tries[int(np.argmax(score))]
+        table[n, :n, :2] = (best[:, :2] + 0.5) / n - 0.5
+        table[n, :n, 2] = best[:, 2]
+    return table

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.simulator.render.projection import Array32
 from services.simulator.hands.bodies import Ints
+from services.simulator.render.projection import Array32
 
 # The sRGB curve as a table over the square root of light: nearly a line, so 1024 steps are exact to
 # 0.05 grey levels.

@@ -13,11 +13,14 @@ import numpy.typing as npt
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.simulator.render.buffers import FrameBuffers
-from services.simulator.hands.bodies import Ints
+from services.simulator.hands.bodies import CAPSULE, Ints
+from services.simulator.render.buffers import CapsulePaths, FrameBuffers
+from services.simulator.render.projection import Array32
 
 # Neighbours further apart in depth than this are different things: half a finger.
 _STEP_M = 4e-3
+# Solids have edges, where light changes by more than texture does: a matt wall's by 5 %.
+_CREASE_LIGHT = 0.02
 # Less movement than this while the shutter is open is not worth several instants.
 STILL_PX = 0.3
 # Longest motion that is followed, px: flags are bytes, and what crosses a third of the picture
@@ -26,15 +29,15 @@ _MAX_MOTION_PX = 200.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def flag_edges(tracks: Array, buffers: FrameBuffers, exposure: float) -> float:
+def flag_edges(capsules: CapsulePaths, buffers: FrameBuffers, exposure: float) -> float:
     """Flag every pixel that needs several rays, by 1 + the px that its outline moves while the
     shutter is open; returns the longest motion.
 
-    tracks (c, 2, 3, 3) as in CapsulePaths, exposure in units of u. flags must be 0.
+    exposure is in units of u. flags must be 0.
     """
     height, width = buffers.depth.shape
     longest = 0.0
-    flags, columns = buffers.flags, buffers.columns
+    flags, columns, kind = buffers.flags, buffers.columns, capsules.kind
     for y in range(height - 1):
         first = min(columns[y, 0], columns[y + 1, 0])
         last = max(columns[y, 1], columns[y + 1, 1])
@@ -43,6 +46,9 @@ def flag_edges(tracks: Array, buffers: FrameBuffers, exposure: float) -> float:
         for x in range(max(0, first - 1), min(width - 1, last + 1)):
             right = label[x] != label[x + 1] or abs(depth[x] - depth[x + 1]) > _STEP_M
             down = label[x] != label_below[x] or abs(depth[x] - depth_below[x]) > _STEP_M
+            if label[x] > 0 and kind[buffers.capsule[y, x], 3] != CAPSULE:
+                right = right or _crease(buffers.light, y, x, y, x + 1)
+                down = down or _crease(buffers.light, y, x, y + 1, x)
             if not right and not down:
                 continue
             flags[y, x] = max(flags[y, x], 1)
@@ -56,7 +62,7 @@ def flag_edges(tracks: Array, buffers: FrameBuffers, exposure: float) -> float:
                 if depth_below[x] < nearest:
                     front_y, front_x = y + 1, x
             # What is in front makes the outline, and its motion smears it.
-            track = tracks[buffers.capsule[front_y, front_x]]
+            track = capsules.tracks[buffers.capsule[front_y, front_x]]
             vx, vy = _motion_px(track, front_y, front_x, exposure)
             motion = math.hypot(vx, vy)
             if motion > STILL_PX:
@@ -64,6 +70,12 @@ def flag_edges(tracks: Array, buffers: FrameBuffers, exposure: float) -> float:
                 longest = max(longest, motion)
                 _flag_path(flags, y, x, vx, vy, 1 + int(motion))
     return longest
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _crease(light: Array32, y: int, x: int, v: int, w: int) -> bool:
+    """Whether two neighbours on a solid are faces in different light."""
+    return abs(light[y, x, 1] - light[v, w, 1]) > _CREASE_LIGHT
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -23,14 +23,21 @@ GLOSS, SHININESS, TEXTURE, IS_SKIN = 3, 4, 5, 6
 
 
 def surfaces_in_light(
-    surfaces: list[Surface], gains: Array, light: Light, rotation: Array, seed: int
+    surfaces: list[Surface],
+    gains: Array,
+    light: Light,
+    rotation: Array,
+    seed: int,
+    facets: Array,
 ) -> Surfaces:
     """How surfaces look to a camera with colour gains (3,).
 
     rotation (3, 3) turns the first camera's frame, in which `light` is given, into the frame of the
-    camera that renders.
+    camera that renders. facets (f, 3) are the normals of meshes' triangles.
     """
-    return Surfaces(_materials(surfaces, gains), _lights(light, rotation), _skin_texture(seed))
+    return Surfaces(
+        _materials(surfaces, gains), _lights(light, rotation), _skin_texture(seed), facets
+    )
 
 
 def _lights(light: Light, rotation: Array) -> Array:

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.simulator.hands.bodies import Ints
 from services.simulator.render.buffers import CameraView, CapsulePaths, DabPaths
 from services.simulator.render.projection import project
 from services.simulator.render.ray_capsule import FAR
-from services.simulator.hands.bodies import Ints
 
 # Added to a capsule's radius in the picture: room for the error of the parabola, px.
 _MARGIN_PX = 1.5

@@ -13,8 +13,8 @@ from typing import NamedTuple
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.simulator.render.projection import Array32
 from services.simulator.hands.bodies import Ints
+from services.simulator.render.projection import Array32
 
 # Fields of a placed capsule (PLACED,). First what depends on the instant, written by
 # `place_capsule`: the balls' centres a and b and the axis b - a (xyz each), the radii ...
@@ -28,7 +28,8 @@ SLANT_SQUARED, CONE_CONSTANT, LENGTH, INVERSE_LENGTH = 16, 17, 18, 19
 # Then what shading needs, written once a frame by `write_attributes`: palmar direction (xyz),
 # surface, surface and length of the painted end, whether dabs stick to it, number of the instant.
 PALMAR, SURFACE, END_SURFACE, END_LENGTH, DABBED, INSTANT = 20, 23, 24, 25, 26, 27
-PLACED = 28
+# The rest is of solids (ray_solid.py).
+PLACED = 40
 # Distance of what a ray does not meet.
 FAR = 1e9
 
@@ -159,7 +160,7 @@ def intersect_row(
 def write_attributes(palms: Array, kind: Ints, end_m: Array, g: Array) -> None:
     """Write what does not move into a table of placed capsules g (instants, c, PLACED).
 
-    palms (c, 3, 3), of which the value at u = 0 counts; kind (c, 3); end_m (c,).
+    palms (c, 3, 3), of which the value at u = 0 counts; kind (c, 4); end_m (c,).
     """
     for k in range(g.shape[0]):
         for c in range(g.shape[1]):

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from services.simulator.hands.bodies import Ints
 from services.simulator.render import develop
 from services.simulator.render.antialias import supersample
 from services.simulator.render.buffers import (
@@ -37,7 +38,6 @@ from services.simulator.render.projection import Array32, pixel_rays
 from services.simulator.render.ray_capsule import FAR
 from services.simulator.render.trace import trace
 from services.simulator.scene.backdrop import backdrop, vignette, wall_texture
-from services.simulator.hands.bodies import Ints
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.scene_shapes import scene_shapes
 
@@ -94,7 +94,9 @@ class Renderer:
                 self.scene.spec.light,
                 R_camera_from_first,
                 self.scene.seed,
+                self.shapes.meshes.normals,
             ),
+            meshes=self.shapes.meshes,
         )
 
     def _develop_backdrop(self) -> None:
@@ -154,8 +156,7 @@ class Renderer:
         """Everything up to the unrounded planes."""
         self._restore_backdrop()
         timing = self._trace(time_s)
-        tracks = self._arrays.capsules.tracks
-        longest = flag_edges(tracks, self._buffers, timing.exposure)
+        longest = flag_edges(self._arrays.capsules, self._buffers, timing.exposure)
         # What moves reaches beyond where it was in the middle of the exposure.
         widen_columns(self._buffers.columns, int(0.5 * longest) + _MARGIN_PX, self._wide)
         np.minimum(self._wide[:, 1], self.camera.size_px[0] - 1, out=self._wide[:, 1])

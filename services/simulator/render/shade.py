@@ -13,6 +13,7 @@ from typing import NamedTuple
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.simulator.hands.bodies import CAPSULE, Ints
 from services.simulator.render.buffers import Surfaces
 from services.simulator.render.materials import (
     AMBIENT,
@@ -44,7 +45,7 @@ from services.simulator.render.ray_capsule import (
     SLANT_SQUARED,
     SURFACE,
 )
-from services.simulator.hands.bodies import Ints
+from services.simulator.render.ray_solid import SHAPE, solid_normal
 
 # Skin lets light in: the shadow's edge is soft by this much.
 _WRAP = 0.25
@@ -107,7 +108,10 @@ def shade(n: int, hits: Hits, g: Array, surfaces: Surfaces) -> None:
         t = hits.distance[i]
         x, y, z = hits.ray[0, i], hits.ray[1, i], hits.ray[2, i]
         ax, ay, az = t * x - g[c, END_A], t * y - g[c, END_A + 1], t * z - g[c, END_A + 2]
-        nx, ny, nz = _normal(g[c], hits.along[i], ax, ay, az)
+        if g[c, SHAPE] == CAPSULE:
+            nx, ny, nz = _normal(g[c], hits.along[i], ax, ay, az)
+        else:
+            nx, ny, nz = solid_normal(g[c], int(hits.along[i]), (ax, ay, az), surfaces.facets)
 
         diffuse, fill, rim, sky, cosine = _light_on(lights, (nx, ny, nz), (x, y, z))
         shininess = materials[s, SHININESS]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from services.simulator.hands.bodies import CAPSULE, Ints
 from services.simulator.render.buffers import FrameBuffers, FrameTiming, SceneArrays
 from services.simulator.render.motion_paths import dabs_at, find_columns
 from services.simulator.render.projection import Array32
@@ -19,8 +20,8 @@ from services.simulator.render.ray_capsule import (
     place_capsule,
     write_attributes,
 )
+from services.simulator.render.ray_solid import intersect_solid_row, place_solid
 from services.simulator.render.shade import Hits, identify, shade
-from services.simulator.hands.bodies import Ints
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -29,7 +30,7 @@ def trace(scene: SceneArrays, buffers: FrameBuffers, timing: FrameTiming) -> Non
     capsules, dabs, surfaces = scene.capsules, scene.dabs, scene.surfaces
     height, width = buffers.depth.shape
     count = capsules.ends.shape[0]
-    g = np.empty((1, count, PLACED))
+    g = np.zeros((1, count, PLACED))
     write_attributes(capsules.palms, capsules.kind, capsules.end_m, g)
     dab_centres = np.empty((1, dabs.paths.shape[0], 3))
     nearest = NearestHits(np.empty(width), np.empty(width), np.empty(width, np.int64))
@@ -46,7 +47,12 @@ def trace(scene: SceneArrays, buffers: FrameBuffers, timing: FrameTiming) -> Non
             if x1 < x0:
                 continue
             place_capsule(capsules.ends[c], capsules.radius[c], u, g[0, c])
-            intersect_row(g[0, c], buffers.rays[row], x0, x1, c, nearest)
+            if capsules.kind[c, 3] == CAPSULE:
+                intersect_row(g[0, c], buffers.rays[row], x0, x1, c, nearest)
+            else:
+                place_solid(capsules.kind[c, 3], capsules.half[c], capsules.palms[c], u, g[0, c])
+                part = buffers.rays[row], x0, x1
+                intersect_solid_row(part, g[0, c], c, scene.meshes, nearest)
             first, last = min(first, x0), max(last, x1)
         buffers.columns[row, 0], buffers.columns[row, 1] = first, last
         if last >= first:

@@ -8,6 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.files.calibration import ObjectPlace
+from rhot.files.rig_tables import ObjectTable
+from rhot.geometry.camera import Camera
+from rhot.geometry.solids import Solid
 from rhot.geometry.transforms import (
     Array,
     inverse,
@@ -23,6 +26,7 @@ from rhot.hand import HandModel, HandName
 from services.simulator.hands.gestures import TAU, Motion
 from services.simulator.hands.hand_kinematics import Skeleton
 from services.simulator.hands.involuntary_motion import InvoluntaryMotion
+from services.simulator.scene.sweep import Sweep
 
 # The middle of an open hand in the wrist frame: at its longest it reaches 0.19 m beyond the wrist.
 _MIDDLE_M = np.array([0.0, 0.0, -0.09])
@@ -121,14 +125,26 @@ class Hand:
 
 @dataclass(frozen=True, eq=False)
 class SceneObject:
-    """An object: its pose at rest, and the hand that takes it, if any."""
+    """An object: its pose at rest, and the hand that takes it or the way it goes, if any.
 
-    name: str
-    serial: str
-    T_rig_from_rest: Array  # (4, 4)
+    solid is its shape, None if rig.toml says none.
+    """
+
+    table: ObjectTable
+    solid: Solid | None
     place: ObjectPlace
+    T_rig_from_rest: Array  # (4, 4)
     holder: HandName | None
     T_wrist_from_held: Array  # (4, 4)
+    sweep: Sweep | None = None
+
+    @property
+    def name(self) -> str:
+        return self.table.name
+
+    @property
+    def serial(self) -> str:
+        return self.table.serial
 
     @property
     def T_object_from_tracker(self) -> Array:  # noqa: N802 - frames cancel by name
@@ -136,11 +152,13 @@ class SceneObject:
             transform(rotation_from_quaternion(self.place.orientation_wxyz), self.place.offset_m)
         )
 
-    def pose_given(self, hands: dict[HandName, HandState]) -> Array:
-        """T_rig_from_object (4, 4) given the hands of the same instant.
+    def pose_at(self, t_s: float, hands: dict[HandName, HandState]) -> Array:
+        """T_rig_from_object (4, 4) at t_s, given the hands of the same instant.
 
         Moves from rest to held without a jump, as the grip closes.
         """
+        if self.sweep is not None:
+            return self.sweep.pose(t_s)
         state = hands.get(self.holder) if self.holder else None
         if state is None or state.grip <= 0.0:
             return self.T_rig_from_rest
@@ -179,3 +197,10 @@ def lateral_offset_m(hand: HandName, hands: int) -> float:
     if hands < 2:
         return 0.0
     return -0.5 * _HANDS_APART_M if hand == "right" else 0.5 * _HANDS_APART_M
+
+
+def middle_of_cameras(cameras: list[Camera]) -> Array:
+    """Middle of all cameras in the first one's frame; (3,)."""
+    T_view = cameras[0].T_rig_from_camera
+    middle_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
+    return np.asarray(T_view[:3, :3].T @ (middle_rig - T_view[:3, 3]))

@@ -33,6 +33,20 @@ class Light:
 
 
 @dataclass(frozen=True)
+class SweepSpec:
+    """How the first object is moved and turned through the volume, by an arm nobody sees.
+
+    reach is how far to either side and up and down, as a share of the depth; depth_m is nearest
+    and farthest; turn_deg to either side about x, y and z of its tracker.
+    """
+
+    # Pictures end at 0.6 and 0.45 of the depth.
+    reach: tuple[float, float] = (0.36, 0.28)
+    depth_m: tuple[float, float] = (0.34, 0.76)
+    turn_deg: Vec3 = (60.0, 60.0, 60.0)
+
+
+@dataclass(frozen=True)
 class SceneSpec:
     """What makes a scene.
 
@@ -62,6 +76,8 @@ class SceneSpec:
     light: Light = Light()
     # Objects in saturated colours in the background.
     clutter: bool = False
+    # The first object's way, if it does not wait for a hand; the scene has no hands then.
+    sweep: SweepSpec | None = None
     # Hands beside the configured ones, unpainted.
     extra_hands: tuple[HandName, ...] = ()
 
@@ -99,6 +115,19 @@ SCENES: dict[str, SceneSpec] = {
         "both hands; one that is not configured is unpainted",
         tilt_deg=30.0,
         extra_hands=("left", "right"),
+    ),
+    "registration": SceneSpec(
+        "", "the first object, moved and turned for `rhot calibrate objects`", sweep=SweepSpec()
+    ),
+    "registration_unturned": SceneSpec(
+        "",
+        "the same without turning: not enough for `rhot calibrate objects`",
+        sweep=SweepSpec(turn_deg=(0.0, 0.0, 0.0)),
+    ),
+    "registration_flat": SceneSpec(
+        "",
+        "the same in one plane: not enough either",
+        sweep=SweepSpec(depth_m=(0.5, 0.5), turn_deg=(0.0, 0.0, 60.0)),
     ),
 }
 

@@ -10,21 +10,23 @@ valid ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from rhot.errors import CalibrationError, ConfigError
-from rhot.files.calibration import ObjectPlace, Objects, load_hand, load_objects, load_rig_cameras
+from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
-from rhot.geometry.transforms import Array, rotation_x, rotation_z, transform
+from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandName
 from rhot.messages.simulator import Truth
 from services.simulator.camera_clock import CameraClock, camera_clock
+from services.simulator.hands.calibration_exercises import guided
+from services.simulator.hands.gestures import MOTIONS
+from services.simulator.hands.hand_kinematics import Skeleton
+from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 from services.simulator.scene.actors import (
-    GRIP_M,
     Hand,
     HandPlacement,
     HandState,
@@ -32,18 +34,12 @@ from services.simulator.scene.actors import (
     SceneObject,
     Travel,
     lateral_offset_m,
+    middle_of_cameras,
     place_hand,
 )
-from services.simulator.hands.calibration_exercises import guided
 from services.simulator.scene.catalog import SceneSpec, scene_spec
-from services.simulator.hands.gestures import MOTIONS
-from services.simulator.hands.hand_kinematics import Skeleton
-from services.simulator.hands.involuntary_motion import InvoluntaryMotion
+from services.simulator.scene.scene_objects import place_objects
 from services.simulator.scene.truth import truth_message
-
-# Without objects.json the lighthouse frame is taken to lie half a metre below and behind the
-# cameras, y up.
-_LIGHTHOUSE = transform(np.diag([1.0, -1.0, -1.0]), (0.0, 0.5, -0.5))
 
 
 class BodyFrames(NamedTuple):
@@ -80,7 +76,7 @@ class Scene:
     def object_poses(self, t_s: float) -> dict[str, Array]:
         """T_rig_from_object (4, 4) of every object."""
         states = self.hand_states(t_s)
-        return {item.name: item.pose_given(states) for item in self.objects}
+        return {item.name: item.pose_at(t_s, states) for item in self.objects}
 
     def body_frames(self, t_s: float) -> BodyFrames:
         """All body frames at one instant, for the renderer."""
@@ -91,7 +87,7 @@ class Scene:
             positions += [p, state.wrist_m[None]]
             rotations += [R, state.arm_rotation[None]]
         for item in self.objects:
-            T = item.pose_given(states)
+            T = item.pose_at(t_s, states)
             positions.append(T[None, :3, 3])
             rotations.append(T[None, :3, :3])
         return BodyFrames(np.concatenate(positions), np.concatenate(rotations))
@@ -102,7 +98,7 @@ class Scene:
         stamp_ns is that instant on the master's clock (default: the scene began at 0).
         """
         states = self.hand_states(t_s)
-        objects = {item.name: item.pose_given(states) for item in self.objects}
+        objects = {item.name: item.pose_at(t_s, states) for item in self.objects}
         stamp_ns = round(t_s * 1e9) if stamp_ns is None else stamp_ns
         return truth_message(self.hands, states, objects, stamp_ns)
 
@@ -137,10 +133,7 @@ def build_scene(
         raise ConfigError("the simulator needs at least one [[camera]] in rig.toml")
     cameras = rig_cameras(config)
     hands = _hands(config, spec, seed, speed, list(cameras.values()))
-    objects = _objects(config)
-    T_rig_from_lighthouse = (
-        _LIGHTHOUSE if objects is None else np.array(objects.T_rig_from_lighthouse)
-    )
+    T_rig_from_lighthouse, objects = place_objects(config, spec, hands, cameras, seed)
     count = len(config.camera)
     clocks = {
         table.name: camera_clock(table, number, count, spec.exposure_s, seed)
@@ -152,7 +145,7 @@ def build_scene(
         seed=seed,
         spec=spec,
         hands=hands,
-        objects=_scene_objects(config, spec, hands, objects, next(iter(cameras.values()))),
+        objects=objects,
         cameras=cameras,
         clocks=clocks,
         T_rig_from_lighthouse=T_rig_from_lighthouse,
@@ -184,6 +177,8 @@ def rig_cameras(config: RigConfig) -> dict[str, Camera]:
 def _hands(
     config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras: list[Camera]
 ) -> dict[HandName, Hand]:
+    if spec.sweep is not None:
+        return {}
     names = [name for name in HANDS if name in config.hand or name in spec.extra_hands]
     if not names:
         raise ConfigError(
@@ -214,8 +209,7 @@ def _placement(
 ) -> HandPlacement:
     """A hand in front of the middle of the rig; every seed gives a slightly different place."""
     T_view = cameras[0].T_rig_from_camera
-    middle_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
-    middle_view = T_view[:3, :3].T @ (middle_rig - T_view[:3, 3])
+    middle_view = middle_of_cameras(cameras)
     rng = np.random.default_rng([seed, 5])
     off_m = rng.uniform(-0.008, 0.008, 3)
     off_deg = rng.uniform(-3.0, 3.0, 3)
@@ -228,45 +222,3 @@ def _placement(
         roll_deg=mirror * (spec.roll_deg + off_deg[2]),
     )
     return place_hand(T_view, middle, view, Travel(spec.travel_m, spec.travel_hz))
-
-
-def _objects(config: RigConfig) -> Objects | None:
-    path = Path(config.calibration_dir, "objects.json")
-    return load_objects(config.calibration_dir) if path.exists() else None
-
-
-def _scene_objects(
-    config: RigConfig,
-    spec: SceneSpec,
-    hands: dict[HandName, Hand],
-    objects: Objects | None,
-    first: Camera,
-) -> list[SceneObject]:
-    """The configured objects: the first is grabbed if the scene grabs, others stand in a row."""
-    holder = next(iter(hands)) if spec.motion == "grab" else None
-    # The y axis of the object lies along the x axis of the hand.
-    T_wrist_from_held = transform(rotation_z(-0.5 * np.pi), GRIP_M)
-    scene_objects = []
-    for number, table in enumerate(config.object):
-        held_by = holder if number == 0 else None
-        if held_by is not None:
-            placement = hands[held_by].placement
-            T_wrist = transform(placement.rotation, placement.wrist_m)
-            T_rest = T_wrist @ T_wrist_from_held
-        else:
-            # Beside one hand or between two, a little behind, upright and turned a little.
-            x_m = (0.17 if len(hands) < 2 else 0.05) - 0.11 * number
-            place_m = (x_m, 0.10, spec.distance_m + 0.12)
-            upright = rotation_x(np.pi) @ rotation_z(0.1)
-            T_rest = first.T_rig_from_camera @ transform(upright, place_m)
-        scene_objects.append(
-            SceneObject(
-                name=table.name,
-                serial=table.serial,
-                T_rig_from_rest=T_rest,
-                place=objects.objects.get(table.name, ObjectPlace()) if objects else ObjectPlace(),
-                holder=held_by,
-                T_wrist_from_held=T_wrist_from_held,
-            )
-        )
-    return scene_objects

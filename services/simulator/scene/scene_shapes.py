@@ -1,29 +1,36 @@
-"""Every body of a scene as capsules, dabs of paint and surfaces, for the renderer. Pure."""
+"""Every body of a scene as capsules, solids, dabs of paint and surfaces, for the renderer. Pure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from services.simulator.hands.bodies import HAND_FRAMES, ShapeArrays, ShapeBuilder, add_hand
+from services.simulator.scene.object_bodies import (
+    MeshBuilder,
+    Meshes,
+    ObjectSurfaces,
+    add_object,
+)
 from services.simulator.scene.paints import CUP, SKIN, TRACKER, Surface, paint
 from services.simulator.scene.scene import Scene
 
-# An object is an upright cylinder about its y axis, half this long and this thick; its tracker is a
-# flat disc across.
-_HALF_LENGTH_M, _RADIUS_M = 0.055, 0.018
-_TRACKER_HALF_M, _TRACKER_RADIUS_M = 0.012, 0.024
+# Numbers of the surfaces that every scene has; paints come after them.
+_CUP, _TRACKER = 1, 2
 
 
 @dataclass(frozen=True, eq=False)
 class SceneShapes:
     """Every body of a scene and how it looks.
 
-    paint_surfaces: (hand, landmark) -> number of the surface that is its paint.
+    paint_surfaces: (hand, landmark) -> number of the surface that is its paint; marker_surfaces:
+    object -> that of the paint on its tracker.
     """
 
     arrays: ShapeArrays
+    meshes: Meshes
     surfaces: list[Surface]
     paint_surfaces: dict[tuple[str, str], int]
+    marker_surfaces: dict[str, int]
 
 
 def scene_shapes(scene: Scene) -> SceneShapes:
@@ -31,7 +38,7 @@ def scene_shapes(scene: Scene) -> SceneShapes:
 
     Raises ConfigError for a colour no paint has.
     """
-    shapes, surfaces = ShapeBuilder(), [SKIN, CUP, TRACKER]
+    shapes, meshes, surfaces = ShapeBuilder(), MeshBuilder(), [SKIN, CUP, TRACKER]
     paint_surfaces: dict[tuple[str, str], int] = {}
     for number, hand in enumerate(scene.hands.values()):
         paints: dict[str, int] = {}
@@ -39,18 +46,11 @@ def scene_shapes(scene: Scene) -> SceneShapes:
             paints[landmark] = paint_surfaces[hand.name, landmark] = len(surfaces)
             surfaces.append(paint(color))
         add_hand(shapes, hand.model, number * HAND_FRAMES, 0, paints)
-    first = HAND_FRAMES * len(scene.hands)
-    for number, item in enumerate(scene.objects):
-        frame = first + number
-        shapes.capsule(
-            (frame, (0.0, -_HALF_LENGTH_M, 0.0), _RADIUS_M),
-            (frame, (0.0, _HALF_LENGTH_M, 0.0), _RADIUS_M),
-            surface=1,
-        )
-        x, y, z = item.T_object_from_tracker[:3, 3].tolist()
-        shapes.capsule(
-            (frame, (x - _TRACKER_HALF_M, y, z), _TRACKER_RADIUS_M),
-            (frame, (x + _TRACKER_HALF_M, y, z), _TRACKER_RADIUS_M),
-            surface=2,
-        )
-    return SceneShapes(shapes.arrays(), surfaces, paint_surfaces)
+    marker_surfaces: dict[str, int] = {}
+    for frame, item in enumerate(scene.objects, start=HAND_FRAMES * len(scene.hands)):
+        if item.table.marker:
+            marker_surfaces[item.name] = len(surfaces)
+            surfaces.append(paint(item.table.marker))
+        bead = marker_surfaces.get(item.name, -1)
+        add_object(shapes, meshes, item, frame, ObjectSurfaces(_CUP, _TRACKER, bead))
+    return SceneShapes(shapes.arrays(), meshes.meshes(), surfaces, paint_surfaces, marker_surfaces)

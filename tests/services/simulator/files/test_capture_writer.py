@@ -131,7 +131,8 @@ def test_truth_lines_are_plain_json(folder):
     assert set(right) == {"points_m", "wrist", "angles_rad"}
     assert len(right["points_m"]["index_tip"]) == 3
     assert set(right["angles_rad"]["index"]) >= {"abduction", "mcp", "pip", "dip"}
-    assert set(first["objects"]["cup"]) == {"position_m", "orientation_wxyz"}
+    cup = first["objects"]["cup"]
+    assert set(cup) == {"position_m", "orientation_wxyz", "contacts", "held_by"}
 
 
 def test_a_video_that_does_not_fit_on_the_disk_is_one_line(fist, tmp_path, small_files):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -81,3 +82,55 @@ def test_deterministic(config):
         poses(scene, [1.0])[0].mDeviceToAbsoluteTracking
         != poses(scene, [1.0], first_seq=1)[0].mDeviceToAbsoluteTracking
     )
+
+
+def faulty(config, **settings):
+    own = msgspec.structs.replace(
+        config, simulator=msgspec.structs.replace(config.simulator, **settings)
+    )
+    return load_scene(own, "piano", seed=1)
+
+
+def off_m(scene, times) -> np.ndarray:
+    """Distances of the reported positions from a scene without any noise, metres."""
+    exact = faulty(scene.config, tracker_noise_m=0.0, tracker_noise_deg=0.0, tracker_outliers=0.0)
+    seen = [matrix(p)[:3, 3] for p in poses(scene, times)]
+    return np.linalg.norm(np.array(seen) - [matrix(p)[:3, 3] for p in poses(exact, times)], axis=1)
+
+
+def test_noise_and_outliers_are_as_asked_for(config):
+    scene = faulty(config, tracker_noise_m=0.003, tracker_outliers=0.1)
+    off = off_m(scene, np.zeros(600))
+    assert np.mean(off > 0.019) == pytest.approx(0.1, abs=0.04)
+    assert off.max() < 0.21
+    assert np.sqrt(np.mean(np.square(off[off < 0.015]))) == pytest.approx(0.003, rel=0.1)
+
+
+def test_drop_outs_are_told_and_keep_the_last_pose(config):
+    scene = faulty(config, tracker_dropouts=0.3, tracker_noise_m=0.0, tracker_noise_deg=0.0)
+    times = np.arange(0.0, 40.0, 0.1)
+    seen = poses(scene, times)
+    lost = [p for p in seen if not p.bPoseIsValid]
+    assert len(lost) / len(seen) == pytest.approx(0.3, abs=0.12)
+    assert {p.eTrackingResult for p in lost} == {201}
+    assert {p.eTrackingResult for p in seen if p.bPoseIsValid} == {200}
+
+
+def test_stamps_are_late_as_asked_for(config):
+    (pose,) = poses(faulty(config, tracker_late_ms=30.0), [1.0])
+    assert pose.stamp_ns == 1000 + 30_000_000
+
+
+def test_a_moved_base_station_moves_all_poses(config):
+    scene = faulty(
+        config,
+        lighthouse_moves_s=5.0,
+        lighthouse_shift_m=0.02,
+        lighthouse_turn_deg=1.0,
+        tracker_noise_m=0.0,
+        tracker_noise_deg=0.0,
+    )
+    before, after = (matrix(p) for p in poses(scene, [4.9, 5.1]))
+    shift = np.linalg.norm(after[:3, 3] - before[:3, 3])
+    assert 0.005 < shift < 0.08
+    assert np.rad2deg(angle_between(before[:3, :3], after[:3, :3])) == pytest.approx(1.0, abs=1e-3)
