@@ -12,7 +12,7 @@ queue=n it delivers every message through a queue of n that drops the oldest.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,15 +21,21 @@ from rhot.bus.bus import Bus, open_bus
 from rhot.bus.liveliness import AliveWatch
 from rhot.bus.security.credentials import with_certificates
 from rhot.bus.subscription import Subscription
+from rhot.contact_events import GraspEvent, GraspEvents, TouchEvent, TouchEvents
 from rhot.errors import BusError
 from rhot.hand import HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame, Session
 from rhot.messages.camera import Colors, ExposureControl
 from rhot.messages.health import Health
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import ObjectContacts, ObjectPose
 from rhot.topics import Topic
 
 T = TypeVar("T")
+Event = TypeVar("Event")
+
+# Contacts waiting for who awaits events: 4 s of two hands at 30 Hz. Their state is whole, so that
+# what is dropped loses no grasp.
+_EVENT_QUEUE = 256
 
 
 class RigClient:
@@ -55,6 +61,26 @@ class RigClient:
     ) -> Subscription[ObjectPose]:
         """Object poses, of one object or of all."""
         return self._stream(topics.OBJECT, queue, object=name)
+
+    def contacts(
+        self, name: str | None = None, queue: int | None = None
+    ) -> Subscription[ObjectContacts]:
+        """Distances of hands to one object or to all that have a shape, who touches and holds it.
+
+        With several objects, queue=n: `latest` would skip one object's for another's.
+        """
+        return self._stream(topics.CONTACTS, queue, object=name)
+
+    def grasps(self, name: str | None = None) -> AsyncIterator[GraspEvent]:
+        """Each begin and end of a grasp, of one object or of all: `async for event in ...`.
+
+        A grasp that is there already is the first event. stamp_ns is when it happened.
+        """
+        return _events(self.contacts(name, _EVENT_QUEUE), GraspEvents().feed)
+
+    def touches(self, name: str | None = None) -> AsyncIterator[TouchEvent]:
+        """Each begin and end of a touch, finger by finger, of one object or of all."""
+        return _events(self.contacts(name, _EVENT_QUEUE), TouchEvents().feed)
 
     def markers(
         self, camera: str | None = None, queue: int | None = None
@@ -118,6 +144,14 @@ class RigClient:
             if queue is None
             else self.bus.every(topic, queue, **given)
         )
+
+
+async def _events(
+    messages: Subscription[ObjectContacts], feed: Callable[[ObjectContacts], list[Event]]
+) -> AsyncIterator[Event]:
+    async for message in messages:
+        for event in feed(message):
+            yield event
 
 
 def _one(answers: list[T], camera: str) -> T:

@@ -38,6 +38,14 @@ PALM: tuple[tuple[_Ball, _Ball], ...] = (
 )
 
 
+_COLUMNS = [end for pair in PALM for end in pair]
+_BALL_JOINT = np.array([JOINT_INDEX[joint] for joint, _, _ in _COLUMNS])
+_BALL_OFFSET = 1e-3 * np.array([offset for _, offset, _ in _COLUMNS])
+_BALL_RADIUS = 1e-3 * np.array([radius for _, _, radius in _COLUMNS])
+_TIP = np.array([JOINT_INDEX[f"{digit}_tip"] for digit in DIGITS])
+_PART = np.array([*range(len(DIGITS)), *[PARTS.index("palm")] * len(PALM)])
+
+
 class Skin(NamedTuple):
     """c tapered capsules, in the frame of the joints; part is a row of PARTS."""
 
@@ -51,28 +59,17 @@ def skin_of(positions: Array, rotations: Array, radii_m: Array, side: float) -> 
 
     In OpenXR order, as of rhot.hand.forward and joint_radii_m; side is HandModel.side.
     """
-    ends, radii, part = [], [], []
-    for row, digit in enumerate(DIGITS):
-        tip = JOINT_INDEX[f"{digit}_tip"]
-        # The skin ends at the tip joint: its last ball lies its radius before it, a short bone's at
-        # its start.
-        back = min(radii_m[tip], float(np.linalg.norm(positions[tip] - positions[tip - 1])))
-        ends.append((positions[tip - 1], positions[tip] + back * rotations[tip][:, 2]))
-        radii.append((radii_m[tip - 1], radii_m[tip]))
-        part.append(row)
-    mm = 1e-3 * radii_m[JOINT_INDEX["palm"]] / _AVERAGE_PALM_M
-    for a, b in PALM:
-        (p, r), (q, t) = (_ball(one, positions, rotations, radii_m, side, mm) for one in (a, b))
-        ends.append((p, q))
-        radii.append((r, t))
-        part.append(PARTS.index("palm"))
-    return Skin(np.array(ends), np.array(radii), np.array(part))
-
-
-def _ball(
-    ball: _Ball, positions: Array, rotations: Array, radii_m: Array, side: float, mm: float
-) -> tuple[Array, float]:
-    joint, offset, radius = ball
-    row = JOINT_INDEX[joint]
-    own = mm * np.array([side * offset[0], offset[1], offset[2]])
-    return positions[row] + rotations[row] @ own, mm * radius if radius else float(radii_m[row])
+    start, tip = positions[_TIP - 1], positions[_TIP]
+    # The skin ends at the tip joint: its last ball lies its radius before it, a short bone's at its
+    # start.
+    back = np.minimum(radii_m[_TIP], np.linalg.norm(tip - start, axis=1))
+    ends = np.stack([start, tip + back[:, None] * rotations[_TIP][:, :, 2]], axis=1)
+    scale = radii_m[JOINT_INDEX["palm"]] / _AVERAGE_PALM_M
+    offset = scale * _BALL_OFFSET * [side, 1.0, 1.0]
+    balls = positions[_BALL_JOINT] + np.einsum("bij,bj->bi", rotations[_BALL_JOINT], offset)
+    own = np.where(_BALL_RADIUS > 0.0, scale * _BALL_RADIUS, radii_m[_BALL_JOINT])
+    return Skin(
+        np.concatenate([ends, balls.reshape(-1, 2, 3)]),
+        np.concatenate([np.stack([radii_m[_TIP - 1], radii_m[_TIP]], axis=1), own.reshape(-1, 2)]),
+        _PART,
+    )

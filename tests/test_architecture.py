@@ -64,7 +64,7 @@ FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
     {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises", "rhot/hand_skin"},
     {"rhot/messages"},
-    {"rhot/topics", "rhot/faults", "rhot/object_motion"},
+    {"rhot/topics", "rhot/faults", "rhot/object_motion", "rhot/contact_events"},
     {"rhot/files", "rhot/bus"},
     {"rhot/process", "rhot/watch"},
     {"rhot/client"},

@@ -108,7 +108,8 @@ class Contact(Message, frozen=True, kw_only=True):
 
     distance_m is from skin to surface, negative where they overlap; sigma_m its standard deviation.
     point_m is the point of the surface that is nearest, in the rig frame. since_ns is when the
-    touch began, 0 while nothing touches.
+    touch began, 0 while nothing touches; until_ns when the last one ended, 0 if none did. Both are
+    when it happened, some frames before the first message that says so.
     """
 
     hand: HandName
@@ -118,21 +119,27 @@ class Contact(Message, frozen=True, kw_only=True):
     point_m: Vec3
     touching: bool
     since_ns: Stamp = 0
+    until_ns: Stamp = 0
 
 
 class Grasp(Message, frozen=True, kw_only=True):
-    """A hand holds an object: which parts of it, and since when."""
+    """A hand holds an object: which parts of it, and since when.
+
+    until_ns is 0 while it does; of a grasp that has ended, parts are those that held last.
+    """
 
     hand: HandName
     parts: Annotated[list[HandPart], msgspec.Meta(max_length=6)]
     since_ns: Stamp
+    until_ns: Stamp = 0
 
 
 class ObjectContacts(Message, frozen=True, kw_only=True):
     """Who touches an object at one instant of the master's clock, and who holds it.
 
     contacts has every part of every hand in view whose distance is known; grasps one entry a hand
-    that holds it. The state is whole in every message, so that a lost one loses no event.
+    that holds it, ended the last one of each hand that is over. The state is whole in every
+    message, so that a lost one loses no event.
     """
 
     object: Name
@@ -140,4 +147,5 @@ class ObjectContacts(Message, frozen=True, kw_only=True):
     stamp_ns: Stamp
     contacts: Annotated[list[Contact], msgspec.Meta(max_length=16)]
     grasps: Annotated[list[Grasp], msgspec.Meta(max_length=2)]
+    ended: Annotated[list[Grasp], msgspec.Meta(max_length=2)] = msgspec.field(default_factory=list)
     sent_ns: Stamp = 0

@@ -23,6 +23,7 @@ from rhot.errors import SourceError
 from rhot.messages.objects import ObjectPose, OpenVrEvent, OpenVrPose
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
+from services.object_tracker.contacts.service import start_contacts
 from services.object_tracker.registration import load_registration
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.sources.retry_pause import RetryPause
@@ -48,6 +49,7 @@ async def serve(service: Service) -> None:
         service.faults.report("object_unregistered", text)
     source = open_source(config)
     outlet = Outlet(service)
+    await start_contacts(service, outlet.consumers)
     poses = service.bus.every(topics.OPENVR, _QUEUE)
     events = service.bus.every(topics.OPENVR_EVENT, 64)
     unknown = UnknownDevices()
