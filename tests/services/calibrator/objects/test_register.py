@@ -1,0 +1,135 @@
+"""Registration of lighthouses to the rig from synthetic recordings, and those it must refuse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot.errors import CalibrationError
+from rhot.geometry.transforms import angle_between, apply, inverse
+from services.calibrator.objects.register import register
+from services.calibrator.objects.sightings import sightings
+from services.calibrator.objects.tracker_path import tracker_path
+from testing.synthetic_points import SyntheticRig
+from testing.synthetic_tracker import COLOR, SERIAL, Lighthouse, TrackerMotion, painted_frames
+
+MARKER_M = (0.012, 0.030, -0.025)
+RIG = SyntheticRig(sigma_px=0.3)
+FAR = {"middle_m": (0.04, 0.0, 1.1), "size_m": (0.7, 0.6, 0.6)}
+
+
+def recorded(motion, lighthouse, rig=RIG, seconds=20.0, serial=SERIAL, marker_m=MARKER_M):
+    """What `register` takes: sightings and paths by serial."""
+    frames = painted_frames(rig, motion, marker_m, seconds)
+    seen = sightings(frames, rig.rig(), COLOR)
+    return {serial: seen}, {serial: tracker_path(lighthouse.poses(motion, seconds, serial))}
+
+
+def errors(found, motion, lighthouse):
+    """Median error (mm) over the volume, of the turn (deg) and of the time offset (ms)."""
+    T = lighthouse.T_rig_from_lighthouse()
+    points = motion(np.linspace(0.0, 20.0, 200))[0]
+    off = apply(found.T_rig_from_lighthouse, apply(inverse(T), points)) - points
+    turn = np.degrees(angle_between(found.T_rig_from_lighthouse[:3, :3], T[:3, :3]))
+    late_ms = 1e-6 * next(iter(found.trackers.values())).time_offset_ns - 1e3 * lighthouse.late_s
+    return 1e3 * float(np.median(np.linalg.norm(off, axis=1))), turn, late_ms
+
+
+@pytest.mark.parametrize("volume", [{}, FAR], ids=["near", "far"])
+def test_noise_outliers_and_a_late_clock_leave_less_than_a_millimetre(volume):
+    for seed in (1, 2):
+        motion, lighthouse = TrackerMotion(seed=seed, **volume), Lighthouse(seed=seed)
+        found = register(*recorded(motion, lighthouse))
+        mm, deg, late_ms = errors(found, motion, lighthouse)
+        assert mm < 0.75
+        assert deg < 0.1
+        assert abs(late_ms) < 1.0
+        place = found.trackers[SERIAL]
+        assert np.linalg.norm(place.marker_m - MARKER_M) < 1e-3
+        assert found.rejected_poses > 0.03 * 20 * 90
+        # The error is of the size that the covariance says.
+        assert mm < 1e3 * 3.0 * found.sigma_m
+        assert found.held_out.px < 1.2 * found.residual.px
+
+
+def test_without_noise_it_is_exact():
+    motion = TrackerMotion()
+    lighthouse = Lighthouse(noise_m=0.0, noise_rad=0.0, outliers=0.0, late_s=-0.21)
+    rig = replace(RIG, sigma_px=0.001, clock_error_s=0.0)
+    found = register(*recorded(motion, lighthouse, rig))
+    mm, deg, late_ms = errors(found, motion, lighthouse)
+    assert mm < 0.05
+    assert deg < 0.01
+    assert abs(late_ms) < 0.05
+
+
+def test_two_trackers_share_one_frame():
+    lighthouse, other = Lighthouse(), replace(Lighthouse(), late_s=-0.011)
+    motion, second = TrackerMotion(), TrackerMotion(seed=5)
+    seen, paths = recorded(motion, lighthouse)
+    more_seen, more_paths = recorded(second, other, serial="LHR-2", marker_m=(0.0, 0.02, 0.03))
+    found = register(seen | more_seen, paths | more_paths)
+    mm, deg, late_ms = errors(found, motion, lighthouse)
+    assert mm < 0.5
+    assert deg < 0.1
+    assert abs(late_ms) < 1.0
+    assert found.trackers["LHR-2"].time_offset_ns == pytest.approx(-11e6, abs=1e6)
+    assert found.trackers["LHR-2"].marker_m == pytest.approx([0.0, 0.02, 0.03], abs=1e-3)
+
+
+WEAK = {
+    "turned about one axis": ({"turn_rad": (0.0, 0.8, 0.0)}, "about one axis"),
+    "not turned": ({"turn_rad": (0.0, 0.0, 0.0)}, "about one axis"),
+    "a plane": ({"size_m": (0.3, 0.3, 0.0)}, "in a plane"),
+    "a line": ({"size_m": (0.4, 0.0, 0.0)}, "on a line"),
+}
+
+
+@pytest.mark.parametrize("case", WEAK)
+def test_motion_that_cannot_tell_is_refused_with_the_reason(case):
+    change, reason = WEAK[case]
+    motion = TrackerMotion(**change)
+    # Paint on the axis: away from it, it would draw a volume of its own.
+    with pytest.raises(CalibrationError, match=reason):
+        register(*recorded(motion, Lighthouse(), marker_m=(0.0, 0.005, 0.0)))
+
+
+def test_too_short_is_refused():
+    with pytest.raises(CalibrationError, match="record 20 s"):
+        register(*recorded(TrackerMotion(), Lighthouse(), seconds=5.0))
+
+
+def test_paint_that_one_camera_or_none_sees_is_refused():
+    seen, paths = recorded(TrackerMotion(), Lighthouse())
+    left = seen[SERIAL].only(seen[SERIAL].camera == 0)
+    with pytest.raises(CalibrationError, match=r"two cameras must see .*right 0"):
+        register({SERIAL: left}, paths)
+    with pytest.raises(CalibrationError, match="no camera saw 'orange' paint"):
+        register({SERIAL: left.only(left.camera == 1)}, paths)
+
+
+def test_swapped_trackers_are_told_apart():
+    lighthouse = Lighthouse()
+    seen, paths = recorded(TrackerMotion(), lighthouse)
+    other = tracker_path(lighthouse.poses(TrackerMotion(seed=9), 20.0, "LHR-other"))
+    both = {SERIAL: other, "LHR-other": paths[SERIAL]}
+    with pytest.raises(CalibrationError, match="is on tracker LHR-other, not on LHR-0A1B2C3D"):
+        register(seen, both)
+    with pytest.raises(CalibrationError, match="does not move as tracker"):
+        register(seen, {SERIAL: other})
+
+
+def test_a_tracker_that_is_not_there_is_named():
+    seen, paths = recorded(TrackerMotion(), Lighthouse())
+    with pytest.raises(CalibrationError, match=r"tracker LHR-lost .* Tracked were: LHR-0A1B2C3D"):
+        register({"LHR-lost": seen[SERIAL]}, paths)
+
+
+def test_a_change_of_universe_is_refused():
+    poses = Lighthouse().poses(TrackerMotion(), 2.0)
+    poses[50:] = [msgspec.structs.replace(pose, universe="2") for pose in poses[50:]]
+    with pytest.raises(CalibrationError, match="changed its universe"):
+        tracker_path(poses)
