@@ -15,17 +15,23 @@ from collections.abc import Mapping
 import numpy as np
 
 from rhot.geometry.transforms import Array
+from services.calibrator.objects.bundle.held_out import held_out, residuals_of
+from services.calibrator.objects.bundle.reprojection import (
+    POSE_SIZE,
+    TRACKER_SIZE,
+    Scene,
+    Unknowns,
+    scene,
+)
+from services.calibrator.objects.bundle.solve import Sampler, Solution, middle_of, solve
 from services.calibrator.objects.checks import (
     check_result,
     check_sightings,
     check_start,
 )
 from services.calibrator.objects.coverage import extents
-from services.calibrator.objects.held_out import held_out, residuals_of
-from services.calibrator.objects.reprojection import POSE_SIZE, TRACKER_SIZE, Scene, Unknowns, scene
 from services.calibrator.objects.result import ObjectRegistration, TrackerPlace
 from services.calibrator.objects.sightings import Sightings
-from services.calibrator.objects.solve import Sampler, Solution, middle_of, points_of, solve
 from services.calibrator.objects.start import Located, Start, find_start, locate
 from services.calibrator.objects.tracker_path import TrackerPath
 
@@ -86,7 +92,7 @@ def _registration(
     sample: Sampler, found: Solution, serials: list[str], paths: list[TrackerPath]
 ) -> ObjectRegistration:
     inlier = found.inlier
-    points = points_of(found)[inlier]
+    points = found.result.points[inlier]
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     trackers = {}
     for k, serial in enumerate(serials):
@@ -110,6 +116,5 @@ def _registration(
         rejected_poses=sum(path.rejected for path in paths),
         seconds=float(np.ptp(found.scene.stamps_s)),
         extent_m=extents(points),
-        noise_px=found.noise_px,
-        noise_m=found.noise_m,
+        noise=found.noise,
     )

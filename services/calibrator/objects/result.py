@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from rhot.geometry.transforms import Array
+from services.calibrator.objects.bundle.tracker_noise import Noise
 
 
 class Residuals(NamedTuple):
@@ -34,8 +35,8 @@ class ObjectRegistration:
     covariance (6, 6) is of a small turn (rad) and shift (m) in the rig frame about middle_m;
     sigma_rad and sigma_m are the standard deviations of their lengths. extent_m is how far the
     paint reached along the three main directions of its motion, largest first. residual and
-    held_out are robust RMS an axis, held_out on seconds that took no part in the fit. noise_px is
-    by how much the cameras' sigma_px is to be multiplied, noise_m the trackers' error across a ray.
+    held_out are robust RMS an axis, held_out on seconds that took no part in the fit. noise is
+    what the residuals show of the cameras' and of the tracker's errors.
     """
 
     T_rig_from_lighthouse: Array  # (4, 4)
@@ -52,5 +53,4 @@ class ObjectRegistration:
     rejected_poses: int
     seconds: float
     extent_m: Array  # (3,)
-    noise_px: float
-    noise_m: float
+    noise: Noise

@@ -92,7 +92,7 @@ def instants_in_two_views(seen: Sightings) -> Ints:
 
 
 def _triangulated(seen: Sightings, stamps_ns: Ints, rays: Array) -> Located | None:
-    known: Bools = np.isfinite(rays).all(axis=2)
+    known: Bools = np.asarray(np.isfinite(rays).all(axis=2))
     use = known.sum(axis=0) >= 2
     if not use.any():
         return None

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.calibrator.objects.reprojection import Scene, Unknowns, reproject
+from services.calibrator.objects.bundle.reprojection import Scene, Unknowns, reproject
+from services.calibrator.objects.bundle.solve import Sampler, Solution, refine
 from services.calibrator.objects.result import Residuals
 from services.calibrator.objects.sightings import Bools
-from services.calibrator.objects.solve import Sampler, Solution, solve
 
 # Parts of the recording that are left out by turns, each of whole stretches of this many seconds.
 _PARTS, _STRETCH_S = 5, 2.0
@@ -29,7 +29,7 @@ def held_out(sample: Sampler, found: Solution) -> Residuals:
     for number in range(_PARTS):
         if not (part == number).any() or (part == number).all():
             continue
-        solution = solve(_without(sample, number), found.unknowns)
+        solution = refine(_without(sample, number), found.unknowns, found.noise, 0)
         left_out = _part(sample(solution.unknowns.late_s), number, keep=True)
         own_px, own_m = _lengths(left_out, solution.unknowns)
         pixels.append(own_px)

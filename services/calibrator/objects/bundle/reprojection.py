@@ -75,8 +75,19 @@ class Reprojection:
 
     residual_px: Array  # (n, 2)
     jacobian: Array  # (n, 2, 6 + 4 K): of the prediction, so r falls along it
+    by_point: Array  # (n, 2, 3), px/m: of the prediction by the paint in the rig frame
     depth_m: Array  # (n,)
     points: Array  # (n, 3), rig frame
+
+    def only(self, wanted: Bools) -> Reprojection:
+        """Those sightings."""
+        return Reprojection(
+            self.residual_px[wanted],
+            self.jacobian[wanted],
+            self.by_point[wanted],
+            self.depth_m[wanted],
+            self.points[wanted],
+        )
 
 
 def scene(all_seen: Sequence[Sightings], motions: Sequence[Motion], late_s: Array) -> Scene:
@@ -109,9 +120,11 @@ def reproject(at: Scene, unknowns: Unknowns, middle: Array) -> Reprojection:
     """
     R, t = unknowns.T_rig_from_lighthouse[:3, :3], unknowns.T_rig_from_lighthouse[:3, 3]
     motion = at.motion
-    lever = np.einsum("nij,nj->ni", motion.rotation, unknowns.markers_m[at.tracker])
-    velocity = motion.velocity_m_s + np.cross(motion.angular_velocity_rad_s, lever)
     ahead_s = (unknowns.late_s - at.late_s)[at.tracker]
+    rates = cross_matrices(motion.angular_velocity_rad_s)
+    rotation = motion.rotation + ahead_s[:, None, None] * (rates @ motion.rotation)
+    lever = np.einsum("nij,nj->ni", motion.rotation, unknowns.markers_m[at.tracker])
+    velocity = motion.velocity_m_s + np.einsum("nij,nj->ni", rates, lever)
     q = motion.position_m + lever + velocity * ahead_s[:, None]
     turned = (q - middle) @ R.T
     x = turned + R @ middle + t
@@ -129,6 +142,6 @@ def reproject(at: Scene, unknowns: Unknowns, middle: Array) -> Reprojection:
     for k in range(len(unknowns.markers_m)):
         own = at.tracker == k
         first = POSE_SIZE + TRACKER_SIZE * k
-        J[own, :, first : first + 3] = by_lighthouse[own] @ motion.rotation[own]
+        J[own, :, first : first + 3] = by_lighthouse[own] @ rotation[own]
         J[own, :, first + 3] = np.einsum("nij,nj->ni", by_lighthouse[own], velocity[own])
-    return Reprojection((at.rays - ray) * at.focals_px[:, None], J, depth, x)
+    return Reprojection((at.rays - ray) * at.focals_px[:, None], J, by_point, depth, x)

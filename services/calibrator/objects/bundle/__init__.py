@@ -1,0 +1,1 @@
+"""The bundle of the objects' registration: reprojection, noise, solution, held-out error. Pure."""
