@@ -1,7 +1,7 @@
 """Everything about objects: `python benchmarks/objects.py [--only PART ...] [--json FILE]`
 
-The parts, each a file of its own beside this one: registration of the lighthouses to the rig,
-tracking (load, filter, outliers, drift), contacts and grasps.
+The parts, each a file of its own beside this one: registration of the lighthouses to the rig, the
+same from rendered pictures, tracking (load, filter, outliers, drift), contacts and grasps.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 PARTS = {
     "registration": "objects_registration",
+    "pictures": "objects_pictures",
     "tracking": "objects_tracking",
     "grasps": "objects_grasps",
 }

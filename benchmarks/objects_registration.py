@@ -5,13 +5,15 @@ in two rolling-shutter cameras that run freely, 1 % of markers of other things, 
 and 0.2 deg of noise, 5 % of poses off by up to 250 mm and 0.5 rad, stamps late by 30 ms; two sizes
 of volume, noise that is white or lasts .5 s (first-order Gauss-Markov). The error of a run is the
 median over the volume. Beside it a plain method on the same data: nearest pose to each triangulated
-point, rigid fit, neither lever arm nor time offset.
+point, rigid fit, neither lever arm nor time offset. Last, a real Vive tracker against a laser
+tracker, where $RHOT_DATA has it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from dataclasses import dataclass
@@ -23,6 +25,8 @@ from scipy.spatial.transform import Rotation
 
 from rhot.errors import CalibrationError
 from rhot.geometry.transforms import Array, angle_between, apply, inverse, transform
+from services.calibrator.objects.laser_points import read_experiment, register_laser
+from services.calibrator.objects.points import register_points
 from services.calibrator.objects.register import ObjectRegistration, register
 from services.calibrator.objects.sightings import Sightings, sightings
 from services.calibrator.objects.start import locate
@@ -30,6 +34,8 @@ from services.calibrator.objects.tracker_path import TrackerPath, tracker_path
 from testing.synthetic_points import SyntheticRig
 from testing.synthetic_tracker import COLOR, SERIAL, Lighthouse, TrackerMotion, painted_frames
 
+DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
+LASER = DATA / "vive" / "marvin" / "20200827_Exp1"
 SECONDS, SEEDS = 20.0, 20
 VOLUMES: dict[str, dict[str, Any]] = {
     "0.3 m at 0.6 m": {"middle_m": (0.0375, 0.0, 0.6), "size_m": (0.30, 0.25, 0.30)},
@@ -141,7 +147,31 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
         figures[name], figures[f"{name}_95"], figures[f"{name}_max"] = white[name]
     figures["registration_plain_mm"] = white["plain_mm"]
     figures["registration_refused"] = white["refused"]
-    return figures
+    return figures | (laser() if LASER.is_dir() else {})
+
+
+def laser() -> dict[str, float]:
+    """A real tracker at the places of a laser tracker, mm: RMS, most, RMS of each place by the
+    others, and RMS without a lever arm.
+    """
+    experiment = read_experiment(LASER)
+    fit = register_laser(experiment)
+    points, poses = experiment.points_m[experiment.again], experiment.poses
+    left_out = []
+    for k in range(len(points)):
+        found = register_points(np.delete(points, k, axis=0), np.delete(poses, k, axis=0))
+        paint = poses[k, :3, :3] @ found.marker_m + poses[k, :3, 3]
+        left_out.append(apply(found.T_rig_from_lighthouse, paint) - points[k])
+    unturned = poses.copy()
+    unturned[:, :3, :3] = np.eye(3)
+    figures = {
+        "leica_rms_mm": 1e3 * fit.rms_m,
+        "leica_max_mm": 1e3 * float(np.linalg.norm(fit.residuals_m, axis=1).max()),
+        "leica_left_out_mm": 1e3 * float(np.sqrt(np.mean(np.sum(np.square(left_out), axis=1)))),
+        "leica_no_lever_mm": 1e3 * register_points(points, unturned).rms_m,
+    }
+    print(*(f"{name} {value:.2f}" for name, value in figures.items()), sep="\n")
+    return {name: round(value, 3) for name, value in figures.items()}
 
 
 def _summary(runs: list[Run]) -> dict[str, Any]:

@@ -9,7 +9,9 @@ time constant. Some of its poses jump, some markers are of other things.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import msgspec
 import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
@@ -85,21 +87,36 @@ class Lighthouse:
         self, motion: TrackerMotion, seconds: float, serial: str = SERIAL
     ) -> list[OpenVrPose]:
         """What it reports over these seconds."""
-        random = np.random.default_rng((self.seed, 13))
         times_s = np.arange(-0.5, seconds + 0.5, 1.0 / self.rate_hz)
         positions, rotations = motion(times_s)
         T = inverse(self.T_rig_from_lighthouse())
         positions, rotations = positions @ T[:3, :3].T + T[:3, 3], T[:3, :3] @ rotations
-        n = len(times_s)
-        positions = positions + self._noise(random, n, self.noise_m)
-        turns = self._noise(random, n, self.noise_rad)
-        wrong = random.random(n) < self.outliers
-        positions[wrong] += random.uniform(-self.outlier_m, self.outlier_m, (int(wrong.sum()), 3))
-        turns[wrong] += random.uniform(-0.5, 0.5, (int(wrong.sum()), 3))
-        rotations = rotations @ Rotation.from_rotvec(turns).as_matrix()
+        exact = zip(times_s.tolist(), rotations, positions, strict=True)
+        return self.disturbed(
+            [
+                _pose(k, serial, START_NS + round(time_s * 1e9), np.column_stack([R, p]))
+                for k, (time_s, R, p) in enumerate(exact)
+            ]
+        )
+
+    def disturbed(self, poses: list[OpenVrPose]) -> list[OpenVrPose]:
+        """Exact poses with this lighthouse's noise, outliers and lateness."""
+        random = np.random.default_rng((self.seed, 13))
+        matrices = np.array([pose.mDeviceToAbsoluteTracking for pose in poses])  # (n, 3, 4)
+        shifts = self._noise(random, len(poses), self.noise_m)
+        turns = self._noise(random, len(poses), self.noise_rad)
+        wrong = random.random(len(poses)) < self.outliers
+        count = int(wrong.sum())
+        shifts[wrong] += random.uniform(-self.outlier_m, self.outlier_m, (count, 3))
+        turns[wrong] += random.uniform(-0.5, 0.5, (count, 3))
+        matrices[:, :, 3] += shifts
+        matrices[:, :, :3] = matrices[:, :, :3] @ Rotation.from_rotvec(turns).as_matrix()
+        late_ns = round(self.late_s * 1e9)
         return [
-            _pose(k, serial, START_NS + round((t + self.late_s) * 1e9), R, p)
-            for k, (t, R, p) in enumerate(zip(times_s.tolist(), rotations, positions, strict=True))
+            msgspec.structs.replace(
+                pose, stamp_ns=pose.stamp_ns + late_ns, mDeviceToAbsoluteTracking=_rows(matrix)
+            )
+            for pose, matrix in zip(poses, matrices, strict=True)
         ]
 
     def _noise(self, random: np.random.Generator, n: int, sigma: float) -> Array:
@@ -111,8 +128,12 @@ class Lighthouse:
         return lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white, axis=0, zi=start)[0]
 
 
-def _pose(seq: int, serial: str, stamp_ns: int, R: Array, p: Array) -> OpenVrPose:
-    rows = np.column_stack([R, p]).astype(np.float32).astype(np.float64).tolist()
+def _rows(matrix: Array) -> Any:
+    """A matrix (3, 4) as a message holds it, with the precision of SteamVR's."""
+    return tuple(map(tuple, matrix.astype(np.float32).astype(np.float64).tolist()))
+
+
+def _pose(seq: int, serial: str, stamp_ns: int, matrix: Array) -> OpenVrPose:
     return OpenVrPose(
         v=1,
         seq=seq,
@@ -121,7 +142,7 @@ def _pose(seq: int, serial: str, stamp_ns: int, R: Array, p: Array) -> OpenVrPos
         device=OpenVrDevice(
             index=1, serial=serial, device_class="tracker", model="", battery=1.0, charging=False
         ),
-        mDeviceToAbsoluteTracking=tuple(tuple(row) for row in rows),
+        mDeviceToAbsoluteTracking=_rows(matrix),
         vVelocity=(0.0, 0.0, 0.0),
         vAngularVelocity=(0.0, 0.0, 0.0),
         eTrackingResult=200,

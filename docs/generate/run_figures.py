@@ -68,6 +68,7 @@ RUNS = {
         "--first-seed 11 --seeds 1 --frames 8",
         6,
     ),
+    "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
     "scenes": _script("scenes", "", "--seconds 1", 9),
     "solver": _script("solver", "", "--quick", 1.5),

@@ -28,8 +28,9 @@ from services.calibrator.objects.sightings import Bools
 
 # Instants nearer than this, s, count as so far apart: two cameras may expose together.
 _MIN_STEP_S = 1e-4
-# Where a, sqrt(b) m and tau s are searched.
-_CAMERA, _TRACKER_M, _TAU_S = (1e-2, 400.0), (2e-5, 0.05), (0.01, 3.0)
+# Where a, sqrt(b) m and tau s are searched. What a picture's light does to a centroid is no noise
+# and lasts as long as the view: markers are never taken for much better than they say.
+_CAMERA, _TRACKER_M, _TAU_S = (0.5, 400.0), (2e-5, 0.05), (0.01, 3.0)
 _MAX_EVALUATIONS = 80
 
 
