@@ -47,6 +47,7 @@ IMPURE_ROOMS = {
     "rhot/process",
     "services/pi_tracker/endpoints",
     "services/pi_tracker/sources",
+    "services/object_tracker/drift.py",
     "services/object_tracker/sources",
     "services/openvr_bridge/endpoints",
     "services/openvr_bridge/sources",

@@ -24,6 +24,7 @@ from rhot.messages.objects import ObjectPose, OpenVrEvent, OpenVrPose
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from services.object_tracker.contacts.service import start_contacts
+from services.object_tracker.drift import camera_files, open_drift
 from services.object_tracker.registration import load_registration
 from services.object_tracker.sources import PoseSource, open_source
 from services.object_tracker.sources.retry_pause import RetryPause
@@ -42,7 +43,8 @@ async def serve(service: Service) -> None:
     """Tracks the objects that rig.toml names, from libsurvive, a file or the bus."""
     config = service.config
     path = config.calibration_dir / "objects.json"
-    step = load_and_watch(service, [path], lambda: ObjectStep(config, load_registration(config)))
+    files = [path, *camera_files(config)]
+    step = load_and_watch(service, files, lambda: ObjectStep(config, load_registration(config)))
     if not step.registered and config.object:
         names = ", ".join(item.name for item in config.object)
         text = f"no calibration/objects.json: poses of {names} stay in the lighthouse frame"
@@ -58,6 +60,9 @@ async def serve(service: Service) -> None:
         service.tasks.create_task(_keep_source(service, source))
     service.tasks.create_task(_hear_events(service, step, events))
     service.tasks.create_task(_look_after(service, step, outlet, unknown))
+    if drift := open_drift(service):
+        outlet.consumers.append(drift.take)
+        service.tasks.create_task(drift.follow())
     service.ready()
     async for pose in poses:
         result = step.step(pose, clock.now_ns())
