@@ -6,12 +6,19 @@ Everything is random by a seed, and the same each time.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
+from rhot import clock, topics
+from rhot.bus.bus import Bus
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import (
     Array,
@@ -105,7 +112,7 @@ class PaintedTracker:
                     battery=1.0,
                     charging=False,
                 ),
-                mDeviceToAbsoluteTracking=rows_of(matrix),  # type: ignore[arg-type]
+                mDeviceToAbsoluteTracking=rows_of(matrix),
                 vVelocity=(0.0, 0.0, 0.0),
                 vAngularVelocity=(0.0, 0.0, 0.0),
                 eTrackingResult=200,
@@ -158,6 +165,43 @@ class PaintedTracker:
         return replace(self, size_m=0.0, turn_rad=0.0)
 
 
-def rows_of(matrix: Array) -> tuple[tuple[float, ...], ...]:
+def write_cameras(scene: PaintedTracker, folder: Path) -> None:
+    """rig.json and the lenses of the scene's cameras, as calibrated."""
+    cameras = scene.cameras()
+    places = {
+        name: CameraPlace(T_rig_from_camera=rows_of(camera.T_rig_from_camera))
+        for name, camera in cameras.items()
+    }
+    save(folder / "rig.json", RigGeometry(cameras=places))
+    for name, camera in cameras.items():
+        lens = Lens(
+            size_px=camera.size_px,
+            matrix=rows_of(camera.matrix),
+            distortion=tuple(camera.distortion.tolist()),
+        )
+        save(folder / f"{name}.lens.json", lens)
+
+
+async def play(bus: Bus, scene: PaintedTracker, moved: Array | None = None) -> None:
+    """Poses and pictures at their own pace, by this computer's clock; moved as in `poses`."""
+    poses = bus.publisher(topics.OPENVR, serial=scene.serial)
+    frames = {name: bus.publisher(topics.MARKERS, camera=name) for name in scene.cameras()}
+    began_ns = clock.now_ns()
+    for second in range(int(scene.seconds)):
+        one = replace(scene, seconds=1.0)
+        due = [(pose.stamp_ns, 0, pose) for pose in one.poses(float(second), moved)]
+        due += [(frame.stamp_ns + 40_000_000, 1, frame) for frame in one.frames(float(second))]
+        due.sort(key=lambda message: message[:2])
+        for at_ns, _, message in due:
+            await asyncio.sleep(max(at_ns - START_NS + began_ns - clock.now_ns(), 0) * 1e-9)
+            stamp_ns = message.stamp_ns - START_NS + began_ns
+            shown = msgspec.structs.replace(message, stamp_ns=stamp_ns)
+            if isinstance(shown, MarkerFrame):
+                frames[shown.camera].put(shown)
+            else:
+                poses.put(shown)
+
+
+def rows_of(matrix: Array) -> Any:
     """A matrix as messages and calibration files have it."""
     return tuple(map(tuple, matrix.tolist()))

@@ -38,7 +38,7 @@ class WatchedCup:
             marker_m=MARKER_M,
         )
         objects = Objects(
-            T_rig_from_lighthouse=rows,  # type: ignore[arg-type]
+            T_rig_from_lighthouse=rows,
             sigma_m=0.0007,
             objects={"cup": place},
         )
