@@ -218,8 +218,10 @@ class Service:
 
 
 def _is_steady(stats: StreamStats) -> bool:
-    """Whether silence of a stream is a fault; there is no pose of a hand that nobody holds up."""
-    return stats.topic is not topics.POSE
+    """Whether silence of a stream is a fault; there is no pose of a hand that nobody holds up, and
+    no contact of an object without a shape or a hand.
+    """
+    return stats.topic not in (topics.POSE, topics.CONTACTS)
 
 
 def _rss_mb() -> float:

@@ -17,6 +17,31 @@ _POLL_S = 0.5
 
 
 @contextlib.asynccontextmanager
+async def watching_objects(bus: Bus, monitor: RigMonitor) -> AsyncIterator[None]:
+    """As watching(), and the monitor's state has objects, too: for `rhot top` and the metrics."""
+    objects = monitor.watch_objects()
+    poses, contacts = bus.latest(topics.OBJECT), bus.latest(topics.CONTACTS)
+
+    async def follow_poses() -> None:
+        async for pose in poses:
+            objects.pose(pose, clock.now_ns())
+
+    async def follow_contacts() -> None:
+        async for one in contacts:
+            objects.contacts(one, clock.now_ns())
+
+    async with watching(bus, monitor), asyncio.TaskGroup() as tasks:
+        listeners = [tasks.create_task(one) for one in (follow_poses(), follow_contacts())]
+        try:
+            yield
+        finally:
+            for task in listeners:
+                task.cancel()
+            bus.close(poses)
+            bus.close(contacts)
+
+
+@contextlib.asynccontextmanager
 async def watching(bus: Bus, monitor: RigMonitor) -> AsyncIterator[None]:
     """Beats, tokens and the connection reach the monitor for as long as the block lasts."""
     health, alive = bus.every(topics.HEALTH, _QUEUE), bus.watch_alive()

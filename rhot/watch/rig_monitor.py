@@ -14,6 +14,7 @@ from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.messages.health import Health
 from rhot.watch.ages import ages_of
+from rhot.watch.object_watch import ObjectWatch
 from rhot.watch.onlooker_faults import missing_services, router_lost
 from rhot.watch.rig_state import CameraRow, RigState, ServiceRow, StandingFault
 
@@ -56,6 +57,13 @@ class RigMonitor:
         self._alive: dict[tuple[str, str], tuple[bool, int]] = {}
         self._beats: dict[tuple[str, str], tuple[int, Health]] = {}
         self._lost_ns: int | None = None
+        # None: nobody listens to objects.
+        self._objects: ObjectWatch | None = None
+
+    def watch_objects(self) -> ObjectWatch:
+        """Have objects in the state from now on; what is heard of them goes to the result."""
+        self._objects = self._objects or ObjectWatch(self._config)
+        return self._objects
 
     def token(self, service: str, instance: str, alive: bool, now_ns: int) -> None:
         """A service came or went."""
@@ -89,6 +97,7 @@ class RigMonitor:
             cameras=[self._camera(camera.name, beats) for camera in self._config.camera],
             ages=ages,
             glass_to_pose_ms={one.hand: (one.pose_ms, one.pose_p99_ms) for one in ages},
+            objects=self._objects.rows(now_ns) if self._objects is not None else [],
         )
 
     def _has_room(self, name: tuple[str, str]) -> bool:

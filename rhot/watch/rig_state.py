@@ -1,4 +1,5 @@
-"""What an onlooker knows of a rig at one instant: its services, its faults, its cameras, its ages.
+"""What an onlooker knows of a rig at one instant: its services, its faults, its cameras, its
+objects, its ages.
 
 `rhot top`, `rhot doctor`, the page and the metrics show the same RigState. Pure.
 """
@@ -67,6 +68,23 @@ class Ages(msgspec.Struct, frozen=True, kw_only=True):
     pose_p99_ms: float
 
 
+class ObjectRow(msgspec.Struct, frozen=True, kw_only=True):
+    """An object; state is an ObjectTracking, `absent` if it never came, `silent` if no longer.
+
+    age_ms is from its stamp to its arrival, sigma_m as in ObjectPose; touching and held_by have the
+    parts of each hand. heard_ns is when its newest pose came, 0 if none has.
+    """
+
+    object: str
+    state: str
+    registered: bool = False
+    heard_ns: int = 0
+    age_ms: float = 0.0
+    sigma_m: float | None = None
+    touching: dict[str, list[str]] = msgspec.field(default_factory=dict)
+    held_by: dict[str, list[str]] = msgspec.field(default_factory=dict)
+
+
 class RigState(msgspec.Struct, frozen=True, kw_only=True):
     """Everything; faults with errors first, then the oldest.
 
@@ -81,6 +99,8 @@ class RigState(msgspec.Struct, frozen=True, kw_only=True):
     cameras: list[CameraRow]
     ages: list[Ages]
     glass_to_pose_ms: dict[str, tuple[float, float]]
+    # Empty where the onlooker does not listen to objects.
+    objects: list[ObjectRow] = msgspec.field(default_factory=list)
 
     @property
     def healthy(self) -> bool:

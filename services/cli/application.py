@@ -11,12 +11,12 @@ from rhot.process.service import rhot_version
 from services.cli.calibrate.board import board
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.check.check import check
+from services.cli.demo.demo import demo
 from services.cli.deploy.deploy import deploy
 from services.cli.doctor.doctor import doctor
 from services.cli.evaluate.plot import plot
 from services.cli.evaluate.score import score
 from services.cli.init.init import init
-from services.cli.live.demo import demo
 from services.cli.live.router import router
 from services.cli.live.session import session
 from services.cli.live.top import top

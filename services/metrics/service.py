@@ -20,7 +20,7 @@ from rhot import clock
 from rhot.errors import BusError
 from rhot.process import systemd
 from rhot.process.service import Service
-from rhot.watch.follow import watching
+from rhot.watch.follow import watching_objects
 from services.metrics.counting_monitor import CountingMonitor
 from services.metrics.families import families
 
@@ -38,7 +38,7 @@ async def serve(service: Service) -> None:
         return
     monitor = CountingMonitor(service.config, clock.now_ns())
     snapshot = Snapshot()
-    async with watching(service.bus, monitor):
+    async with watching_objects(service.bus, monitor):
         with http_server(table.host, table.port, snapshot) as port:
             service.values["port"] = port
             log.info("metrics at http://%s:%d/metrics", table.host, port)

@@ -1,5 +1,5 @@
-"""The live view in a browser on this machine: hands, markers, objects, cameras, joint angles,
-rates.
+"""The live view in a browser on this machine: hands, markers, objects and who touches them,
+cameras, joint angles, rates.
 
 Nothing is subscribed to, and nothing is computed, while no browser is connected. Late streams are
 drawn when they come and hidden when they are a second old; missing ones are said to be missing.
@@ -16,6 +16,7 @@ from typing import Any
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
+from rhot.files.config import RigConfig
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from rhot.topics import Topic
@@ -39,7 +40,7 @@ async def serve(service: Service) -> None:
     config = service.config
     loop = asyncio.get_running_loop()
     # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
-    names = ["rig.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
+    names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
     files = [config.calibration_dir / name for name in names]
     setup = load_and_watch(service, files, lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
@@ -51,7 +52,7 @@ async def serve(service: Service) -> None:
             lambda count: loop.call_soon_threadsafe(connected.set if count else connected.clear),
         )
         panel = LivePanel(server, config, setup.notes)
-        scene = LiveScene(server, config, setup.cameras, setup.paints)
+        scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
         calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
         service.values["port"] = server.get_port()
         log.info("live view at http://127.0.0.1:%d", server.get_port())
@@ -72,7 +73,8 @@ async def _show_live(
     model = ViewModel()
     async with watching(service.bus, rig), asyncio.TaskGroup() as tasks:
         followers = [
-            tasks.create_task(_follow(service.bus, topic, take)) for topic, take in _handlers(model)
+            tasks.create_task(_follow(service.bus, topic, take))
+            for topic, take in _handlers(model, service.config)
         ]
         pictures: asyncio.Task[None] | None = None
         text_due_s = 0.0
@@ -90,15 +92,23 @@ async def _show_live(
             follower.cancel()
 
 
-def _handlers(model: ViewModel) -> list[tuple[Topic[Any], Callable[[Any], None]]]:
+def _handlers(
+    model: ViewModel, config: RigConfig
+) -> list[tuple[Topic[Any], Callable[[Any], None]]]:
     """What is subscribed to, and who takes it."""
     now_s = time.monotonic
-    return [
+    handlers: list[tuple[Topic[Any], Callable[[Any], None]]] = [
         (topics.POSE, lambda message: model.pose(message, now_s(), clock.now_ns())),
         (topics.POINTS, lambda message: model.points(message, now_s())),
         (topics.OBJECT, lambda message: model.object(message, now_s())),
         (topics.HEALTH, lambda message: model.health(message, now_s())),
     ]
+    # Of objects without a shape nobody can say who touches them: nothing would come.
+    if any(table.shape for table in config.object):
+        handlers.append(
+            (topics.CONTACTS, lambda message: model.contacts(message, now_s())),
+        )
+    return handlers
 
 
 async def _follow(bus: Bus, topic: Topic[Any], take: Callable[[Any], None]) -> None:

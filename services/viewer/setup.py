@@ -1,18 +1,28 @@
-"""What the viewer reads before it starts: cameras and paints, with a note for whatever is missing.
+"""What the viewer reads before it starts: cameras, paints and the looks of objects, with a note for
+whatever is missing.
 
-A camera that is not calibrated, or whose calibration file is broken, is shown without a frustum:
-the note says which and what to run.
+A camera that is not calibrated, or whose calibration file is broken, is shown without a frustum,
+an object whose mesh cannot be read as its axes: the note says which and what to do.
 """
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
+from pathlib import Path
 
-from rhot.errors import CalibrationError
-from rhot.files.calibration import Colors, load_colors, load_rig_cameras
+from rhot.errors import CalibrationError, ConfigError
+from rhot.files.calibration import (
+    Colors,
+    ObjectPlace,
+    load_colors,
+    load_objects,
+    load_rig_cameras,
+)
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandName
+from services.viewer.live.object_looks import ObjectLook, read_mesh
 from services.viewer.live.palette import Rgb, paint_rgb
 
 
@@ -22,6 +32,7 @@ class Setup:
 
     cameras: dict[str, Camera]
     paints: dict[tuple[HandName, str], Rgb]
+    looks: dict[str, ObjectLook]
     notes: list[str]
 
 
@@ -45,7 +56,25 @@ def read_setup(config: RigConfig) -> Setup:
         for hand, markers in config.hand.items()
         for landmark, color in markers.markers.items()
     }
-    return Setup(cameras, paints, notes)
+    return Setup(cameras, paints, _looks(config, notes), notes)
+
+
+def _looks(config: RigConfig, notes: list[str]) -> dict[str, ObjectLook]:
+    """How each object looks; notes of meshes that cannot be drawn are added."""
+    places: dict[str, ObjectPlace] = {}
+    # Without the file nothing is registered, which the panel says of each object.
+    with contextlib.suppress(CalibrationError):
+        places = load_objects(config.calibration_dir).objects
+    looks = {}
+    for table in config.object:
+        mesh = None
+        if table.shape == "mesh":
+            try:
+                mesh = read_mesh(Path(config.folder) / table.mesh)
+            except ConfigError as error:
+                notes.append(f"object {table.name} is drawn as axes: {error}")
+        looks[table.name] = ObjectLook(table, mesh, places.get(table.name))
+    return looks
 
 
 def _short(error: CalibrationError, config: RigConfig) -> str:

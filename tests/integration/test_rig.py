@@ -15,7 +15,7 @@ import pytest
 from rhot import clock, topics
 from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import DIGITS, default_hand
-from services.cli.live.demo_metrics import DemoMetrics
+from services.cli.demo.metrics import DemoMetrics
 
 pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 

@@ -20,7 +20,7 @@ import uvloop
 from rhot import clock
 from rhot.files.config import RigConfig
 from rhot.process.event_loop import cancelled_by, stop_on_signals
-from rhot.watch.follow import watching
+from rhot.watch.follow import watching_objects
 from rhot.watch.rig_monitor import RigMonitor
 from rhot.watch.rig_state import RigState
 from services.cli.live.alternate_screen import alternate_screen, size
@@ -57,7 +57,7 @@ async def _top(
     stopping = stop_on_signals()
     monitor, state = RigMonitor(rig, clock.now_ns()), None
     with cancelled_by(stopping):
-        async with router_session(rig.rig.name, endpoints) as bus, watching(bus, monitor):
+        async with router_session(rig.rig.name, endpoints) as bus, watching_objects(bus, monitor):
             left_s = _LISTEN_S if once else seconds
             await asyncio.sleep(_LISTEN_S)
             with _display(once, as_json) as show:

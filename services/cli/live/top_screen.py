@@ -1,7 +1,8 @@
 """What `rhot top` shows, as lines that fit a screen. Pure.
 
-Faults with what to do come first, errors before warnings, then where the time of a pose goes, then
-a line per service, then what else there is room for. What does not fit is counted.
+Where the time of a pose goes and a line per object come first; then faults with what to do, errors
+before warnings, then a line per service, then what else there is room for. What does not fit is
+counted.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from rhot import topics
 from rhot.messages.health import StreamHealth
 from rhot.plain_text import clipped
 from rhot.watch.rig_state import Ages, RigState, ServiceRow, StandingFault
+from services.cli.live.top_objects import object_lines
 
 _HEADER = f"{'service':<18} {'state':<9} {'up':>6} {'cpu%':>5} {'MB':>4} {'Hz':>6} {'of':>4}"
 _HEADER += f" {'markers':>8} {'age ms':>7} {'lost':>4}"
@@ -19,7 +21,7 @@ _HEADER += f" {'markers':>8} {'age ms':>7} {'lost':>4}"
 
 def screen(state: RigState, width: int, height: int | None) -> list[str]:
     """At most height lines of at most width columns; None: as many as there is to say."""
-    head = [_title(state), *(_ages(one) for one in state.ages)]
+    head = [_title(state), *(_ages(one) for one in state.ages), *object_lines(state, height)]
     faults = [_fault(one) for one in state.faults]
     services = [_service(state, row) for row in _order(state, height)]
     streams = [

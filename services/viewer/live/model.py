@@ -3,12 +3,14 @@ monotonic clock).
 
 What has not come for a second is hidden, and said to be missing. Implausible positions (not finite,
 beyond 100 m) are not drawn. Objects in the lighthouse frame are not drawn either: where they are in
-the rig would be a guess. Nothing from the network makes the state grow without bound.
+the rig would be a guess. Who touches what holds for as long as contacts are fresh. Nothing from the
+network makes the state grow without bound.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -18,7 +20,14 @@ from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
 from rhot.messages import HandPoints, HandPose
 from rhot.messages.health import Health
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import (
+    Grasp,
+    HandPart,
+    ObjectContacts,
+    ObjectPose,
+    ObjectTracking,
+)
+from rhot.watch.object_words import state_of
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -60,18 +69,50 @@ class PointView:
 
 @dataclass(frozen=True)
 class ObjectView:
-    """An object; drawn is false while it is lost or not registered."""
+    """An object; drawn is false while it is lost or not registered.
+
+    certain is false while its tracker is not located: it is drawn where it was carried on to.
+    """
 
     name: str
     position_m: tuple[float, float, float]
     orientation_wxyz: tuple[float, float, float, float]
-    tracking: str
+    tracking: ObjectTracking
     registered: bool
 
     @property
     def drawn(self) -> bool:
         """Whether its pose is one in the rig frame."""
-        return self.registered and self.tracking != "lost"
+        return self.registered and self.tracking not in ("lost", "unregistered")
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is seen where it is drawn."""
+        return self.drawn and self.tracking == "ok"
+
+    @property
+    def state(self) -> ObjectTracking:
+        """Its tracking, "unregistered" before all if its place in the rig is unknown."""
+        return state_of(self.tracking, self.registered)
+
+
+@dataclass(frozen=True)
+class TouchView:
+    """A finger tip, or the palm, that touches an object at point_m (rig frame)."""
+
+    object: str
+    hand: HandName
+    part: HandPart
+    point_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class HoldView:
+    """A hand that holds an object, and with which parts."""
+
+    object: str
+    hand: HandName
+    parts: tuple[HandPart, ...]
 
 
 @dataclass(frozen=True)
@@ -85,6 +126,10 @@ class View:
     health: list[Health]
     # From exposure to the newest pose's arrival here, ms; None where its stamp is no guide.
     latency_ms: dict[HandName, float | None]
+    touches: Sequence[TouchView] = ()
+    holds: Sequence[HoldView] = ()
+    # Objects that were there and of which nothing comes any more: for how long, s.
+    silent_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -105,6 +150,8 @@ class ViewModel:
         self._hands: dict[HandName, _Hand] = {}
         self._points: dict[HandName, tuple[float, list[PointView]]] = {}
         self._objects: dict[str, tuple[float, ObjectView]] = {}
+        self._heard_s: dict[str, float] = {}
+        self._contacts: dict[str, tuple[float, tuple[list[TouchView], list[HoldView]]]] = {}
         self._health: dict[tuple[str, str], tuple[float, Health]] = {}
         self.implausible = 0
 
@@ -151,6 +198,20 @@ class ViewModel:
                 pose.object, pose.position_m, pose.orientation_wxyz, pose.tracking, pose.registered
             )
             self._objects[pose.object] = (now_s, view)
+            if pose.object in self._heard_s or len(self._heard_s) < _MAX_OBJECTS:
+                self._heard_s[pose.object] = now_s
+
+    def contacts(self, contacts: ObjectContacts, now_s: float) -> None:
+        """Take who touches an object, and who holds it."""
+        touches = []
+        for one in contacts.contacts:
+            if not all(abs(v) <= _MAX_M for v in one.point_m):
+                self.implausible += 1
+            elif one.touching:
+                touches.append(TouchView(contacts.object, one.hand, one.part, one.point_m))
+        holds = [_hold(contacts.object, grasp) for grasp in contacts.grasps]
+        if contacts.object in self._contacts or len(self._contacts) < _MAX_OBJECTS:
+            self._contacts[contacts.object] = (now_s, (touches, holds))
 
     def health(self, health: Health, now_s: float) -> None:
         """Take a service's health."""
@@ -165,7 +226,9 @@ class ViewModel:
         }
         self._points = _fresh(self._points, now_s, STALE_S)
         self._objects = _fresh(self._objects, now_s, STALE_S)
+        self._contacts = _fresh(self._contacts, now_s, STALE_S)
         self._health = _fresh(self._health, now_s, HEALTH_STALE_S)
+        contacts = [both for _, both in self._contacts.values()]
         return View(
             hands={name: hand.view for name, hand in self._hands.items()},
             points={(p.hand, p.name): p for _, points in self._points.values() for p in points},
@@ -175,7 +238,18 @@ class ViewModel:
                 health for _, (_, health) in sorted(self._health.items(), key=lambda item: item[0])
             ],
             latency_ms={name: hand.latency_ms for name, hand in self._hands.items()},
+            touches=[touch for touches, _ in contacts for touch in touches],
+            holds=[hold for _, holds in contacts for hold in holds],
+            silent_s={
+                name: now_s - heard_s
+                for name, heard_s in self._heard_s.items()
+                if name not in self._objects
+            },
         )
+
+
+def _hold(name: str, grasp: Grasp) -> HoldView:
+    return HoldView(name, grasp.hand, tuple(dict.fromkeys(grasp.parts)))
 
 
 def _fresh(

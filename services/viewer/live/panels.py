@@ -17,6 +17,7 @@ from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
 from rhot.messages import HandPose
 from rhot.messages.health import Health, StreamHealth
 from services.viewer.live.model import View
+from services.viewer.live.object_texts import object_lines
 from services.viewer.live.palette import SOURCE_RGB
 
 # Rows of the rates table: a rig of two Pis has some twenty streams.
@@ -36,7 +37,7 @@ def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
     lines = [_hand_line(hand, view) for hand in config.hand]
     if not config.hand:
         lines.append("no hand is configured: add [hand.right.markers] to rig.toml")
-    lines += [_object_line(table.name, view) for table in config.object]
+    lines += [text(line, 200) for line in object_lines(config, view)]
     lines += [text(note, 200) for note in notes]
     return _box("<br>".join(lines))
 
@@ -49,15 +50,6 @@ def _hand_line(hand: HandName, view: View) -> str:
     if any(of_hand == hand for of_hand, _ in view.points):
         return f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)"
     return f"waiting for hand poses of the {hand} hand ... ({_missing(view)})"
-
-
-def _object_line(name: str, view: View) -> str:
-    known = view.objects.get(name)
-    if known is None:
-        return f"waiting for the object {text(name)} ..."
-    if not known.registered:
-        return f"object {text(name)}: not registered to the rig; run `rhot calibrate objects`"
-    return f"object {text(name)}: {text(known.tracking.replace('_', ' '))}"
 
 
 def _missing(view: View) -> str:

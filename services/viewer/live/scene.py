@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 import viser
 
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, apply, quaternion_from_rotation
 from rhot.hand import HandName
-from services.viewer.live.model import HandView, ObjectView, PointView, View
+from services.viewer.live.model import HandView, PointView, View
+from services.viewer.live.object_looks import ObjectLook
+from services.viewer.live.objects import Objects
 from services.viewer.live.palette import SOURCE_RGB, UNKNOWN, Rgb
-from services.viewer.live.shapes import BONES, cylinders, unit_cylinder, unit_sphere
+from services.viewer.live.shapes import BONES, cylinders, f32, unit_cylinder, unit_sphere
+from services.viewer.live.touches import Touches
 
 # What the viewer looks at first, in the first camera's frame: hands work half a metre in front of
 # the cameras (RHOT section 6).
@@ -34,7 +36,6 @@ _ON_DESK = np.array([1.0, 1.0, 0.0])
 # Joints at their full skin radius would hide the bones; with these shares of it, both are seen.
 _JOINT_SHARE, _BONE_SHARE = 0.72, 0.42
 _POINT_RADIUS_M, _PREDICTED_RADIUS_M, _HIDDEN_RADIUS_M = 0.008, 0.004, 1e-6
-_OBJECT_BOX_M = (0.06, 0.06, 0.09)
 _TRAIL_RGB: Rgb = (90, 90, 90)
 # Sources from most to least certain: a bone is as certain as its worse end.
 _SOURCES = tuple(SOURCE_RGB)
@@ -42,7 +43,9 @@ _PALETTE = np.array([SOURCE_RGB[source] for source in _SOURCES], dtype=np.uint8)
 
 
 class LiveScene:
-    """Everything that is drawn; paints is what each hand's landmarks are painted with."""
+    """Everything that is drawn; paints is what each hand's landmarks are painted with, looks how
+    each object looks.
+    """
 
     def __init__(
         self,
@@ -50,13 +53,15 @@ class LiveScene:
         config: RigConfig,
         cameras: Mapping[str, Camera],
         paints: Mapping[tuple[HandName, str], Rgb],
+        looks: Mapping[str, ObjectLook],
     ) -> None:
         self._scene = server.scene
         self._atomic = server.atomic
         self._paints = paints
         self._hands: dict[HandName, _Hand] = {}
         self._points: dict[HandName, _Points] = {}
-        self._objects: dict[str, _Object] = {}
+        self._objects = Objects(server.scene, looks)
+        self._touches = Touches(server.scene)
         self._add_grid(server, config)
         for camera in cameras.values():
             self._add_frustum(camera)
@@ -68,10 +73,8 @@ class LiveScene:
                 self._show_hand(hand, view, trails=trails)
             for hand in {*self._points, *(name for name, _ in view.points)}:
                 self._show_points(hand, view)
-            for name in {*self._objects, *view.objects}:
-                if name not in self._objects:
-                    self._objects[name] = _Object(self._scene, name)
-                self._objects[name].show(view.objects.get(name))
+            self._objects.show(view.objects)
+            self._touches.show(view)
 
     def _show_hand(self, hand: HandName, view: View, *, trails: bool) -> None:
         if hand not in self._hands:
@@ -162,20 +165,20 @@ class _Hand:
         if view is None:
             return
         uncertainty = np.array([_SOURCES.index(source) for source in view.sources])
-        self._joints.batched_positions = _f32(view.positions_m)
-        self._joints.batched_scales = _f32(
+        self._joints.batched_positions = f32(view.positions_m)
+        self._joints.batched_scales = f32(
             np.repeat(_JOINT_SHARE * view.radii_m[:, None], 3, axis=1)
         )
         self._joints.batched_colors = _PALETTE[uncertainty]
         start, end = BONES.T
         middle, wxyz, length = cylinders(view.positions_m[start], view.positions_m[end])
         radius = _BONE_SHARE * np.minimum(view.radii_m[start], view.radii_m[end])
-        self._bones.batched_positions = _f32(middle)
-        self._bones.batched_wxyzs = _f32(wxyz)
-        self._bones.batched_scales = _f32(np.stack([radius, radius, length], axis=1))
+        self._bones.batched_positions = f32(middle)
+        self._bones.batched_wxyzs = f32(wxyz)
+        self._bones.batched_scales = f32(np.stack([radius, radius, length], axis=1))
         self._bones.batched_colors = _PALETTE[np.maximum(uncertainty[start], uncertainty[end])]
         if self._trails.visible and trail is not None:
-            self._trails.points = _f32(np.stack([trail[:-1], trail[1:]], axis=2).reshape(-1, 2, 3))
+            self._trails.points = f32(np.stack([trail[:-1], trail[1:]], axis=2).reshape(-1, 2, 3))
 
 
 class _Points:
@@ -203,31 +206,5 @@ class _Points:
             if name in points:
                 positions[slot] = points[name].position_m
                 radii[slot] = _PREDICTED_RADIUS_M if points[name].predicted else _POINT_RADIUS_M
-        self._handle.batched_positions = _f32(positions)
-        self._handle.batched_scales = _f32(np.repeat(radii[:, None], 3, axis=1))
-
-
-class _Object:
-    """An object as axes, a box and a name."""
-
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._frame = scene.add_frame(f"/objects/{name}", axes_length=0.06, axes_radius=0.0018)
-        self._box = scene.add_box(
-            f"/objects/{name}/box",
-            color=SOURCE_RGB["measured"],
-            dimensions=_OBJECT_BOX_M,
-            opacity=0.45,
-        )
-        scene.add_label(f"/objects/{name}/name", name)
-
-    def show(self, view: ObjectView | None) -> None:
-        self._frame.visible = view is not None and view.drawn
-        if view is not None and view.drawn:
-            self._frame.position = view.position_m
-            self._frame.wxyz = view.orientation_wxyz
-            self._box.color = SOURCE_RGB["measured" if view.tracking == "ok" else "predicted"]
-
-
-def _f32(values: Array) -> npt.NDArray[np.float32]:
-    """As float32, which is what goes to the browser."""
-    return values.astype(np.float32)
+        self._handle.batched_positions = f32(positions)
+        self._handle.batched_scales = f32(np.repeat(radii[:, None], 3, axis=1))

@@ -96,3 +96,8 @@ def _strips(rings: int, segments: int) -> npt.NDArray[np.intp]:
             np.stack([upper, lower_right, right], -1).reshape(-1, 3),
         ]
     )
+
+
+def f32(values: Array) -> npt.NDArray[np.float32]:
+    """As float32, which is what goes to the browser."""
+    return values.astype(np.float32)

@@ -26,7 +26,7 @@ from rhot.messages import (
     WristPose,
 )
 from rhot.messages.health import Health, StreamHealth
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import Contact, Grasp, ObjectContacts, ObjectPose
 
 STAMP_NS = 1_700_000_000_000_000_000
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -39,7 +39,7 @@ def config() -> RigConfig:
         rig=RigTable(name="desk"),
         camera=[CameraTable(name="left"), CameraTable(name="right")],
         hand={"right": HandTable(markers={"wrist": "violet", "index_tip": "blue"})},
-        object=[ObjectTable(name="cup", serial="LHR-1")],
+        object=[ObjectTable(name="cup", serial="LHR-1", shape="cylinder", size_m=(0.07, 0.1))],
         viewer=Viewer(port=0),
         folder="/nonexistent",
     )
@@ -117,6 +117,33 @@ def make_object() -> Callable[..., ObjectPose]:
             "registered": True,
         }
         return ObjectPose(**(values | fields))
+
+    return make
+
+
+@pytest.fixture
+def make_contacts() -> Callable[..., ObjectContacts]:
+    """Contacts of the right hand: parts touch at a point, held parts hold, near ones do neither."""
+
+    def make(
+        *parts: str, held: Any = (), near: Any = (), name: str = "cup", at: Any = (0.1, 0.1, 0.5)
+    ) -> ObjectContacts:
+        contacts = [
+            Contact(
+                hand="right",
+                part=part,  # type: ignore[arg-type]
+                distance_m=0.0 if part in parts else 0.02,
+                sigma_m=0.001,
+                point_m=at,
+                touching=part in parts,
+                since_ns=STAMP_NS if part in parts else 0,
+            )
+            for part in (*parts, *near)
+        ]
+        grasps = [Grasp(hand="right", parts=list(held), since_ns=STAMP_NS)] if held else []
+        return ObjectContacts(
+            object=name, seq=1, stamp_ns=STAMP_NS, contacts=contacts, grasps=grasps
+        )
 
     return make
 

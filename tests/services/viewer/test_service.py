@@ -15,6 +15,7 @@ from services.viewer.service import serve
 
 Make = Callable[..., Any]
 Message = tuple[str, dict[str, Any]]
+HELD = ("thumb", "index")
 JPEG = b"\xff\xd8\xff\xe0picture"
 
 
@@ -34,6 +35,11 @@ DRAWN: tuple[Message, ...] = (
     ("BatchedMeshesMessage", {"name": "/hands/right/joints"}),
     ("BatchedMeshesMessage", {"name": "/hands/right/points"}),
     ("SetPositionMessage", {"name": "/objects/cup"}),
+    ("CylinderMessage", {"name": "/objects/cup/shape"}),
+    ("SetSceneNodeVisibilityMessage", {"name": "/touches/tips", "visible": True}),
+    ("SetSceneNodeVisibilityMessage", {"name": "/touches/points", "visible": True}),
+    hears("object cup: tracked"),
+    hears("right hand holds cup (thumb, index)"),
     hears("right hand: tracked"),
     hears("hand/right/points"),
     hears("57&deg;"),
@@ -42,12 +48,15 @@ DRAWN: tuple[Message, ...] = (
 MISSING: tuple[Message, ...] = (
     ("SetSceneNodeVisibilityMessage", {"name": "/hands/right/joints", "visible": False}),
     hears("waiting for hand poses"),
+    ("SetSceneNodeVisibilityMessage", {"name": "/objects/cup", "visible": False}),
+    ("SetSceneNodeVisibilityMessage", {"name": "/touches/tips", "visible": False}),
+    hears("object cup: nothing has come"),
 )
 
 
 @pytest.fixture
 def send_everything(
-    make_pose: Make, make_points: Make, make_object: Make, make_health: Make
+    make_pose: Make, make_points: Make, make_object: Make, make_contacts: Make, make_health: Make
 ) -> Callable[[Bus], Callable[[], None]]:
     """A function of the bus that sends one message of every kind, and garbage on their keys."""
 
@@ -56,6 +65,7 @@ def send_everything(
             (bus.publisher(topics.POSE, hand="right"), make_pose()),
             (bus.publisher(topics.POINTS, hand="right"), make_points("index_tip")),
             (bus.publisher(topics.OBJECT, object="cup"), make_object()),
+            (bus.publisher(topics.CONTACTS, object="cup"), make_contacts("index", held=HELD)),
             (bus.publisher(topics.HEALTH, service="fusion", instance="main"), make_health()),
         )
 
@@ -83,7 +93,7 @@ async def test_what_is_published_is_drawn_and_told(
         with sending(send):
             for kind, fields in DRAWN:
                 await asyncio.to_thread(browser.wait_for, kind, **fields)
-            await until(lambda: sum(stats.rejected for stats in service.bus.streams) >= 4)
+            await until(lambda: sum(stats.rejected for stats in service.bus.streams) >= 5)
         browser.forget()
         for kind, fields in MISSING:
             await asyncio.to_thread(browser.wait_for, kind, **fields)
@@ -115,8 +125,8 @@ async def test_nothing_is_done_while_nobody_looks(
         for _ in range(2):
             browser = await asyncio.to_thread(browse, int(service.values["port"]))
             await until(lambda: publisher.wanted)
-            # Poses, points, objects, and health twice: for its rates and for what is wrong.
-            assert len(service.bus.streams) == 5
+            # Poses, points, objects, contacts, and health twice: rates, and what is wrong.
+            assert len(service.bus.streams) == 6
             await asyncio.to_thread(browser.close)
             await until(lambda: not publisher.wanted)
             assert service.bus.streams == []

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+import trimesh
 
-from rhot.files.calibration import ColorRange, Colors, save
+from rhot.files.calibration import ColorRange, Colors, ObjectPlace, Objects, save
 from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import ObjectTable
 from services.viewer.live.palette import UNKNOWN, paint_rgb
 from services.viewer.setup import read_setup
 
@@ -57,3 +59,31 @@ def test_one_broken_camera_leaves_the_other(repository: Path, tmp_path: Path) ->
     assert set(broken.cameras) == {"left"}
     assert len(broken.notes) == 1
     assert broken.notes[0].startswith("camera right is not drawn: right.lens.json:")
+
+
+def test_looks_have_shape_mesh_and_tracker_and_a_broken_mesh_is_told(
+    config: RigConfig, tmp_path: Path
+) -> None:
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "duck.stl")
+    (tmp_path / "broken.glb").write_bytes(b"glTF")
+    tables = [
+        *config.object,
+        ObjectTable(name="duck", serial="LHR-2", shape="mesh", mesh="duck.stl"),
+        ObjectTable(name="blob", serial="LHR-3", shape="mesh", mesh="broken.glb"),
+    ]
+    rig = msgspec.structs.replace(config, object=tables, folder=str(tmp_path))
+    rig.calibration_dir.mkdir()
+    place = ObjectPlace(offset_m=(0.0, -0.08, 0.0))
+    identity = np.eye(4).tolist()
+    save(
+        rig.calibration_dir / "objects.json",
+        Objects(T_rig_from_lighthouse=identity, objects={"cup": place}),
+    )
+    setup = read_setup(rig)
+    assert setup.looks["cup"].table == config.object[0]
+    assert setup.looks["cup"].place == place
+    assert setup.looks["duck"].mesh is not None
+    assert setup.looks["duck"].place is None
+    assert setup.looks["blob"].mesh is None
+    (told,) = [note for note in setup.notes if "blob" in note]
+    assert told.startswith("object blob is drawn as axes: broken.glb: cannot be read")

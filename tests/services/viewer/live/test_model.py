@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rhot.messages import HandPoints, HandPose
 from rhot.messages.health import Health
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import ObjectContacts, ObjectPose
 from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
 
 STAMP_NS = 1_700_000_000_000_000_000
@@ -83,6 +83,7 @@ def test_implausible_orientations_are_not_drawn(
         ({"tracking": "rotation_only"}, True),
         ({"tracking": "lost"}, False),
         ({"registered": False}, False),
+        ({"tracking": "unregistered"}, False),
     ],
 )
 def test_objects_are_drawn_where_they_are_known(
@@ -91,6 +92,63 @@ def test_objects_are_drawn_where_they_are_known(
     model = ViewModel()
     model.object(make_object(**fields), 0.0)
     assert model.view(0.0).objects["cup"].drawn is drawn
+
+
+@pytest.mark.parametrize(
+    ("fields", "state"),
+    [
+        ({}, "ok"),
+        ({"tracking": "calibrating"}, "calibrating"),
+        ({"registered": False}, "unregistered"),
+        ({"registered": False, "tracking": "out_of_range"}, "unregistered"),
+        ({"registered": False, "tracking": "lost"}, "lost"),
+    ],
+)
+def test_what_hinders_most_is_an_objects_state(
+    make_object: Callable[..., ObjectPose], fields: dict[str, object], state: str
+) -> None:
+    model = ViewModel()
+    model.object(make_object(**fields), 0.0)
+    view = model.view(0.0).objects["cup"]
+    assert (view.state, view.certain) == (state, state == "ok")
+
+
+def test_who_touches_and_holds_is_known_while_contacts_come(
+    make_contacts: Callable[..., ObjectContacts],
+) -> None:
+    model = ViewModel()
+    model.contacts(
+        make_contacts("thumb", "index", held=("thumb", "index", "index"), near=("ring",)), 1.0
+    )
+    view = model.view(1.0 + STALE_S)
+    assert [(one.object, one.hand, one.part) for one in view.touches] == [
+        ("cup", "right", "thumb"),
+        ("cup", "right", "index"),
+    ]
+    (hold,) = view.holds
+    assert (hold.object, hold.hand, hold.parts) == ("cup", "right", ("thumb", "index"))
+    later = model.view(1.01 + STALE_S)
+    assert (later.touches, later.holds) == ([], [])
+
+
+@pytest.mark.parametrize("at", [(math.nan, 0.0, 0.0), (0.0, -1e300, 0.0)])
+def test_touches_nowhere_are_left_out(
+    make_contacts: Callable[..., ObjectContacts], at: tuple[float, float, float]
+) -> None:
+    model = ViewModel()
+    model.contacts(make_contacts("thumb", at=at), 0.0)
+    assert model.view(0.0).touches == []
+    assert model.implausible == 1
+
+
+def test_an_object_that_comes_no_more_is_missed(make_object: Callable[..., ObjectPose]) -> None:
+    model = ViewModel()
+    assert model.view(0.0).silent_s == {}
+    model.object(make_object(), 1.0)
+    assert model.view(1.5).silent_s == {}
+    assert model.view(6.0).silent_s == {"cup": 5.0}
+    model.object(make_object(), 7.0)
+    assert model.view(7.0).silent_s == {}
 
 
 def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(
@@ -107,14 +165,19 @@ def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(
 
 
 def test_state_is_bounded(
-    make_object: Callable[..., ObjectPose], make_health: Callable[..., Health]
+    make_object: Callable[..., ObjectPose],
+    make_health: Callable[..., Health],
+    make_contacts: Callable[..., ObjectContacts],
 ) -> None:
     model = ViewModel()
     for i in range(1000):
+        model.contacts(make_contacts("thumb", held=("thumb",), name=f"o{i}"), 0.0)
         model.object(make_object(f"o{i}"), 0.0)
         model.health(make_health(f"s{i}"), 0.0)
     view = model.view(0.0)
     assert (len(view.objects), len(view.health)) == (32, 64)
+    assert (len(view.touches), len(view.holds)) == (32, 32)
+    assert len(model.view(2.0).silent_s) == 32
     # What has left makes room.
     later = 1.0 + HEALTH_STALE_S
     assert model.view(later).health == []

@@ -76,7 +76,7 @@ def test_what_is_there_is_said(
     assert "right hand: tracked, 31 ms after the light" in said
     assert "object cup: not registered" in said
     model.object(make_object(tracking="out_of_range"), 0.0)
-    assert "object cup: out of range" in panels.status(config, model.view(0.0), [])
+    assert "object cup: out of the lighthouses" in panels.status(config, model.view(0.0), [])
 
 
 def test_a_rig_without_hands() -> None:

@@ -15,7 +15,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import JOINT_INDEX, TIPS
 from rhot.messages import HandPose
 from rhot.messages.simulator import Truth
-from services.cli.live.demo_summary import Summary
+from services.cli.demo.summary import Summary
 
 # Truth kept: two seconds at 90 Hz, far longer than any pose takes.
 _TRUTHS = 180

@@ -22,8 +22,8 @@ from rhot.bus.bus import Bus, open_bus
 from rhot.errors import ConfigError
 from rhot.files.config import load_rig
 from rhot.process.event_loop import cancelled_by, stop_on_signals
-from services.cli.live.demo_metrics import DemoMetrics
-from services.cli.live.demo_summary import Summary, summary_text
+from services.cli.demo.metrics import DemoMetrics
+from services.cli.demo.summary import Summary, summary_text
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
 from services.cli.live.working_copy import working_copy

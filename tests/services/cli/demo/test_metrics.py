@@ -8,8 +8,8 @@ import pytest
 from rhot import hand as h
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from rhot.messages.simulator import HandTruth, Truth
-from services.cli.live.demo_metrics import DemoMetrics
-from services.cli.live.demo_summary import summary_text
+from services.cli.demo.metrics import DemoMetrics
+from services.cli.demo.summary import summary_text
 
 START_NS = 1_700_000_000_000_000_000
 FRAME_NS = 33_333_333
