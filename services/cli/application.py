@@ -14,7 +14,6 @@ from services.cli.check.check import check
 from services.cli.demo.demo import demo
 from services.cli.deploy.deploy import deploy
 from services.cli.doctor.doctor import doctor
-from services.cli.evaluate.plot import plot
 from services.cli.evaluate.score import score
 from services.cli.init.init import init
 from services.cli.live.router import router
@@ -28,6 +27,7 @@ from services.cli.offline.track import track
 from services.cli.offline.tune import tune
 from services.cli.options import menu
 from services.cli.pki.pki import pki
+from services.cli.plot.plot import plot
 from services.cli.record.record import record
 from services.cli.record.replay import replay
 

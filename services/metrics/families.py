@@ -6,28 +6,27 @@ seconds, bytes and ratios, as Prometheus' naming asks for.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, Metric
 
 from rhot.faults import FAULTS
 from rhot.messages.health import Health
-from rhot.plain_text import clipped
 from rhot.watch.rig_state import MISSING, RigState, ServiceRow
 from services.metrics.counting_monitor import CountingMonitor, StreamName
+from services.metrics.gauges import gauge, label
+from services.metrics.object_families import object_families
 
 _SERVICE = ("service", "instance")
 _STREAM = ("service", "instance", "direction", "key")
 # Of a service and of a fault; what says more is broken or hostile.
-_MAX_STREAMS, _MAX_FAULTS, _MAX_LABEL = 64, 200, 100
+_MAX_STREAMS, _MAX_FAULTS = 64, 200
 # Their counters go on in this process's lifetime only.
 _COUNTERS = (
     ("rhot_stream_messages", "messages published or received"),
     ("rhot_stream_dropped", "messages dropped, as their reader was slower"),
     ("rhot_stream_rejected", "messages that did not decode"),
 )
-
-Row = tuple[Sequence[str], float]
 
 
 def families(state: RigState, monitor: CountingMonitor) -> Iterator[Metric]:
@@ -40,6 +39,7 @@ def families(state: RigState, monitor: CountingMonitor) -> Iterator[Metric]:
     ):
         yield _counter(name, about, counts)
     yield from _cameras(state)
+    yield from object_families(state.objects)
     yield gauge(
         "rhot_glass_to_pose_seconds",
         "age of a pose when it is published, since mid-exposure",
@@ -53,23 +53,11 @@ def families(state: RigState, monitor: CountingMonitor) -> Iterator[Metric]:
     yield _faults(state)
 
 
-def gauge(name: str, about: str, labels: Sequence[str], rows: Iterable[Row]) -> GaugeMetricFamily:
-    """A family of gauges, each row its labels' values and its own."""
-    family = GaugeMetricFamily(name, about, labels=labels)
-    for values, value in rows:
-        family.add_metric([_label(one) for one in values], value)
-    return family
-
-
 def _counter(name: str, about: str, counts: Mapping[StreamName, int]) -> CounterMetricFamily:
     family = CounterMetricFamily(name, about, labels=_STREAM)
     for stream, count in counts.items():
-        family.add_metric([_label(one) for one in stream], count)
+        family.add_metric([label(one) for one in stream], count)
     return family
-
-
-def _label(value: str) -> str:
-    return clipped(value, _MAX_LABEL)
 
 
 def _router(state: RigState) -> float:

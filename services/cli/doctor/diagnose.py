@@ -13,9 +13,10 @@ from rhot.watch.onlooker_faults import about, host_of
 from rhot.watch.rig_state import MISSING, RigState, ServiceRow, StandingFault
 from services.cli.doctor.links import Link, broken, from_faults, holds
 from services.cli.doctor.observations import Observations
-from services.cli.doctor.way_of_markers import CAMERA_CODES, camera_links, hand_links, object_links
+from services.cli.doctor.way_of_markers import CAMERA_CODES, camera_links, hand_links
+from services.cli.doctor.way_of_objects import OBJECT_CODES, object_links
 
-# Codes of fusion's of the cameras together, and of objects.
+# Codes of fusion's of the cameras together.
 _OF_VIEWS = (
     "camera_wrong_size",
     "camera_moved",
@@ -23,10 +24,9 @@ _OF_VIEWS = (
     "camera_unknown",
     "not_calibrated",
 )
-_OF_OBJECTS = ("object_unregistered", "device_unknown")
 # Judged by links of their own, before the cameras.
 _JUDGED = ("second_service", "second_clock", "session_stopped", "service_absent")
-_KNOWN = {*CAMERA_CODES, *_OF_VIEWS, *_OF_OBJECTS, *_JUDGED, "service_gone", "service_silent"}
+_KNOWN = {*CAMERA_CODES, *_OF_VIEWS, *OBJECT_CODES, *_JUDGED, "service_gone", "service_silent"}
 
 
 def diagnose(seen: Observations) -> list[Link]:
@@ -48,7 +48,7 @@ def diagnose(seen: Observations) -> list[Link]:
     links += _views(faults)
     for hand in config.hand if config.has_depth else ():
         links += hand_links(seen, hand)
-    links += object_links(seen, [f for f in faults if f.code in _OF_OBJECTS])
+    links += object_links(seen, [f for f in faults if f.code in OBJECT_CODES])
     return links + _remaining(state)
 
 

@@ -12,7 +12,9 @@ from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
 from rhot.messages import HandPose
 from rhot.messages.health import Health
+from rhot.messages.objects import ObjectContacts
 from rhot.watch.follow import watching
+from rhot.watch.object_words import holding, state_of, touching
 from rhot.watch.rig_monitor import RigMonitor
 from services.cli.doctor.observations import CameraSeen, HandSeen, ObjectSeen, Observations
 
@@ -75,9 +77,27 @@ def _listeners(
         async for pose in bus.every(topics.OBJECT, _QUEUE):
             if (known := seen.objects.get(pose.object)) is not None:
                 known.poses += 1
-                known.tracking, known.registered = pose.tracking, pose.registered
+                known.state = state_of(pose.tracking, pose.registered)
+                known.ok += known.state == "ok"
 
-    return [health(), markers(), points(), poses(), objects()]
+    async def contacts() -> None:
+        async for message in bus.every(topics.CONTACTS, _QUEUE):
+            if (known := seen.objects.get(message.object)) is not None:
+                known.contacts += 1
+                known.touching = touch_text(message)
+
+    return [health(), markers(), points(), poses(), objects(), contacts()]
+
+
+def touch_text(message: ObjectContacts) -> str:
+    """Who holds an object, else who touches it, in words; "" if nobody does."""
+    held = [holding(one.hand, message.object, one.parts) for one in message.grasps]
+    by_hand: dict[str, list[str]] = {}
+    for one in message.contacts:
+        if one.touching and one.hand not in [grasp.hand for grasp in message.grasps]:
+            by_hand.setdefault(one.hand, []).append(one.part)
+    touched = [touching(hand, message.object, parts) for hand, parts in by_hand.items()]
+    return ", ".join([*held, *touched])
 
 
 # Services and places that are told apart; names come from the network, memory must not.

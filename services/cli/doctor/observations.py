@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from rhot.files.config import RigConfig
+from rhot.messages.objects import ObjectTracking
 from rhot.watch.rig_state import RigState
 
 
@@ -40,11 +41,16 @@ class HandSeen(msgspec.Struct, kw_only=True):
 
 
 class ObjectSeen(msgspec.Struct, kw_only=True):
-    """Poses that arrived of one object, and what the last of them said."""
+    """Poses that arrived of one object, how many were ok in the rig's frame, and how the last was.
+
+    contacts: messages of who touches it; touching: what the last of them said, in words.
+    """
 
     poses: int = 0
-    tracking: str = ""
-    registered: bool = False
+    ok: int = 0
+    state: ObjectTracking = "lost"
+    contacts: int = 0
+    touching: str = ""
 
 
 class Observations(msgspec.Struct, kw_only=True):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from rhot.messages.health import Fault
 from rhot.watch.rig_state import RigState
-from services.cli.doctor.links import Link, broken, from_faults, holds, judged
+from services.cli.doctor.links import Link, broken, holds, judged
 from services.cli.doctor.observations import CameraSeen, HandSeen, Observations
 
 _PICTURE = (
@@ -140,22 +139,3 @@ def _poses(hand: str, found: HandSeen) -> Link:
         text = f"{found.implausible} of {found.poses} poses are nowhere near the cameras"
         return broken(name, "pose_implausible", text)
     return holds(name, f"{found.poses} poses")
-
-
-def object_links(seen: Observations, told: Sequence[Fault]) -> list[Link]:
-    """Every object of rig.toml."""
-    config: RigConfig | None = seen.config
-    links = []
-    for table in config.object if config is not None else []:
-        name = f"object {table.name}"
-        own = [fault for fault in told if fault.subject in (table.name, table.serial)]
-        found = seen.objects.get(table.name)
-        if link := from_faults(name, own):
-            links.append(link)
-        elif found is None or not found.poses:
-            text = f"no pose of {table.serial} arrives"
-            action = "switch the tracker on, and see the object tracker's journal"
-            links.append(broken(name, "source_lost", text, action))
-        else:
-            links.append(holds(name, f"{found.poses} poses, {found.tracking}"))
-    return links

@@ -22,6 +22,12 @@ def cubic(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
     )
 
 
+def cubic_slope(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
+    """The derivative of that spline at (m,) -> (m, ...), per second."""
+    spline = CubicSpline(_seconds(stamps_ns, stamps_ns), values, axis=0)
+    return np.asarray(spline(_seconds(at_ns, stamps_ns), 1))
+
+
 def linear(stamps_ns: Stamps, values: Array, at_ns: Stamps) -> Array:
     """Straight lines through (n, ...) at (m,) -> (m, ...)."""
     index, share = _segments(stamps_ns, at_ns)

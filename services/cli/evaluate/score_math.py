@@ -13,7 +13,6 @@ import numpy as np
 from rhot.errors import CaptureError
 from rhot.hand import JOINT_INDEX, TIPS, HandModel
 from rhot.messages import HandPose
-from rhot.messages.objects import ObjectPose
 from services.cli.evaluate.interpolation import Stamps
 from services.cli.evaluate.score_statistics import (
     angle_errors,
@@ -23,8 +22,8 @@ from services.cli.evaluate.score_statistics import (
     orientation_error,
     point_error,
 )
-from services.cli.evaluate.score_types import HandScore, ObjectScore
-from services.cli.evaluate.truth_track import HandTrack, ObjectTrack, angle_rows, inside
+from services.cli.evaluate.score_types import HandScore
+from services.cli.evaluate.truth_track import HandTrack, angle_rows, inside
 
 _TIP_JOINTS = [JOINT_INDEX[tip] for tip in TIPS]
 
@@ -70,32 +69,6 @@ def score_hand(
             truth.stamps_ns,
             truth.tips_m.reshape(-1, 15),
         ),
-    )
-
-
-def score_object(poses: Sequence[ObjectPose], truth: ObjectTrack, period_ns: float) -> ObjectScore:
-    """One object's poses against its truth.
-
-    Errors are None if no registered pose lies inside the truth.
-    """
-    registered = sorted(
-        (pose for pose in poses if pose.registered and pose.tracking == "ok"),
-        key=lambda pose: pose.stamp_ns,
-    )
-    stamps = np.array([pose.stamp_ns for pose in registered], dtype=np.int64)
-    position = np.array([pose.position_m for pose in registered]).reshape(-1, 3)
-    wxyz = np.array([pose.orientation_wxyz for pose in registered]).reshape(-1, 4)
-    within = inside(truth, stamps)
-    real = truth.at(stamps[within])
-    scored = bool(within.any())
-    return ObjectScore(
-        poses=len(poses),
-        scored=int(within.sum()),
-        unregistered=sum(not pose.registered for pose in poses),
-        position=point_error(position[within] - real.position_m) if scored else None,
-        orientation=orientation_error(wxyz[within], real.orientation_wxyz) if scored else None,
-        coverage=coverage(stamps, truth.stamps_ns, period_ns),
-        delay_ms=delay_ms(stamps, position, truth.stamps_ns, truth.position_m),
     )
 
 

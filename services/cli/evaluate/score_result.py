@@ -17,7 +17,8 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import Truth
 from rhot.topics import Rate
-from services.cli.evaluate.score_math import score_hand, score_object
+from services.cli.evaluate.score_math import score_hand
+from services.cli.evaluate.score_objects import score_object
 from services.cli.evaluate.score_types import ObjectScore, Score, Stages
 from services.cli.evaluate.stages import landmark_truth, marker_errors, point_errors
 from services.cli.evaluate.truth_track import HandTrack, hand_track, object_track

@@ -18,6 +18,7 @@ from services.cli.evaluate.score_types import (
     Coverage,
     OrientationError,
     PointError,
+    Spread,
     Vec3,
     Violations,
 )
@@ -43,14 +44,29 @@ def point_error(error_m: Array) -> PointError:
     )
 
 
-def orientation_error(a_wxyz: Array, b_wxyz: Array) -> OrientationError:
-    """Angles between orientations (n, 4) and (n, 4), n > 0."""
+def spread(sizes: Array) -> Spread:
+    """Statistics of sizes of errors (n,), n > 0, in the unit that they have."""
+    return Spread(
+        median=_round(float(np.median(sizes))),
+        rms=_round(float(np.sqrt(np.mean(sizes**2)))),
+        p95=_round(float(np.percentile(sizes, 95.0))),
+        max=_round(float(sizes.max())),
+    )
+
+
+def turns_deg(a_wxyz: Array, b_wxyz: Array) -> Array:
+    """Angles (n,) between orientations (n, 4) and (n, 4)."""
     a = a_wxyz / np.linalg.norm(a_wxyz, axis=1, keepdims=True)
     b = b_wxyz / np.linalg.norm(b_wxyz, axis=1, keepdims=True)
     # From the chord |a -+ b| = 2 sin(angle / 4): exact for small angles, where arccos of the dot
     # product is not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
-    deg = np.rad2deg(4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
+    return np.rad2deg(4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
+
+
+def orientation_error(a_wxyz: Array, b_wxyz: Array) -> OrientationError:
+    """Angles between orientations (n, 4) and (n, 4), n > 0."""
+    deg = turns_deg(a_wxyz, b_wxyz)
     return OrientationError(
         mean_deg=_round(float(deg.mean())),
         rms_deg=_round(float(np.sqrt(np.mean(deg**2)))),

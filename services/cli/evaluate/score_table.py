@@ -8,6 +8,7 @@ from services.cli.evaluate.score_types import (
     ObjectScore,
     PointError,
     Score,
+    Spread,
     Stages,
 )
 from services.cli.evaluate.text_table import number, plain, table
@@ -56,19 +57,49 @@ def hand_text(hand: str, score: HandScore) -> str:
 
 
 def objects_text(objects: dict[str, ObjectScore]) -> str:
-    """One row per object."""
-    rows = [
-        (
-            name,
-            f"{one.scored}/{one.poses}",
-            *(_point(one.position) if one.position else ["-"] * len(_POINT_COLUMNS)),
-            number(one.orientation.rms_deg if one.orientation else None),
-            f"{100 * one.coverage.missed_share:.1f}",
-            number(one.delay_ms, 1),
-        )
+    """How large each object's errors are, then what else there is to say of it."""
+    sizes = [
+        (f"{name}, {unit}", *_sizes(spread))
         for name, one in objects.items()
+        for unit, spread in (
+            ("mm", one.position_mm),
+            ("deg", one.orientation_deg),
+            ("mm/s", one.velocity_mm_s),
+        )
     ]
-    return table(("object", "poses", *_POINT_COLUMNS, "turn deg", "lost %", "delay ms"), rows)
+    return "\n\n".join(
+        [
+            table(("object", "median", "RMS", "95 %", "max"), sizes),
+            plain([line for name, one in objects.items() for line in _object(name, one)]),
+        ]
+    )
+
+
+def _sizes(spread: Spread | None) -> list[str]:
+    if spread is None:
+        return ["-"] * 4
+    return [number(value) for value in (spread.median, spread.rms, spread.p95, spread.max)]
+
+
+def _object(name: str, score: ObjectScore) -> list[tuple[str, str, str]]:
+    """(what, value, remark) of an object's poses."""
+    others = [
+        f"{count} {state.replace('_', ' ')}"
+        for state, count in sorted(score.states.items())
+        if state != "ok"
+    ]
+    if score.unregistered:
+        others.append(f"{score.unregistered} not registered")
+    count = f"{score.scored} of {score.poses} poses scored"
+    missed = f"{100 * score.coverage.missed_share:.1f} %"
+    bias = score.position.bias_mm if score.position else (None, None, None)
+    late = "" if score.latency_ms is None else f"sent {score.latency_ms:.1f} ms after their stamps"
+    return [
+        (f"{name}, ok", f"{100 * score.ok_share:.1f} %", ", ".join([count, *others])),
+        (f"{name}, dropouts", missed, _coverage_text(score.coverage)),
+        (f"{name}, bias", " ".join(number(value) for value in bias), "mm, along x, y and z"),
+        (f"{name}, delay", f"{number(score.delay_ms, 1)} ms", late or "of the content"),
+    ]
 
 
 def stages_text(hand: str, stages: Stages) -> str:

@@ -86,10 +86,21 @@ class HandScore(msgspec.Struct, frozen=True, kw_only=True):
     delay_ms: float | None
 
 
+class Spread(msgspec.Struct, frozen=True, kw_only=True):
+    """How large errors are: half are below median, 95 % below p95. Unit: that of its field."""
+
+    median: float
+    rms: float
+    p95: float
+    max: float
+
+
 class ObjectScore(msgspec.Struct, frozen=True, kw_only=True):
     """One object against its truth.
 
-    Unregistered poses (lighthouse frame) are counted and not scored.
+    Poses that are not ok, or not registered (lighthouse frame), are counted and not scored. states
+    counts poses by their tracking, ok_share is of all poses. delay_ms is that of the content, as
+    HandScore's; latency_ms how late poses were sent, None of a result of `rhot track`.
     """
 
     poses: int
@@ -99,6 +110,12 @@ class ObjectScore(msgspec.Struct, frozen=True, kw_only=True):
     orientation: OrientationError | None
     coverage: Coverage
     delay_ms: float | None
+    states: dict[str, int] = {}
+    ok_share: float = 0.0
+    position_mm: Spread | None = None
+    orientation_deg: Spread | None = None
+    velocity_mm_s: Spread | None = None
+    latency_ms: float | None = None
 
 
 class MarkerError(msgspec.Struct, frozen=True, kw_only=True):

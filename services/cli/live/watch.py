@@ -23,10 +23,11 @@ from rhot.errors import BusError
 from rhot.files.config import RigConfig
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.health import Health
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import ObjectContacts, ObjectPose
 from rhot.plain_text import printable
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.topics import Topic
+from rhot.watch.object_words import ADVICE, WORDS, holding, state_of
 from services.cli.live.alternate_screen import alternate_screen, size
 from services.cli.options import ConnectOption, RunningRigOption
 from services.cli.router_session import rig_and_endpoints, router_session
@@ -35,7 +36,10 @@ from services.cli.router_session import rig_and_endpoints, router_session
 _PERIOD_S = 0.2
 # Health comes once a second, everything else more often.
 _PATIENCE_S = 5.0
-_EXAMPLES = "hand/right/pose, hand/right/points, camera/left/markers, service/fusion/main/health"
+_EXAMPLES = (
+    "hand/right/pose, hand/right/points, object/cup/pose, object/cup/contacts, "
+    "camera/left/markers, service/fusion/main/health"
+)
 # Words of a table that are read as numbers; longer ones are stamps.
 _NUMBER = re.compile(r"-?[0-9.]{1,9}( deg| mm)?$")
 Row = Sequence[str]
@@ -59,7 +63,7 @@ def _topic(stream: str) -> tuple[Topic[Any], dict[str, str]]:
     topic = topics.find(f"{topics.ROOT}/rig/{stream}")
     if topic is None or topic.message is None or topic.kind is topics.Kind.QUERY:
         there = [one.template for one in topics.TOPICS if one.kind is topics.Kind.STREAM]
-        shown = ", ".join(one for one in there if one.partition("/")[0] in ("hand", "service"))
+        shown = ", ".join(one for one in there if one.partition("/")[0] in ("hand", "object"))
         raise BusError(
             f"{stream!r} is no stream of messages; say one like {_EXAMPLES} ({shown}, ...: "
             "docs/reference/topics.md has all)"
@@ -122,6 +126,8 @@ def table(message: msgspec.Struct, now_ns: int) -> list[str]:
             title, rows = f"camera {message.camera}", _markers(message)
         case ObjectPose():
             title, rows = message.object, _object(message)
+        case ObjectContacts():
+            title, rows = f"{message.object}, who touches it", _contacts(message)
         case Health():
             title, rows = f"{message.service}/{message.instance}", _health(message)
         case _:
@@ -172,12 +178,31 @@ def _markers(frame: MarkerFrame) -> list[Row]:
 
 
 def _object(pose: ObjectPose) -> list[Row]:
-    return [
+    state = state_of(pose.tracking, pose.registered)
+    advice = f"; {ADVICE[state]}" if ADVICE[state] else ""
+    rows: list[Row] = [
         ("position", *_mm(pose.position_m), "mm"),
         ("orientation", *(f"{value:.3f}" for value in pose.orientation_wxyz), "wxyz"),
         ("velocity", *_mm(pose.velocity_m_s), "mm/s"),
-        ("tracking", pose.tracking, "" if pose.registered else "not registered to the rig"),
+        ("turns", *(f"{math.degrees(v):.1f}" for v in pose.angular_velocity_rad_s), "deg/s"),
     ]
+    if pose.sigma_m is not None:
+        turn = "" if pose.sigma_rad is None else f"{math.degrees(pose.sigma_rad):.2f} deg"
+        rows.append(("+-", f"{1e3 * pose.sigma_m:.1f} mm", turn))
+    return [*rows, ("tracking", f"{WORDS[state]}{advice}"), ("tracker", pose.serial)]
+
+
+def _contacts(message: ObjectContacts) -> list[Row]:
+    """Each part of each hand with its distance; then who holds."""
+    rows: list[Row] = [("hand", "part", "off mm", "+- mm", "for s", "")]
+    for one in message.contacts:
+        lasts = ""
+        if one.touching and one.since_ns:
+            lasts = f"{(message.stamp_ns - one.since_ns) * 1e-9:.1f}"
+        touch = "touches" if one.touching else ""
+        rows.append((one.hand, one.part, *_mm((one.distance_m, one.sigma_m)), lasts, touch))
+    rows += [(holding(one.hand, message.object, one.parts),) for one in message.grasps]
+    return rows
 
 
 def _health(health: Health) -> list[Row]:

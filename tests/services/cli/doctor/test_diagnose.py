@@ -24,7 +24,7 @@ CONFIG = RigConfig(
     rig=RigTable(name="desk"),
     camera=[CameraTable(name="left", host="pi-left"), CameraTable(name="right", host="pi-right")],
     hand={"right": HandTable(markers={"index_tip": "blue", "little_tip": "lime"})},
-    object=[ObjectTable(name="cup", serial="LHR-1")],
+    object=[ObjectTable(name="cup", serial="LHR-1", shape="sphere", size_m=(0.08,))],
 )
 SERVICES = ("pi_tracker/left", "pi_tracker/right", "fusion", "solver", "object_tracker")
 
@@ -57,7 +57,7 @@ def observations(faults=None, **changes):
             for name in ("left", "right")
         },
         "hands": {"right": HandSeen(points=120, measured=120, poses=120)},
-        "objects": {"cup": ObjectSeen(poses=300, tracking="ok", registered=True)},
+        "objects": {"cup": ObjectSeen(poses=300, ok=300, state="ok", contacts=120)},
     }
     return Observations(**values | changes)
 
@@ -76,7 +76,13 @@ def test_links_go_from_the_file_to_the_object():
     names = [link.name for link in diagnose(observations())]
     assert names[:2] == ["rig.toml", "router"]
     way = ["pi_tracker/left", "fusion", "session", "camera left", "markers of left"]
-    way += ["cameras together", "points of right hand", "pose of right hand", "object cup"]
+    way += [
+        "cameras together",
+        "points of right hand",
+        "pose of right hand",
+        "object cup",
+        "touch of cup",
+    ]
     assert [name for name in names if name in way] == way
 
 

@@ -7,9 +7,8 @@ import pytest
 
 from rhot.errors import CaptureError
 from rhot.hand import DIGIT_ANGLES, DIGITS
-from rhot.messages.objects import ObjectPose
-from services.cli.evaluate.score_math import score_hand, score_object
-from services.cli.evaluate.truth_track import hand_track, object_track
+from services.cli.evaluate.score_math import score_hand
+from services.cli.evaluate.truth_track import hand_track
 
 PERIOD_NS = 1e9 / 30.0
 
@@ -125,49 +124,3 @@ def test_a_late_start_counts_as_a_gap_and_poses_after_the_end_do_not_score(made_
 def test_poses_of_another_time_are_an_error(made_up):
     with pytest.raises(CaptureError, match="not of this capture"):
         scored(made_up, [made_up.pose(100.0)])
-
-
-def object_pose(truth, i, *, registered=True, tracking="ok", shift_m=0.0):
-    cup = truth.objects["cup"]
-    x, y, z = cup.position_m
-    return ObjectPose(
-        object="cup",
-        serial="LHR-1",
-        seq=i,
-        stamp_ns=truth.stamp_ns,
-        position_m=(x + shift_m, y, z),
-        orientation_wxyz=cup.orientation_wxyz,
-        velocity_m_s=(0.0, 0.0, 0.0),
-        angular_velocity_rad_s=(0.0, 0.0, 0.0),
-        tracking=tracking,
-        registered=registered,
-    )
-
-
-def test_an_object_is_scored_like_a_point(made_up):
-    lines = made_up.truths()
-    poses = [
-        object_pose(line, i, shift_m=0.002, tracking="lost" if i < 9 else "ok")
-        for i, line in enumerate(lines)
-    ]
-    score = score_object(poses, object_track(lines, "cup"), PERIOD_NS)
-    assert score.poses == 90
-    assert score.scored == 81
-    assert score.coverage.missed == 9
-    assert score.position.bias_mm == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
-    assert score.orientation.max_deg == pytest.approx(0.0, abs=1e-3)
-    assert score.delay_ms == pytest.approx(0.0, abs=0.1)
-
-
-def test_an_unregistered_object_is_counted_and_not_scored(made_up):
-    lines = made_up.truths()
-    score = score_object(
-        [object_pose(line, 0, registered=False) for line in lines],
-        object_track(lines, "cup"),
-        PERIOD_NS,
-    )
-    assert score.unregistered == 90
-    assert score.scored == 0
-    assert score.position is None
-    assert score.orientation is None
-    assert score.coverage.missed_share == 1.0

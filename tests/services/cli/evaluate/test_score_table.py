@@ -37,6 +37,10 @@ def test_a_score_has_all_its_parts(made_up):
     )
     for part in ("thumb cmc", "3.00", "0 of 90 instants", "none", "note: so it is"):
         assert part in text
-    row = next(line for line in text.splitlines() if line.startswith("cup"))
-    assert row.split() == ["cup", "0/3", *"-" * 9, "100.0", "-"]
+    rows = [line.split() for line in text.splitlines() if line.startswith("cup")]
+    assert rows[0] == ["cup,", "mm", *"-" * 4]
+    told = [" ".join(row) for row in rows[3:]]
+    assert told[0] == "cup, ok 0.0 % 0 of 3 poses scored, 3 not registered"
+    assert told[1].startswith("cup, dropouts 100.0 %")
+    assert told[3] == "cup, delay - ms of the content"
     assert next(line for line in text.splitlines() if line.startswith("delay")).split()[1] == "-"

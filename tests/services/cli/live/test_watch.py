@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 
 from rhot import topics
@@ -21,7 +22,7 @@ from rhot.messages import (
     WristPose,
 )
 from rhot.messages.health import Fault, Health, StreamHealth
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import Contact, Grasp, ObjectContacts, ObjectPose
 from services.cli.live.watch import _topic, table
 
 NOW_NS = 5_000_000_000
@@ -183,16 +184,47 @@ def test_objects_and_anything_else():
         tracking="ok",
         registered=False,
     )
-    assert "not registered" in table(pose, NOW_NS)[-1]
+    lines = table(pose, NOW_NS)
+    assert any("not registered to the rig; run `rhot calibrate objects`" in line for line in lines)
+    assert not any(line.startswith("+-") for line in lines)
+    sure = msgspec.structs.replace(pose, registered=True, sigma_m=0.0008, sigma_rad=0.002)
+    lines = table(sure, NOW_NS)
+    assert ["+-", "0.8", "mm", "0.11", "deg"] in [cells(line) for line in lines]
+    assert ["tracking", "tracked"] in [cells(line) for line in lines]
     lines = table(Session(running=True, start_ns=7), NOW_NS)
     assert lines[0] == "Session"
     assert cells(lines[1]) == ["running", "true"]
+
+
+def test_who_touches_and_holds_an_object():
+    contacts = [
+        Contact(
+            hand="right",
+            part=part,
+            distance_m=off_m,
+            sigma_m=0.0012,
+            point_m=(0.0, 0.0, 0.5),
+            touching=off_m < 0.001,
+            since_ns=NOW_NS - 1_500_000_000 if off_m < 0.001 else 0,
+        )
+        for part, off_m in (("thumb", -0.0004), ("ring", 0.0213))
+    ]
+    grasp = Grasp(hand="right", parts=["thumb", "index"], since_ns=NOW_NS)
+    message = ObjectContacts(
+        object="cup", seq=1, stamp_ns=NOW_NS, contacts=contacts, grasps=[grasp]
+    )
+    lines = table(message, NOW_NS)
+    assert lines[0] == "cup, who touches it, 0 ms old"
+    assert cells(lines[2]) == ["right", "thumb", "-0.4", "1.2", "1.5", "touches"]
+    assert cells(lines[3]) == ["right", "ring", "21.3", "1.2"]
+    assert lines[4] == "right hand holds cup (thumb, index)"
 
 
 @pytest.mark.parametrize(
     ("stream", "topic", "names"),
     [
         ("hand/right/pose", topics.POSE, {"hand": "right"}),
+        ("object/cup/contacts", topics.CONTACTS, {"object": "cup"}),
         ("camera/left/markers", topics.MARKERS, {"camera": "left"}),
         ("control/session", topics.SESSION, {}),
     ],

@@ -22,10 +22,10 @@ def plot(
         Path | None, typer.Option(metavar="CAPTURE", help="capture whose truth is drawn beside")
     ] = None,
 ) -> None:
-    """Draw marker tracks, 3D points, joint angles, residuals and objects."""
+    """Draw marker tracks, 3D points, joint angles, residuals, and objects with their errors."""
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
-    from services.cli.evaluate.plot_result import plot_result
+    from services.cli.plot.result import plot_result
 
     for path in plot_result(result, out or result, truth):
         typer.echo(path)

@@ -1,4 +1,4 @@
-"""Which pictures a result gives, and what is on them; plot_figures.py draws them.
+"""Which pictures a result gives, and what is on them; figures.py and objects.py draw them.
 
 Times are seconds since the first frame. Where a marker, point or pose is missing, the line breaks.
 """
@@ -22,17 +22,17 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import Truth
 from services.cli.evaluate.interpolation import Stamps
-from services.cli.evaluate.plot_figures import (
-    Track,
+from services.cli.evaluate.score_math import estimate_track
+from services.cli.evaluate.truth_track import HandTrack, hand_track
+from services.cli.offline.results import check_result
+from services.cli.plot.axes import Track, with_gaps
+from services.cli.plot.figures import (
     angles_figure,
     markers_figure,
-    objects_figure,
     points_figure,
     residuals_figure,
 )
-from services.cli.evaluate.score_math import estimate_track
-from services.cli.evaluate.truth_track import HandTrack, hand_track, object_track
-from services.cli.offline.results import check_result
+from services.cli.plot.objects import drawings, objects_figure
 
 Flags = npt.NDArray[np.bool_]
 
@@ -43,9 +43,6 @@ class _Stamped(Protocol):
 
 
 M = TypeVar("M", bound=_Stamped)
-
-# A gap of more than this many usual steps breaks the line.
-_GAP_STEPS = 2.5
 
 
 def plot_result(result: Path, out: Path, capture: Path | None) -> list[Path]:
@@ -96,16 +93,16 @@ def _figures(result: Path, truth: list[Truth]) -> Iterator[tuple[str, Figure]]:
         solved = _by_stamp(pose for pose in poses if pose.hand == hand)
         if solved:
             yield from _pose_figures(hand, solved, truth, origin_ns)
-    objects = _object_tracks(list(read_lines(result / "objects.jsonl", ObjectPose)), origin_ns)
+    objects = drawings(list(read_lines(result / "objects.jsonl", ObjectPose)), truth, origin_ns)
     if objects:
-        yield "objects", objects_figure(objects, _object_truths(objects, truth, origin_ns))
+        yield "objects", objects_figure(objects)
 
 
 def _pose_figures(
     hand: str, poses: list[HandPose], truth: list[Truth], origin_ns: int
 ) -> Iterator[tuple[str, Figure]]:
     estimate = estimate_track(poses)
-    angles = _with_gaps(_angles_track(estimate, origin_ns))
+    angles = with_gaps(_angles_track(estimate, origin_ns))
     true_angles = None
     if any(hand in line.hands for line in truth):
         true_angles = _angles_track(hand_track(truth, hand), origin_ns)
@@ -155,42 +152,8 @@ def _point_tracks(lines: list[HandPoints], origin_ns: int) -> dict[str, tuple[Tr
     return dict(sorted(tracks.items()))
 
 
-def _object_tracks(poses: list[ObjectPose], origin_ns: int) -> dict[str, Track]:
-    """Per object its position in m, without the poses in which it was lost."""
-    tracks = {}
-    for name in sorted({pose.object for pose in poses}):
-        own = _by_stamp(p for p in poses if p.object == name and p.tracking != "lost")
-        if own:
-            stamps_ns = np.array([pose.stamp_ns for pose in own], dtype=np.int64)
-            positions_m = np.array([pose.position_m for pose in own])
-            tracks[name] = _with_gaps(Track(_seconds(stamps_ns, origin_ns), positions_m))
-    return tracks
-
-
-def _object_truths(names: Iterable[str], truth: list[Truth], origin_ns: int) -> dict[str, Track]:
-    """Per object that the truth knows its true position in m."""
-    known = [name for name in names if any(name in line.objects for line in truth)]
-    tracks = {name: object_track(truth, name) for name in known}
-    return {
-        name: Track(_seconds(track.stamps_ns, origin_ns), track.position_m)
-        for name, track in tracks.items()
-    }
-
-
 def _by_stamp(messages: Iterable[M]) -> list[M]:
     return sorted(messages, key=lambda message: message.stamp_ns)
-
-
-def _with_gaps(track: Track) -> Track:
-    """The track with a NaN row in each gap, so that its line breaks there."""
-    steps_s = np.diff(track.times_s)
-    if not len(steps_s):
-        return track
-    gaps = np.flatnonzero(steps_s > _GAP_STEPS * max(float(np.median(steps_s)), 1e-9)) + 1
-    return Track(
-        np.insert(track.times_s, gaps, track.times_s[gaps - 1]),
-        np.insert(track.values, gaps, np.nan, axis=0),
-    )
 
 
 def _times(messages: Iterable[_Stamped], origin_ns: int) -> Array:

@@ -7,57 +7,43 @@ figure: callers leave it out.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS
-
-# Okabe and Ito's colours, which colour-blind readers can tell apart too.
-_PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_DPI = 110
-_BACKGROUND = "#f2f2f2"
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """A sampled signal."""
-
-    times_s: Array  # (n,)
-    values: Array  # (n, k)
+from services.cli.plot.axes import Track, color_of, label, label_xyz, new_figure, style
 
 
 def markers_figure(
     camera: str, size_px: tuple[int, int], tracks: Mapping[str, Track], counts: Track
 ) -> Figure:
     """One camera: x and y of each colour over time, markers per frame, and paths in the image."""
-    figure = _figure(f"markers, camera {camera}", (13.0, 7.5))
+    figure = new_figure(f"markers, camera {camera}", (13.0, 7.5))
     grid = figure.add_gridspec(3, 2, width_ratios=(3, 2), height_ratios=(3, 3, 1))
     count = figure.add_subplot(grid[2, 0])
     x, y = (figure.add_subplot(grid[row, 0], sharex=count) for row in range(2))
     image = figure.add_subplot(grid[:, 1])
     dots: dict[str, Any] = {"marker": ".", "markersize": 2.5}
     for number, (name, track) in enumerate(tracks.items()):
-        color = name if is_color_like(name) else _palette(number)
+        color = name if is_color_like(name) else color_of(number)
         for axes, column in ((x, 0), (y, 1)):
             axes.plot(track.times_s, track.values[:, column], color=color, linewidth=0.8, **dots)
         image.plot(*track.values.T, color=color, linewidth=0.6, label=name, **dots)
     count.step(counts.times_s, counts.values[:, 0], color="black", linewidth=0.7, where="mid")
     count.set_ylim(-0.2, max(float(np.max(counts.values)), 1.0) + 0.4)
-    _label(x, "x / px", last=False)
-    _label(y, "y / px", last=False)
-    _label(count, "markers", last=True)
+    label(x, "x / px", last=False)
+    label(y, "y / px", last=False)
+    label(count, "markers", last=True)
     y.invert_yaxis()
     image.set_xlim(-0.5, size_px[0] - 0.5)
     image.set_ylim(size_px[1] - 0.5, -0.5)
     image.set_aspect("equal")
-    _style(image)
+    style(image)
     image.set_title("paths in the image", fontsize=9)
     if tracks:
         image.legend(
@@ -71,7 +57,7 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
 
     Each track comes with which of its rows are only predicted (n,): those are drawn as circles.
     """
-    figure = _figure(f"3D points, {hand} hand, rig frame", (13.0, 8.0))
+    figure = new_figure(f"3D points, {hand} hand, rig frame", (13.0, 8.0))
     grid = figure.add_gridspec(1, 2, width_ratios=(3, 2))
     left, right = (figure.add_subfigure(grid[0, column]) for column in range(2))
     over_time = left.subplots(3, 1, sharex=True)
@@ -83,13 +69,13 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
         "markerfacecolor": "none",
     }
     for number, (name, (track, predicted)) in enumerate(tracks.items()):
-        color, mm = _palette(number), 1e3 * track.values
+        color, mm = color_of(number), 1e3 * track.values
         for row, axes in enumerate(over_time):
             axes.plot(track.times_s, mm[:, row], color=color, linewidth=1.0, label=name)
             axes.plot(track.times_s[predicted], mm[predicted, row], color=color, **circles)
         front.plot(mm[:, 0], mm[:, 1], color=color, linewidth=0.8)
         above.plot(mm[:, 0], mm[:, 2], color=color, linewidth=0.8)
-    _label_xyz(over_time, legend_size=7)
+    label_xyz(over_time, legend_size=7)
     for axes, title, vertical in (
         (front, "from the front", "y / mm"),
         (above, "from above", "z / mm"),
@@ -97,7 +83,7 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
         axes.set_title(f"{title} (x to the right, mm)", fontsize=9)
         axes.set_ylabel(vertical, fontsize=8)
         axes.set_aspect("equal", adjustable="datalim")
-        _style(axes)
+        style(axes)
     front.invert_yaxis()
     return figure
 
@@ -105,18 +91,18 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
 def angles_figure(hand: str, estimate: Track, truth: Track | None) -> Figure:
     """One hand: the four angles of each digit in deg, values (n, 20); truth dashed."""
     dashed = ", dashed: truth" if truth is not None else ""
-    figure = _figure(f"joint angles, {hand} hand{dashed}", (12.0, 11.0))
+    figure = new_figure(f"joint angles, {hand} hand{dashed}", (12.0, 11.0))
     rows = figure.subplots(5, 1, sharex=True)
     dashes: dict[str, Any] = {"linewidth": 0.9, "linestyle": "--", "alpha": 0.8}
     for row, (digit, names) in enumerate(zip(DIGITS, DIGIT_ANGLES, strict=True)):
         axes = rows[row]
         for column, name in enumerate(names):
-            color, index = _palette(column), 4 * row + column
+            color, index = color_of(column), 4 * row + column
             values = estimate.values[:, index]
             axes.plot(estimate.times_s, values, color=color, linewidth=1.2, label=name)
             if truth is not None:
                 axes.plot(truth.times_s, truth.values[:, index], color=color, **dashes)
-        _label(axes, f"{digit} / deg", last=row == 4)
+        label(axes, f"{digit} / deg", last=row == 4)
         axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
 
@@ -128,63 +114,14 @@ def residuals_figure(
 
     Crosses stand where the status is not "solved", unsolved (n, 5).
     """
-    figure = _figure(f"solver, {hand} hand", (12.0, 7.0))
+    figure = new_figure(f"solver, {hand} hand", (12.0, 7.0))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for row, digit in enumerate(DIGITS):
-        color, values, flagged = _palette(row), residuals.values[:, row], unsolved[:, row]
+        color, values, flagged = color_of(row), residuals.values[:, row], unsolved[:, row]
         above.plot(residuals.times_s, values, color=color, linewidth=1.0, label=digit)
         above.plot(residuals.times_s[flagged], values[flagged], "x", color=color, markersize=4.5)
         below.plot(residuals.times_s, iterations[:, row], color=color, linewidth=0.8)
-    _label(above, "residual / mm (x: not solved)", last=False)
-    _label(below, "iterations", last=True)
+    label(above, "residual / mm (x: not solved)", last=False)
+    label(below, "iterations", last=True)
     above.legend(fontsize=8, ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     return figure
-
-
-def objects_figure(tracks: Mapping[str, Track], truth: Mapping[str, Track]) -> Figure:
-    """Position of each object in mm over time; truth dashed."""
-    figure = _figure("objects" + (", dashed: truth" if truth else ""), (12.0, 7.0))
-    rows = figure.subplots(3, 1, sharex=True)
-    dashes: dict[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": "--"}
-    for number, (name, track) in enumerate(tracks.items()):
-        color, mm = _palette(number), 1e3 * track.values
-        for row, axes in enumerate(rows):
-            axes.plot(track.times_s, mm[:, row], color=color, linewidth=1.0, label=name)
-            if name in truth:
-                axes.plot(truth[name].times_s, 1e3 * truth[name].values[:, row], **dashes)
-    _label_xyz(rows, legend_size=8)
-    return figure
-
-
-def _palette(number: int) -> str:
-    return _PALETTE[number % len(_PALETTE)]
-
-
-def _figure(title: str, size_in: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size_in, dpi=_DPI, layout="constrained")
-    figure.suptitle(title, fontsize=11)
-    return figure
-
-
-def _label_xyz(rows: npt.NDArray[np.object_], legend_size: int) -> None:
-    """Labels of three axes, x, y and z in mm over time, and a legend above the first."""
-    for row, axes in enumerate(rows):
-        _label(axes, f"{'xyz'[row]} / mm", last=row == 2)
-    rows[0].legend(
-        fontsize=legend_size, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, frameon=False
-    )
-
-
-def _label(axes: Axes, vertical: str, *, last: bool) -> None:
-    axes.set_ylabel(vertical, fontsize=8)
-    if last:
-        axes.set_xlabel("time / s", fontsize=8)
-    else:
-        axes.tick_params(labelbottom=False)
-    _style(axes)
-
-
-def _style(axes: Axes) -> None:
-    axes.grid(visible=True, linewidth=0.3)
-    axes.tick_params(labelsize=8)
-    axes.set_facecolor(_BACKGROUND)

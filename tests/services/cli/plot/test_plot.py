@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from rhot.errors import CaptureError
 from services.cli.application import application
-from services.cli.evaluate.plot_result import plot_result
+from services.cli.plot.result import plot_result
 
 pytest.importorskip("matplotlib", reason="matplotlib is of the extra `study`")
 
