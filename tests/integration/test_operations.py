@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import shutil
 import socket
 import subprocess
@@ -16,10 +17,11 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 
-from rhot import topics
+from rhot import clock, topics
 from rhot.bus.bus import open_bus
 from rhot.files.calibration import Exposure
 from rhot.files.config import load_rig
+from rhot.messages.objects import Contact, Grasp, ObjectContacts
 from rhot.process.service import Service
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.live.working_copy import working_copy
@@ -107,8 +109,6 @@ async def desk() -> AsyncIterator[Desk]:
         ports = free_ports(2)
         text = config.read_text().replace('[rig]\nname = "sim"\n', "")
         text = text.replace('source = "simulator"', 'source = "simulator"\nfps = 10.0')
-        # The object tracker is asked nothing here.
-        text = text.partition("[[object]]")[0]
         config.write_text(RIG.format(open=ports[0], secured=ports[1]) + text)
         rig = load_rig(config)
         pki = [sys.executable, "-m", "services.cli", "pki", "init"]
@@ -121,12 +121,12 @@ async def desk() -> AsyncIterator[Desk]:
             Child("pi_tracker", service_argv("pi_tracker", *common, "--camera", "right")),
             *(
                 Child(name, service_argv(name, *common))
-                for name in ("simulator", "fusion", "solver")
+                for name in ("simulator", "fusion", "solver", "object_tracker")
             ),
         ]
         logged: list[str] = []
         supervisor = Supervisor(lambda name, _, line: logged.append(f"[{name}] {line}"))
-        async with all_running(supervisor, children), steerable_tracker(rig):
+        async with all_running(supervisor, children), steerable_tracker(rig), held_cup(rig):
             async with asyncio.timeout(START_S):
                 while sum(" ready" in line for line in logged) < len(children) - 1:
                     await asyncio.sleep(0.1)
@@ -147,6 +147,41 @@ async def steerable_tracker(rig):
             yield
             for task in running:
                 task.cancel()
+
+
+@contextlib.asynccontextmanager
+async def held_cup(rig):
+    """Somebody who says all the time that the right hand holds the cup: the simulated one plays."""
+    async with open_bus("desk", list(rig.bus.connect)) as bus, asyncio.TaskGroup() as tasks:
+        publisher = bus.publisher(topics.CONTACTS, object="cup")
+
+        async def publish():
+            for seq in itertools.count():
+                publisher.put(holding_cup(seq, clock.now_ns()))
+                await asyncio.sleep(0.1)
+
+        running = tasks.create_task(publish())
+        yield
+        running.cancel()
+
+
+def holding_cup(seq: int, now_ns: int) -> ObjectContacts:
+    """Thumb and index hold it, and have touched it for a second."""
+    since_ns = now_ns - 1_000_000_000
+    contacts = [
+        Contact(
+            hand="right",
+            part=part,
+            distance_m=-0.0003,
+            sigma_m=0.0011,
+            point_m=(0.0, 0.0, 0.5),
+            touching=True,
+            since_ns=since_ns,
+        )
+        for part in ("thumb", "index")
+    ]
+    grasp = Grasp(hand="right", parts=["thumb", "index"], since_ns=since_ns)
+    return ObjectContacts(object="cup", seq=seq, stamp_ns=now_ns, contacts=contacts, grasps=[grasp])
 
 
 def free_ports(count: int) -> list[int]:

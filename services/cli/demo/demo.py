@@ -26,13 +26,15 @@ from services.cli.demo.metrics import DemoMetrics
 from services.cli.demo.summary import Summary, summary_text
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
-from services.cli.live.working_copy import working_copy
+from services.cli.live.working_copy import has_rig, working_copy
 from services.cli.options import VerboseOption
 from services.cli.terminal import Terminal
 
 # Without a pose by then something is wrong: numba's first compilation takes most of a minute on a
 # slow machine.
 _FIRST_POSE_S = 120.0
+# A hand that takes a cup shows hand, object and touch.
+SCENE = "grab"
 _POLL_S = 0.25
 
 
@@ -50,6 +52,13 @@ def demo(
             "default: a temporary folder, removed at the end"
         ),
     ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help="what the simulated hand does; `rhot simulate --list` names the scenes. "
+            f"Default: {SCENE}, where it takes a cup"
+        ),
+    ] = None,
     seconds: Annotated[
         float | None,
         typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary"),
@@ -58,13 +67,8 @@ def demo(
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
     verbose: VerboseOption = False,
 ) -> None:
-    """Run the whole rig, simulated: a moving hand and an object, live in the browser."""
-    if config is not None and folder is not None:
-        raise ConfigError(
-            "--folder is for rhot's own rig, --config for another one, which runs where it is: "
-            "give one of them"
-        )
-    with working_copy(folder) if config is None else contextlib.nullcontext(config) as path:
+    """Run the whole rig, simulated: a hand that takes a cup, live in the browser."""
+    with _rig(config, folder, scene) as path:
         terminal = Terminal(verbose=verbose)
         if config is None:
             kept = "" if folder else "; removed at the end, --folder DIR keeps it"
@@ -79,6 +83,38 @@ def demo(
             "rhot demo: no pose came; `rhot demo --verbose` shows what the services log", err=True
         )
         raise typer.Exit(1)
+
+
+def _rig(
+    config: Path | None, folder: Path | None, scene: str | None
+) -> contextlib.AbstractContextManager[Path]:
+    """The rig.toml to run; raises ConfigError where options do not go together."""
+    if config is None:
+        return working_copy(folder, _scene(scene, folder))
+    if folder is not None:
+        raise ConfigError(
+            "--folder is for rhot's own rig, --config for another one, which runs where it is: "
+            "give one of them"
+        )
+    if scene is not None:
+        raise ConfigError(
+            f"--scene is for rhot's own rig; set `scene` under [simulator] in {config}"
+        )
+    return contextlib.nullcontext(config)
+
+
+def _scene(wanted: str | None, folder: Path | None) -> str | None:
+    """The scene of a new copy, None for the one that a kept one has.
+
+    Raises ConfigError with the valid ones.
+    """
+    if wanted is None:
+        return None if folder is not None and has_rig(folder) else SCENE
+    # Not above: the simulator's rooms take longer to import than other commands to run.
+    from services.simulator.scene.catalog import scene_spec
+
+    scene_spec(wanted)
+    return wanted
 
 
 async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Terminal) -> Summary:
@@ -129,8 +165,12 @@ def _subscribers(
             metrics.add_truth(truth)
 
     async def objects() -> None:
-        async for _ in bus.every(topics.OBJECT, 256):
-            metrics.objects += 1
+        async for pose in bus.every(topics.OBJECT, 256):
+            metrics.objects.add_pose(pose)
+
+    async def contacts() -> None:
+        async for message in bus.every(topics.CONTACTS, 256):
+            metrics.objects.add_contacts(message)
 
     async def viewer_port() -> None:
         port = 0
@@ -139,7 +179,7 @@ def _subscribers(
                 port = int(beat.values["port"])
                 terminal.line(f"live view: http://127.0.0.1:{port}")
 
-    return [poses(), truths(), objects(), viewer_port()]
+    return [poses(), truths(), objects(), contacts(), viewer_port()]
 
 
 async def _until_done(metrics: DemoMetrics, seconds: float | None, terminal: Terminal) -> None:

@@ -15,10 +15,10 @@ from rhot.geometry.transforms import Array
 from rhot.hand import JOINT_INDEX, TIPS
 from rhot.messages import HandPose
 from rhot.messages.simulator import Truth
+from services.cli.demo.object_metrics import ObjectMetrics
 from services.cli.demo.summary import Summary
+from services.cli.demo.truths import KEPT, Truths
 
-# Truth kept: two seconds at 90 Hz, far longer than any pose takes.
-_TRUTHS = 180
 _TIP_JOINTS = [JOINT_INDEX[name] for name in TIPS]
 
 
@@ -27,19 +27,20 @@ class DemoMetrics:
 
     def __init__(self) -> None:
         self.poses = 0
-        self.objects = 0
         self.first_ns = 0
         self.last_ns = 0
         self._latencies_ns: list[int] = []
         # One value a pose: the mean over the five tips of the squared distance.
         self._squared_errors_mm2: list[float] = []
-        self._truths: deque[Truth] = deque(maxlen=_TRUTHS)
+        self._truths = Truths()
+        self.objects = ObjectMetrics(self._truths)
         # Poses that are newer than the newest truth.
-        self._waiting: deque[HandPose] = deque(maxlen=_TRUTHS)
+        self._waiting: deque[HandPose] = deque(maxlen=KEPT)
 
     def add_truth(self, truth: Truth) -> None:
         """Take in the simulator's truth, and score the poses that waited for it."""
-        self._truths.append(truth)
+        self._truths.add(truth)
+        self.objects.score()
         while self._waiting and self._waiting[0].stamp_ns <= truth.stamp_ns:
             self._score(self._waiting.popleft())
 
@@ -71,7 +72,8 @@ class DemoMetrics:
             latency_p99_ms=p99_ms if self.poses else None,
             tip_error_rms_mm=None if rms_mm is None else round(rms_mm, 2),
             tip_error_median_mm=round(float(np.sqrt(np.median(squared))), 2) if squared else None,
-            object_poses=self.objects,
+            object_poses=self.objects.poses,
+            objects=self.objects.summary(),
             restarts=restarts,
         )
 
@@ -85,16 +87,11 @@ class DemoMetrics:
 
     def _true_tips(self, pose: HandPose) -> Array | None:
         """True tips (5, 3) in m at the pose's stamp, linear between the truths around it."""
-        for before, after in zip(self._truths, list(self._truths)[1:], strict=False):
-            if (
-                before.stamp_ns <= pose.stamp_ns <= after.stamp_ns
-                and pose.hand in before.hands
-                and pose.hand in after.hands
-            ):
-                a, b = (
-                    np.array([t.hands[pose.hand].points_m[name] for name in TIPS])
-                    for t in (before, after)
-                )
-                share = (pose.stamp_ns - before.stamp_ns) / max(1, after.stamp_ns - before.stamp_ns)
-                return a + share * (b - a)
-        return None
+        found = self._truths.around(pose.stamp_ns)
+        if found is None or pose.hand not in found.before.hands.keys() & found.after.hands.keys():
+            return None
+        a, b = (
+            np.array([truth.hands[pose.hand].points_m[name] for name in TIPS])
+            for truth in (found.before, found.after)
+        )
+        return a + found.share * (b - a)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from services.cli.demo.object_metrics import ObjectSummary, object_text
+
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """The measurements of one run; None where nothing was measured."""
@@ -16,6 +18,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     tip_error_rms_mm: float | None
     tip_error_median_mm: float | None
     object_poses: int
+    objects: dict[str, ObjectSummary]
     restarts: dict[str, int]
 
 
@@ -30,6 +33,7 @@ def summary_text(summary: Summary) -> str:
         f"latency      p50 {p50}, p99 {p99} (mid-exposure to pose received)",
         f"tip error    RMS {rms}, median {median} against the truth",
         f"object poses {summary.object_poses}",
+        *(object_text(name, one) for name, one in summary.objects.items()),
     ]
     lines += [f"restarts     {name}: {count}" for name, count in sorted(summary.restarts.items())]
     return "\n".join(lines)

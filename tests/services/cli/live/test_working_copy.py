@@ -29,6 +29,23 @@ def test_a_folder_is_kept_and_used_again_as_it_is(tmp_path):
         assert (path.parent / "calibration" / "left.colors.json").read_text() == "mine"
 
 
+def test_a_scene_of_its_own_is_for_a_new_copy_only(tmp_path):
+    shipped = sim_toml().read_text(encoding="utf-8").splitlines()
+    with working_copy(tmp_path / "a", "wave") as path:
+        assert load_rig(path).simulator.scene == "wave"
+        changed = path.read_text(encoding="utf-8").splitlines()
+        assert [(a, b) for a, b in zip(shipped, changed, strict=True) if a != b] == [
+            (f'scene = "{load_rig(sim_toml()).simulator.scene}"', 'scene = "wave"')
+        ]
+    with (
+        pytest.raises(ConfigError, match="set `scene` under"),
+        working_copy(tmp_path / "a", "fist"),
+    ):
+        pass
+    with working_copy(tmp_path / "a") as path:
+        assert load_rig(path).simulator.scene == "wave"
+
+
 def test_foreign_files_are_left_alone(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with (
@@ -49,3 +66,11 @@ def test_another_rig_runs_where_it_is_and_has_no_copy():
     ran = CliRunner().invoke(application(), ["demo", "--config", "rig.toml", "--folder", "copy"])
     assert isinstance(ran.exception, ConfigError)
     assert "give one of them" in str(ran.exception)
+
+
+def test_a_scene_is_checked_before_anything_starts():
+    ran = CliRunner().invoke(application(), ["demo", "--scene", "grap"])
+    assert isinstance(ran.exception, ConfigError)
+    assert "did you mean 'grab'" in str(ran.exception)
+    ran = CliRunner().invoke(application(), ["demo", "--scene", "grab", "--config", "rig.toml"])
+    assert "under [simulator] in rig.toml" in str(ran.exception)
