@@ -2,12 +2,13 @@
 
 If survive-cli is missing, ends, or hangs, SourceError says so with its last words; who called tries
 again. A device that libsurvive loses gets poses that are not valid: at once when it is unplugged,
-after a fifth of a second when it sees no light. Cancelling ends the child process.
+a fifth of a second after its last light. Cancelling ends the child process.
 """
 
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import AsyncGenerator, Iterator, Sequence
 from pathlib import Path
 
@@ -29,6 +30,9 @@ from services.object_tracker.survive_lines import (
 _SILENT_S = 30.0
 # Poses come every 8 ms (vive/libsurvive), with gaps of up to 60 ms.
 _LOST_AFTER_S = 0.2
+# Without any line it is the machine that is busy, or the tracker that is off.
+_SILENCE_S = 1.0
+_TIME = re.compile(r"\d{1,9}\.\d{1,9}\Z")
 # libsurvive names a few devices at most.
 _MOST_DEVICES = 64
 
@@ -139,11 +143,18 @@ class _Reader:
             yield self._message(pose, now_ns)
         if not lines and (waiting := self._parser.flush()) is not None:
             yield self._message(waiting, now_ns)
+        yield from self._lost(lines[-1] if lines else "", now_ns)
+
+    def _lost(self, line: str, now_ns: int) -> Iterator[OpenVrPose]:
+        """The devices that others, or libsurvive itself, have left behind; once each."""
+        word = line.partition(" ")[0]
+        time_s = float(word) if _TIME.match(word) else 0.0
         for device, (pose, came_ns) in list(self._tracked.items()):
             silent_s = 1e-9 * (now_ns - came_ns)
-            if silent_s > _LOST_AFTER_S:
+            if time_s - pose.time_s > _LOST_AFTER_S or silent_s > _SILENCE_S:
                 del self._tracked[device]
-                yield self._message(without_pose(pose, pose.time_s + silent_s, "lost"), now_ns)
+                at_s = max(time_s, pose.time_s + _LOST_AFTER_S)
+                yield self._message(without_pose(pose, at_s, "lost"), now_ns)
 
     def _message(self, pose: SurvivePose, now_ns: int) -> OpenVrPose:
         stamp_ns = self._run_clock.stamp_ns(pose.time_s, now_ns)

