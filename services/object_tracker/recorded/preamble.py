@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 from services.object_tracker.recorded.columns import Columns, columns_of_header, columns_of_row
 
-_SEPARATORS = re.compile(r"[\s,;\[\]()]+")
+_SEPARATORS = re.compile(r"\s*[,;\t]\s*|\s+")
+_COMMAS = re.compile(r"[,;\t]")
+_AROUND = str.maketrans('[]()"', "     ")
 _FREQUENCY = re.compile(r"\bFreq: *([0-9]{1,5}(?:\.[0-9]{1,5})?)")
 _BEGAN = re.compile(r"\bcurrent Time: *(\d{4})-(\d\d)-(\d\d)[-T ](\d\d):(\d\d):(\d\d)")
 # A column's unit in brackets: `x [mm]`.
@@ -21,10 +23,12 @@ _DEFAULT_HZ = 250.0
 
 @dataclass
 class Preamble:
-    """What is known of a table's rows: their columns (None: not yet), rate, beginning, device."""
+    """What is known of a table's rows: the columns of each device (none: not yet), their rate, when
+    they began, the device where they name none.
+    """
 
     serial: str
-    columns: Columns | None = None
+    columns: tuple[Columns, ...] = ()
     rate_hz: float = _DEFAULT_HZ
     began_s: float = 0.0
 
@@ -39,17 +43,24 @@ class Preamble:
         comment = line.lstrip().startswith("#")
         names = line.lstrip("# \t").partition(" Freq:")[0]
         words = words_of(names)
+        words = words[:-1] if words[-1] == "" else words
         numbers = [number_of(word) for word in row_words(words)]
         if numbers and not comment and None not in numbers:
             self.columns = columns_of_row([number for number in numbers if number is not None])
-            return self.columns is not None
-        self.columns = columns_of_header(words_of(_UNIT.sub(r"_\1", names)))
+            return bool(self.columns)
+        names = _UNIT.sub(r"_\1", names)
+        # Where commas part them, names may have spaces.
+        parts = _COMMAS.split(names) if _COMMAS.search(names) else words_of(names)
+        self.columns = columns_of_header(parts)
         return False
 
 
 def words_of(line: str) -> list[str]:
-    """The words of a line; commas, semicolons, brackets and white space part them."""
-    return [word for word in _SEPARATORS.split(line) if word]
+    """The words of a line; commas, semicolons, brackets and white space part them.
+
+    Between two commas with nothing between them is an empty word.
+    """
+    return _SEPARATORS.split(line.translate(_AROUND).strip())
 
 
 def row_words(words: list[str]) -> list[str]:

@@ -62,11 +62,10 @@ def read_table(path: Path, serial: str) -> Iterator[OpenVrPose]:
             raise wrong
         if not line.strip() or (not rows.begun and not rows.begin(number, line)):
             continue
-        pose = rows.pose(line)
-        if pose is None:
+        poses = rows.poses(line)
+        if not poses:
             wrong = _no_row(path, number, line)
-        else:
-            yield pose
+        yield from poses
     if rows.count == 0:
         raise CaptureError(f"{path}: no poses in it; {KNOWN_ROWS}")
 
@@ -81,9 +80,9 @@ class _Rows:
     def __init__(self, path: Path, serial: str) -> None:
         self._path = path
         self._preamble = Preamble(serial)
-        self._columns = Columns((), ())
         self._texts = False
         self._time_scale = 0.0
+        self._seq = 0
         self.begun = False
         self.count = 0
 
@@ -94,73 +93,85 @@ class _Rows:
         """
         first = self._preamble.read(line)
         columns = self._preamble.columns
-        if columns is not None:
+        if columns:
             self.begun = True
-            self._columns = columns
-            self._texts = columns.has(("serial",)) or columns.has(("kind",))
+            self._texts = columns[0].has(("serial",)) or columns[0].has(("kind",))
         elif number >= _LONGEST_PREAMBLE:
             raise _no_row(self._path, number, line)
         return first
 
-    def pose(self, line: str) -> OpenVrPose | None:
-        """The pose of one row, None if the line is no row."""
+    def poses(self, line: str) -> list[OpenVrPose]:
+        """The poses of one row, one for each device in it; none if the line is no row."""
         words = words_of(line)
         row = words if self._texts else row_words(words)
-        if row == [] and words[-1] == "None":
-            cells: dict[str, str] = {}
-        elif len(row) == len(self._columns.names):
-            cells = {n: w for n, w in zip(self._columns.names, row, strict=True) if n is not None}
-        else:
-            return None
-        values = {
-            name: number_of(word) for name, word in cells.items() if name not in ("serial", "kind")
-        }
-        if None in values.values():
-            return None
-        numbers = {name: value or 0.0 for name, value in values.items()}
-        serial = cells.get("serial", self._preamble.serial)
         if not self._texts and len(words) - len(row) == 2 and _SERIAL.match(words[0]):
             # `LHR-1 Quaternion x y z ...`, as the UDP sender made of triad_openvr prints it.
-            serial = words[0]
+            self._preamble.serial = words[0]
+        if row == [] and words[-1:] == ["None"]:
+            stamp_ns = self._stamp_ns(self._preamble.columns[0], {}, {})
+            found = [recorded_pose(self._preamble.serial, self._seq, stamp_ns, None)]
+        else:
+            several = len(self._preamble.columns) > 1
+            made = [self._pose(columns, row, several) for columns in self._preamble.columns]
+            found = [pose for pose in made if pose is not None]
+        self.count += bool(found)
+        self._seq += len(found)
+        return found
+
+    def _pose(self, columns: Columns, row: list[str], several: bool) -> OpenVrPose | None:
+        """One device's pose in a row, None if it is none."""
+        if len(row) == len(columns.names) + 1 and row[-1] == "":
+            row = row[:-1]
+        if len(row) != len(columns.names):
+            return None
+        cells = {n: word for n, word in zip(columns.names, row, strict=True) if n is not None}
+        numbers: dict[str, float] = {}
+        for name, word in cells.items():
+            if name not in ("serial", "kind"):
+                # An empty cell is a sample that is missing.
+                value = number_of(word or "nan")
+                if value is None:
+                    return None
+                numbers[name] = value
+        named = columns.device if several and columns.device else self._preamble.serial
+        serial = cells.get("serial", named)
         if not _SERIAL.match(serial):
             return None
         survive = cells.get("kind") in _SURVIVE_KINDS
-        T = self._transform(numbers, survive) if numbers else None
-        pose = recorded_pose(
+        return recorded_pose(
             serial,
-            self.count,
-            self._stamp_ns(cells.get("time"), numbers),
-            T,
+            self._seq,
+            self._stamp_ns(columns, cells, numbers),
+            _transform(columns, numbers, survive),
             "libsurvive" if survive else UNIVERSE,
         )
-        self.count += 1
-        return pose
 
-    def _stamp_ns(self, text: str | None, numbers: dict[str, float]) -> int:
-        if text is None:
+    def _stamp_ns(self, columns: Columns, cells: dict[str, str], numbers: dict[str, float]) -> int:
+        if "time" not in cells:
             return round((self._preamble.began_s + self.count / self._preamble.rate_hz) * 1e9)
         time = numbers["time"]
         if self._time_scale == 0.0:
-            scale = self._columns.scale("time")
+            scale = columns.scale("time")
             self._time_scale = scale if scale else time_scale(time)
         if not abs(time * self._time_scale) < _LATEST_S:
             return 0
         # Decimal: float64 holds nanoseconds since 1970 to a quarter of a microsecond only.
-        return round(Decimal(text) * round(self._time_scale * 1e9))
+        return round(Decimal(cells["time"]) * round(self._time_scale * 1e9))
 
-    def _transform(self, numbers: dict[str, float], survive: bool) -> Array | None:
-        """T_lighthouse_from_tracker (3, 4); None if these numbers are no rotation."""
-        if self._columns.has(MATRIX):
-            return np.array([numbers[name] for name in MATRIX]).reshape(3, 4)
-        position = np.array([numbers[name] * self._columns.scale(name) for name in POSITION])
-        rotation: Array | None
-        if self._columns.has(QUATERNION):
-            quaternion = np.array([numbers[name] for name in QUATERNION])
-            unit = abs(float(np.sqrt(quaternion @ quaternion)) - 1.0) <= _UNIT_TOLERANCE
-            rotation = rotation_from_quaternion(quaternion) if unit else None
-        else:
-            rotation = rotation_from_triad_angles(*(numbers[name] for name in ANGLES))
-        if rotation is None:
-            return None
-        T = np.column_stack([rotation, position])
-        return R_LIGHTHOUSE_FROM_SURVIVE @ T if survive else T
+
+def _transform(columns: Columns, numbers: dict[str, float], survive: bool) -> Array | None:
+    """T_lighthouse_from_tracker (3, 4); None if these numbers are no rotation."""
+    if columns.has(MATRIX):
+        return np.array([numbers[name] for name in MATRIX]).reshape(3, 4)
+    position = np.array([numbers[name] * columns.scale(name) for name in POSITION])
+    rotation: Array | None
+    if columns.has(QUATERNION):
+        quaternion = np.array([numbers[name] for name in QUATERNION])
+        unit = abs(float(np.sqrt(quaternion @ quaternion)) - 1.0) <= _UNIT_TOLERANCE
+        rotation = rotation_from_quaternion(quaternion) if unit else None
+    else:
+        rotation = rotation_from_triad_angles(*(numbers[name] for name in ANGLES))
+    if rotation is None:
+        return None
+    T = np.column_stack([rotation, position])
+    return R_LIGHTHOUSE_FROM_SURVIVE @ T if survive else T

@@ -94,6 +94,45 @@ def test_columns_by_name(read, header: str) -> None:
     assert np.array_equal(rows[:, :3], np.diag([-1.0, -1.0, 1.0]))
 
 
+def header_of(first: str, *names: str) -> str:
+    """A header of a time and seven columns of each of two devices."""
+    columns = [
+        name.format(of)
+        for of, unit in (("vive", ""), ("mocap", "_mm"))
+        for name in (*(f"{name}{unit}" for name in names[:3]), *names[3:])
+    ]
+    return ",".join([first, *columns])
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        header_of("time", *(f"{{}}_{name}" for name in ["x", "y", "z", "qw", "qx", "qy", "qz"])),
+        header_of("t_s", *(f"{name}_{{}}" for name in ["x", "y", "z", "qw", "qx", "qy", "qz"])),
+        header_of(
+            "Time (s)",
+            *(f"{{}} Position{axis}" for axis in "XYZ"),
+            *(f"{{}} Rotation{axis}" for axis in "WXYZ"),
+        ),
+    ],
+)
+def test_two_systems_side_by_side(read, header: str) -> None:
+    """A row has a pose of each; a sample that is missing is not valid."""
+    poses = read(f"{header}\n0.002,1,2,3,1,0,0,0,100,200,300,0,0,0,1\n0.004,1,2,3,1,0,0,0,,,,,,,\n")
+    told = [(pose.device.serial, pose.stamp_ns, pose.bPoseIsValid) for pose in poses]
+    assert told == [
+        ("vive", 2_000_000, True),
+        ("mocap", 2_000_000, True),
+        ("vive", 4_000_000, True),
+        ("mocap", 4_000_000, False),
+    ]
+    np.testing.assert_allclose(
+        np.array(poses[1].mDeviceToAbsoluteTracking),
+        np.column_stack([np.diag([-1.0, -1.0, 1.0]), [0.1, 0.2, 0.3]]),
+    )
+    assert [pose.seq for pose in poses] == [0, 0, 2, 2]
+
+
 def test_header_in_another_order(read) -> None:
     (pose,) = read("qx,qy,qz,qw,x,y,z,note\n0,0,1,0,1,2,3,still\n")
     rows = np.array(pose.mDeviceToAbsoluteTracking)
