@@ -35,9 +35,9 @@ _SERIAL = re.compile(r'"device_serial_number"\s*:\s*"([A-Za-z0-9][A-Za-z0-9_.-]{
 R_LIGHTHOUSE_FROM_SURVIVE: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 # libsurvive names a few devices at most; more names are damaged lines.
 _MAX_DEVICES = 64
-# The VELOCITY of a pose was printed 20 to 60 us after it (0.1 ms on a busy machine) by libsurvive
-# 1.1.21 live, and at the same time in a recording; poses are 4 ms apart at least.
-_SAME_S = 2e-3
+# libsurvive 1.1.21 prints a pose's VELOCITY in the next line: live 30 us later (110 us at most of
+# 454; some ms where the processor was taken from it in between), in a recording at the same time.
+_SAME_S = 0.05
 # libsurvive rounds to 1e-6; a quaternion whose length is off by more than this is no rotation.
 _UNIT_TOLERANCE = 1e-3
 
