@@ -181,7 +181,7 @@ async def load(seconds: float) -> dict[str, float]:
 async def collect(objects: Any, payloads: list[tuple[bytes, int]]) -> None:
     """Keep what arrives, undecoded."""
     async for sample in objects:
-        payloads.append((sample.payload, sample.received_ns))
+        payloads += [(sample.payload, sample.received_ns)]
 
 
 def recording(name: str, kind: str) -> tuple[Array, Array, Array]:

@@ -11,6 +11,7 @@ queue=n it delivers every message through a queue of n that drops the oldest.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -28,6 +29,7 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame, Session
 from rhot.messages.camera import Colors, ExposureControl
 from rhot.messages.health import Health
 from rhot.messages.objects import ObjectContacts, ObjectPose
+from rhot.object_motion import ObjectHistory
 from rhot.topics import Topic
 
 T = TypeVar("T")
@@ -43,6 +45,7 @@ class RigClient:
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
+        self._followed: dict[str, _Followed] = {}
 
     def hand_poses(
         self, hand: HandName | None = None, queue: int | None = None
@@ -81,6 +84,21 @@ class RigClient:
     def touches(self, name: str | None = None) -> AsyncIterator[TouchEvent]:
         """Each begin and end of a touch, finger by finger, of one object or of all."""
         return _events(self.contacts(name, _EVENT_QUEUE), TouchEvents().feed)
+
+    async def object_at(self, name: str, at_ns: int, timeout_s: float = 1.0) -> ObjectPose | None:
+        """An object at an instant of the master's clock: that of a hand's pose, or some
+        milliseconds ahead.
+
+        Interpolated between its messages, carried on with its velocities for 0.1 s after the last
+        one; None where it is not known, or lost. The first call for an object begins to follow it,
+        and waits for its first message for timeout_s at most; half a second of it is kept.
+        """
+        followed = self._followed.get(name)
+        if followed is None:
+            followed = self._followed[name] = _Followed(self.object_poses(name, queue=256))
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(followed.heard.wait(), timeout_s)
+        return followed.history.at(at_ns)
 
     def markers(
         self, camera: str | None = None, queue: int | None = None
@@ -152,6 +170,20 @@ async def _events(
     async for message in messages:
         for event in feed(message):
             yield event
+
+
+class _Followed:
+    """One object's last poses, kept up to date as long as its subscription lasts."""
+
+    def __init__(self, poses: Subscription[ObjectPose]) -> None:
+        self.history = ObjectHistory()
+        self.heard = asyncio.Event()
+        self._task = asyncio.create_task(self._follow(poses))
+
+    async def _follow(self, poses: Subscription[ObjectPose]) -> None:
+        async for pose in poses:
+            self.history.add(pose)
+            self.heard.set()
 
 
 def _one(answers: list[T], camera: str) -> T:

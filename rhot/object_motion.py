@@ -1,10 +1,12 @@
 """Where an object is at another instant than that of its message. Pure.
 
 Between two messages a pose is interpolated; after the last one it is carried on with its own
-velocities, up to HORIZON_NS.
+velocities, up to HORIZON_NS. ObjectHistory keeps the last ones of an object for that.
 """
 
 from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
 
 from rhot.geometry.quaternions import from_vector, multiply, normalized, slerp
 from rhot.messages import Vec3
@@ -16,6 +18,10 @@ HORIZON_NS = 100_000_000
 _HAND_ACCELERATION_M_S2 = 20.0
 # A wrist turns its hand at up to 20 rad/s within some 0.1 s.
 _HAND_ACCELERATION_RAD_S2 = 200.0
+# 0.5 s: a hand's pose comes at most some frames after its pictures. 512 poses are 0.5 s at 1 kHz,
+# the fastest source that rig.toml allows.
+_KEPT_NS = 500_000_000
+_MAX_POSES = 512
 # From bad to good: between two messages the worse one's state holds.
 _ORDER: tuple[ObjectTracking, ...] = (
     "lost",
@@ -102,3 +108,58 @@ def _grown(sigma: float | None, acceleration: float, ahead_s: float) -> float | 
 
 def _larger(a: float | None, b: float | None) -> float | None:
     return None if a is None or b is None else max(a, b)
+
+
+class ObjectHistory:
+    """Half a second of ObjectPose of one object, by their stamps."""
+
+    def __init__(self, horizon_ns: int = HORIZON_NS) -> None:
+        """horizon_ns: how far a pose is carried on, and the longest gap that is bridged."""
+        self._horizon_ns = horizon_ns
+        self._poses: list[ObjectPose] = []
+        self._stamps: list[int] = []
+
+    def add(self, pose: ObjectPose) -> None:
+        """The next pose. One that is older than the last begins a new history: time was set."""
+        if self._stamps and pose.stamp_ns < self._stamps[-1]:
+            self._poses.clear()
+            self._stamps.clear()
+        self._poses.append(pose)
+        self._stamps.append(pose.stamp_ns)
+        # Emptied by halves: a list that loses its first element at every pose moves all the others.
+        if len(self._stamps) >= 2 * _MAX_POSES or (
+            len(self._stamps) % 64 == 0 and pose.stamp_ns - self._stamps[0] > 2 * _KEPT_NS
+        ):
+            old = bisect_left(self._stamps, pose.stamp_ns - _KEPT_NS)
+            old = max(old, len(self._stamps) - _MAX_POSES)
+            del self._poses[:old], self._stamps[:old]
+
+    @property
+    def newest(self) -> ObjectPose | None:
+        """The last pose added."""
+        return self._poses[-1] if self._poses else None
+
+    def at(self, stamp_ns: int) -> ObjectPose | None:
+        """The object at that instant: interpolated inside, predicted after the newest pose.
+
+        None before the oldest pose, further than the horizon from the next earlier pose, and
+        wherever the object is lost; its `tracking` and `registered` are to be looked at as those of
+        a message are.
+        """
+        after = bisect_right(self._stamps, stamp_ns)
+        if after == 0:
+            return None
+        before = self._poses[after - 1]
+        if before.tracking == "lost" or stamp_ns - before.stamp_ns > self._horizon_ns:
+            return None
+        if before.stamp_ns == stamp_ns:
+            return before
+        if after < len(self._poses):
+            following = self._poses[after]
+            if (
+                following.tracking != "lost"
+                and following.registered == before.registered
+                and following.stamp_ns - before.stamp_ns <= self._horizon_ns
+            ):
+                return between(before, following, stamp_ns)
+        return predict(before, stamp_ns, self._horizon_ns)

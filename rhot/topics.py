@@ -71,6 +71,9 @@ class Topic(Generic[T]):
     # Larger payloads are rejected unread: every message is untrusted. 64 KiB is six times the
     # largest (HandPose, 9 kB).
     max_bytes: int = 65_536
+    # Whether each real-time message leaves at once, or those of one instant together: 16 objects at
+    # 250 Hz cost .43 instead of .50 of a core so, and one object's messages are .1 ms later.
+    express: bool = True
     # First part of the key. Pictures have another, so that a subscription to rhot/** shows JSON and
     # stays small.
     root: str = ROOT
@@ -139,7 +142,16 @@ POSE = _stream("hand/{hand}/pose", m.HandPose, Rate.HAND, "the full hand")
 OPENVR = _stream(
     "openvr/{serial}/pose", o.OpenVrPose, Rate.OBJECT, "tracked devices as SteamVR reports them"
 )
-OBJECT = _stream("object/{object}/pose", o.ObjectPose, Rate.OBJECT, "objects in the rig frame")
+OBJECT = Topic(
+    "object/{object}/pose",
+    o.ObjectPose,
+    Kind.STREAM,
+    Rate.OBJECT,
+    Priority.REAL_TIME,
+    recorded=True,
+    about="objects in the rig frame",
+    express=False,
+)
 OPENVR_EVENT = Topic(
     "openvr/{host}/event",
     o.OpenVrEvent,

@@ -31,6 +31,7 @@ class Publisher(Generic[T]):
         self.stats = stats
         self._encoder = msgspec.json.Encoder()
         self._message = topic.message
+        self._says_when = "sent_ns" in getattr(topic.message, "__struct_fields__", ())
         self._publisher = session.declare_publisher(
             key,
             encoding=topic.encoding,
@@ -38,7 +39,7 @@ class Publisher(Generic[T]):
             # nothing.
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITY[topic.priority],
-            express=topic.priority is Priority.REAL_TIME,
+            express=topic.express and topic.priority is Priority.REAL_TIME,
         )
 
     @property
@@ -53,7 +54,7 @@ class Publisher(Generic[T]):
         A value that is not finite has no JSON: such a message is not sent, and counted as rejected.
         """
         now_ns = clock.now_ns()
-        if hasattr(message, "sent_ns"):
+        if self._says_when:
             message = msgspec.structs.replace(message, sent_ns=now_ns)  # type: ignore[type-var]
         payload = self._encoder.encode(message)
         if b"null" in payload and not self._decodes(payload):

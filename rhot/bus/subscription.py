@@ -6,8 +6,7 @@ What does not decode, or names another sender than its key, is rejected and coun
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import msgspec
 import zenoh
@@ -25,10 +24,11 @@ T = TypeVar("T")
 _SAMPLE_BYTES = 512
 # What goes with a picture is a small message; larger ones are rejected unread, as payloads are.
 _MAX_ATTACHMENT_BYTES = 65_536
+# Keys that one subscription knows by heart: a rig has some dozens.
+_MAX_KEYS = 256
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread."""
 
     key: str
@@ -60,15 +60,17 @@ class RawSubscription(Buffer[Sample]):
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         received_ns = clock.now_ns()
-        attached = 0 if sample.attachment is None else len(sample.attachment)
-        if len(sample.payload) > self.stats.topic.max_bytes or attached > _MAX_ATTACHMENT_BYTES:
+        # Zenoh makes each of these anew whenever it is asked for one.
+        payload, attached, key = sample.payload, sample.attachment, str(sample.key_expr)
+        too_much = attached is not None and len(attached) > _MAX_ATTACHMENT_BYTES
+        if len(payload) > self.stats.topic.max_bytes or too_much:
             self.stats.rejected += 1
             return
-        attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        key = str(sample.key_expr)
-        self.stats.dropped += self.push(
-            key, Sample(key, sample.payload.to_bytes(), attachment, received_ns)
-        )
+        attachment = b"" if attached is None else attached.to_bytes()
+        taken = Sample(key, payload.to_bytes(), attachment, received_ns)
+        dropped = self.push(key, taken)
+        if dropped:
+            self.stats.dropped += dropped
 
     def __aiter__(self) -> RawSubscription:
         return self
@@ -97,6 +99,8 @@ class Subscription(Generic[T]):
         self._topic = topic
         self._raw = RawSubscription(loop, stats, capacity)
         self._decoder = msgspec.json.Decoder(topic.message)
+        # What a key says that its messages say as well: worked out once a key, not once a message.
+        self._said: dict[str, tuple[tuple[str, str], ...]] = {}
 
     def declare(self, session: zenoh.Session, key: str) -> None:
         self._raw.declare(session, key)
@@ -123,10 +127,22 @@ class Subscription(Generic[T]):
         except UNDECODABLE:
             return None
         # A message that says another name than its key would be taken for another sender's.
-        names = self._topic.names(sample.key) or {}
-        if any(getattr(message, field, value) != value for field, value in names.items()):
-            return None
+        said = self._said.get(sample.key)
+        if said is None:
+            said = self._said_by(sample.key, message)
+        for field, value in said:
+            if getattr(message, field) != value:
+                return None
         return message
+
+    def _said_by(self, key: str, message: T) -> tuple[tuple[str, str], ...]:
+        """The fields of a key that are fields of its messages, with their values."""
+        names = self._topic.names(key) or {}
+        said = tuple((field, value) for field, value in names.items() if hasattr(message, field))
+        # Keys come from the network: what does not fit is worked out anew each time.
+        if len(self._said) < _MAX_KEYS:
+            self._said[key] = said
+        return said
 
     def undeclare(self) -> None:
         self._raw.undeclare()

@@ -179,9 +179,10 @@ class Objects(Table, frozen=True, kw_only=True):
     speed: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)] = 1.0
     # Of a replay: begin anew at its end; poses are stamped as of now.
     loop: bool = False
-    # Smoothing, as the millimetres by which it may let a moving object lag; 0: none. 1 takes most
-    # of the jitter from a tracker that rests: benchmarks/objects_tracking.py.
-    filter_mm: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 1.0
+    # Smoothing, as the millimetres by which it may let a moving object lag; 0: none. 0.5 leaves a
+    # third of the jitter of a tracker that rests, 0.2 a half, and more than 0.5 gains nothing:
+    # benchmarks/objects_tracking.py.
+    filter_mm: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.5
 
 
 class HandTable(Table, frozen=True, kw_only=True):

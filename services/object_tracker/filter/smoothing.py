@@ -1,8 +1,8 @@
 """Takes the jitter from a tracker that rests, and lets none lag behind by more than a leash.
 
-Pure. A low pass at 0.5 Hz follows the poses; where it would stay behind by more than the leash it is
-dragged along at its length. So what rests is smooth, what moves is late by the leash and no more,
-whatever its speed and whatever the rate of its poses.
+Pure. A low pass at 0.5 Hz follows the poses; where it would stay behind by more than the leash it
+is dragged along at its length. So what rests is smooth, and what moves is late by the leash and no
+more, whatever its speed and whatever the rate of its poses.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 
 from rhot.messages.objects import ObjectPose
-from services.object_tracker.history import ObjectHistory
+from rhot.object_motion import ObjectHistory
 
 MS = 1_000_000
 T0 = 10**18
