@@ -116,7 +116,16 @@ def _track_objects(job: Job, writer: ResultWriter) -> list[str]:
         notes.append(
             f"{step.unknown} poses of devices that no [[object]] of rig.toml names: {serials}"
         )
-    return notes
+    prefix = "left_out_"
+    left_out = [
+        f"{n:.0f} {name.removeprefix(prefix).replace('_', ' ')}"
+        for name, n in sorted(step.values().items())
+        if name.startswith(prefix)
+    ]
+    if left_out:
+        notes.append(f"poses of objects left out: {', '.join(left_out)}")
+    stale = step.faults(0)["registration_stale"].values()
+    return notes + [f"the registration does not hold: {text}" for text in stale]
 
 
 def _pose_notes(pipeline: Pipeline, counts: dict[str, int]) -> list[str]:

@@ -13,11 +13,13 @@ import pytest
 
 from rhot import topics
 from rhot.errors import SourceError
+from rhot.files.calibration import Objects as Registered
+from rhot.files.calibration import save
 from rhot.files.capture import write_lines
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects, ObjectTable, RigTable
 from rhot.geometry.transforms import transform
-from rhot.messages.objects import OpenVrPose
+from rhot.messages.objects import OpenVrEvent, OpenVrPose
 from rhot.process.service import Service
 from services.object_tracker.service import serve
 
@@ -75,6 +77,40 @@ async def test_poses_in_objects_out_with_garbage_between(
         texts = {fault.code: fault.text for fault in service.faults.standing()}
         assert texts.keys() == {"object_unregistered", "device_unknown"}
         assert "poses of cup stay" in texts["object_unregistered"]
+
+
+async def test_a_moved_universe_and_a_device_that_stops(
+    running: Callable, tmp_path: Path, make_pose: MakePose
+) -> None:
+    eye = tuple(tuple(row) for row in np.eye(4).tolist())
+    save(tmp_path / "calibration" / "objects.json", Registered(T_rig_from_lighthouse=eye))  # type: ignore[arg-type]
+    async with running("object_tracker", serve, rig(tmp_path, "network")) as (service, bus):
+        poses = bus.publisher(topics.OPENVR, serial="LHR-1")
+        events = bus.publisher(topics.OPENVR_EVENT, host="pc")
+        objects = bus.every(topics.OBJECT, 64)
+        while not (poses.wanted and events.wanted):
+            await asyncio.sleep(0.05)
+
+        async def until(tracking: str) -> None:
+            """Send on until an object's pose says so."""
+            while True:
+                poses.put(make_pose(stamp_ns=time.time_ns(), seq=time.time_ns()))
+                if (await anext(objects)).tracking == tracking:
+                    return
+
+        await until("ok")
+        # It is told as lost, and as nothing else, until it is back.
+        assert [(await anext(objects)).tracking for _ in range(2)] == ["lost", "lost"]
+        await until("ok")
+        events.put(
+            OpenVrEvent(
+                v=1, stamp_ns=time.time_ns(), event_type=801, name="ChaperoneUniverseHasChanged"
+            )
+        )
+        await until("unregistered")
+        while service.values["registered"]:
+            await asyncio.sleep(0.05)
+        assert [fault.code for fault in service.faults.standing()] == ["registration_stale"]
 
 
 async def test_a_source_feeds_the_bus(

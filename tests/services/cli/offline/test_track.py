@@ -198,3 +198,10 @@ def test_the_command_prints_a_summary_and_notes_and_nothing_else_on_a_pipe(short
         application(), ["track", *sources, "--out", str(tmp_path / "b"), "--json"]
     )
     assert json.loads(found.stdout)["cameras"]["left"]["frames"] > 10
+
+
+def test_poses_of_objects_that_are_left_out_are_a_note(copy, tmp_path):
+    lines = (copy / "objects.jsonl").read_text().splitlines(keepends=True)
+    (copy / "objects.jsonl").write_text("".join([*lines, lines[3], lines[-1]]))
+    summary = track([copy], tmp_path / "out")
+    assert "poses of objects left out: 1 out of order, 1 repeated" in summary.notes

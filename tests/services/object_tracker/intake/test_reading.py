@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,10 +14,17 @@ from hypothesis import strategies as st
 
 from rhot.geometry.transforms import Array, rotation_from_quaternion, rotation_from_vector
 from rhot.messages.objects import OpenVrPose
-from services.object_tracker.intake.reading import LOST, Reading, _is_rotation, read
+from services.object_tracker.intake.reading import (
+    LOST,
+    TRACKING_RESULTS,
+    Reading,
+    _is_rotation,
+    read,
+)
 
 MakePose = Callable[..., OpenVrPose]
 GOOD = np.eye(4)[:3]
+GOLDEN = Path(__file__).parents[2] / "openvr_bridge" / "golden" / "messages.json"
 
 
 def rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
@@ -82,6 +91,23 @@ def test_five_digits_of_a_rotation_are_one(make_pose: MakePose) -> None:
     assert isinstance(reading, Reading)
     np.testing.assert_allclose(rotation_from_quaternion(reading.orientation_wxyz), R, atol=2e-5)
     assert reading.position_m == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.skipif(not GOLDEN.exists(), reason="the bridge's golden messages are not there")
+def test_golden_messages_of_the_bridge() -> None:
+    """Made from the binding's own ctypes structs, for every ETrackingResult and device class."""
+    golden = msgspec.json.decode(GOLDEN.read_bytes(), type=dict[str, dict | None])
+    poses = {
+        name: msgspec.convert(message, OpenVrPose)
+        for name, message in golden.items()
+        if message and "eTrackingResult" in message
+    }
+    assert {pose.eTrackingResult for pose in poses.values()} == set(TRACKING_RESULTS)
+    for name, pose in poses.items():
+        reading = read(pose)
+        assert isinstance(reading, Reading), f"{name}: {reading}"
+        known = pose.bPoseIsValid and pose.bDeviceIsConnected
+        assert reading.tracking == (TRACKING_RESULTS[pose.eTrackingResult] if known else "lost")
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=9, max_size=9))
