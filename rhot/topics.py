@@ -164,7 +164,8 @@ OPENVR_EVENT = Topic(
 CONTACTS = _stream(
     "object/{object}/contacts",
     o.ObjectContacts,
-    Rate.HAND,
+    # At the hands' rate while one is near an object that has a shape; nothing is amiss without.
+    Rate.DEMAND,
     "who touches an object, and who holds it",
 )
 TRUTH = _stream("sim/truth", s.Truth, Rate.CAMERA, "the simulator's ground truth")

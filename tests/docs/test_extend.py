@@ -7,15 +7,18 @@ import re
 import sys
 import types
 
+import msgspec
 import numpy as np
 import pytest
 
 from rhot import topics
+from rhot.bus.bus import open_bus
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, HandTable, Solver
 from rhot.hand import default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from rhot.messages.objects import Grasp, ObjectContacts
 from testing.source_tree import ROOT
 
 PAGE = (ROOT / "docs" / "extend.md").read_text(encoding="utf-8")
@@ -68,6 +71,32 @@ def test_a_camera_source(module, monkeypatch):
     wrong = CameraTable(name="left", source="pattern:wide")
     with pytest.raises(ConfigError, match="pattern:WIDTH"):
         sources.open_reader(wrong, RigConfig())
+
+
+async def test_a_program_that_knows_what_is_held(module, router, sending):
+    run(module, "A program that knows what is held")
+    second = 10**9
+    held = Grasp(hand="right", parts=["thumb", "index"], since_ns=second)
+    ended = msgspec.structs.replace(held, until_ns=3 * second)
+    frame = 0
+
+    def message(stamp_ns: int, **fields) -> ObjectContacts:
+        fields = {"contacts": [], "grasps": [], "ended": []} | fields
+        return ObjectContacts(object="cup", seq=0, stamp_ns=stamp_ns, **fields)
+
+    async with open_bus("desk", [router]) as bus:
+        contacts = bus.publisher(topics.CONTACTS, object="cup")
+
+        def send() -> None:
+            nonlocal frame
+            frame += 1
+            # Held first, until the program must have heard of it; then let go.
+            fields = {"grasps": [held]} if frame < 50 else {"ended": [ended]}
+            contacts.put(message(frame * second, **fields))
+
+        with sending(send):
+            found = await asyncio.wait_for(module.count_grasps(router, 1), 60.0)
+    assert found == {"cup": pytest.approx(2.0)}
 
 
 def pose_with(thumb_m: float, index_m: float) -> HandPose:

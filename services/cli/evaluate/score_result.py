@@ -17,6 +17,7 @@ from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import Truth
 from rhot.topics import Rate
+from services.cli.evaluate.contacts.score_contacts import score_contacts
 from services.cli.evaluate.score_math import score_hand
 from services.cli.evaluate.score_objects import score_object
 from services.cli.evaluate.score_types import ObjectScore, Score, Stages
@@ -58,6 +59,7 @@ def score_result(capture: Capture, result: Path, *, stages: bool = False) -> Sco
         hands=hands,
         objects=_objects(config, truth, result, period_ns),
         stages=scored_stages,
+        contacts=score_contacts(truth, result),
         notes=_notes(poses_of),
     )
 

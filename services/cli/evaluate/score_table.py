@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from services.cli.evaluate.contacts.score_contacts import contacts_text
 from services.cli.evaluate.score_types import (
     Coverage,
     HandScore,
@@ -23,6 +24,8 @@ def score_text(score: Score) -> str:
     parts = [hand_text(hand, one) for hand, one in score.hands.items()]
     if score.objects:
         parts.append(objects_text(score.objects))
+    if score.contacts:
+        parts.append(contacts_text(score.contacts))
     parts += [stages_text(hand, one) for hand, one in score.stages.items()]
     parts += [f"note: {note}" for note in score.notes]
     return "\n\n".join(parts)

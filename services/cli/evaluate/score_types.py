@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import msgspec
 
+from services.cli.evaluate.contacts.contact_score import ContactScore
+
 Vec3 = tuple[float, float, float]
 
 
@@ -150,9 +152,13 @@ class Stages(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Score(msgspec.Struct, frozen=True, kw_only=True):
-    """All of a result against the capture it was made from; stages only where asked for."""
+    """All of a result against the capture it was made from; stages only where asked for.
+
+    contacts has the objects whose shape the simulator knows.
+    """
 
     hands: dict[str, HandScore]
     objects: dict[str, ObjectScore]
     stages: dict[str, Stages] = {}
+    contacts: dict[str, ContactScore] = {}
     notes: list[str] = []

@@ -8,18 +8,21 @@ files are lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO, Self, TypeVar
 
 import msgspec
 
 from rhot.errors import CaptureError, RhotError, disk_full, writing
+from rhot.files.capture import read_lines
 from services.cli.offline.track_summary import Summary
 
-STREAMS = ("markers", "points", "poses", "objects")
+M = TypeVar("M", bound=msgspec.Struct)
+
+STREAMS = ("markers", "points", "poses", "objects", "contacts")
 SUMMARY = "summary.json"
 PARTIAL = ".partial"
 # What `rhot plot` writes beside them: a second run may overwrite a folder that holds pictures of
@@ -72,6 +75,12 @@ class ResultWriter:
             for message in messages:
                 self._files[stream].write(msgspec.json.encode(message) + b"\n")
                 self.counts[stream] += 1
+
+    def written(self, stream: str, kind: type[M]) -> Iterator[M]:
+        """What was written to a stream so far, read back one by one."""
+        with writing(self.folder):
+            self._files[stream].flush()
+        return read_lines(self.folder / f"{stream}.jsonl{PARTIAL}", kind)
 
     def finish(self, summary: Summary) -> None:
         """Give the files their names and write summary.json."""

@@ -11,7 +11,8 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import load_colors, load_lens, load_objects
 from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
-from rhot.messages.objects import OpenVrPose
+from rhot.messages.objects import ObjectPose, OpenVrPose
+from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
 from services.cli.offline.results import ResultWriter
@@ -34,7 +35,8 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
     with ResultWriter(out) as writer:
         # First, as it takes no time and a broken line should not come up after an hour of video.
         object_notes = _track_objects(job, writer)
-        counters = _track_frames(job, pipeline, writer, progress)
+        contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
+        counters = _track_frames(job, pipeline, contacts, writer, progress)
         warnings = [warning for one in job.inputs for warning in one.warnings]
         notes = [markers_only] if markers_only else []
         notes += [note for one in job.inputs for note in one.notes]
@@ -52,7 +54,11 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
 
 
 def _track_frames(
-    job: Job, pipeline: Pipeline, writer: ResultWriter, progress: bool | None
+    job: Job,
+    pipeline: Pipeline,
+    contacts: ContactTrack,
+    writer: ResultWriter,
+    progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """All frames through the pipeline into the result; the counts by camera."""
     counters = {one.camera: CameraCounter() for one in job.inputs}
@@ -62,9 +68,9 @@ def _track_frames(
             output = pipeline.step(frame)
             for markers in output.markers:
                 counters[markers.camera].add(markers)
-            _write(writer, output)
+            _write(writer, output, contacts)
             shown.advance()
-        _write(writer, pipeline.flush())
+        _write(writer, pipeline.flush(), contacts)
     finally:
         shown.end()
     return counters
@@ -88,10 +94,11 @@ def tracker_step(config: RigConfig, name: str) -> TrackerStep:
     return TrackerStep(name, colors, config.tracker, size_px, wanted, colors_path=path, lens=lens)
 
 
-def _write(writer: ResultWriter, output: Output) -> None:
+def _write(writer: ResultWriter, output: Output, contacts: ContactTrack) -> None:
     writer.write("markers", output.markers)
     writer.write("points", output.points)
     writer.write("poses", output.poses)
+    writer.write("contacts", contacts.step(output.poses))
 
 
 def _track_objects(job: Job, writer: ResultWriter) -> list[str]:

@@ -32,6 +32,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     points: int
     poses: int
     objects: int
+    contacts: int = 0
     refusals: dict[str, int]
     complete: bool
     warnings: list[str]
@@ -73,5 +74,6 @@ def summary_text(summary: Summary, out: Path) -> str:
     lines.append(
         f"{out}: {summary.points} sets of points, {summary.poses} hand poses, "
         f"{summary.objects} object poses"
+        + (f", {summary.contacts} sets of contacts" if summary.contacts else "")
     )
     return "\n".join(lines)

@@ -15,6 +15,7 @@ from rhot.geometry.transforms import Array
 
 # Kinks tried between two samples; the finest step is then 4 ms at 60 Hz.
 _STEPS = 4
+# How long the other side rises at most: a finger may set out just before it touches.
 _RAMPS_S = (0.1, np.inf)
 
 

@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 
 from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.capture import read_lines
+from rhot.files.config import load_rig
 from rhot.messages import HandPoints, HandPose, MarkerFrame
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import ObjectContacts, ObjectPose
 from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS
@@ -28,6 +29,7 @@ def test_a_capture_becomes_markers_points_poses_and_objects_in_wire_format(captu
     points = list(read_lines(result / "points.jsonl", HandPoints))
     poses = list(read_lines(result / "poses.jsonl", HandPose))
     objects = list(read_lines(result / "objects.jsonl", ObjectPose))
+    contacts = len(list(read_lines(result / "contacts.jsonl", ObjectContacts)))
     summary = json.loads((result / "summary.json").read_text())
     assert summary["complete"]
     assert summary["warnings"] == []
@@ -36,7 +38,10 @@ def test_a_capture_becomes_markers_points_poses_and_objects_in_wire_format(captu
         len(points),
         len(poses),
         len(objects),
+        contacts,
     ]
+    # Objects without a shape are touched by nobody.
+    assert (contacts > 0) == any(item.shape for item in load_rig(capture / "rig.toml").object)
     assert len(frames) == sum(one.total for one in job_of([str(capture)], None).inputs)
     assert 50 < len(poses) <= 62
     assert len(objects) == 180
