@@ -83,8 +83,21 @@ class RigConfig(Table, frozen=True, kw_only=True):
     @property
     def colors(self) -> list[str]:
         """Every colour some marker uses: those of the hands, and of the objects' trackers."""
-        of_hands = {color for hand in self.hand.values() for color in hand.markers.values()}
-        return sorted(of_hands | {item.marker for item in self.object if item.marker})
+        of_objects = {item.marker for item in self.object if item.marker}
+        return sorted(of_objects.union(self.hand_colors))
+
+    @property
+    def hand_colors(self) -> list[str]:
+        """Every colour some hand's marker uses."""
+        return sorted({color for hand in self.hand.values() for color in hand.markers.values()})
+
+    def wearer(self, color: str) -> str:
+        """What carries a colour, for people: "the cup's tracker"; "" if nothing does."""
+        for hand, table in self.hand.items():
+            for landmark, own in table.markers.items():
+                if own == color:
+                    return f"the {hand} hand's {landmark.replace('_', ' ')}"
+        return next((f"the {o.name}'s tracker" for o in self.object if o.marker == color), "")
 
     def rate_hz(self, rate: Rate, camera: str | None = None) -> float:
         """Expected rate of a stream; 0 where there is none."""

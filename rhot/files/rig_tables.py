@@ -183,6 +183,9 @@ class Objects(Table, frozen=True, kw_only=True):
     # third of the jitter of a tracker that rests, 0.2 a half, and more than 0.5 gains nothing:
     # benchmarks/objects_tracking.py.
     filter_mm: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.5
+    # Once the paint on a tracker and its pose drift apart: report it, or correct poses as well, by
+    # up to 30 mm; calibration files are never changed.
+    drift: Literal["report", "correct"] = "report"
 
 
 class HandTable(Table, frozen=True, kw_only=True):

@@ -8,7 +8,7 @@ CalibrationError, never repaired.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,12 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import ObjectPlace, Objects, load_objects
 from rhot.files.config import RigConfig
 from rhot.geometry.quaternions import Quat, from_rows, normalized
-from rhot.geometry.transforms import Array, rotation_from_quaternion, transform
+from rhot.geometry.transforms import (
+    Array,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    transform,
+)
 from rhot.messages import Vec3
 
 # A matrix typed with five digits passes, a scaled or mirrored one does not.
@@ -82,6 +87,16 @@ def register(config: RigConfig, objects: Objects | None) -> Registration:
         sigma_rad=_sigma(objects.sigma_rad),
         sigma_m=_sigma(objects.sigma_m),
         middle_m=objects.middle_m,
+    )
+
+
+def corrected(known: Registration, T_rig_from_before: Array) -> Registration:
+    """A registration before which a small rigid motion (4, 4) is put."""
+    T = T_rig_from_before @ known.T_rig_from_lighthouse
+    x, y, z = T[:3, 3].tolist()
+    w, i, j, k = quaternion_from_rotation(T[:3, :3]).tolist()
+    return replace(
+        known, T_rig_from_lighthouse=T, position_m=(x, y, z), orientation_wxyz=(w, i, j, k)
     )
 
 

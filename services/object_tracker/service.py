@@ -60,7 +60,7 @@ async def serve(service: Service) -> None:
         service.tasks.create_task(_keep_source(service, source))
     service.tasks.create_task(_hear_events(service, step, events))
     service.tasks.create_task(_look_after(service, step, outlet, unknown))
-    if drift := open_drift(service):
+    if drift := open_drift(service, step.correct):
         outlet.consumers.append(drift.take)
         service.tasks.create_task(drift.follow())
     service.ready()

@@ -17,12 +17,13 @@ from collections import Counter
 from rhot.files.calibration import Objects
 from rhot.files.config import RigConfig
 from rhot.geometry.quaternions import Quat, multiply, normalized, rotate
+from rhot.geometry.transforms import Array
 from rhot.messages import Vec3
 from rhot.messages.objects import ObjectPose, OpenVrEvent, OpenVrPose
 from services.object_tracker.device import Device, Where
 from services.object_tracker.intake.frames import FrameWatch
 from services.object_tracker.intake.reading import LOST
-from services.object_tracker.registration import Placement, Registration, register
+from services.object_tracker.registration import Placement, Registration, corrected, register
 
 # Serials kept so that people can see what to write into rig.toml; OpenVR has 64 slots.
 _MAX_UNKNOWN = 64
@@ -41,6 +42,7 @@ class ObjectStep:
 
     def __init__(self, config: RigConfig, objects: Objects | None) -> None:
         self._registration: Registration = register(config, objects)
+        self._uncorrected = self._registration
         self._frames = FrameWatch(objects.universe if objects else "")
         leash_m = config.objects.filter_mm * 1e-3
         self._devices = {serial: Device(leash_m) for serial in self._registration.placements}
@@ -77,6 +79,10 @@ class ObjectStep:
             return None
         holds = self._frames.holds(serial, pose.universe) and self._registration.registered
         return self._message(serial, pose.seq, where, holds=holds)
+
+    def correct(self, T_rig_from_before: Array) -> None:
+        """Put a small rigid motion (4, 4) before objects.json's registration, from now on."""
+        self._registration = corrected(self._uncorrected, T_rig_from_before)
 
     def event(self, event: OpenVrEvent) -> str | None:
         """Takes in what SteamVR says of its frame; a warning to tell, or None."""

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
 from rhot.files.calibration import (
+    Objects,
     load_cameras,
     load_geometry,
     load_hand,
@@ -24,6 +26,7 @@ from rhot.files.rig_tables import CameraTable
 from rhot.geometry.camera import Camera
 from services.cli.check.colors import check_colors, check_exposure
 from services.cli.check.problems import Problem, error, load_or_report, note, warning
+from services.cli.check.shapes import check_shapes
 from services.cli.rig.place import Place
 
 # Depth error grows as 1 / baseline: at 20 mm and 0.6 m it is 34 mm per pixel, which no filter mends
@@ -121,13 +124,13 @@ def _objects(config: RigConfig) -> list[Problem]:
     if not config.object:
         return []
     path = config.calibration_dir / "objects.json"
+    problems = check_shapes(config)
     if not path.exists():
         text = (
             "no such file: objects stay in the lighthouse frame until `rhot calibrate objects` has "
             "registered it to the rig"
         )
-        return [warning(path, text)]
-    problems: list[Problem] = []
+        return [*problems, warning(path, text)]
     objects = load_or_report(partial(load_objects, config.calibration_dir), problems, path)
     if objects is not None:
         for table in config.object:
@@ -137,7 +140,28 @@ def _objects(config: RigConfig) -> list[Problem]:
                     "Run `rhot calibrate objects`"
                 )
                 problems.append(warning(path, text))
+            elif table.marker and objects.objects[table.name].marker_m is None:
+                text = (
+                    f"does not know where the {table.marker} paint is on {table.name}'s tracker: "
+                    "drift of the lighthouses is not noticed. Run `rhot calibrate objects "
+                    f"{table.name}`"
+                )
+                problems.append(note(path, text))
+        problems += _other_world(config, objects, path)
     return problems
+
+
+def _other_world(config: RigConfig, objects: Objects, path: Path) -> list[Problem]:
+    """A registration that was made while the rig's frame lay elsewhere."""
+    world = config.rig.world
+    now = None if world is None else [list(row) for row in world.T_rig_from_camera]
+    if "T_rig_from_camera" not in objects.inputs or objects.inputs["T_rig_from_camera"] == now:
+        return []
+    text = (
+        "was made with another [rig.world] than rig.toml has now: objects are beside the hands. "
+        "Run `rhot calibrate objects`"
+    )
+    return [error(path, text)]
 
 
 def _size(size_px: tuple[int, int]) -> str:

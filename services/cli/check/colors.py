@@ -34,7 +34,7 @@ def color_problems(
         if name not in colors.colors:
             has = ", ".join(sorted(colors.colors)) or "none"
             text = (
-                f"colour {name!r} of rig.toml's markers is missing; it has {has}. "
+                f"colour {name!r}{_wearer(config, name)} is missing; it has {has}. "
                 f"Add it with `rhot calibrate colors {camera.name}`"
             )
             problems.append(error(where, text))
@@ -46,6 +46,11 @@ def color_problems(
             )
             problems.append(warning(where, text))
     return problems
+
+
+def _wearer(config: RigConfig, color: str) -> str:
+    wearer = config.wearer(color)
+    return f" of {wearer}" if wearer else ""
 
 
 def overlap(a: ColorRange, b: ColorRange) -> bool:

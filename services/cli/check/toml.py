@@ -15,7 +15,7 @@ from typing import Any, get_args, get_origin
 import msgspec
 
 from rhot.errors import ConfigError
-from rhot.files.config import RigConfig, load_rig
+from rhot.files.config import RigConfig, load_rig, shape_problem
 from rhot.files.config_errors import explain
 from rhot.hand import LANDMARKS
 from services.cli.check.problems import Problem, error
@@ -128,6 +128,12 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
                 )
             )
         colors.update(table.markers.values())
+    colors.update(item.marker for item in config.object if item.marker)
+    problems += [
+        error(path, f"[[object]] {item.name!r}: {wrong}")
+        for item in config.object
+        if (wrong := shape_problem(item))
+    ]
     for what, names in (
         ("[[camera]] name", Counter(c.name for c in config.camera)),
         ("[[object]] name", Counter(o.name for o in config.object)),

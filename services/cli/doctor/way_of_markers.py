@@ -38,7 +38,8 @@ def camera_links(seen: Observations, state: RigState, camera: CameraTable) -> li
     """Picture, clock, colours and markers of one camera."""
     faults = _of_camera(state, camera.name)
     frames = seen.cameras.get(camera.name, CameraSeen())
-    colors = seen.config.colors if seen.config is not None else []
+    # An object's paint that is not in view is no broken link: objects lie where they lie.
+    colors = seen.config.hand_colors if seen.config is not None else []
     name = camera.name
 
     def told(codes: Iterable[str]) -> list[Fault]:
@@ -86,7 +87,7 @@ def _clock(camera: str, frames: CameraSeen) -> Link:
 
 def _markers(camera: str, frames: CameraSeen, colors: Sequence[str]) -> Link:
     name = f"markers of {camera}"
-    if not frames.frames:
+    if not frames.frames or not colors:
         return holds(name, "nothing to judge by")
     least = max(1.0, _SEEN * frames.frames)
     missing = [color for color in colors if frames.colors.get(color, 0) < least]

@@ -31,6 +31,9 @@ def next_steps(path: Path, choices: Choices) -> str:
     steps += [
         (f"rhot calibrate hand {hand} --config {path}", "its bones") for hand in choices.markers
     ]
+    if choices.objects:
+        objects = f"rhot calibrate objects --config {path}"
+        steps.append((objects, "where the lighthouses are, from paint on a tracker"))
     width = max(len(command) for command, _ in steps)
     lines = [f"  {command.ljust(width)}   # {what}" for command, what in steps]
     return "\n".join([*lines, "\nStep by step: docs/guide/first-rig.md"])

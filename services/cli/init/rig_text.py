@@ -20,6 +20,14 @@ Tools never change it; what they measure is in calibration/. A key that is not h
 docs/reference/rig-toml.md lists them all. `rhot check rig.toml` says what is wrong or missing."""
 
 
+# What an object's table may say beside its tracker, as lines to be taken in.
+_OBJECT_EXTRAS = """\
+# A dab of paint on the tracker, for `rhot calibrate objects`, and the object's shape:
+# marker = "orange"
+# shape = "cylinder"
+# size_m = [0.08, 0.10]"""
+
+
 def rig_text(choices: Choices) -> str:
     """The whole file."""
     parts = [_comment(_ABOUT), _table("rig", rig_tables.Rig, {"name": choices.name}), _bus(choices)]
@@ -35,9 +43,8 @@ def rig_text(choices: Choices) -> str:
         parts.append(_table("objects", rig_tables.Objects, {"source": "steamvr"}))
     for index, (name, serial) in enumerate(choices.objects.items()):
         keys = {"name": name, "serial": serial}
-        parts.append(
-            _table("object", rig_tables.ObjectTable, keys, many=True, commented=index == 0)
-        )
+        table = _table("object", rig_tables.ObjectTable, keys, many=True, commented=index == 0)
+        parts.append(table if index else f"{table}\n{_OBJECT_EXTRAS}")
     parts.append(_table("viewer", rig_tables.Viewer, {"port": 8080}))
     recorder = {"folder": "recordings", "autostart": False}
     parts.append(_table("recorder", rig_tables.Recorder, recorder))

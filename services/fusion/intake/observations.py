@@ -78,6 +78,8 @@ class ObservationBuilder:
                     self._landmark_of[color] = len(landmarks)
                     landmarks.append(Landmark(hand, name))
         self.landmarks = tuple(landmarks)
+        # Paint on objects' trackers is the object tracker's matter.
+        self._of_objects = {item.marker for item in config.object if item.marker}
 
     def build(self, frame: MarkerFrame) -> View | FrameRejection:
         """The observations of one frame, or why there can be none."""
@@ -108,8 +110,11 @@ class ObservationBuilder:
             sigmas=(sigmas_px * scale)[valid],
             clock_offset_ns=frame.clock_offset_ns,
             clock_sigma_s=clock_sigma_s(frame.clock_sigma_ns),
-            ignored=len(frame.markers) - int(np.count_nonzero(valid)),
+            ignored=self._count_of_hands(frame) - int(np.count_nonzero(valid)),
         )
+
+    def _count_of_hands(self, frame: MarkerFrame) -> int:
+        return sum(marker.color not in self._of_objects for marker in frame.markers)
 
     def _best_markers(self, frame: MarkerFrame, camera: Camera) -> dict[int, Marker]:
         """The best usable marker of each landmark (by index) that is in the frame."""

@@ -151,7 +151,8 @@ class DriftWatch:
         return float(sighting.area_px * depth_m**2)
 
     def _samples_of(self, used: list[PaintSighting]) -> DriftSamples | None:
-        # Not every second one: that would be those of one camera.
+        # By camera: every second one of all could be those of one camera.
+        used = sorted(used, key=lambda one: one.camera)
         count = min(len(used), _MAX_FITTED)
         used = [used[n] for n in np.linspace(0, len(used) - 1, count).astype(int)]
         index = np.array([one.camera for one in used], dtype=np.int64)

@@ -58,9 +58,13 @@ class ColorRanges:
         """Say in health which colours have drifted: these, and no others any more."""
         self._service.faults.replace(
             "color_drifted",
-            {one.color: one.text(self._camera) for one in drifted},
+            {one.color: self._drift_text(one) for one in drifted},
             {one.color: f"run `rhot calibrate colors {self._camera}`" for one in drifted},
         )
+
+    def _drift_text(self, one: Drifted) -> str:
+        wearer = self._service.config.wearer(one.color)
+        return f"{one.text(self._camera)} ({wearer})" if wearer else one.text(self._camera)
 
     async def follow_file(self) -> None:
         """Use what is saved by hand, for ever."""
@@ -122,7 +126,10 @@ class ColorRanges:
         self._forget_problems()
         names = ", ".join(sorted(colors.colors))
         log.info("new colours of %s by %s: %s", colors.date[:60], colors.tool[:60], names)
-        missing = [name for name in self._service.config.colors if name not in colors.colors]
+        config = self._service.config
+        missing = [
+            f"{name} ({config.wearer(name)})" for name in config.colors if name not in colors.colors
+        ]
         if missing:
             self._report(
                 f"camera {self._camera!r}: {', '.join(missing)} not calibrated yet, "

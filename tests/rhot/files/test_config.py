@@ -1,7 +1,8 @@
 import pytest
 
 from rhot.errors import ConfigError
-from rhot.files.config import load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.files.rig_tables import HandTable, ObjectTable
 from rhot.topics import Rate
 
 
@@ -77,3 +78,14 @@ def test_expected_rates(rig):
     assert config.rate_hz(Rate.HAND) == 60.0
     assert config.rate_hz(Rate.OBJECT) == 90.0
     assert config.rate_hz(Rate.DEMAND) == 0.0
+
+
+def test_hands_and_trackers_wear_colors():
+    config = RigConfig(
+        hand={"right": HandTable(markers={"index_tip": "blue"})},
+        object=[ObjectTable(name="cup", serial="LHR-1", marker="orange")],
+    )
+    assert config.wearer("blue") == "the right hand's index tip"
+    assert config.wearer("orange") == "the cup's tracker"
+    assert config.wearer("green") == ""
+    assert (config.colors, config.hand_colors) == (["blue", "orange"], ["blue"])

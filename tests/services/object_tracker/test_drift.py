@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot import topics
+from rhot import clock, topics
 from rhot.files.calibration import ObjectPlace, Objects, save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, ObjectTable, RigTable
@@ -63,6 +63,32 @@ async def test_a_moved_base_station_is_named_and_its_return_too(
         while _drift(service):
             await asyncio.sleep(0.1)
         again.cancel()
+
+
+async def test_poses_are_corrected_if_rig_toml_asks_for_it(
+    running: Callable, config: RigConfig
+) -> None:
+    table = ObjectsTable(source="network", drift="correct")
+    asking = msgspec.structs.replace(config, objects=table)
+    written = (config.calibration_dir / "objects.json").read_bytes()
+    async with running("object_tracker", serve, asking) as (service, bus):
+        scene = PaintedTracker(seconds=600.0, outliers=0.0)
+        moved = transform(rotation_y(np.deg2rad(0.5)), (0.003, 0.004, 0.0))
+        began_ns = clock.now_ns()
+        player = asyncio.create_task(play(bus, scene, moved))
+        while service.values.get("correction_mm", 0.0) < 8.0:
+            await asyncio.sleep(0.1)
+        assert "; poses are corrected by " in _drift(service)[0]
+        errors_m = []
+        async for pose in bus.every(topics.OBJECT, 64):
+            truth = scene.truth((pose.stamp_ns - began_ns) * 1e-9)
+            errors_m.append(np.linalg.norm(truth[:3, 3] - pose.position_m))
+            if len(errors_m) >= 100:
+                break
+        player.cancel()
+        # 9 mm without the correction.
+        assert np.median(errors_m) < 0.004
+    assert (config.calibration_dir / "objects.json").read_bytes() == written
 
 
 async def test_without_paint_that_is_known_nothing_is_listened_to(

@@ -56,7 +56,10 @@ class SourceOptions:
     ] = None
     points: Annotated[
         Path | None,
-        typer.Option(help="reference points in the rig frame, CSV: x,y,z or stamp_ns,x,y,z in m"),
+        typer.Option(
+            help="reference points in the rig frame, CSV: x,y,z or stamp_ns,x,y,z in m; or a "
+            "folder of a laser tracker's points with poses"
+        ),
     ] = None
 
 
@@ -114,8 +117,10 @@ def objects(
         return
     if place.place_only:
         made, text = _only_placed(before, places, path), "the registration stays as it was"
+    elif source.points:
+        made, text = job.from_points(source.points)
     else:
-        made, text = job.from_points() if source.points else job.from_paint()
+        made, text = job.from_paint()
     made = _placed(made, places)
     if not dry_run:
         save(path, made)
@@ -158,18 +163,26 @@ class _Job:
         made = options.now_text(), self._inputs({one.name: one.color for one in painted})
         return objects_file(found, names, self.before, others, made), objects_text(found, names)
 
-    def from_points(self) -> tuple[Objects, str]:
-        """The same from points that were measured by other means."""
+    def from_points(self, measured: Path) -> tuple[Objects, str]:
+        """The same from points that were measured by other means: a file, or a folder."""
+        from services.calibrator.objects.laser_points import read_experiment, register_laser
         from services.calibrator.objects.points import register_points
         from services.calibrator.output.objects_file import points_file
         from services.calibrator.output.objects_report import points_text
         from services.cli.calibrate.objects.points import poses_at, read_points
         from services.cli.calibrate.objects.recording import read_poses
 
-        if self.source.poses is None or self.source.points is None:
-            raise CalibrationError("--points needs --poses: the tracker's poses at these points")
         name, serial = self._only_one()
-        stamps_ns, points = read_points(self.source.points)
+        if measured.is_dir():
+            experiment = read_experiment(measured)
+            laser = register_laser(experiment)
+            middle_m = experiment.points_m.mean(axis=0)
+            made = options.now_text(), self._inputs({})
+            file = points_file(laser, name, "", middle_m, self.before, made)
+            return file, points_text(laser, name)
+        if self.source.poses is None:
+            raise CalibrationError("--points needs --poses: the tracker's poses at these points")
+        stamps_ns, points = read_points(measured)
         poses = read_poses(self.source.poses)
         at = poses_at(stamps_ns, len(points), poses, serial)
         found = register_points(points, at)

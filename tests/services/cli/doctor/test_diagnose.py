@@ -189,6 +189,10 @@ def test_a_marker_nobody_complains_of_is_found_all_the_same():
     assert "not lime" in found.text
     assert "rhot calibrate colors left" in found.action
     cameras["left"].colors = {}
+    # The cup's paint, which need not be in view, is not asked for.
+    cup = ObjectTable(name="cup", serial="LHR-1", marker="orange")
+    painted = msgspec.structs.replace(CONFIG, object=[cup])
+    assert cause(cameras=observations().cameras, config=painted) is None
     assert "no marker at all" in cause(cameras=cameras).text
 
 

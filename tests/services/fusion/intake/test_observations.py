@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot.files.rig_tables import ObjectTable
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.intake.observations import (
     CLOCK_SIGMA_MAX_S,
@@ -116,3 +117,14 @@ def test_two_hands_have_their_own_landmarks():
         ("left", "index_tip"),
         ("right", "index_tip"),
     ]
+
+
+def test_paint_on_an_objects_tracker_is_no_marker_of_a_hand_and_no_refusal():
+    cup = ObjectTable(name="cup", serial="LHR-1", marker="orange")
+    config = msgspec.structs.replace(SETUP.config(), object=[cup])
+    view = ObservationBuilder(config, SETUP.rig()).build(
+        frame(marker("blue"), marker("orange"), marker("pink"))
+    )
+    assert isinstance(view, View)
+    assert len(view.landmarks) == 1
+    assert view.ignored == 1

@@ -13,7 +13,6 @@ from rhot.files.config import RigConfig
 from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import Array, transform
 from rhot.messages import MarkerFrame
-from rhot.messages.objects import ObjectPose
 from services.object_tracker.monitors.drift_monitor import DriftMonitor
 from services.object_tracker.monitors.drift_watch import Drift
 from services.object_tracker.step import ObjectStep
@@ -65,7 +64,7 @@ class WatchedCup:
         for now_ns, _, message in arrivals:
             if isinstance(message, MarkerFrame):
                 self.monitor.take_frame(message)
-            elif (found := self.step.step(message)) and isinstance(found, ObjectPose):
+            elif found := self.step.step(message):
                 self.monitor.take_object(found)
             if now_ns >= look_ns:
                 look_ns += 10**9
