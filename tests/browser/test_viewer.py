@@ -22,14 +22,36 @@ from rhot import topics
 from rhot.bus.bus import client_config
 from rhot.files.config import RigConfig, load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_x, rotation_z
-from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, default_hand, forward, joint_radii_m
+from rhot.hand import (
+    BASIC_LANDMARKS,
+    DIGITS,
+    JOINT_INDEX,
+    JOINTS,
+    default_hand,
+    forward,
+    joint_radii_m,
+)
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
-from rhot.messages.objects import ObjectPose
+from rhot.messages.objects import Contact, Grasp, HandPart, ObjectContacts, ObjectPose
 from testing.sample_health import beat, fault
 
 pytestmark = pytest.mark.browser
-DEADLINE_S = 30.0
+# Chromium without a graphics card shares its cores with the viewer and everything else.
+DEADLINE_S = 90.0
 OBJECT_AT = (0.17, 0.05, 0.55)
+CUP = """
+[[object]]
+name = "cup"
+serial = "LHR-SIM00001"
+shape = "cylinder"
+size_m = [0.07, 0.1]
+
+[viewer]
+port = 0
+"""
+HELD: tuple[HandPart, ...] = ("thumb", "index", "middle")
+# A small window of a desktop, and an upright phone.
+WINDOWS = ((1280, 800), (390, 844))
 InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
 
 
@@ -42,9 +64,7 @@ def rig(repository: Path) -> RigConfig:
 def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
     """A viewer process on a free port; its address."""
     text = (repository / "config" / "sim.toml").read_text(encoding="utf-8")
-    (tmp_path / "rig.toml").write_text(
-        f"{text}\n[viewer]\nport = 0\n" if "[viewer]" not in text else text, encoding="utf-8"
-    )
+    (tmp_path / "rig.toml").write_text(text.partition("[[object]]")[0] + CUP, encoding="utf-8")
     (tmp_path / "calibration").symlink_to(repository / "config" / "calibration")
     command = [
         sys.executable,
@@ -130,6 +150,27 @@ def cup_pose(seq: int) -> ObjectPose:
     )
 
 
+def cup_contacts(seq: int) -> ObjectContacts:
+    """Three fingers of the moving hand on the cup, at their own tips."""
+    hand = hand_pose(seq)
+    contacts = [
+        Contact(
+            hand="right",
+            part=part,
+            distance_m=0.0,
+            sigma_m=0.001,
+            point_m=hand.joints[JOINT_INDEX[f"{part}_tip"]].position_m,
+            touching=True,
+            since_ns=hand.stamp_ns,
+        )
+        for part in HELD
+    ]
+    grasp = Grasp(hand="right", parts=list(HELD), since_ns=hand.stamp_ns)
+    return ObjectContacts(
+        object="cup", seq=seq, stamp_ns=hand.stamp_ns, contacts=contacts, grasps=[grasp]
+    )
+
+
 @pytest.fixture
 def moving_hand(router: str, rig: RigConfig, in_background: InBackground) -> threading.Event:
     """Publishes a hand and a cup at 30 Hz until the event is set."""
@@ -141,6 +182,21 @@ def moving_hand(router: str, rig: RigConfig, in_background: InBackground) -> thr
             for seq in itertools.count():
                 session.put(hand_key, msgspec.json.encode(hand_pose(seq)))
                 session.put(cup_key, msgspec.json.encode(cup_pose(seq)))
+                if stop.wait(1 / 30):
+                    return
+
+    return in_background(publish)
+
+
+@pytest.fixture
+def holding(router: str, rig: RigConfig, in_background: InBackground) -> threading.Event:
+    """Publishes that the hand holds the cup until the event is set."""
+    key = topics.CONTACTS.key(rig.rig.name, object="cup")
+
+    def publish(stop: threading.Event) -> None:
+        with zenoh.open(client_config([router])) as session:
+            for seq in itertools.count():
+                session.put(key, msgspec.json.encode(cup_contacts(seq)))
                 if stop.wait(1 / 30):
                     return
 
@@ -170,7 +226,7 @@ def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(viewer)
     page.get_by_text("right hand: tracked").wait_for(timeout=DEADLINE_S * 1e3)
-    page.get_by_text("object cup: ok").wait_for(timeout=DEADLINE_S * 1e3)
+    page.get_by_text("object cup: tracked").wait_for(timeout=DEADLINE_S * 1e3)
     deadline = time.monotonic() + DEADLINE_S
     while (seen := blue_and_green(picture(page)))[0].sum() < 1500 and time.monotonic() < deadline:
         page.wait_for_timeout(200)
@@ -192,6 +248,48 @@ def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
     assert blue_and_green(picture(page))[0].sum() <= 300, "a hand is drawn that is not there"
     assert errors == []
     page.close()
+
+
+@pytest.mark.parametrize("window", WINDOWS, ids=str)
+def test_touching_tips_are_lit_for_as_long_as_they_touch(
+    chromium: Any,
+    viewer: str,
+    moving_hand: threading.Event,
+    holding: threading.Event,
+    window: tuple[int, int],
+) -> None:
+    page = chromium.new_page(viewport={"width": window[0], "height": window[1]})
+    page.goto(viewer)
+    told = page.get_by_text("right hand holds cup (thumb, index, middle)")
+    told.wait_for(timeout=DEADLINE_S * 1e3)
+    deadline = time.monotonic() + DEADLINE_S
+    while lit(page) < 40 and time.monotonic() < deadline:
+        page.wait_for_timeout(200)
+    assert lit(page) >= 40, "no tip is lit"
+    holding.set()
+    told.wait_for(state="hidden", timeout=DEADLINE_S * 1e3)
+    deadline = time.monotonic() + DEADLINE_S
+    while lit(page) >= 40 and time.monotonic() < deadline:
+        page.wait_for_timeout(200)
+    assert lit(page) < 40, "tips are lit that touch nothing"
+    moving_hand.set()
+    page.get_by_text("object cup: nothing has come for").wait_for(timeout=DEADLINE_S * 1e3)
+    page.close()
+
+
+def lit(page: Any) -> int:
+    """How many pixels of the scene, without panel and notice, are as yellow as halos."""
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    shot = page.screenshot(timeout=DEADLINE_S * 1e3)
+    pixels = np.array(image.open(BytesIO(shot)).convert("RGB")).astype(int)
+    height, width = pixels.shape[:2]
+    if width > height:
+        pixels = pixels[:, int(0.27 * width) : int(0.65 * width)]
+    else:
+        pixels = pixels[int(0.2 * height) : int(0.4 * height)]
+    red, green, blue = np.moveaxis(pixels, 2, 0)
+    yellow = (red > 150) & (red - blue > 70) & (green - blue > 50) & (np.abs(red - green) < 60)
+    return int(yellow.sum())
 
 
 def test_a_fault_stands_at_the_top_with_what_to_do_until_it_is_over(
