@@ -262,6 +262,23 @@ async def test_open_waits_for_the_router_and_can_be_cancelled(endpoint):
     await asyncio.to_thread(router.close)
 
 
+async def test_others_are_heard_without_ones_own(pair):
+    ours, theirs = pair
+    ears = ours.others(topics.POINTS, 8, hand="right")
+    mine = ours.publisher(topics.POINTS, hand="right")
+    strange = await publisher_of(theirs, topics.POINTS, hand="right")
+    mine.put(points(1))
+    strange.put(points(2))
+    async with asyncio.timeout(DEADLINE_S):
+        heard = msgspec.json.decode((await anext(ears)).payload, type=HandPoints)
+    assert heard.seq == 2
+    # Nobody expects it, and what is closed is no stream any more.
+    assert [stats.direction for stats in ours.streams] == ["out"]
+    ours.close(mine)
+    ours.close(ears)
+    assert ours.streams == []
+
+
 async def test_iterations_end_with_the_bus(router):
     async with open_bus("test", [router]) as bus:
         subscription = bus.every(topics.POINTS, 4)

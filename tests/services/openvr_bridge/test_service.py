@@ -117,6 +117,19 @@ async def test_a_steamvr_without_any_device_is_connected_anew(running, steamvr, 
             pass
 
 
+async def test_64_devices_have_a_stream_each(running, steamvr, rig):
+    slow = msgspec.structs.replace(rig.objects, rate_hz=5.0)
+    steamvr.slots = {slot: device(f"LHR-{slot}") for slot in range(64)}
+    config = msgspec.structs.replace(rig, objects=slow)
+    async with running("openvr_bridge", serve, config) as (service, bus):
+        poses, heard = bus.every(topics.OPENVR, 512), {}
+        while len(heard) < 64 or min(heard.values()) < 2:
+            pose = await anext(poses)
+            assert pose.device.serial == f"LHR-{pose.device.index}"
+            heard[pose.device.serial] = pose.seq
+        assert faults(service) == {}
+
+
 async def test_a_slow_steamvr_is_polled_as_it_can(running, steamvr, rig):
     steamvr.poll_s = 0.05
     async with running("openvr_bridge", serve, rig) as (service, bus):

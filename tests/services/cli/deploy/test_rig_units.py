@@ -47,6 +47,8 @@ def test_steamvr_on_the_master_is_its_users(objects, units, tmp_path):
     path.write_text(f'[objects]\n{objects}\n[[object]]\nname = "cup"\nserial = "LHR-1"\n')
     assert asked("user-units", path).stdout.split() == units
     assert "rhot-openvr-bridge.service" not in asked("units", path).stdout
+    names = [child.name for child in children_of(load_rig(path), path, viewer=True)]
+    assert ("openvr_bridge" in names) == bool(units)
 
 
 def test_install_sh_gets_lines(tmp_path):
