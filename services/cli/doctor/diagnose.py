@@ -24,6 +24,7 @@ _OF_VIEWS = (
     "camera_unknown",
     "not_calibrated",
 )
+_BRIDGE = "openvr_bridge"
 # Judged by links of their own, before the cameras.
 _JUDGED = ("second_service", "second_clock", "session_stopped", "service_absent")
 _KNOWN = {*CAMERA_CODES, *_OF_VIEWS, *OBJECT_CODES, *_JUDGED, "service_gone", "service_silent"}
@@ -48,6 +49,7 @@ def diagnose(seen: Observations) -> list[Link]:
     links += _views(faults)
     for hand in config.hand if config.has_depth else ():
         links += hand_links(seen, hand)
+    links += _steamvr(state)
     links += object_links(seen, [f for f in faults if f.code in OBJECT_CODES])
     return links + _remaining(state)
 
@@ -147,6 +149,13 @@ def _views(faults: list[Fault]) -> list[Link]:
     return [found or holds("cameras together", "their views fit the calibration")]
 
 
+def _steamvr(state: RigState) -> list[Link]:
+    """Why no tracker of SteamVR has a pose, where its bridge knows."""
+    lost = (one.fault for one in state.faults if one.teller.startswith(_BRIDGE))
+    link = from_faults("SteamVR", [fault for fault in lost if fault.code == "source_lost"])
+    return [link] if link else []
+
+
 def _remaining(state: RigState) -> list[Link]:
     """What no link above judges: disks, heat, whatever else services complain of."""
     links = []
@@ -159,5 +168,5 @@ def _remaining(state: RigState) -> list[Link]:
 
 def _is_judged(one: StandingFault) -> bool:
     """Whether a link above speaks of it; a lost source may be a camera's or another service's."""
-    of_camera = one.teller.startswith("pi_tracker/") or one.fault.code != "source_lost"
-    return one.fault.code in _KNOWN and of_camera
+    has_link = one.teller.startswith(("pi_tracker/", _BRIDGE)) or one.fault.code != "source_lost"
+    return one.fault.code in _KNOWN and has_link

@@ -156,7 +156,9 @@ def test_a_hint_does_not_hide_what_is_broken():
         ("fusion", "second_service", "1a2b", "one of each"),
         ("fusion", "second_clock", "", "master clock"),
         ("recorder", "disk_full", "session.mcap", "recorder"),
-        ("object_tracker", "source_lost", "steamvr", "object_tracker"),
+        ("object_tracker", "source_lost", "libsurvive", "object_tracker"),
+        ("openvr_bridge", "source_lost", "steamvr", "SteamVR"),
+        ("openvr_bridge/gaming-pc", "source_lost", "steamvr", "SteamVR"),
     ],
 )
 def test_what_services_tell_breaks_its_own_link(teller, code, subject, name):
@@ -171,6 +173,20 @@ def test_what_services_tell_breaks_its_own_link(teller, code, subject, name):
     state = monitor.state(NOW_NS + 2 * SECOND_NS)
     found = first_cause(diagnose(observations(state=state)))
     assert (found.name, found.code) == (name, code)
+
+
+def test_a_steamvr_that_is_off_is_the_reason_for_objects_without_poses():
+    monitor = RigMonitor(CONFIG, NOW_NS)
+    told = fault("source_lost", "SteamVR does not run; start it", "steamvr")
+    for name in (*SERVICES, "openvr_bridge"):
+        service, _, instance = name.partition("/")
+        faults = [told] if name == "openvr_bridge" else []
+        monitor.token(service, instance or "main", True, NOW_NS)
+        monitor.beat(beat(service, instance or "main", faults=faults), NOW_NS + SECOND_NS)
+    state = monitor.state(NOW_NS + 2 * SECOND_NS)
+    links = diagnose(observations(state=state, objects={}))
+    assert first_cause(links).text == "SteamVR does not run; start it"
+    assert [link.text for link in links].count("SteamVR does not run; start it") == 1
 
 
 def test_a_warning_is_worse_and_not_broken():
