@@ -20,6 +20,7 @@ ENTRY_POINTS = (
     "rhot-fusion",
     "rhot-solver",
     "rhot-object-tracker",
+    "rhot-openvr-bridge",
     "rhot-simulator",
     "rhot-viewer",
     "rhot-recorder",
@@ -27,9 +28,10 @@ ENTRY_POINTS = (
 )
 # What each extra is for: these entry points must start with it alone.
 COMPLETE = {
-    "pi": {"rhot-pi-tracker", "rhot-object-tracker"},
+    "pi": {"rhot-pi-tracker", "rhot-object-tracker", "rhot-openvr-bridge"},
     "master": set(ENTRY_POINTS),
-    "study": {"rhot-object-tracker"},
+    "openvr": {"rhot-object-tracker", "rhot-openvr-bridge"},
+    "study": {"rhot-object-tracker", "rhot-openvr-bridge"},
 }
 
 
