@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,6 +27,7 @@ from rhot.messages.objects import OpenVrPose
 from services.calibrator.objects.register import register
 from services.calibrator.objects.sightings import sightings
 from services.calibrator.objects.tracker_path import tracker_path
+from services.cli.defaults import config_dir
 from testing.synthetic_tracker import Lighthouse
 
 SECONDS, SEEDS = 20.0, 3
@@ -38,9 +40,14 @@ LIGHTHOUSES: dict[str, dict[str, Any]] = {
 
 def record(folder: Path, seed: int) -> tuple[Path, Path]:
     """Render and track; the folders of the capture and of what was tracked."""
-    capture, tracked = folder / "capture", folder / "tracked"
+    capture, tracked, rig = folder / "capture", folder / "tracked", folder / "config"
+    shutil.copytree(config_dir(), rig)
+    text = (rig / "sim.toml").read_text(encoding="utf-8")
+    exact = "[simulator]\ntracker_noise_m = 0.0\ntracker_noise_deg = 0.0\n"
+    (rig / "sim.toml").write_text(text.replace("[simulator]\n", exact), encoding="utf-8")
     rhot = [sys.executable, "-m", "services.cli"]
-    told = ["--seconds", str(SECONDS), "--seed", str(seed), "--out", str(capture), "--no-progress"]
+    told = ["--seconds", str(SECONDS), "--seed", str(seed), "--config", str(rig / "sim.toml")]
+    told += ["--out", str(capture), "--no-progress"]
     subprocess.run([*rhot, "simulate", "registration", *told], check=True, capture_output=True)
     told = [str(capture), "--out", str(tracked), "--no-progress"]
     subprocess.run([*rhot, "track", *told], check=True, capture_output=True)

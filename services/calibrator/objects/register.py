@@ -109,7 +109,7 @@ def _registration(
         middle_m=middle_of(found),
         sigma_m=float(np.linalg.norm(sigma[3:6])),
         sigma_rad=float(np.linalg.norm(sigma[:3])),
-        residual=residuals_of(found.scene.only(inlier), found.unknowns),
+        residual=residuals_of(found),
         held_out=held_out(sample, found),
         inliers=int(inlier.sum()),
         rejected=int((~inlier).sum()),

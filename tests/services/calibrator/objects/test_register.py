@@ -133,3 +133,38 @@ def test_a_change_of_universe_is_refused():
     poses[50:] = [msgspec.structs.replace(pose, universe="2") for pose in poses[50:]]
     with pytest.raises(CalibrationError, match="changed its universe"):
         tracker_path(poses)
+
+
+def test_a_jump_of_the_lighthouse_and_a_second_blob_do_not_move_it():
+    motion, lighthouse = TrackerMotion(), Lighthouse()
+    poses = lighthouse.poses(motion, 20.0)
+    for k in range(450, 630):
+        rows = np.array(poses[k].mDeviceToAbsoluteTracking)
+        rows[:, 3] += [0.1, 0.0, 0.05]
+        poses[k] = msgspec.structs.replace(poses[k], mDeviceToAbsoluteTracking=rows.tolist())
+    frames = painted_frames(RIG, motion, MARKER_M, 20.0)
+    spot = msgspec.structs.replace(frames[0].markers[0], x_px=500.0, y_px=100.0)
+    frames = [
+        msgspec.structs.replace(frame, markers=[*frame.markers, spot])
+        if frame.camera == "left"
+        else frame
+        for frame in frames
+    ]
+    seen = {SERIAL: sightings(frames, RIG.rig(), COLOR)}
+    found = register(seen, {SERIAL: tracker_path(poses)})
+    mm, deg, late_ms = errors(found, motion, lighthouse)
+    assert mm < 0.75
+    assert deg < 0.1
+    assert abs(late_ms) < 1.0
+    assert found.rejected > 500
+    assert found.held_out.px < 1.3 * found.residual.px
+
+
+def test_an_error_that_lasts_is_told_from_the_cameras_noise():
+    motion, lighthouse = TrackerMotion(), Lighthouse(correlation_s=0.5)
+    found = register(*recorded(motion, lighthouse))
+    mm, _, _ = errors(found, motion, lighthouse)
+    assert mm < 1.5
+    assert mm < 1e3 * 3.0 * found.sigma_m
+    assert 0.2 < found.noise.tau_s < 1.2
+    assert 0.6e-3 < found.noise.tracker_m < 1.6e-3
