@@ -28,7 +28,7 @@ _MIN_SIGHTINGS = 40
 # tracker are not of one thing. Another tracker is the one if it leaves under half.
 _MAX_MISS_M, _MUCH_BETTER = 0.04, 0.5
 # Of the sightings, those that must agree with the result: 59 % do where a spot of the paint's
-# colour is always in view of one of two cameras, and poses go astray for 2 s of 20: and it is right.
+# colour is always in view of one of two cameras and poses go astray for 2 s of 20; it is right.
 _MIN_INLIERS = 0.4
 # Standard deviations beyond which objects would not sit in the hand: m, rad, ms.
 _MAX_SIGMA_M, _MAX_SIGMA_RAD, _MAX_SIGMA_MS = 0.003, 0.009, 3.0
