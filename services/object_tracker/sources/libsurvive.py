@@ -32,7 +32,8 @@ _SILENT_S = 30.0
 _LOST_AFTER_S = 0.2
 # Without any line it is the machine that is busy, or the tracker that is off.
 _SILENCE_S = 1.0
-_TIME = re.compile(r"\d{1,9}\.\d{1,9}\Z")
+# A line of a device, with its time; options and logs have times before the clock runs.
+_DEVICE_LINE = re.compile(r"(\d{1,9}\.\d{1,9}) (?!INFO |OPTION )\S+ ")
 # libsurvive names a few devices at most.
 _MOST_DEVICES = 64
 
@@ -130,6 +131,10 @@ class _Reader:
 
     def read(self, lines: Sequence[str], now_ns: int) -> Iterator[OpenVrPose]:
         """What lines that came together say."""
+        time_s = _device_time(lines[-1]) if lines else 0.0
+        if time_s > 0.0:
+            # Before the first pose, too: then the clocks' offset is known when it comes.
+            self._run_clock.stamp_ns(time_s, now_ns)
         for line in lines:
             pose = self._parser.feed(line)
             if " LOG " in line[:40]:
@@ -143,12 +148,10 @@ class _Reader:
             yield self._message(pose, now_ns)
         if not lines and (waiting := self._parser.flush()) is not None:
             yield self._message(waiting, now_ns)
-        yield from self._lost(lines[-1] if lines else "", now_ns)
+        yield from self._lost(time_s, now_ns)
 
-    def _lost(self, line: str, now_ns: int) -> Iterator[OpenVrPose]:
+    def _lost(self, time_s: float, now_ns: int) -> Iterator[OpenVrPose]:
         """The devices that others, or libsurvive itself, have left behind; once each."""
-        word = line.partition(" ")[0]
-        time_s = float(word) if _TIME.match(word) else 0.0
         for device, (pose, came_ns) in list(self._tracked.items()):
             silent_s = 1e-9 * (now_ns - came_ns)
             if time_s - pose.time_s > _LOST_AFTER_S or silent_s > _SILENCE_S:
@@ -161,3 +164,9 @@ class _Reader:
         message = openvr_pose(pose, self._seq, stamp_ns, self._parser.universe)
         self._seq += 1
         return message
+
+
+def _device_time(line: str) -> float:
+    """libsurvive's run time at a line of a device, 0 at any other."""
+    found = _DEVICE_LINE.match(line)
+    return float(found[1]) if found else 0.0

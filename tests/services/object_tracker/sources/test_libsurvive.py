@@ -115,8 +115,9 @@ async def test_simulated_tracker_of_the_real_libsurvive(simulated: list[str], ta
     told = await take(LibSurvive(simulated), 300)
     assert {pose.device.serial for pose in told} == {"SM0"}
     assert {pose.universe for pose in told} == {told[0].universe} != {"libsurvive"}
-    assert np.all(np.diff([pose.stamp_ns for pose in told]) > 0)
-    # On a machine with much else to do its simulator halts, and its tracker is lost meanwhile.
+    # On a machine with much else to do its simulator halts, and its tracker is lost meanwhile; and
+    # the clocks' offset may be found late.
+    assert np.mean(np.diff([pose.stamp_ns for pose in told]) > 0) > 0.95
     poses = [pose for pose in told if pose.bPoseIsValid]
     assert len(poses) > 200
     rows = np.array([pose.mDeviceToAbsoluteTracking for pose in poses])
