@@ -123,7 +123,9 @@ def object_tracker(endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
         (Path(folder) / "rig.toml").write_text("\n".join(rig) + "\n")
         save(Path(folder) / "calibration" / "objects.json", registration())
         command = [sys.executable, "-m", "services.object_tracker", "--config"]
-        process = subprocess.Popen([*command, f"{folder}/rig.toml"], stderr=subprocess.DEVNULL)
+        silent = subprocess.DEVNULL
+        command.append(f"{folder}/rig.toml")
+        process = subprocess.Popen(command, stdout=silent, stderr=silent)
         try:
             yield process
         finally:

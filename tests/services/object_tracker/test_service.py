@@ -82,8 +82,8 @@ async def test_poses_in_objects_out_with_garbage_between(
 async def test_a_moved_universe_and_a_device_that_stops(
     running: Callable, tmp_path: Path, make_pose: MakePose
 ) -> None:
-    eye = tuple(tuple(row) for row in np.eye(4).tolist())
-    save(tmp_path / "calibration" / "objects.json", Registered(T_rig_from_lighthouse=eye))  # type: ignore[arg-type]
+    same_frame = msgspec.convert({"T_rig_from_lighthouse": np.eye(4).tolist()}, Registered)
+    save(tmp_path / "calibration" / "objects.json", same_frame)
     async with running("object_tracker", serve, rig(tmp_path, "network")) as (service, bus):
         poses = bus.publisher(topics.OPENVR, serial="LHR-1")
         events = bus.publisher(topics.OPENVR_EVENT, host="pc")
