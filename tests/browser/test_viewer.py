@@ -206,7 +206,9 @@ def holding(router: str, rig: RigConfig, in_background: InBackground) -> threadi
 def picture(page: Any) -> np.ndarray:
     """The page as (h, w, 3), without the panel on its right and the notice on its left."""
     image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
-    pixels = np.array(image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    pixels = np.array(
+        image.open(BytesIO(page.screenshot(timeout=DEADLINE_S * 1e3))).convert("RGB")
+    ).astype(int)
     return pixels[:, int(0.27 * pixels.shape[1]) : int(0.65 * pixels.shape[1])]
 
 

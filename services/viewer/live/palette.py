@@ -24,7 +24,7 @@ UNKNOWN: Rgb = (150, 150, 150)
 # A finger tip that touches is lit; no source and no paint has this colour.
 TOUCH: Rgb = (255, 214, 10)
 # Where it touches: seen on the object as on the finger.
-CONTACT: Rgb = (214, 20, 20)
+CONTACT: Rgb = (255, 50, 50)
 TRACKER: Rgb = (45, 45, 50)
 # Paints by the names people use in rig.toml, calibrated or not.
 _NAMED: dict[str, Rgb] = {

@@ -19,7 +19,7 @@ _SLOTS = 12
 # A halo goes round the paint of a tip (8 mm) and is seen through, so that its colour stays.
 _HALO_M, _HALO_OPACITY = 0.0135, 0.5
 _PALM_HALO_M = 0.022
-_MARK_M = 0.0045
+_MARK_M = 0.0055
 # viser wants a size of what is not there, too.
 _HIDDEN_M = 1e-6
 
