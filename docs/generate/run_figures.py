@@ -68,6 +68,7 @@ RUNS = {
         "--first-seed 11 --seeds 1 --frames 8",
         6,
     ),
+    "objects_pictures": _script("objects_pictures", "", "--seeds 1", 5),
     "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
     "scenes": _script("scenes", "", "--seconds 1", 9),
