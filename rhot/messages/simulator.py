@@ -41,8 +41,8 @@ class ObjectTruth(Message, frozen=True, kw_only=True):
     """What the simulator knows of one object, in the rig frame.
 
     contacts is how far the skin of each hand's part is from the object's surface, in metres,
-    negative where they overlap; empty where the object has no shape. held_by is the hand that
-    carries the object, empty if it rests.
+    negative where they overlap; empty where the object has no shape. held_by is the hand whose
+    fingers press it against the thumb or the palm, empty if none does.
     """
 
     position_m: Vec3

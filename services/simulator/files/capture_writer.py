@@ -15,6 +15,7 @@ import cv2
 import msgspec
 
 from rhot.errors import CaptureError, DiskFullError
+from rhot.files.calibration import save
 from rhot.files.capture import Capture, FrameStamp, write_lines, write_stamps
 from rhot.files.config import RigConfig
 from rhot.messages.objects import OpenVrPose
@@ -22,6 +23,7 @@ from rhot.messages.simulator import Truth
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off
 from services.simulator.files.rig_toml import rig_toml
+from services.simulator.hands.families import VARIED
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
@@ -46,6 +48,7 @@ def write_capture(
     capture = _make_folder(folder)
     try:
         _copy_rig(scene.config, capture)
+        _save_hands(scene, capture)
         write_lines(capture.objects, _object_lines(scene, seconds))
         write_lines(capture.truth, _truth_lines(scene, seconds))
         return _write_pictures(scene, seconds, capture, progress)
@@ -79,6 +82,13 @@ def _copy_rig(config: RigConfig, capture: Capture) -> None:
     target.mkdir()
     for path in sorted(config.calibration_dir.glob("*.json")):
         shutil.copyfile(path, target / path.name)
+
+
+def _save_hands(scene: Scene, capture: Capture) -> None:
+    """The hands of a family (hands/families.py), as if somebody had measured them."""
+    for name, hand in scene.hands.items():
+        if hand.model.origin == VARIED:
+            save(capture.folder / "calibration" / f"hand.{name}.json", hand.model)
 
 
 def _object_lines(scene: Scene, seconds: float) -> Iterator[OpenVrPose]:

@@ -24,13 +24,16 @@ class Gesture(NamedTuple):
     """One instant of a motion.
 
     turn_rad and shift_m move the hand in the frame of the resting wrist; grip is 0 while the hand
-    is empty and 1 while it holds an object.
+    is empty and 1 while it holds an object. calm and calm_digits are 0 where hand and digits move
+    without meaning to, as they always do, and 1 where something that stands steadies them.
     """
 
     angles_rad: Array  # (5, 4)
     turn_rad: Array  # (3,) rotation vector
     shift_m: Array  # (3,)
     grip: float = 0.0
+    calm: float = 0.0
+    calm_digits: float = 0.0
 
 
 Motion = Callable[[float], Gesture]

@@ -107,7 +107,7 @@ class Hand:
     def state_at(self, t_s: float) -> HandState:
         """The hand at t_s seconds of the scene."""
         gesture = self.motion(self.speed * t_s)
-        turn, shift = self.involuntary(t_s)
+        turn, shift = (1.0 - gesture.calm) * np.array(self.involuntary(t_s))
         rest = self.placement
         phase = TAU * rest.travel_hz * self.speed * t_s * _TRAVEL_RATIOS
         travel = rest.travel_axes @ (rest.travel_m * np.sin(phase))
@@ -115,7 +115,9 @@ class Hand:
             rest.rotation @ rotation_from_vector(gesture.turn_rad) @ rotation_from_vector(turn)
         )
         wrist = rest.wrist_m + travel + rest.rotation @ (gesture.shift_m + shift)
-        angles = self.involuntary.fingers(t_s, gesture.angles_rad, self.model)
+        meant = gesture.angles_rad
+        restless = self.involuntary.fingers(t_s, meant, self.model)
+        angles = restless + gesture.calm_digits * (meant - restless)
         return HandState(rotation, wrist, rest.arm_rotation, angles, gesture.grip)
 
     def joints(self, state: HandState) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
-from rhot.hand import HANDS, HandName
+from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages.simulator import Truth
 from services.simulator.camera_clock import CameraClock, camera_clock
 from services.simulator.hands.calibration_exercises import guided
@@ -100,7 +100,7 @@ class Scene:
         states = self.hand_states(t_s)
         objects = {item.name: item.pose_at(t_s, states) for item in self.objects}
         stamp_ns = round(t_s * 1e9) if stamp_ns is None else stamp_ns
-        return truth_message(self.hands, states, objects, stamp_ns)
+        return truth_message(self.hands, states, self.objects, objects, stamp_ns)
 
 
 def load_scene(
@@ -123,16 +123,22 @@ def load_scene(
 
 
 def build_scene(
-    config: RigConfig, spec: SceneSpec, name: str, seed: int, speed: float = 1.0
+    config: RigConfig,
+    spec: SceneSpec,
+    name: str,
+    seed: int,
+    speed: float = 1.0,
+    models: dict[HandName, HandModel] | None = None,
 ) -> Scene:
     """A scene that is in no catalogue, e.g. dataclasses.replace(SCENES["wave"], distance_m=1.0).
 
-    Errors as load_scene.
+    models are hands other than those of the calibration files. Errors as load_scene.
     """
     if not config.camera:
         raise ConfigError("the simulator needs at least one [[camera]] in rig.toml")
     cameras = rig_cameras(config)
-    hands = _hands(config, spec, seed, speed, list(cameras.values()))
+    models = _models(config, spec) if models is None else models
+    hands = _hands(config, spec, seed, speed, list(cameras.values()), models)
     T_rig_from_lighthouse, objects = place_objects(config, spec, hands, cameras, seed)
     count = len(config.camera)
     clocks = {
@@ -174,9 +180,8 @@ def rig_cameras(config: RigConfig) -> dict[str, Camera]:
     return cameras
 
 
-def _hands(
-    config: RigConfig, spec: SceneSpec, seed: int, speed: float, cameras: list[Camera]
-) -> dict[HandName, Hand]:
+def _models(config: RigConfig, spec: SceneSpec) -> dict[HandName, HandModel]:
+    """The hands that the calibration files or the tables describe, and the scene has."""
     if spec.sweep is not None:
         return {}
     names = [name for name in HANDS if name in config.hand or name in spec.extra_hands]
@@ -185,10 +190,21 @@ def _hands(
             "the simulator needs a hand; add a [hand.right.markers] table to rig.toml,"
             ' e.g. index_tip = "blue"'
         )
+    scales = {name: table.scale for name, table in config.hand.items()}
+    return {name: load_hand(config.calibration_dir, name, scales.get(name, 1.0)) for name in names}
+
+
+def _hands(
+    config: RigConfig,
+    spec: SceneSpec,
+    seed: int,
+    speed: float,
+    cameras: list[Camera],
+    models: dict[HandName, HandModel],
+) -> dict[HandName, Hand]:
     hands: dict[HandName, Hand] = {}
-    for name in names:
+    for name, model in models.items():
         table = config.hand.get(name)
-        model = load_hand(config.calibration_dir, name, table.scale if table else 1.0)
         hand_seed = seed * len(HANDS) + HANDS.index(name)
         make_motion = guided if spec.motion == "guided" else MOTIONS[spec.motion]
         hands[name] = Hand(
@@ -198,7 +214,7 @@ def _hands(
             landmarks=dict(table.markers) if table else {},
             motion=make_motion(model, hand_seed),
             involuntary=InvoluntaryMotion(hand_seed),
-            placement=_placement(spec, name, len(names), hand_seed, cameras),
+            placement=_placement(spec, name, len(models), hand_seed, cameras),
             speed=spec.speed * speed,
         )
     return hands

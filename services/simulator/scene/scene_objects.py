@@ -4,6 +4,7 @@ for the files that it reads: calibration/objects.json and the meshes of rig.toml
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from rhot.files.calibration import ObjectPlace, Objects, load_objects
 from rhot.files.config import RigConfig
 from rhot.files.shapes import solid_of
 from rhot.geometry.camera import Camera
+from rhot.geometry.solids import Solid
 from rhot.geometry.transforms import (
     Array,
     rotation_x,
@@ -20,6 +22,8 @@ from rhot.geometry.transforms import (
     transform,
 )
 from rhot.hand import HandName
+from services.simulator.hands.grasps import grasp, timing
+from services.simulator.hands.holds import Grip, hold
 from services.simulator.scene.actors import GRIP_M, Hand, SceneObject, middle_of_cameras
 from services.simulator.scene.catalog import SceneSpec, SweepSpec
 from services.simulator.scene.sweep import Sweep, sweep
@@ -30,6 +34,10 @@ from services.simulator.scene.tracker_mounts import (
     is_puck,
     simulated_place,
 )
+
+# A held object's axis lies obliquely across the palm: at 0.5 rad the thumb presses against the
+# fingers (their normals' cosine is -0.97), at 0.25 on the object's end (-0.4).
+_TILT_RAD = (0.42, 0.58)
 
 
 def place_objects(
@@ -57,7 +65,12 @@ def place_objects(
     if items and spec.sweep is not None:
         items[0] = _swept(items[0], spec.sweep, list(cameras.values()), seed)
     elif items and hands and spec.motion == "grab":
-        items[0] = _taken(items[0], *next(iter(hands.items())))
+        name = next(iter(hands))
+        solid = items[0].solid
+        if solid is None:
+            items[0] = _taken(items[0], hands[name])
+        else:
+            items[0], hands[name] = _grasped(items[0], solid, hands[name], spec, seed)
     T = LIGHTHOUSE if known is None else np.array(known.T_rig_from_lighthouse)
     return T, items
 
@@ -96,17 +109,33 @@ def _resting(
     )
 
 
-def _taken(item: SceneObject, name: HandName, hand: Hand) -> SceneObject:
-    """The same object, where a hand takes it."""
+def _grasped(
+    item: SceneObject, solid: Solid, hand: Hand, spec: SceneSpec, seed: int
+) -> tuple[SceneObject, Hand]:
+    """An object where a hand takes it, and the hand, which closes until its digits touch."""
+    rng = np.random.default_rng([seed, 47])
+    grip = Grip(gap_m=spec.pass_by_m, tilt_rad=float(rng.uniform(*_TILT_RAD)))
+    held = hold(hand.model, solid, grip)
+    carry = not spec.pass_by_m
+    T_wrist = transform(hand.placement.rotation, hand.placement.wrist_m)
+    placed = replace(
+        item,
+        T_rig_from_rest=T_wrist @ held.T_wrist_from_object,
+        holder=hand.name if carry else None,
+        T_wrist_from_held=held.T_wrist_from_object,
+    )
+    return placed, replace(hand, motion=grasp(held, timing(seed, carry=carry)))
+
+
+def _taken(item: SceneObject, hand: Hand) -> SceneObject:
+    """An object without a shape, where a hand takes it."""
     # The y axis of the object lies along the x axis of the hand.
     T_wrist_from_held = transform(rotation_z(-0.5 * np.pi), GRIP_M)
     T_wrist = transform(hand.placement.rotation, hand.placement.wrist_m)
-    return SceneObject(
-        table=item.table,
-        solid=item.solid,
-        place=item.place,
+    return replace(
+        item,
         T_rig_from_rest=T_wrist @ T_wrist_from_held,
-        holder=name,
+        holder=hand.name,
         T_wrist_from_held=T_wrist_from_held,
     )
 
@@ -121,12 +150,4 @@ def _swept(item: SceneObject, spec: SweepSpec, cameras: list[Camera], seed: int)
         np.array(bead_m(item.place)),
         seed,
     )
-    return SceneObject(
-        table=item.table,
-        solid=item.solid,
-        place=item.place,
-        T_rig_from_rest=way.pose(0.0),
-        holder=None,
-        T_wrist_from_held=np.eye(4),
-        sweep=way,
-    )
+    return replace(item, T_rig_from_rest=way.pose(0.0), sweep=way)
