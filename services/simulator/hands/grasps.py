@@ -117,6 +117,6 @@ def _carried(phase: float) -> tuple[Array, Array]:
     carry = _window(phase, (_LIFT_S, _LIFT_S + 0.9), (_DOWN_S - 0.9, _DOWN_S))
     angle = TAU * (phase - _LIFT_S) / (_DOWN_S - _LIFT_S)
     up = 0.5 * (1.0 - np.cos(angle))
-    shift = np.array([0.035 * np.sin(angle), 0.03 * np.sin(2.0 * angle), -0.04 * up])
+    shift = np.array([0.045 * np.sin(angle), 0.035 * np.sin(2.0 * angle), -0.05 * up])
     turn = np.array([0.15 * np.sin(angle), 0.25 * np.sin(angle), 0.2 * np.sin(2.0 * angle)])
     return carry * shift, carry * turn
