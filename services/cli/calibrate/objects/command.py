@@ -109,7 +109,7 @@ def objects(
     """
     rig, endpoints = rig_and_endpoints(config, connect)
     path = options.out_folder(out, rig) / "objects.json"
-    before = load_objects(path.parent) if path.exists() else None
+    before = _there(path.parent) or _there(rig.calibration_dir)
     job = _Job(rig, endpoints, list(names or []), source, config, before)
     places = places_of(rig, job.names, place.offset or [], place.turn or [])
     if check:
@@ -244,6 +244,11 @@ class _Job:
             # The registration holds for this frame of the rig only.
             "T_rig_from_camera": None if world is None else world.T_rig_from_camera,
         }
+
+
+def _there(folder: Path) -> Objects | None:
+    """A folder's objects.json, or None if it has none."""
+    return load_objects(folder) if (folder / "objects.json").exists() else None
 
 
 def _only_placed(before: Objects | None, places: dict[str, Place], path: Path) -> Objects:
