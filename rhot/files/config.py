@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -98,6 +99,10 @@ class RigConfig(Table, frozen=True, kw_only=True):
                 if own == color:
                     return f"the {hand} hand's {landmark.replace('_', ' ')}"
         return next((f"the {o.name}'s tracker" for o in self.object if o.marker == color), "")
+
+    def tracked_colors(self, calibrated: Iterable[str]) -> list[str]:
+        """What a tracker looks for: markers' colours, and without a hand all calibrated ones."""
+        return self.colors if self.hand else sorted({*self.colors, *calibrated})
 
     def rate_hz(self, rate: Rate, camera: str | None = None) -> float:
         """Expected rate of a stream; 0 where there is none."""

@@ -19,6 +19,8 @@ from rhot.geometry.transforms import Array
 # whose edges are worst, the distance is found to 1 and 4 um, where they overlap by 5 mm at most.
 _BALLS = 9
 _STEPS = (1 / 8, 1 / 32, 0.0)
+# A shorter vector has no direction: its square has no digits left.
+_NOTHING = 1e-100
 
 
 class SignedDistance(NamedTuple):
@@ -94,8 +96,9 @@ class Cylinder:
         x, y, z = np.asarray(points_m, dtype=np.float64).T
         radius = np.hypot(x, z)
         # On the axis itself every direction is as good.
-        safe = np.where(radius > 0.0, radius, 1.0)
-        across = np.where(radius > 0.0, x / safe, 1.0), np.where(radius > 0.0, z / safe, 0.0)
+        beside = radius > _NOTHING
+        safe = np.where(beside, radius, 1.0)
+        across = np.where(beside, x / safe, 1.0), np.where(beside, z / safe, 0.0)
         half = 0.5 * np.array([self.diameter_m, self.height_m])
         flat = _block(np.stack([radius, y], axis=1), half)
         return SignedDistance(
@@ -123,8 +126,9 @@ class Sphere:
         """Of points (n, 3)."""
         points = np.asarray(points_m, dtype=np.float64)
         length = np.linalg.norm(points, axis=1)[:, None]
-        safe = np.where(length > 0.0, length, 1.0)
-        normal = np.where(length > 0.0, points / safe, [0.0, 1.0, 0.0])
+        beside = length > _NOTHING
+        safe = np.where(beside, length, 1.0)
+        normal = np.where(beside, points / safe, [0.0, 1.0, 0.0])
         return SignedDistance(length[:, 0] - self.reach_m, self.reach_m * normal, normal)
 
 

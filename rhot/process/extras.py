@@ -18,6 +18,7 @@ EXTRAS = {
     "openvr": "openvr",
     "prometheus_client": "master",
     "scipy": "master",
+    "trimesh": "master",
     "typer": "master",
     "viser": "master",
 }

@@ -37,7 +37,7 @@ class CameraTracker:
 
     def wanted(self, colors: Colors) -> list[str]:
         """The colours that rig.toml's hands use; without a hand, all that there are."""
-        return self._config.colors or sorted(colors.colors)
+        return self._config.tracked_colors(colors.colors)
 
     def calibrated(self, colors: Colors) -> list[str]:
         """Those of the wanted colours that have a range."""

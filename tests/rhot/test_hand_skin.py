@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from services.simulator.scene.bodies import ShapeBuilder, add_hand
 
 from rhot.hand import DIGITS, JOINT_INDEX, default_hand, forward, joint_radii_m
 from rhot.hand_skin import PARTS, skin_of
+from services.simulator.hands.bodies import ShapeBuilder, add_hand
 
 
 def posed(hand, scale):

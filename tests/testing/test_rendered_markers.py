@@ -25,7 +25,7 @@ def test_markers_are_where_the_paint_is(repository):
         assert -0.1 < at_s < 0.3
         joints = scene.hands["right"].joints(scene.hand_states(at_s)["right"])
         seen = {marker.color: (marker.x_px, marker.y_px) for marker in frame.markers}
-        assert len(seen) == 6
+        assert set(seen) >= set(config.hand["right"].markers.values())
         for landmark, color in config.hand["right"].markers.items():
             place = landmark_point(model, landmark, *joints)
             expected = scene.cameras[frame.camera].project(place)[0]

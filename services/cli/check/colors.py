@@ -29,7 +29,7 @@ def color_problems(
 ) -> list[Problem]:
     """What is wrong with the colours of a file, or of a tracker; where names it."""
     problems: list[Problem] = []
-    wanted = config.colors or sorted(colors.colors)
+    wanted = config.tracked_colors(colors.colors)
     for name in wanted:
         if name not in colors.colors:
             has = ", ".join(sorted(colors.colors)) or "none"

@@ -84,7 +84,7 @@ def tracker_step(config: RigConfig, name: str) -> TrackerStep:
     colors = load_colors(config.calibration_dir, name)
     path = config.calibration_dir / f"{name}.colors.json"
     # Without a hand in rig.toml no landmark chooses the colours: all are tracked.
-    wanted = config.colors or sorted(colors.colors)
+    wanted = config.tracked_colors(colors.colors)
     if not wanted:
         raise CalibrationError(
             f"{path}: has no colour; add one with `rhot calibrate colors {name}`"

@@ -65,7 +65,8 @@ def test_a_registration_that_does_not_know_the_paint_or_is_of_another_world(rig:
     add(rig, 'marker = "teal"')
     folder = next(rig.parent.glob("calibration*"))
     before = load_objects(folder)
-    places = before.objects | {"fork": before.objects["cup"]}
+    unpainted = msgspec.structs.replace(before.objects["cup"], marker_m=None)
+    places = before.objects | {"fork": unpainted}
     save(folder / "objects.json", msgspec.structs.replace(before, objects=places))
     assert "does not know where the teal paint is on fork's tracker" in found(rig, "note")
     assert "another [rig.world]" not in found(rig, "error")

@@ -44,7 +44,8 @@ def test_a_capture_becomes_markers_points_poses_and_objects_in_wire_format(captu
     assert (contacts > 0) == any(item.shape for item in load_rig(capture / "rig.toml").object)
     assert len(frames) == sum(one.total for one in job_of([str(capture)], None).inputs)
     assert 50 < len(poses) <= 62
-    assert len(objects) == 180
+    # Two seconds of 120 poses each.
+    assert len(objects) == 240
     assert all(one.sent_ns == 0 for one in (*frames, *points, *poses, *objects))
     assert [(f.stamp_ns, f.camera) for f in frames] == sorted(
         (f.stamp_ns, f.camera) for f in frames
@@ -88,6 +89,7 @@ def test_without_a_hand_all_calibrated_colours_are_tracked(copy, tmp_path):
         "cyan",
         "green",
         "lime",
+        "leaf",
     }
     assert "no [hand.right.markers]" in summary.notes[0]
 

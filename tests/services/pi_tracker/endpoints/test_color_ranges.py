@@ -232,7 +232,7 @@ async def test_colours_may_come_one_after_the_other(config, tracking, seen, colo
         await seen(client)
         green = Colors(date="1", tool="t", colors={"green": colors.colors["green"]})
         await client.set_colors("left", green)
-        assert "blue not calibrated yet" in service.last_error
+        assert "blue (the right hand's thumb tip) not calibrated yet" in service.last_error
         await seen(client, "green")
         await client.set_colors(
             "left",
