@@ -59,6 +59,11 @@ class Buffer(Generic[S]):
         self._entity: Undeclarable | None = None
 
     @property
+    def waiting(self) -> int:
+        """How many items wait."""
+        return len(self._queue) + len(self._newest)
+
+    @property
     def waiting_bytes(self) -> int:
         """Size of all that waits."""
         return self._bytes

@@ -17,7 +17,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 import msgspec
@@ -118,9 +118,17 @@ class Bus:
         """Only the newest message of each key counts: for displays and control, which may skip."""
         return self._subscribe(topic, None, names)
 
-    def every(self, topic: Topic[T], n: int, **names: str) -> Subscription[T]:
-        """Every message, in order, through a queue of n that drops the oldest."""
-        return self._subscribe(topic, n, names)
+    def every(
+        self, topic: Topic[T], n: int, expected: Iterable[str] = (), **names: str
+    ) -> Subscription[T]:
+        """Every message, in order, through a queue of n that drops the oldest.
+
+        expected are the names, in the field that is left open, that the rig has: of others only
+        some messages a second are taken.
+        """
+        (open_field,) = set(topic.fields) - set(names) if expected else ("",)
+        keys = [topic.key(self.rig, **names, **{open_field: name}) for name in expected]
+        return self._subscribe(topic, n, names, frozenset(keys))
 
     def raw(self, topic: Topic[T], n: int, **names: str) -> RawSubscription:
         """Undecoded samples through a queue of n that drops the oldest."""
@@ -138,9 +146,16 @@ class Bus:
         self._open.append(subscription)
         return subscription
 
-    def _subscribe(self, topic: Topic[T], n: int | None, names: dict[str, str]) -> Subscription[T]:
+    def _subscribe(
+        self,
+        topic: Topic[T],
+        n: int | None,
+        names: dict[str, str],
+        expected: frozenset[str] = frozenset(),
+    ) -> Subscription[T]:
         key = topic.key(self.rig, **names)
-        subscription = Subscription(self._loop, topic, self._stats(topic, key, names, "in"), n)
+        stats = self._stats(topic, key, names, "in")
+        subscription = Subscription(self._loop, topic, stats, n, expected)
         subscription.declare(self._session, key)
         self._open.append(subscription)
         return subscription

@@ -24,6 +24,10 @@ T = TypeVar("T")
 _SAMPLE_BYTES = 512
 # What goes with a picture is a small message; larger ones are rejected unread, as payloads are.
 _MAX_ATTACHMENT_BYTES = 65_536
+# Of names that a rig does not have: enough to be named as a fault, too few to be in the way.
+_STRANGERS_A_SECOND = 16
+# What a JSON object may begin with, white space of people who type one included.
+_BEGINS_OBJECT = (b"{", b" ", b"\t", b"\r", b"\n")
 # Keys that one subscription knows by heart: a rig has some dozens.
 _MAX_KEYS = 256
 
@@ -42,13 +46,29 @@ def _size_of(sample: Sample) -> int:
 
 
 class RawSubscription(Buffer[Sample]):
-    """Undecoded samples of a key expression."""
+    """Undecoded samples of a key expression.
+
+    With objects_only what cannot be a JSON object is rejected before it takes a message's place in
+    the queue, and of keys that are not among the expected ones (if any are) only some a second are
+    taken: among 10^5 messages of garbage, or of ever new names, those that count were lost
+    otherwise.
+    """
 
     def __init__(
-        self, loop: asyncio.AbstractEventLoop, stats: StreamStats, capacity: int | None
+        self,
+        loop: asyncio.AbstractEventLoop,
+        stats: StreamStats,
+        capacity: int | None,
+        *,
+        objects_only: bool = False,
+        expected: frozenset[str] = frozenset(),
     ) -> None:
         super().__init__(loop, capacity, _size_of)
         self.stats = stats
+        self._objects_only = objects_only
+        self._expected = expected
+        # The second it is, and how many of other keys it had.
+        self._second, self._strangers = 0, 0
 
     def declare(
         self,
@@ -66,11 +86,24 @@ class RawSubscription(Buffer[Sample]):
         if len(payload) > self.stats.topic.max_bytes or too_much:
             self.stats.rejected += 1
             return
+        if self._expected and key not in self._expected and not self._admits_stranger(received_ns):
+            self.stats.dropped += 1
+            return
+        content = payload.to_bytes()
+        if self._objects_only and content[:1] not in _BEGINS_OBJECT:
+            self.stats.rejected += 1
+            return
         attachment = b"" if attached is None else attached.to_bytes()
-        taken = Sample(key, payload.to_bytes(), attachment, received_ns)
+        taken = Sample(key, content, attachment, received_ns)
         dropped = self.push(key, taken)
         if dropped:
             self.stats.dropped += dropped
+
+    def _admits_stranger(self, now_ns: int) -> bool:
+        if now_ns // 10**9 != self._second:
+            self._second, self._strangers = now_ns // 10**9, 0
+        self._strangers += 1
+        return self._strangers <= _STRANGERS_A_SECOND
 
     def __aiter__(self) -> RawSubscription:
         return self
@@ -90,6 +123,7 @@ class Subscription(Generic[T]):
         topic: Topic[T],
         stats: StreamStats,
         capacity: int | None,
+        expected: frozenset[str] = frozenset(),
     ) -> None:
         if topic.message is None:
             raise BusError(
@@ -97,13 +131,18 @@ class Subscription(Generic[T]):
             )
         self.stats = stats
         self._topic = topic
-        self._raw = RawSubscription(loop, stats, capacity)
+        self._raw = RawSubscription(loop, stats, capacity, objects_only=True, expected=expected)
         self._decoder = msgspec.json.Decoder(topic.message)
         # What a key says that its messages say as well: worked out once a key, not once a message.
         self._said: dict[str, tuple[tuple[str, str], ...]] = {}
 
     def declare(self, session: zenoh.Session, key: str) -> None:
         self._raw.declare(session, key)
+
+    @property
+    def waiting(self) -> int:
+        """How many samples have come and are not taken yet."""
+        return self._raw.waiting
 
     def __aiter__(self) -> Subscription[T]:
         return self

@@ -73,7 +73,8 @@ class DriftService:
                 self._look(clock.now_ns())
 
     async def _hear(self) -> None:
-        async for frame in self._service.bus.every(topics.MARKERS, 64):
+        cameras = [camera.name for camera in self._service.config.camera]
+        async for frame in self._service.bus.every(topics.MARKERS, 64, cameras):
             self._monitor.take_frame(frame)
 
     def _look(self, now_ns: int) -> None:

@@ -52,7 +52,7 @@ async def serve(service: Service) -> None:
     source = open_source(config)
     outlet = Outlet(service)
     await start_contacts(service, outlet.consumers)
-    poses = service.bus.every(topics.OPENVR, _QUEUE)
+    poses = service.bus.every(topics.OPENVR, _QUEUE, [item.serial for item in config.object])
     events = service.bus.every(topics.OPENVR_EVENT, 64)
     unknown = UnknownDevices()
     service.values.update(step.values())

@@ -120,6 +120,35 @@ async def test_garbage_is_rejected_counted_and_passed_over(pair):
     assert subscription.stats.rejected >= len(garbage)
 
 
+async def test_garbage_takes_no_message_its_place_in_the_queue(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 2)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    async with asyncio.timeout(DEADLINE_S):
+        # Nobody takes meanwhile: what decodes stays, however much garbage follows.
+        while not subscription.waiting:
+            publisher.put(points(1))
+            await asyncio.sleep(0.01)
+        while subscription.stats.rejected < 50:
+            sender.put_raw(publisher.key, b"[1, 2]")
+            await asyncio.sleep(0.001)
+    assert (await take(subscription, 1))[0].seq == 1
+
+
+async def test_of_names_that_are_not_expected_some_a_second_are_taken(pair):
+    sender, receiver = pair
+    subscription = receiver.every(topics.POINTS, 4096, ["right"])
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    stranger = msgspec.json.encode(points(2, hand="left"))
+    async with asyncio.timeout(DEADLINE_S):
+        while subscription.stats.dropped < 100:
+            sender.put_raw(topics.POINTS.key("test", hand="left"), stranger)
+            publisher.put(points(1))
+            await asyncio.sleep(0.001)
+        taken = [(await take(subscription, 1))[0].hand for _ in range(subscription.waiting)]
+    assert taken.count("right") > taken.count("left") > 0
+
+
 async def test_what_is_not_finite_is_not_sent(pair):
     sender, receiver = pair
     subscription = receiver.every(topics.POINTS, 64)

@@ -69,7 +69,7 @@ def config(tmp_path: Path) -> RigConfig:
 
 def keys() -> Iterator[str]:
     """A key of every topic, with names of this rig where it asks for them."""
-    names = {"camera": "left", "hand": "right", "object": "cup", "serial": "LHR-1"}
+    names = {"camera": "left", "hand": "right", "object": "cup", "serial": "LHR-1", "host": "h"}
     for topic in topics.TOPICS:
         for service in SERVICES if "service" in topic.fields else ("",):
             given = names | {"service": service, "instance": "main"}

@@ -177,6 +177,7 @@ async def test_garbage_on_every_key_is_counted_and_poses_go_on(rig):
         "object": "cup",
         "service": "fusion",
         "instance": "main",
+        "host": "desk",
     }
     keys = [
         topic.key("sim", **{field: names[field] for field in topic.fields})
