@@ -90,11 +90,14 @@ class TouchTracker:
         if speed_m_s > _STILL_M_S or not (long or now_m < -on_m or speed_m_s > -_STILL_M_S):
             return
         times_s, values_m = self._window()
+        near = values_m <= on_m
+        if not near.any():
+            # The line says so, but no sample yet: the distance has just jumped.
+            return
         kink = arrival(times_s, values_m)
         self.touching, self._near_since_ns = True, 0
         if kink is None or kink.speed_m_s < _STILL_M_S:
             # It was there before it was seen, or came so slowly that no instant stands out.
-            near = values_m <= on_m
             self.since_ns = self._stamp(times_s[np.argmax(near)])
             self._level_m = float(values_m[near].mean())
         else:
@@ -114,7 +117,9 @@ class TouchTracker:
         times_s, values_m = self._window()
         kink = departure(times_s, values_m)
         self.touching, self._armed = False, False
-        at_ns = self._stamp(times_s[-1] if kink is None else kink.time_s)
+        # Without a kink it jumped away: after the last sample that was near, or now.
+        last_near_s = times_s[-1] if len(times_s) else 0.0
+        at_ns = self._stamp(last_near_s if kink is None else kink.time_s)
         self.until_ns, self.since_ns = max(at_ns, self.since_ns), 0
 
     @property
@@ -138,10 +143,16 @@ class TouchTracker:
         return (v - slope * t) / count, slope
 
     def _window(self) -> tuple[np.ndarray, np.ndarray]:
-        """The samples of the last moments, without those far away: seconds before now, metres."""
+        """The samples of the last moments, without those far away: seconds before now, metres.
+
+        The latest ones may be far away, too: what is gone within a frame was near until then.
+        """
         newest_ns = self._samples[-1][0]
-        times, values = [], []
+        times: list[float] = []
+        values: list[float] = []
         for stamp, value in reversed(self._samples):
+            if value > _NEAR_M and not times:
+                continue
             if newest_ns - stamp > _WINDOW_S * 1e9 or value > _NEAR_M:
                 break
             times.append(1e-9 * (stamp - newest_ns))

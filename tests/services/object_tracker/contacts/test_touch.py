@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from services.object_tracker.contacts.touch import TouchTracker
 
@@ -98,3 +100,27 @@ def test_an_end_without_a_sample():
     # Ended once, it stays so.
     touch.end(START + 3 * 10**9)
     assert touch.until_ns == START + 2 * 10**9
+
+
+def test_a_finger_that_is_gone_within_a_frame_touched_until_then():
+    states, touch = follow(lambda t: 0.0 if t < 1.0 else 0.1)
+    assert not touch.touching
+    assert seconds_of(touch.until_ns) == pytest.approx(1.0, abs=2 * FRAME)
+    assert states[10][1]
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(st.integers(0, 400_000_000), st.floats(-0.1, 0.4)), max_size=60),
+    st.booleans(),
+)
+def test_any_series_of_distances_is_borne(steps, held):
+    touch, now_ns = TouchTracker(), START
+    for step_ns, distance_m in steps:
+        now_ns += step_ns
+        touch.step(now_ns, distance_m, 0.0015, held)
+        if touch.touching:
+            assert 0 < touch.since_ns <= now_ns
+        else:
+            assert touch.since_ns == 0
+            assert touch.until_ns <= now_ns
