@@ -18,6 +18,7 @@ PARTS = {
     "pictures": "objects_pictures",
     "tracking": "objects_tracking",
     "grasps": "objects_grasps",
+    "grasp_pictures": "objects_grasp_pictures",
 }
 
 

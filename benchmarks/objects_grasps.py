@@ -61,7 +61,7 @@ def measure(hands: int = 20, first_seed: int = JUDGED_FROM) -> dict[str, float]:
         runs = [Run(r.truth, method(r, scene.solid)) for scene, r in grasps]
         figures |= {f"{name}{key}": value for key, value in figures_of(runs).items()}
         beside = [Run(r.truth, method(r, scene.solid)) for scene, r in passes]
-        figures[f"{name}events_beside"] = sum(_event_count(run) for run in beside)
+        figures[f"{name}events_beside"] = sum(event_count(run) for run in beside)
     return figures
 
 
@@ -175,7 +175,7 @@ def _grasps_right(score: ContactScore) -> int:
     return int(score.grasps.missed == 0 and score.grasps.false == 0 and score.grasps.true > 0)
 
 
-def _event_count(run: Run) -> int:
+def event_count(run: Run) -> int:
     """Touches and grasps that began in a recording without any."""
     begun = {
         (one.hand, one.part, one.since_ns)
@@ -202,7 +202,7 @@ def _tail(errors: np.ndarray) -> float:
     return round(float(np.percentile(np.abs(errors), 95.0)), 2) if len(errors) else 0.0
 
 
-def _print(title: str, figures: dict[str, float], show: Callable[[str], None] = print) -> None:
+def print_table(title: str, figures: dict[str, float], show: Callable[[str], None] = print) -> None:
     show(title)
     for key, value in figures.items():
         show(f"  {key:22}{value:>10g}")
@@ -221,7 +221,7 @@ def main() -> None:
         figures = {f"rendered_{key}": value for key, value in figures.items()}
     else:
         figures = measure(options.hands, options.first_seed)
-    _print("rendered" if options.captures else "synthetic", figures)
+    print_table("rendered" if options.captures else "synthetic", figures)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n")
 

@@ -9,14 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pytest
 import typer
 
 from services.cli.application import application
 from testing.source_tree import BESIDE, CODE, ROOT, relative, tree_of
-
-# What is named before it is built, and the issue that builds it.
-TO_COME: dict[str, str] = {}
 
 # What docs/extend.md makes as an example, and tests/docs/test_extend.py runs.
 EXAMPLES = ("services/pi_tracker/sources/pattern.py", "services/pinch/")
@@ -80,8 +76,6 @@ ROOT_COMMAND: Any = typer.main.get_command(application())
 
 def unknown_part(line: str) -> str | None:
     """The first word of a command line that `rhot` does not know, or None."""
-    if any(line.startswith(name) for name in TO_COME):
-        return None
     # A choice such as lens|stereo is checked word by word; several commands may follow each other.
     for one in re.split(r"\s{2,}rhot |\s&&\s(?:rhot )?", line.removeprefix("rhot ")):
         try:
@@ -133,7 +127,6 @@ def test_every_entry_point_that_a_text_names_exists():
     # Not entry points: systemd's units, the root of simulated pictures' keys, and prefixes of
     # folders.
     there |= {unit.stem.split("@")[0] for unit in (ROOT / "deploy" / "systemd").glob("rhot-*")}
-    there |= {name for name in TO_COME if name.startswith("rhot-")}
     there |= {"rhot-sim", "rhot-picture", "rhot-kernels", "rhot-demo", "rhot-deploy"}
     for where, text in texts():
         for name in ENTRY_POINT.findall(text):
@@ -146,7 +139,7 @@ def missing(name: str, where: str) -> bool:
     # tests/docs makes pages of its own.
     if (
         where.startswith("tests/docs/")
-        or any(name.startswith(prefix) for prefix in (*TO_COME, *EXAMPLES))
+        or any(name.startswith(prefix) for prefix in EXAMPLES)
         or re.search(r"[<>*{}]", name)
     ):
         return False
@@ -165,17 +158,3 @@ def test_every_file_that_a_text_names_exists():
         if missing(name, where)
     )
     assert not wrong, "\n".join(wrong)
-
-
-@pytest.mark.parametrize("name", TO_COME)
-def test_what_is_to_come_is_still_named_and_still_missing(name):
-    """An exception nobody needs any more goes."""
-    assert unknown_part(name + " ") is None
-    if name.startswith("rhot "):
-        command = ROOT_COMMAND
-        for word in name.split()[1:]:
-            command = command.commands.get(word) if command is not None else None
-        assert command is None, f"{name} exists: take it off the list"
-    else:
-        assert not (ROOT / name).exists(), f"{name} exists: take it off the list"
-    assert any(name in text for _, text in texts()), f"nothing names {name}: take it off the list"

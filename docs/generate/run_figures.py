@@ -68,8 +68,12 @@ RUNS = {
         "--first-seed 11 --seeds 1 --frames 8",
         6,
     ),
+    "objects_grasp_pictures": _script(
+        "objects_grasp_pictures", "--passes 6", "--hands 1 --passes 1", 10
+    ),
     "objects_pictures": _script("objects_pictures", "", "--seeds 1", 5),
     "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
+    "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
     "scenes": _script("scenes", "", "--seconds 1", 9),
     "solver": _script("solver", "", "--quick", 1.5),
