@@ -30,9 +30,9 @@ from services.cli.live.working_copy import has_rig, working_copy
 from services.cli.options import VerboseOption
 from services.cli.terminal import Terminal
 
-# Without a pose by then something is wrong: numba's first compilation takes most of a minute on a
-# slow machine.
-_FIRST_POSE_S = 120.0
+# Without a pose by then something is wrong. numba's first compilation takes 100 s of a processor's
+# time, and two cores that had other work did not finish within two minutes.
+_FIRST_POSE_S = 240.0
 # A hand that takes a cup shows hand, object and touch.
 SCENE = "grab"
 _POLL_S = 0.25
