@@ -157,7 +157,8 @@ def test_a_colour_that_a_pi_lacks_is_an_error_on_the_master_and_there(hosts):
     assert "error  tracker of right on 10.77.0.3: colour 'blue'" in said
     code, said = hosts.check("right")
     assert code == 1
-    assert "colour 'blue' of rig.toml's markers is missing" in said
+    assert "colour 'blue' of the right hand's" in said
+    assert "is missing" in said
     save(folder / "right.colors.json", whole)
     until(lambda: hosts.check("master")[0] == 0, END_S, log)
 
