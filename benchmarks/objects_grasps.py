@@ -25,6 +25,7 @@ from rhot.geometry.solids import Solid
 from rhot.hand_skin import PARTS
 from rhot.messages.objects import Contact, ObjectContacts, ObjectPose
 from rhot.messages.simulator import Truth
+from rhot.object_motion import ObjectHistory
 from services.cli.evaluate.contacts.contact_score import (
     ContactScore,
     contact_score,
@@ -33,7 +34,6 @@ from services.cli.evaluate.contacts.contact_score import (
 )
 from services.object_tracker.contacts.distances import part_distances, seen_hand
 from services.object_tracker.contacts.step import ContactStep
-from services.object_tracker.history import ObjectHistory
 from testing.synthetic_grasps import GraspScene, Recording, Setting, record
 
 # Below it constants were chosen, from it on they are judged.

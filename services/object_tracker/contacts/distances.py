@@ -19,8 +19,8 @@ from rhot.hand_skin import PARTS, Skin, SkinPart, skin_of
 from rhot.messages import HandPose
 from rhot.messages.objects import ObjectPose
 
-# Where senders know no sigma: the medians that `rhot score` finds of wrists and wrists' turns, of a
-# finger's angles, and a Vive tracker's (1 mm, 0.3 deg) about a registration of a millimetre.
+# Where senders know no sigma, which rhot's own solver and object tracker do: round numbers, not
+# measured, of the size that simulated hands and a Vive tracker about a registration of 1 mm have.
 _WRIST_M, _WRIST_RAD = 0.002, math.radians(1.5)
 _FINGER_RAD = math.radians(3.0)
 _OBJECT_M, _OBJECT_RAD = 0.0015, math.radians(0.3)

@@ -22,6 +22,7 @@ from rhot.hand import HandName
 from rhot.hand_skin import PARTS
 from rhot.messages import HandPose, Quat, Vec3
 from rhot.messages.objects import Contact, Grasp, ObjectContacts, ObjectPose
+from rhot.object_motion import ObjectHistory
 from services.object_tracker.contacts.distances import (
     PartDistance,
     SeenHand,
@@ -31,7 +32,6 @@ from services.object_tracker.contacts.distances import (
 )
 from services.object_tracker.contacts.grasp import GraspTracker
 from services.object_tracker.contacts.touch import TouchTracker
-from services.object_tracker.history import ObjectHistory
 
 # States whose pose is where the object is; out_of_range still is, if less exactly.
 _LOCATED = ("ok", "out_of_range")

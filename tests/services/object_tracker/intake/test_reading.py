@@ -93,7 +93,6 @@ def test_five_digits_of_a_rotation_are_one(make_pose: MakePose) -> None:
     assert reading.position_m == (1.0, 2.0, 3.0)
 
 
-@pytest.mark.skipif(not GOLDEN.exists(), reason="the bridge's golden messages are not there")
 def test_golden_messages_of_the_bridge() -> None:
     """Made from the binding's own ctypes structs, for every ETrackingResult and device class."""
     golden = msgspec.json.decode(GOLDEN.read_bytes(), type=dict[str, dict | None])
