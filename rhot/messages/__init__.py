@@ -74,14 +74,20 @@ class MarkerFrame(Message, frozen=True, kw_only=True):
 PointSource = Literal["measured", "predicted"]
 
 
-class HandPoint(Message, frozen=True, kw_only=True):
-    """A landmark in the rig frame; sigma_m is one standard deviation along each rig axis."""
+class HandPoint(Message, frozen=True, kw_only=True, omit_defaults=True):
+    """A landmark in the rig frame; sigma_m is one standard deviation along each rig axis.
+
+    covariance_m2 is the upper triangle xx, xy, xz, yy, yz, zz of its error's covariance: a landmark
+    that one camera sees is known well across that camera's ray and badly along it, whichever way
+    the rig's axes lie. None if the sender knows no more than sigma_m.
+    """
 
     name: Name
     position_m: Vec3
     sigma_m: tuple[NonNegative, NonNegative, NonNegative]
     cameras: list[Name]
     source: PointSource
+    covariance_m2: tuple[float, float, float, float, float, float] | None = None
 
 
 class HandPoints(Message, frozen=True, kw_only=True):

@@ -39,6 +39,8 @@ from services.fusion.paired.estimator import PairedMethod
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
 _DIGITS = 6
+# Covariances to as many digits as sigmas' squares need.
+_COVARIANCE_DIGITS = 13
 # Reasons and cameras for which rejected frames are counted apart: a rig has four reasons for each
 # of some cameras.
 _MAX_REJECTED = 64
@@ -164,7 +166,7 @@ class FusionStep:
         messages = []
         for hand, rows in self._rows.items():
             points = [
-                self._point(row, positions[row].tolist(), sigmas[row].tolist(), estimates)
+                self._point(row, positions[row], covariances[row], estimates)
                 for row in rows[kept[rows]].tolist()
             ]
             messages.append(HandPoints(hand=hand, seq=self._seq, stamp_ns=stamp_ns, points=points))
@@ -188,10 +190,15 @@ class FusionStep:
         return kept
 
     def _point(
-        self, row: int, position: list[float], sigmas: list[float], estimates: Estimates
+        self, row: int, position: Array, covariance: Array, estimates: Estimates
     ) -> HandPoint:
-        x, y, z = (round(value, _DIGITS) for value in position)
+        """A landmark's message: its position (3,) and covariance (3, 3)."""
+        x, y, z = (round(value, _DIGITS) for value in position.tolist())
+        sigmas = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
         sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigmas)
+        xx, xy, xz, yy, yz, zz = (
+            round(value, _COVARIANCE_DIGITS) for value in covariance[np.triu_indices(3)].tolist()
+        )
         seen_by = zip(self._cameras, estimates.seen_by[row].tolist(), strict=True)
         source: PointSource = "measured" if estimates.measured[row] else "predicted"
         return HandPoint(
@@ -200,6 +207,7 @@ class FusionStep:
             sigma_m=(sx, sy, sz),
             cameras=[camera.name for camera, seen in seen_by if seen],
             source=source,
+            covariance_m2=(xx, xy, xz, yy, yz, zz),
         )
 
 
