@@ -1,7 +1,7 @@
 """What `rhot track` reads: a capture folder, or CAM=VIDEO pairs with a rig.toml.
 
-Stamps come from the capture's csv, from VIDEO's own csv beside it (left.mp4, left.csv), or from the
-frame rate.
+Stamps come from the capture's csv, from VIDEO's own csv beside it (left.mp4, left.csv), from the
+times in the video's container, or from a frame rate given by hand.
 """
 
 from __future__ import annotations
@@ -35,13 +35,16 @@ class Job:
     objects: Path | None
 
 
-def job_of(sources: Sequence[str], config: Path | None) -> Job:
+def job_of(sources: Sequence[str], config: Path | None, rates: Sequence[str] = ()) -> Job:
     """From the command line's arguments: one CAPTURE, or CAM=VIDEO pairs.
 
-    Raises ConfigError or CaptureError saying what was expected.
+    rates: frame rates of videos by hand, `30` of all or `left=29.97` of one. Raises ConfigError or
+    CaptureError saying what was expected.
     """
     if any("=" in source and not Path(source).is_dir() for source in sources):
-        return _videos(sources, config)
+        return _videos(sources, config, rates)
+    if rates:
+        raise ConfigError("--fps is for CAM=VIDEO; a capture has the stamps of its frames")
     if len(sources) != 1:
         raise ConfigError(
             f"expected one CAPTURE folder or CAM=VIDEO pairs, got {' '.join(sources)!r}; "
@@ -78,7 +81,7 @@ def _capture(capture: Capture, config: Path | None) -> Job:
     return Job(rig, inputs, capture.objects if capture.objects.exists() else None)
 
 
-def _videos(sources: Sequence[str], path: Path | None) -> Job:
+def _videos(sources: Sequence[str], path: Path | None, rates: Sequence[str]) -> Job:
     if path is None:
         raise ConfigError(
             "CAM=VIDEO needs --config rig.toml, whose calibration/CAM.colors.json has the colours"
@@ -95,7 +98,31 @@ def _videos(sources: Sequence[str], path: Path | None) -> Job:
     tables = {name: config.camera_named(name) for name in names}
     order = [camera.name for camera in config.camera if camera.name in tables]
     videos = dict(pairs)
-    return Job(config, [_video_input(tables[name], videos[name]) for name in order], None)
+    by_hand = _rates(rates, order)
+    inputs = [_video_input(tables[name], videos[name], by_hand.get(name)) for name in order]
+    return Job(config, inputs, None)
+
+
+def _rates(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, float]:
+    """Frame rates by camera."""
+    rates: dict[str, float] = {}
+    for text in texts:
+        name, _, rate = text.rpartition("=")
+        if name and name not in cameras:
+            raise ConfigError(
+                f"--fps {text}: there is no video of a camera {name!r}; there are {list(cameras)}"
+            )
+        try:
+            value = float(rate)
+        except ValueError:
+            value = 0.0
+        if not 0.1 <= value <= 1000.0:
+            raise ConfigError(
+                f"--fps {text}: give frames a second, 0.1 to 1000, e.g. --fps 30, or of one "
+                f"camera, e.g. --fps {cameras[0]}=29.97"
+            )
+        rates |= dict.fromkeys([name] if name else cameras, value)
+    return rates
 
 
 def _pair(source: str) -> tuple[str, Path]:
@@ -113,21 +140,25 @@ def _pair(source: str) -> tuple[str, Path]:
     return name, Path(video)
 
 
-def _video_input(table: CameraTable, path: Path) -> CameraInput:
+def _video_input(table: CameraTable, path: Path, rate: float | None) -> CameraInput:
+    """rate: by hand."""
     if path.is_dir():
-        return CameraInput(table.name, FolderReader(table.name, path, table.fps), _UNKNOWN_SIGMA_NS)
-    video, csv = VideoReader(table.name, path, table.fps), path.with_suffix(".csv")
-    if not csv.is_file() or csv == path:
+        folder = FolderReader(table.name, path, rate or table.fps)
+        return CameraInput(table.name, folder, _UNKNOWN_SIGMA_NS)
+    video, csv = VideoReader(table.name, path, table.fps, rate=rate), path.with_suffix(".csv")
+    if rate is not None or not csv.is_file() or csv == path:
         return CameraInput(table.name, video, _UNKNOWN_SIGMA_NS)
     with csv.open(encoding="utf-8", errors="replace") as file:
         has_stamps = tuple(cell.strip() for cell in file.readline().split(",")) == CSV_HEADER
     if has_stamps:
         stamps = read_stamps(csv)
+        # Whatever times the video has do not matter, not even damaged ones.
+        video = VideoReader(table.name, path, table.fps, rate=table.fps)
         reader = StampedReader(video, csv, stamps)
         return CameraInput(table.name, reader, _CSV_SIGMA_NS, len(stamps))
     note = (
         f"{csv}: is no list of stamps (`{','.join(CSV_HEADER)}`); "
-        f"camera {table.name!r} is stamped by its frame rate"
+        f"camera {table.name!r} is stamped by the video's own times"
     )
     return CameraInput(table.name, video, _UNKNOWN_SIGMA_NS, notes=[note])
 

@@ -29,6 +29,13 @@ def track(
     config: Annotated[
         Path | None, typer.Option(help="rig.toml; default: the capture's own")
     ] = None,
+    fps: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RATE | CAM=RATE",
+            help="frames a second of videos whose own times are wrong, of all or of one",
+        ),
+    ] = None,
     progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:
@@ -38,7 +45,7 @@ def track(
     from services.cli.offline.run import run
     from services.cli.offline.track_summary import summary_text
 
-    summary = run(job_of(sources, config), out, progress)
+    summary = run(job_of(sources, config, fps or ()), out, progress)
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
         return

@@ -11,9 +11,10 @@ import cv2
 
 from rhot.errors import CaptureError
 from services.pi_tracker.image.frame import Image
+from services.pi_tracker.sources.container_size import announced_size
 
-# Headers of several containers give the duration only, from which OpenCV estimates the count; two
-# frames or 2 % off is still whole.
+# Where the container does not tell its size: headers of several give the duration only, from which
+# OpenCV estimates the count; two frames or 2 % off is still whole.
 _SLACK_FRAMES, _SLACK_SHARE = 2, 0.02
 # LOG_LEVEL_SILENT
 _SILENT = 0
@@ -30,6 +31,9 @@ class VideoDecoder:
         self.fps = 0.0
         self.frame_count = 0
         self.grey = False
+        # When the latest image is to be shown, by the container, s after the first; 0 where the
+        # file holds no times.
+        self.time_s = 0.0
 
     def open(self) -> None:
         if not self._path.is_file():
@@ -52,13 +56,23 @@ class VideoDecoder:
         if self._capture is None:
             return None
         ok, image = self._capture.read()
+        self.time_s = 1e-3 * float(self._capture.get(cv2.CAP_PROP_POS_MSEC))
         return image if ok else None
 
     def check_end(self, count: int) -> None:
-        """Raise CaptureError if a file that ended after count frames had announced more."""
+        """Raise CaptureError if the end of a file, of which count frames came, is missing.
+
+        A trimmed video gives fewer frames than it holds: that is no damage.
+        """
         if count == 0:
             raise CaptureError(f"{self._path}: holds no frame that can be decoded")
-        if count + max(_SLACK_FRAMES, _SLACK_SHARE * self.frame_count) < self.frame_count:
+        announced = announced_size(self._path)
+        if announced is None:
+            slack = max(_SLACK_FRAMES, _SLACK_SHARE * self.frame_count)
+            cut_short = count + slack < self.frame_count
+        else:
+            cut_short = self._path.stat().st_size < announced
+        if cut_short:
             raise CaptureError(
                 f"{self._path}: ends after {count} of {self.frame_count} frames: "
                 "cut short or damaged"

@@ -134,3 +134,35 @@ def test_a_broken_row_of_stamps_names_file_and_line(copy):
     right = job_of([str(copy)], None).inputs[1]
     with pytest.raises(CaptureError, match=r"right\.csv: line 5"):
         list(right.frames())
+
+
+def stamps_of(job):
+    return [[frame.stamp_ns for frame in one.frames()] for one in job.inputs]
+
+
+def test_a_rate_by_hand_is_of_all_videos_or_of_one(tmp_path, rig):
+    v = video(tmp_path / "v.mkv")
+    pairs = [f"left={v}", f"right={v}"]
+    left, right = stamps_of(job_of(pairs, rig, ["10"]))
+    assert left[:3] == right[:3] == [0, 100_000_000, 200_000_000]
+    left, right = stamps_of(job_of(pairs, rig, ["right=25"]))
+    assert (left[1], right[1]) == (50_000_000, 40_000_000)
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        ("fast", r"--fps fast: give frames a second, 0\.1 to 1000, e\.g\. --fps 30"),
+        ("0", r"--fps 0: give frames a second"),
+        ("top=30", r"no video of a camera 'top'; there are \['left'\]"),
+    ],
+)
+def test_a_rate_that_cannot_be_is_refused(tmp_path, rig, rate, message):
+    v = video(tmp_path / "v.mkv")
+    with pytest.raises(ConfigError, match=message):
+        job_of([f"left={v}"], rig, [rate])
+
+
+def test_a_capture_takes_no_rate(short_capture):
+    with pytest.raises(ConfigError, match="a capture has the stamps of its frames"):
+        job_of([str(short_capture)], None, ["30"])
