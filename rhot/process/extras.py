@@ -17,6 +17,7 @@ EXTRAS = {
     "numba": "master",
     "openvr": "openvr",
     "prometheus_client": "master",
+    "pyarrow": "tables",
     "scipy": "master",
     "trimesh": "master",
     "typer": "master",

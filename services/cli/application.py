@@ -15,6 +15,7 @@ from services.cli.demo.demo import demo
 from services.cli.deploy.deploy import deploy
 from services.cli.doctor.doctor import doctor
 from services.cli.evaluate.score import score
+from services.cli.export.export import export
 from services.cli.init.init import init
 from services.cli.live.router import router
 from services.cli.live.session import session
@@ -43,6 +44,7 @@ COMMANDS = (
     track,
     score,
     plot,
+    export,
     simulate,
     record,
     replay,

@@ -25,9 +25,9 @@ M = TypeVar("M", bound=msgspec.Struct)
 STREAMS = ("markers", "points", "poses", "objects", "contacts")
 SUMMARY = "summary.json"
 PARTIAL = ".partial"
-# What `rhot plot` writes beside them: a second run may overwrite a folder that holds pictures of
-# the first.
-PICTURES = ".png"
+# What `rhot plot` and `rhot export` write beside them: a second run may overwrite a folder that
+# holds pictures and tables of the first.
+ADDED = (".png", ".csv", ".parquet")
 
 
 class ResultWriter:
@@ -126,7 +126,8 @@ def _prepare(folder: Path) -> None:
         foreign = [
             name
             for name in present
-            if name.removesuffix(PARTIAL) not in own and not name.endswith(PICTURES)
+            if name.removesuffix(PARTIAL) not in own
+            and not name.removesuffix(PARTIAL).endswith(ADDED)
         ]
         if foreign:
             raise CaptureError(
