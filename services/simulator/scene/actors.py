@@ -29,7 +29,7 @@ from services.simulator.hands.involuntary_motion import InvoluntaryMotion
 from services.simulator.scene.sweep import Sweep
 
 # The middle of an open hand in the wrist frame: at its longest it reaches 0.19 m beyond the wrist.
-_MIDDLE_M = np.array([0.0, 0.0, -0.09])
+MIDDLE_M = np.array([0.0, 0.0, -0.09])
 # A hand tilted back by some angle has its wrist extended by this share of it; the rest is the
 # forearm's.
 _EXTENSION = 0.6
@@ -189,7 +189,7 @@ def place_hand(
     R_view_from_wrist = rotation_z(roll) @ rotation_y(yaw) @ upright
     axes = T_rig_from_view[:3, :3]
     rotation = axes @ R_view_from_wrist
-    wrist = T_rig_from_view[:3, 3] + axes @ (middle_m - R_view_from_wrist @ _MIDDLE_M)
+    wrist = T_rig_from_view[:3, 3] + axes @ (middle_m - R_view_from_wrist @ MIDDLE_M)
     arm = rotation @ rotation_x(-_EXTENSION * tilt)
     return HandPlacement(rotation, wrist, arm, axes, np.array(travel.amplitude_m), travel.hz)
 

@@ -205,7 +205,7 @@ def _hands(
     hands: dict[HandName, Hand] = {}
     for name, model in models.items():
         table = config.hand.get(name)
-        hand_seed = seed * len(HANDS) + HANDS.index(name)
+        hand_seed = seed_of_hand(seed, name)
         make_motion = guided if spec.motion == "guided" else MOTIONS[spec.motion]
         hands[name] = Hand(
             name=name,
@@ -214,13 +214,18 @@ def _hands(
             landmarks=dict(table.markers) if table else {},
             motion=make_motion(model, hand_seed),
             involuntary=InvoluntaryMotion(hand_seed),
-            placement=_placement(spec, name, len(models), hand_seed, cameras),
+            placement=hand_placement(spec, name, len(models), hand_seed, cameras),
             speed=spec.speed * speed,
         )
     return hands
 
 
-def _placement(
+def seed_of_hand(seed: int, name: HandName) -> int:
+    """Of its motion and place: each hand of a scene has another."""
+    return seed * len(HANDS) + HANDS.index(name)
+
+
+def hand_placement(
     spec: SceneSpec, name: HandName, hands: int, seed: int, cameras: list[Camera]
 ) -> HandPlacement:
     """A hand in front of the middle of the rig; every seed gives a slightly different place."""
