@@ -6,9 +6,9 @@ record`. A file that cannot be read, or a damaged message, raises CaptureError w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -28,13 +28,23 @@ def messages(recording: Path, topic: topics.Topic[M], kind: type[M], stream: str
     if path.suffix != ".mcap":
         yield from read_lines(path, kind)
         return
+    for _, message in arrivals(path, {topic: kind}):
+        yield message
+
+
+def arrivals(
+    path: Path, kinds: Mapping[topics.Topic[Any], type[Any]]
+) -> Iterator[tuple[topics.Topic[Any], Any]]:
+    """All messages of several topics in an MCAP file, in the order of arrival."""
     # Only for MCAP files: the package mcap is not needed for the others.
     from services.recorder.reader import read
 
+    decoders = {topic: msgspec.json.Decoder(kind) for topic, kind in kinds.items()}
     for record in read(path):
-        if topics.find(record.key) is not topic:
+        topic = topics.find(record.key)
+        if topic is None or topic not in decoders:
             continue
         try:
-            yield msgspec.json.decode(record.payload, type=kind)
+            yield topic, decoders[topic].decode(record.payload)
         except UNDECODABLE as error:
             raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None

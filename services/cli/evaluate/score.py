@@ -12,14 +12,26 @@ from typing import Annotated
 import msgspec
 import typer
 
-from rhot.files.capture import Capture
+from rhot.errors import ConfigError
 
 
 def score(
     capture: Annotated[
-        Path, typer.Argument(help="folder written by `rhot simulate`, with truth.jsonl")
+        Path,
+        typer.Argument(
+            metavar="CAPTURE | FILE.mcap",
+            help="folder written by `rhot simulate`, with truth.jsonl, or a recording of the "
+            "simulated rig",
+        ),
     ],
-    result: Annotated[Path, typer.Argument(help="folder written by `rhot track`")],
+    result: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="RESULT",
+            help="folder written by `rhot track`, or a recording; default: what the recording "
+            "itself holds",
+        ),
+    ] = None,
     stages: Annotated[
         bool, typer.Option("--stages", help="also the errors of markers and 3D points")
     ] = False,
@@ -29,8 +41,15 @@ def score(
     # Not above: scipy takes longer to import than the other commands take to run.
     from services.cli.evaluate.score_result import score_result
     from services.cli.evaluate.score_table import score_text
+    from services.cli.unpacked import is_recording, unpacked
 
-    found = score_result(Capture(capture), result, stages=stages)
+    if result is None and not is_recording(capture):
+        raise ConfigError(
+            f"{capture} is a capture; give its result as well: `rhot score {capture} RESULT`, made "
+            f"by `rhot track {capture} --out RESULT`"
+        )
+    with unpacked(capture) as (scene, own), unpacked(result or own) as (_, tracked):
+        found = score_result(scene, tracked, stages=stages)
     typer.echo(
         msgspec.json.format(msgspec.json.encode(found), indent=1).decode()
         if as_json

@@ -21,6 +21,7 @@ from services.cli.export.tables import TABLES, Row, Table
 from services.cli.export.writers import WRITERS, TableWriter
 from services.cli.offline.results import PARTIAL, SUMMARY, check_result
 from services.cli.progress import Progress
+from services.cli.recorded_messages import arrivals
 
 # Rows of a table that are gathered before they are written.
 _BATCH = 10_000
@@ -40,7 +41,11 @@ def export(
     """
     tables = [table for table in TABLES if not names or table.name in names]
     shown = Progress("rhot export:", _count(recording), progress, unit="messages")
-    messages = _mcap(recording) if recording.is_file() else _folder(recording, tables)
+    messages = (
+        arrivals(recording, {table.topic: table.kind for table in tables})
+        if recording.is_file()
+        else _folder(recording, tables)
+    )
     first = next(messages, None)
     if first is None:
         raise CaptureError(f"{recording}: holds no markers, points, poses or objects to export")
@@ -125,22 +130,6 @@ def _folder(result: Path, tables: Sequence[Table]) -> Iterator[tuple[topics.Topi
         if path.is_file():
             for message in read_lines(path, table.kind):
                 yield table.topic, message
-
-
-def _mcap(path: Path) -> Iterator[tuple[topics.Topic[Any], Any]]:
-    """A recording's messages in the order of arrival."""
-    # Not above: the package mcap is not needed for folders.
-    from services.recorder.reader import read
-
-    decoders = {table.topic: msgspec.json.Decoder(table.kind) for table in TABLES}
-    for record in read(path):
-        topic = topics.find(record.key)
-        if topic is None or topic not in decoders:
-            continue
-        try:
-            yield topic, decoders[topic].decode(record.payload)
-        except UNDECODABLE as error:
-            raise CaptureError(f"{path}: a message on {record.key} is damaged: {error}") from None
 
 
 def _count(recording: Path) -> int:

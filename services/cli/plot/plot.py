@@ -1,4 +1,5 @@
-"""`rhot plot DIR`: PNG pictures of a result, to see where a marker was lost or a joint jumped.
+"""`rhot plot DIR|FILE.mcap`: PNG pictures of a result, to see where a marker was lost or a joint
+jumped.
 
 What a result does not hold (no second camera, no hand) is not drawn; an empty or interrupted result
 is an error.
@@ -13,10 +14,15 @@ import typer
 
 
 def plot(
-    result: Annotated[Path, typer.Argument(metavar="DIR", help="folder written by `rhot track`")],
+    result: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR | FILE.mcap", help="folder written by `rhot track`, or a recording"
+        ),
+    ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="folder for the pictures; default: DIR itself"),
+        typer.Option("--out", "-o", help="folder for the pictures; default: DIR, or FILE's name"),
     ] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="CAPTURE", help="capture whose truth is drawn beside")
@@ -26,6 +32,11 @@ def plot(
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
     from services.cli.plot.result import plot_result
+    from services.cli.unpacked import is_recording, unpacked
 
-    for path in plot_result(result, out or result, truth):
-        typer.echo(path)
+    folder = out or (result.with_suffix("") if is_recording(result) else result)
+    with unpacked(result) as (capture, tracked):
+        if truth is None and is_recording(result) and capture.truth.is_file():
+            truth = capture.folder
+        for path in plot_result(tracked, folder, truth):
+            typer.echo(path)

@@ -8,17 +8,31 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from rhot import topics
+from rhot.files.capture import read_lines
 from rhot.files.config import load_rig
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector, rotation_x
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINTS, HandModel, default_hand, forward, joint_radii_m
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from rhot.messages import (
+    FingerAngles,
+    FingerPose,
+    HandJoint,
+    HandPoints,
+    HandPose,
+    MarkerFrame,
+    WristPose,
+)
+from rhot.messages.objects import ObjectContacts, ObjectPose
 from rhot.messages.simulator import HandTruth, ObjectTruth, Truth
 from services.cli.defaults import sim_toml
 from services.cli.offline.inputs import job_of
 from services.cli.offline.run import run
+from services.recorder.recorder import attachments
+from services.recorder.writer import RecordingWriter
 from services.simulator.files.capture_writer import write_capture
 from services.simulator.scene.scene import load_scene
 
@@ -164,3 +178,31 @@ def result(capture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tracked") / "result"
     run(job_of([str(capture)], None), folder)
     return folder
+
+
+_STREAMS = (
+    (topics.MARKERS, MarkerFrame, "markers", "camera"),
+    (topics.POINTS, HandPoints, "points", "hand"),
+    (topics.POSE, HandPose, "poses", "hand"),
+    (topics.OBJECT, ObjectPose, "objects", "object"),
+    (topics.CONTACTS, ObjectContacts, "contacts", "object"),
+)
+
+
+@pytest.fixture(scope="session")
+def recording(capture: Path, result: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The result's messages and the capture's truth, as `rhot record` keeps them."""
+    path = tmp_path_factory.mktemp("recorded") / "r.mcap"
+    found: list[tuple[int, topics.Topic, str, bytes]] = []
+    for topic, kind, stream, field in _STREAMS:
+        for message in read_lines(result / f"{stream}.jsonl", kind):
+            key = topic.key("desk", **{field: getattr(message, field)})
+            found.append((message.stamp_ns, topic, key, msgspec.json.encode(message)))
+    for line in read_lines(capture / "truth.jsonl", Truth):
+        key = topics.TRUTH.key("desk")
+        found.append((line.stamp_ns, topics.TRUTH, key, msgspec.json.encode(line)))
+    found.sort(key=lambda one: one[0])
+    with RecordingWriter(path, "desk", "1", attachments(load_rig(capture / "rig.toml"))) as writer:
+        for stamp_ns, topic, key, payload in found:
+            writer.add(topic, key, payload, stamp_ns)
+    return path

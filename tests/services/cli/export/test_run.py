@@ -10,38 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rhot import topics
 from rhot.errors import CaptureError
 from rhot.files.capture import read_lines
 from rhot.hand import DIGITS, JOINTS
 from rhot.messages import HandPoints, HandPose, MarkerFrame
-from rhot.messages.objects import ObjectContacts, ObjectPose
 from services.cli.export.run import export
 from services.cli.export.tables import TABLES
-from services.recorder.writer import RecordingWriter
-
-
-@pytest.fixture(scope="module")
-def recording(result, tmp_path_factory):
-    """The result's messages as `rhot record` keeps them."""
-    path = tmp_path_factory.mktemp("recorded") / "r.mcap"
-    streams = (
-        (topics.MARKERS, MarkerFrame, "markers", "camera"),
-        (topics.POINTS, HandPoints, "points", "hand"),
-        (topics.POSE, HandPose, "poses", "hand"),
-        (topics.OBJECT, ObjectPose, "objects", "object"),
-        (topics.CONTACTS, ObjectContacts, "contacts", "object"),
-    )
-    found = []
-    for topic, kind, stream, field in streams:
-        for message in read_lines(result / f"{stream}.jsonl", kind):
-            key = topic.key("desk", **{field: getattr(message, field)})
-            found.append((message.stamp_ns, key, topic, msgspec.json.encode(message)))
-    found.sort(key=lambda one: one[0])
-    with RecordingWriter(path, "desk") as writer:
-        for stamp_ns, key, topic, payload in found:
-            writer.add(topic, key, payload, stamp_ns)
-    return path
 
 
 @pytest.fixture(scope="module")
