@@ -208,6 +208,8 @@ class Simulator(Table, frozen=True, kw_only=True):
     # denoised picture; a Pi's tuning files say 0.75).
     sharpen: Annotated[float, msgspec.Meta(ge=0.0, le=16.0)] = 0.0
     denoise: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    # Pictures go through JPEG of this quality, as webcams send them; 0: they do not.
+    jpeg: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
     # Live pictures with Y in 0..255 instead of 16..235.
     full_range: bool = False
     # Jitter of the simulated Vive trackers: that of daily use. The laser-tracker study in the real

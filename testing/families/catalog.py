@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from testing.families.case import CaseSpec, Half, Kind
+from testing.families.picture_catalog import picture_cases
 from testing.families.point_catalog import point_cases
 
-_CASES = point_cases()
+_CASES = point_cases() + picture_cases()
 FAMILIES = tuple(dict.fromkeys(spec.family for spec in _CASES))
 
 

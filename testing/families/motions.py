@@ -59,16 +59,12 @@ def placed(points_m: Array, distance_m: float) -> Array:
     return points_m - middle + np.array([_MIDDLE_X_M, 0.0, distance_m])
 
 
-def stop_and_go(
-    acceleration_m_s2: float,
-    seed: int,
-    distance_m: float = 0.55,
-    pause_s: float = 0.25,
-    seconds: float = 12.0,
-) -> SampledMotion:
-    """A hand that goes from place to place with a constant acceleration, and pauses between.
+def stop_and_go_path(
+    acceleration_m_s2: float, seed: int, pause_s: float = 0.25, seconds: float = 12.0
+) -> tuple[Array, Array]:
+    """Times (n,) and a way (n, 3) from place to place at a constant acceleration, with pauses.
 
-    Accelerations are 60 to 100 % of the given one; fingers wiggle by a few millimetres.
+    Accelerations are 60 to 100 % of the given one.
     """
     rng = np.random.default_rng([seed, 1])
     step_s, count = 1e-3, int(seconds * 1e3)
@@ -85,27 +81,35 @@ def stop_and_go(
         n += 2 * half + int(rng.uniform(0.0, 2.0 * pause_s) / step_s)
         place = goal
     path = np.cumsum(np.cumsum(pushes, axis=0) * step_s, axis=0) * step_s
-    times_s = np.arange(count) * step_s
+    return np.arange(count)[::4] * step_s, path[::4]
+
+
+def stop_and_go(acceleration_m_s2: float, seed: int, distance_m: float = 0.55) -> SampledMotion:
+    """A hand on a stop_and_go_path; its fingers wiggle by a few millimetres."""
+    times_s, path = stop_and_go_path(acceleration_m_s2, seed)
+    rng = np.random.default_rng([seed, 8])
     omega, phase = 2.0 * np.pi * rng.uniform(1.0, 3.0, (6, 3)), rng.uniform(0.0, 6.28, (6, 3))
     wiggle = 3e-3 * np.sin(omega * times_s[:, None, None] + phase)
-    points = open_hand_m(distance_m) + path[:, None] + wiggle
-    return SampledMotion(times_s[::4], points[::4])
+    return SampledMotion(times_s, open_hand_m(distance_m) + path[:, None] + wiggle)
 
 
-def flapping(
-    hz: float, amplitude_deg: float, seed: int, distance_m: float = 0.5, seconds: float = 12.0
-) -> SampledMotion:
-    """A hand that flaps about its wrist: straight strokes, turned round within 50 ms."""
+def strokes(hz: float, seed: int, seconds: float = 12.0) -> tuple[Array, Array]:
+    """Times (n,) and a way (n,) from -1 to 1 and back: straight, turned round within 50 ms."""
     rng = np.random.default_rng([seed, 2])
     times_s = np.arange(0.0, seconds, _STEP_S)
     drift = np.sin(2.0 * np.pi * rng.uniform(0.2, 0.3) * times_s)
     phase = np.cumsum(hz * (1.0 + 0.45 * drift)) * _STEP_S
-    strokes = 2.0 * np.abs(2.0 * (phase - np.floor(phase + 0.5))) - 1.0
+    way = 2.0 * np.abs(2.0 * (phase - np.floor(phase + 0.5))) - 1.0
     window = np.hanning(27)[1:-1]
-    padded = np.pad(strokes, 25, mode="edge")
-    strokes = np.convolve(padded, window / window.sum(), "same")[25:-25]
-    angle = np.deg2rad(amplitude_deg) * strokes
-    return SampledMotion(times_s, _turned_about_x(open_hand_m(distance_m), angle))
+    smooth = np.convolve(np.pad(way, 25, mode="edge"), window / window.sum(), "same")[25:-25]
+    return times_s, smooth
+
+
+def flapping(hz: float, amplitude_deg: float, seed: int, distance_m: float = 0.5) -> SampledMotion:
+    """A hand that flaps about its wrist."""
+    times_s, way = strokes(hz, seed)
+    angles = np.deg2rad(amplitude_deg) * way
+    return SampledMotion(times_s, _turned_about_x(open_hand_m(distance_m), angles))
 
 
 def _turned_about_x(hand_m: Array, angles_rad: Array) -> Array:
@@ -164,8 +168,8 @@ def rolling(hz: float, amplitude_deg: float, seed: int, distance_m: float = 0.5)
     rng = np.random.default_rng([seed, 5])
     times_s = np.arange(0.0, 12.0, _STEP_S)
     hand = open_hand_m(distance_m)
-    angle = np.deg2rad(amplitude_deg) * _back_and_forth(times_s, hz, 0.3)
-    spread = 1.0 + 0.22 * _back_and_forth(times_s + rng.uniform(0.0, 1.0), 0.8 * hz, 0.2)
+    angle = np.deg2rad(amplitude_deg) * back_and_forth(times_s, hz, 0.3)
+    spread = 1.0 + 0.22 * back_and_forth(times_s + rng.uniform(0.0, 1.0), 0.8 * hz, 0.2)
     arms = hand - hand[0]
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, z = arms[:, 0] * spread[:, None], np.broadcast_to(arms[:, 2], (len(times_s), 6))
@@ -174,7 +178,7 @@ def rolling(hz: float, amplitude_deg: float, seed: int, distance_m: float = 0.5)
     return SampledMotion(times_s, points)
 
 
-def _back_and_forth(times_s: Array, hz: float, wait: float) -> Array:
+def back_and_forth(times_s: Array, hz: float, wait: float) -> Array:
     """-1 .. 1 .. -1, with a share of each half period spent waiting at its end."""
     phase = np.mod(times_s * hz, 1.0) * 2.0
     way = _ramp(np.where(phase < 1.0, phase, phase - 1.0) / (1.0 - wait))

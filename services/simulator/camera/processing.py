@@ -1,5 +1,5 @@
 """What a Raspberry Pi's image processor does to a picture by default, and rhot switches off: it
-denoises, then sharpens. Pure: of one picture alone.
+denoises, then sharpens; and what a webcam does that sends JPEG. Pure: of one picture alone.
 
 A model after libcamera's control algorithms (src/ipa/rpi/controller/rpi: denoise.cpp, sharpen.cpp),
 whose numbers feed hardware that is not described. Not compared with a Pi.
@@ -7,6 +7,8 @@ whose numbers feed hardware that is not described. Not compared with a Pi.
               more than noise does, and of 5x5 chroma cells, which takes small colour differences
               for noise. The Pi 5's mean over time is left out: it would make a picture depend on
               those before it, and it backs off where something moves.
+    jpeg      each plane by itself, as JPEG with halved chroma codes them, but that chroma is
+              quantised like luma here.
     sharpen   an unsharp mask on luma: what a Gaussian takes away is added, less a threshold that
               leaves noise alone, up to a limit. Threshold and limit follow the square root of the
               strength, as in libcamera. At strength 1 an edge that a lens has blurred overshoots by
@@ -40,11 +42,11 @@ _THRESHOLD, _LIMIT = 2.5, 32.0
 
 
 def processed(image: Bytes, noise: float, settings: Simulator) -> Bytes:
-    """An I420 picture (h * 3 / 2, w) denoised and sharpened as [simulator] says.
+    """An I420 picture (h * 3 / 2, w) denoised, sharpened and compressed as [simulator] says.
 
     noise is that of each colour channel, grey levels. Nothing asked for: the same picture.
     """
-    if not settings.sharpen and not settings.denoise:
+    if not (settings.sharpen or settings.denoise or settings.jpeg):
         return image
     height, width = image.shape[0] * 2 // 3, image.shape[1]
     luma, chroma = image[:height], image[height:].reshape(2, height // 2, width // 2)
@@ -57,13 +59,22 @@ def processed(image: Bytes, noise: float, settings: Simulator) -> Bytes:
         )
     if settings.sharpen:
         luma = _sharpened(luma, settings.sharpen)
-    return np.concatenate([luma.ravel(), chroma.ravel()]).reshape(image.shape)
+    planes = [luma, chroma[0], chroma[1]]
+    if settings.jpeg:
+        planes = [_compressed(plane, settings.jpeg) for plane in planes]
+    return np.concatenate([plane.ravel() for plane in planes]).reshape(image.shape)
 
 
 def _denoised(plane: Bytes, reach: float, share: float) -> Bytes:
     """A plane mixed with its bilateral mean; reach is the noise's range, grey levels."""
     mean = cv2.bilateralFilter(np.ascontiguousarray(plane), _WINDOW, max(reach, 0.1), _WINDOW_SIGMA)
     return np.asarray(cv2.addWeighted(mean, share, plane, 1.0 - share, 0.0), np.uint8)
+
+
+def _compressed(plane: Bytes, quality: int) -> Bytes:
+    """A plane after JPEG of that quality and back."""
+    coded = cv2.imencode(".jpg", plane, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), np.uint8)
 
 
 def _sharpened(luma: Bytes, strength: float) -> Bytes:

@@ -8,13 +8,14 @@ one.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from rhot.geometry.transforms import Array
-from rhot.hand import JOINT_INDEX, TIPS, HandModel
+from rhot.hand import JOINT_INDEX, TIPS, Digit, HandModel
 
 Ints = npt.NDArray[np.int64]
 
@@ -42,7 +43,9 @@ class ShapeArrays:
     radius: Array  # (c, 2) m
     # (c, 4) surface, surface of the painted end or -1, whether dabs stick to it, which solid
     kind: Ints
-    end_m: Array  # (c,) painted length
+    # (c, 4) painted length; by how much it is longer on the palm's side, on the side that lies
+    # right of it as one looks along the bone, and on both of them alike
+    end_m: Array
     half: Array  # (c, 2) m, half a box along the body's y and z
     dab_frame: Ints  # (d,)
     dab_offset: Array  # (d, 3) m
@@ -57,11 +60,11 @@ class ShapeBuilder:
     frame: list[tuple[int, int]] = field(default_factory=list)
     offset: list[tuple[Vec3, Vec3]] = field(default_factory=list)
     radius: list[tuple[float, float]] = field(default_factory=list)
-    # Surface of the capsule, surface of its painted end (-1: none), painted length, whether dabs
-    # stick to it.
+    # Surface of the capsule, surface of its painted end (-1: none), painted length and how it
+    # leans, whether dabs stick to it.
     surface: list[int] = field(default_factory=list)
     end_surface: list[int] = field(default_factory=list)
-    end_m: list[float] = field(default_factory=list)
+    end_m: list[tuple[float, float, float, float]] = field(default_factory=list)
     dabbed: list[bool] = field(default_factory=list)
     solid: list[int] = field(default_factory=list)
     half: list[tuple[float, float]] = field(default_factory=list)
@@ -77,18 +80,20 @@ class ShapeBuilder:
         surface: int,
         end: tuple[int, float] = (-1, 0.0),
         *,
+        lean_m: Vec3 = _O,
         dabbed: bool = False,
     ) -> None:
         """Add a tapered capsule between two balls (body frame, offset, radius).
 
-        end = (surface, metres) paints the last part of it, before the far end of ball b.
+        end = (surface, metres) paints the last part of it, before the far end of ball b; lean_m is
+        what ShapeArrays.end_m has after the length.
         """
         self.frame.append((a[0], b[0]))
         self.offset.append((a[1], b[1]))
         self.radius.append((a[2], b[2]))
         self.surface.append(surface)
         self.end_surface.append(end[0])
-        self.end_m.append(end[1])
+        self.end_m.append((end[1], *lean_m))
         self.dabbed.append(dabbed)
         self.solid.append(CAPSULE)
         self.half.append((0.0, 0.0))
@@ -127,7 +132,7 @@ class ShapeBuilder:
             offset=np.array(self.offset).reshape(-1, 2, 3),
             radius=np.array(self.radius).reshape(-1, 2),
             kind=np.stack(kind, axis=1).astype(np.int64),
-            end_m=np.array(self.end_m, dtype=np.float64),
+            end_m=np.array(self.end_m, dtype=np.float64).reshape(-1, 4),
             half=np.array(self.half).reshape(-1, 2),
             dab_frame=np.array(self.dab_frame, dtype=np.int64),
             dab_offset=np.array(self.dab_offset).reshape(-1, 3),
@@ -137,17 +142,28 @@ class ShapeBuilder:
 
 
 def add_hand(
-    shapes: ShapeBuilder, model: HandModel, first: int, skin: int, paints: dict[str, int]
+    shapes: ShapeBuilder,
+    model: HandModel,
+    first: int,
+    skin: int,
+    paints: dict[str, int],
+    leans_m: Mapping[str, Vec3] | None = None,
 ) -> None:
     """Add a hand whose body frames start at `first`.
 
-    paints maps painted landmarks to surface numbers, skin is the surface of the rest. Each finger's
+    paints maps painted landmarks to surface numbers, skin is the surface of the rest; leans_m says
+    of tips how unevenly they are painted (ShapeArrays.end_m after the length). Each finger's
     skin ends exactly at its OpenXR tip joint. The palm is a bundle of thick capsules along the
     metacarpals, with thenar, hypothenar and webs. The palm side of the wrist is where
     rhot.hand.Paint says, wrist_radius_m from the joint.
     """
     for digit in model.digits:
-        _add_digit(shapes, model, digit.name, first, skin, paints)
+        painted = (
+            paints.get(f"{digit.name}_tip", -1),
+            model.paint[f"{digit.name}_tip"].extent_m,
+        )
+        lean_m = (leans_m or {}).get(f"{digit.name}_tip", _O)
+        _add_digit(shapes, digit, first, skin, (*painted, lean_m))
     _add_palm(shapes, model, first, skin)
     _add_forearm(shapes, model, first, skin)
     for name, surface in paints.items():
@@ -157,10 +173,10 @@ def add_hand(
 
 
 def _add_digit(
-    shapes: ShapeBuilder, model: HandModel, name: str, first: int, skin: int, paints: dict[str, int]
+    shapes: ShapeBuilder, digit: Digit, first: int, skin: int, painted: tuple[int, float, Vec3]
 ) -> None:
-    digit = next(d for d in model.digits if d.name == name)
-    tip = JOINT_INDEX[f"{name}_tip"]
+    """painted: surface, length and lean of the paint on its tip."""
+    tip = JOINT_INDEX[f"{digit.name}_tip"]
     r0, r1, r2, r3 = digit.radii_m
     joints = [first + j for j in range(tip - 3, tip + 1)]
     for a, b, ra, rb in ((joints[0], joints[1], r0, r1), (joints[1], joints[2], r1, r2)):
@@ -168,8 +184,9 @@ def _add_digit(
     # The last ball lies its radius before the tip; a distal bone shorter than that still gets a
     # ball.
     back = min(r3, digit.lengths_m[2])
-    end = (paints.get(f"{name}_tip", -1), model.paint[f"{name}_tip"].extent_m)
-    shapes.capsule((joints[2], _O, r2), (joints[3], (0.0, 0.0, back), r3), skin, end, dabbed=True)
+    far = (joints[3], (0.0, 0.0, back), r3)
+    surface, length_m, lean_m = painted
+    shapes.capsule((joints[2], _O, r2), far, skin, (surface, length_m), lean_m=lean_m, dabbed=True)
 
 
 def _add_palm(shapes: ShapeBuilder, model: HandModel, first: int, skin: int) -> None:

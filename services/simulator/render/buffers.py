@@ -61,7 +61,7 @@ class CapsulePaths(NamedTuple):
     radius: Array  # (c, 2) m
     # (c, 4) surface, surface of the painted end or -1, whether dabs stick to it, which solid
     kind: Ints
-    end_m: Array  # (c,) painted length
+    end_m: Array  # (c, 4) painted length, and how it leans: bodies.ShapeArrays
     half: Array  # (c, 2) m, of a box along its second and third axis
     ends: Array  # (c, 2, 3, 3) centres of both ends in the camera frame, m
     palms: Array  # (c, 3, 3) palmar direction of the first end's body frame

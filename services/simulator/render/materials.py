@@ -40,6 +40,16 @@ def surfaces_in_light(
     )
 
 
+def flicker_gains(light: Light, times_s: Array, exposure_s: float) -> Array:
+    """What a swinging lamp gives rows exposed about n times, against its mean light; (n,).
+
+    An exposure of whole periods sees none of it.
+    """
+    left = np.sinc(light.flicker_hz * exposure_s)
+    swing = np.cos(2.0 * np.pi * light.flicker_hz * times_s)
+    return np.asarray(1.0 + light.flicker * left * swing)
+
+
 def _lights(light: Light, rotation: Array) -> Array:
     """(8, 3), unit directions to the lamps in the camera's frame."""
     lights = np.array(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
@@ -28,8 +29,10 @@ SLANT_SQUARED, CONE_CONSTANT, LENGTH, INVERSE_LENGTH = 16, 17, 18, 19
 # Then what shading needs, written once a frame by `write_attributes`: palmar direction (xyz),
 # surface, surface and length of the painted end, whether dabs stick to it, number of the instant.
 PALMAR, SURFACE, END_SURFACE, END_LENGTH, DABBED, INSTANT = 20, 23, 24, 25, 26, 27
-# The rest is of solids (ray_solid.py).
-PLACED = 40
+# The rest is of solids (ray_solid.py), up to how an uneven painted end leans: whether it does, and
+# by how much it is longer on the palm's side, on the right, and on both alike.
+END_LEAN = 40
+PLACED = 44
 # Distance of what a ray does not meet.
 FAR = 1e9
 
@@ -160,7 +163,7 @@ def intersect_row(
 def write_attributes(palms: Array, kind: Ints, end_m: Array, g: Array) -> None:
     """Write what does not move into a table of placed capsules g (instants, c, PLACED).
 
-    palms (c, 3, 3), of which the value at u = 0 counts; kind (c, 4); end_m (c,).
+    palms (c, 3, 3), of which the value at u = 0 counts; kind (c, 4); end_m (c, 4).
     """
     for k in range(g.shape[0]):
         for c in range(g.shape[1]):
@@ -168,6 +171,9 @@ def write_attributes(palms: Array, kind: Ints, end_m: Array, g: Array) -> None:
                 g[k, c, PALMAR + i] = palms[c, 0, i]
             g[k, c, SURFACE] = kind[c, 0]
             g[k, c, END_SURFACE] = kind[c, 1]
-            g[k, c, END_LENGTH] = end_m[c]
+            g[k, c, END_LENGTH] = end_m[c, 0]
+            g[k, c, END_LEAN] = 1.0 if np.any(end_m[c, 1:] != 0.0) else 0.0
+            for i in range(3):
+                g[k, c, END_LEAN + 1 + i] = end_m[c, 1 + i]
             g[k, c, DABBED] = kind[c, 2]
             g[k, c, INSTANT] = k

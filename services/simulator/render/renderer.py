@@ -26,7 +26,7 @@ from services.simulator.render.buffers import (
     frame_buffers,
 )
 from services.simulator.render.edges import flag_edges, widen_columns
-from services.simulator.render.materials import surfaces_in_light
+from services.simulator.render.materials import flicker_gains, surfaces_in_light
 from services.simulator.render.motion_paths import (
     BodyPoses,
     find_rows,
@@ -117,13 +117,14 @@ class Renderer:
 
     def picture(self, frame: int) -> Bytes:
         """Frame number `frame` as I420 (h * 3 / 2, w), with everything a camera adds."""
-        self._draw(self.clock.time_s(frame))
-        return self._finish(draw_noise(self._seed, frame, self.scene.spec.noise))
+        time_s = self.clock.time_s(frame)
+        self._draw(time_s)
+        return self._finish(draw_noise(self._seed, frame, self.scene.spec.noise), time_s)
 
     def clean(self, time_s: float) -> Bytes:
         """The picture whose row 0 is exposed about time_s, without noise; I420."""
         self._draw(time_s)
-        return self._finish(draw_noise(self._seed, 0, 0.0))
+        return self._finish(draw_noise(self._seed, 0, 0.0), time_s)
 
     @property
     def light(self) -> Array32:
@@ -143,10 +144,14 @@ class Renderer:
         self._trace(time_s, only)
         return self._buffers.label.copy()
 
-    def _finish(self, draw: NoiseDraw) -> Bytes:
+    def _finish(self, draw: NoiseDraw, time_s: float) -> Bytes:
         width, height = self.camera.size_px
         out = np.empty((height * 3 // 2, width), np.uint8)
         planes = self._planes
+        if self.scene.spec.light.flicker:
+            rows_s = time_s + 1e-9 * self.clock.row_time_ns * np.arange(height, dtype=float)
+            gains = flicker_gains(self.scene.spec.light, rows_s, self.clock.exposure_s)
+            planes = develop.dimmed(planes, gains)
         if self.full_range:
             planes, draw = develop.full_range(planes), draw.scaled(develop.FULL_OVER_LIMITED)
         add_noise(planes, self._noise_bank, draw, out)

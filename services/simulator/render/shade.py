@@ -34,6 +34,7 @@ from services.simulator.render.ray_capsule import (
     AXIS,
     DABBED,
     END_A,
+    END_LEAN,
     END_LENGTH,
     END_SURFACE,
     INSTANT,
@@ -88,7 +89,10 @@ def identify(
                 + g[c, AXIS + 1] * (y - g[c, END_A + 1])
                 + g[c, AXIS + 2] * (z - g[c, END_A + 2])
             ) * g[c, INVERSE_LENGTH]
-            if g[c, LENGTH] + g[c, RADIUS_B] - axial < g[c, END_LENGTH]:
+            painted = g[c, END_LENGTH]
+            if g[c, END_LEAN] > 0.0:
+                painted += _lean(g[c], x, y, z)
+            if g[c, LENGTH] + g[c, RADIUS_B] - axial < painted:
                 surface = g[c, END_SURFACE]
         if g[c, DABBED] > 0.0:
             k = int(g[c, INSTANT])
@@ -97,6 +101,26 @@ def identify(
                 if dx * dx + dy * dy + dz * dz < dab_radius_squared[d]:
                     surface = dab_surface[d]
         hits.surface[i] = int(surface)
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _lean(g: Array, x: float, y: float, z: float) -> float:
+    """By how much an uneven painted end is longer on the side of its bone where (x, y, z) lies."""
+    inverse = g[INVERSE_LENGTH]
+    ux, uy, uz = g[AXIS] * inverse, g[AXIS + 1] * inverse, g[AXIS + 2] * inverse
+    rx, ry, rz = x - g[END_A], y - g[END_A + 1], z - g[END_A + 2]
+    axial = rx * ux + ry * uy + rz * uz
+    rx, ry, rz = rx - axial * ux, ry - axial * uy, rz - axial * uz
+    px, py, pz = g[PALMAR], g[PALMAR + 1], g[PALMAR + 2]
+    palm = rx * px + ry * py + rz * pz
+    right = rx * (uy * pz - uz * py) + ry * (uz * px - ux * pz) + rz * (ux * py - uy * px)
+    scale = 1.0 / math.sqrt(palm * palm + right * right + 1e-30)
+    palm, right = palm * scale, right * scale
+    return (
+        g[END_LEAN + 1] * palm
+        + g[END_LEAN + 2] * right
+        + g[END_LEAN + 3] * (palm * palm - right * right)
+    )
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")

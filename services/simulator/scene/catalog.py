@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from rhot.errors import ConfigError
 from rhot.hand import HandName
+from services.simulator.scene.paints import SKIN, Rgb
 
 Vec3 = tuple[float, float, float]
-Rgb = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,9 @@ class Light:
     # A coloured lamp from the side whose light the skin reflects: RHOT section 9.1.
     rim_from: Vec3 = (0.9, 0.3, 0.2)
     rim: Rgb = (0.0, 0.0, 0.0)
+    # Lamps on the mains: their light swings by this share to either side, this often a second.
+    flicker: float = 0.0
+    flicker_hz: float = 100.0
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,10 @@ class SceneSpec:
     # Standard deviation of lens blur and defocus at the hand, px.
     blur_px: float = 0.6
     light: Light = Light()
+    # Albedo of the skin.
+    skin: Rgb = SKIN.albedo
+    # How unevenly tips are painted: the share of its length by which an edge leans.
+    uneven: float = 0.0
     # Objects in saturated colours in the background.
     clutter: bool = False
     # Of "grab": the hand closes about the object this far from it, and leaves it where it is.

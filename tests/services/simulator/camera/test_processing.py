@@ -101,3 +101,14 @@ def test_live_frames_say_their_range_and_captures_are_limited(config):
     live, recorded = FrameSource(scene, "left"), FrameSource(scene, "left", recorded=True)
     assert (live.take(3).full_range, recorded.take(3).full_range) == (True, False)
     assert not FrameSource(load_scene(config, "fist", seed=1), "left").take(3).full_range
+
+
+def test_jpeg_leaves_the_picture_but_for_what_it_cannot_code(edge):
+    image = noisy(edge, 1)
+    fine, coarse = (processed(image, NOISE, Simulator(jpeg=quality)) for quality in (98, 40))
+    off = [np.abs(coded.astype(int) - image).mean() for coded in (fine, coarse)]
+    assert fine.shape == image.shape
+    assert 0.0 < off[0] < 1.0 < off[1] < 8.0
+    # Means stay: colours are not shifted.
+    for one, other in zip(flat_parts(image), flat_parts(coarse), strict=True):
+        assert one.mean() == pytest.approx(other.mean(), abs=1.5)

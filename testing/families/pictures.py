@@ -1,0 +1,208 @@
+"""Cases of pictures: the simulator's, through the real tracker, with the truth and what is visible.
+
+Each case is calibrated as a rig in its light would be: the colour ranges are fitted to its own
+paint and lamps. Everything but the truth comes from disk where it was made before
+(marker_cache.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from rhot.files.calibration import Colors
+from rhot.files.config import RigConfig, load_rig
+from rhot.geometry.transforms import Array
+from rhot.hand import HandModel, default_hand, landmark_point
+from rhot.messages import MarkerFrame
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.step import TrackerStep
+from services.simulator.camera.frame_source import FrameSource, TakenFrame
+from services.simulator.camera.visibility import patch_visibility
+from services.simulator.files.fit_colors import fit_ranges, sample_pixels
+from services.simulator.render.renderer import Renderer
+from services.simulator.scene.catalog import Light, SceneSpec
+from services.simulator.scene.paints import SKIN, Rgb
+from services.simulator.scene.scene import Scene, build_scene
+from testing.families.case import Case
+from testing.families.marker_cache import MARKER_CODE, PICTURE_CODE, kept
+from testing.families.people import TABLES, PaintJob, Person
+from testing.families.picture_motions import Moves
+from testing.synthetic_points import START_NS
+
+_RIG = Path(__file__).parents[2] / "config" / "sim.toml"
+# As synchronisation leaves a camera's clock, by its own account.
+_CLOCK_SIGMA_NS = 500_000
+# Frames of which a camera's colours are calibrated, and of which visibility is computed: the others
+# have the smaller share of their neighbours.
+_CALIBRATION_FRAMES = (0, 25, 50, 75, 100)
+_VISIBILITY_STEP = 2
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that makes a case of pictures; its repr says everything.
+
+    given_scale is the size that fusion and solver guess. jpeg, sharpen and denoise are those of
+    [simulator]; wrong_range: pictures of limited range that the tracker takes for full ones.
+    """
+
+    moves: Moves = field(default_factory=Moves)
+    person: Person = TABLES
+    paint: PaintJob = field(default_factory=PaintJob)
+    light: Light = field(default_factory=Light)
+    skin: Rgb = SKIN.albedo
+    given_scale: float = 1.0
+    distance_m: float = 0.5
+    tilt_deg: float = 36.0
+    exposure_s: float = 0.008
+    noise: float = 5.0
+    jpeg: int = 0
+    sharpen: float = 0.0
+    denoise: float = 0.0
+    wrong_range: bool = False
+    seconds: float = 5.0
+    seed: int = 1
+
+    def hand(self) -> HandModel:
+        """The painted hand itself."""
+        return self.paint.on(self.person.model())
+
+    def config(self) -> RigConfig:
+        """The rig: sim.toml's cameras, a hand of the guessed size, nothing else."""
+        config = load_rig(_RIG)
+        table = msgspec.structs.replace(config.hand["right"], scale=self.given_scale)
+        settings = msgspec.structs.replace(
+            config.simulator, jpeg=self.jpeg, sharpen=self.sharpen, denoise=self.denoise
+        )
+        return msgspec.structs.replace(config, hand={"right": table}, object=[], simulator=settings)
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; seed: of another one in the same light, 0: of this one."""
+        spec = SceneSpec(
+            "still",
+            "a case of testing/families",
+            distance_m=self.distance_m,
+            tilt_deg=self.tilt_deg,
+            exposure_s=self.exposure_s,
+            noise=self.noise,
+            light=self.light,
+            skin=self.skin,
+            uneven=self.paint.uneven,
+        )
+        model, seed = self.hand(), seed or self.seed
+        scene = build_scene(self.config(), spec, "families", seed, models={"right": model})
+        hand = dataclasses.replace(
+            scene.hands["right"], motion=self.moves.motion(model, 2 * seed + 1)
+        )
+        return dataclasses.replace(scene, hands={"right": hand})
+
+
+def picture_case(name: str, recipe: Recipe) -> Case:
+    """A case of pictures."""
+    scene = recipe.scene()
+    frames = kept("markers", recipe, MARKER_CODE, lambda: detected(recipe, scene))
+    shares = kept("visible", recipe, PICTURE_CODE, lambda: visible_shares(recipe, scene))
+    clocks = scene.clocks
+    truth = _Truth(scene, recipe.hand(), tuple(scene.hands["right"].landmarks))
+    return Case(
+        name=name,
+        config=scene.config,
+        cameras=scene.cameras,
+        hands={"right": default_hand("right", recipe.given_scale)},
+        frames=frames,
+        visible=np.array([shares[frame.camera][frame.seq] for frame in frames]),
+        landmarks=truth.landmarks,
+        truth=truth,
+        seconds=recipe.seconds,
+        angles=lambda at_s: scene.hand_states(at_s)["right"].angles_rad,
+        clock_errors_s={name: 1e-9 * clock.residual_ns for name, clock in clocks.items()},
+    )
+
+
+@dataclass(eq=False)
+class _Truth:
+    """Middles of the paint (n, L, 3) at n instants; what was asked for once is remembered."""
+
+    scene: Scene
+    model: HandModel
+    landmarks: tuple[str, ...]
+    _known: dict[float, Array] = field(default_factory=dict)
+
+    def __call__(self, times_s: Array) -> Array:
+        flat = np.asarray(times_s, dtype=np.float64).tolist()
+        for at_s in flat:
+            if at_s not in self._known:
+                state = self.scene.hand_states(at_s)["right"]
+                joints = self.scene.hands["right"].joints(state)
+                self._known[at_s] = np.array(
+                    [landmark_point(self.model, name, *joints) for name in self.landmarks]
+                )
+        return np.array([self._known[at_s] for at_s in flat]).reshape(-1, len(self.landmarks), 3)
+
+
+def detected(recipe: Recipe, scene: Scene) -> list[MarkerFrame]:
+    """All cameras' frames in order of exposure, with what the tracker detects in their pictures."""
+    found: list[tuple[float, MarkerFrame]] = []
+    calibration = recipe.scene(seed=recipe.seed + 1000)
+    for name in scene.cameras:
+        source = FrameSource(scene, name, recorded=True)
+        colors = fitted_colors(calibration, name)
+        tracker = TrackerStep(
+            name, colors, scene.config.tracker, source.camera.size_px, scene.config.colors
+        )
+        for seq in range(int(recipe.seconds * scene.config.camera_named(name).fps)):
+            taken = source.take(seq, START_NS)
+            if taken.image is not None:
+                frame = _frame(taken, full_range=recipe.wrong_range)
+                found.append((taken.time_s, tracker.step(frame, 0, _CLOCK_SIGMA_NS)))
+    return [frame for _, frame in sorted(found, key=lambda entry: entry[0])]
+
+
+def _frame(taken: TakenFrame, *, full_range: bool) -> Frame:
+    assert taken.image is not None
+    return Frame(
+        taken.camera,
+        taken.seq,
+        taken.stamp_ns,
+        taken.row_time_ns,
+        taken.size_px,
+        taken.image,
+        "i420",
+        full_range,
+    )
+
+
+def fitted_colors(scene: Scene, camera: str) -> Colors:
+    """Colour ranges as somebody calibrates them who clicks on the paint in this light."""
+    renderer = Renderer(scene, camera)
+    by_surface, other = sample_pixels(renderer, _CALIBRATION_FRAMES)
+    surfaces = renderer.shapes.paint_surfaces
+    markers = scene.hands["right"].landmarks
+    painted = {
+        color: by_surface[surfaces["right", landmark]] for landmark, color in markers.items()
+    }
+    return fit_ranges(painted, other, "", "testing/families")
+
+
+def visible_shares(recipe: Recipe, scene: Scene) -> dict[str, Array]:
+    """Of each camera, the share of each landmark's paint that is visible in each frame; (f, L)."""
+    landmarks = tuple(scene.hands["right"].landmarks)
+    shares = {}
+    for name in scene.cameras:
+        source = FrameSource(scene, name, recorded=True)
+        count = int(recipe.seconds * scene.config.camera_named(name).fps)
+        table = np.zeros((count, len(landmarks)))
+        rows = np.arange(0, count, _VISIBILITY_STEP)
+        for seq in rows.tolist():
+            patches = patch_visibility(source.renderer, source.frame_time(seq).time_s)
+            for column, landmark in enumerate(landmarks):
+                table[seq, column] = patches["right", landmark].share
+        for seq in np.setdiff1d(np.arange(count), rows).tolist():
+            table[seq] = np.minimum(table[seq - 1], table[min(seq + 1, rows[-1])])
+        shares[name] = table
+    return shares
