@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.kalman.motion_model import transition, unit_process_noise
+from services.fusion.kalman.motion_model import ACCELERATION_TIME_S, discretize, empty_step
 from services.fusion.paired.one_euro import OneEuroFilter
 from testing.synthetic_points import MovingHand
 
@@ -100,10 +100,9 @@ def kalman(path: Array, rate_hz: float, density: float) -> Array:
 
 def motion_model(rate_hz: float) -> tuple[Array, Array]:
     """F (3, 3) and the process noise (3, 3) of one axis for a jerk density of 1."""
-    f01, f02, f12, f22 = transition(1.0 / rate_hz)
-    unit_Q = np.empty((3, 3))
-    unit_process_noise(1.0 / rate_hz, unit_Q)
-    return np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), unit_Q
+    step = empty_step()
+    discretize(1.0 / rate_hz, np.array([1.0, 0.0, 1.0 / ACCELERATION_TIME_S]), step)
+    return step.F, step.Q
 
 
 def adaptive_kalman(path: Array, rate_hz: float, calmest: float) -> Array:

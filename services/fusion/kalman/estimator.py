@@ -5,7 +5,7 @@ motion models side by side (multiple_models.py). A track starts where the rays o
 Observations that contradict it are gated by their innovation. A track that a single camera sees
 coasts on with growing sigma as `predicted`, and is dropped when no second camera has seen it for
 hold_s. Views may come from 2..N cameras in any order; late ones are inserted as long as the track's
-history reaches back. Landmarks of a hand at rest share its motion (rest_detection.py).
+history reaches back. Landmarks of a hand at rest share its motion (rest/).
 """
 
 from __future__ import annotations
@@ -26,19 +26,33 @@ from services.fusion.kalman.frame_update import (
     empty_state,
     update_frame,
 )
-from services.fusion.kalman.rest_mixing import mix_rest
+from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
+from services.fusion.kalman.rest.rest_mixing import mix_rest
 from services.fusion.kalman.smoother import smooth_all
 from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
 from services.fusion.method import Counts, Estimates
 
-# Jerk densities (m^2/s^5) of the models from a resting hand to a fast finger. Squared error over
-# variance stays within .82 and 1.19 for synthetic hands at 0, .02, .1, .5 and 1 m/s and lags of 0
-# to 2 frames; with 1, 30, 300, 5000 it is .79 to 1.25 and rendered hands with two frames of lag are
-# 2 % worse; with four models (.01, 3, 100, 5000) .72 to 1.11, with a top of 1500 errors at 1 m/s
-# are 30 % larger. Without the first, a still hand is 1.6 times as restless, and nothing moving
-# gains.
-DENSITIES = np.array([0.01, 0.3, 10.0, 80.0, 3000.0])
+# The models from a resting hand to a fast finger: jerk density (m^2/s^5), and how fast velocity and
+# acceleration fade (1/s). Squared error over variance stays within .82 and 1.19 for synthetic hands
+# at 0, .02, .1, .5 and 1 m/s and lags of 0 to 2 frames; with 1, 30, 300, 5000 it is .79 to 1.25 and
+# rendered hands with two frames of lag are 2 % worse; with four models (.01, 3, 100, 5000) .72 to
+# 1.11, with a top of 1500 errors at 1 m/s are 30 % larger. Without the first, a still hand is 1.6
+# times as restless, and nothing moving gains. The last follows sharp turns (a waving hand, .8 m/s
+# RMS: 50 m/s^2 in one instant of twenty): its velocity fades, or it takes what one camera sees for
+# depth and runs off (lag 2 of a recorded wave, RMS and maximum: 5 and 22 mm; without it 76 and 935;
+# 1e5 without fading velocity 73 and 1460; 3e4, 3, 12: 31 and 619; 3e5, 10, 40: 7 and 187).
+SLOWING = 1.0 / ACCELERATION_TIME_S
+MODELS = np.array(
+    [
+        [0.01, 0.0, SLOWING],
+        [0.3, 0.0, SLOWING],
+        [10.0, 0.0, SLOWING],
+        [80.0, 0.0, SLOWING],
+        [3000.0, 0.0, SLOWING],
+        [1e5, 12.0, 25.0],
+    ]
+)
 # Innovations beyond this squared Mahalanobis distance (2 degrees of freedom) are taken for another
 # marker: chance exceeds 30 once in three million.
 GATE = 30.0
@@ -78,7 +92,7 @@ class KalmanMethod:
 
     def reset(self) -> None:
         """Forget all observations."""
-        self._state = empty_state(self._hands, len(self._periods_s), len(DENSITIES))
+        self._state = empty_state(self._hands, len(self._periods_s), len(MODELS))
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
@@ -100,7 +114,7 @@ class KalmanMethod:
                     self._start(int(view.landmarks[n]), float(times_s[n]), clock_sigma_s)
 
     def _update(self, frame: FrameRays, gate: float, *, new: bool) -> list[int]:
-        codes: Ints = update_frame(self._state, frame, self._extrinsics, DENSITIES, gate, new)
+        codes: Ints = update_frame(self._state, frame, self._extrinsics, MODELS, gate, new)
         return codes.tolist()
 
     def _start(self, landmark: int, now_s: float, clock_sigma_s: float) -> None:
@@ -153,7 +167,7 @@ class KalmanMethod:
         landmarks = len(history.size)
         means = np.zeros((landmarks, 6))
         covs = np.zeros((landmarks, 6, 6))
-        found = smooth_all(history, time_s, DENSITIES, means, covs)
+        found = smooth_all(history, time_s, MODELS, means, covs)
         mix_rest(rest, time_s, found, means, covs)
         largest_sigma = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1)
@@ -171,5 +185,5 @@ class KalmanMethod:
         )
 
     def rest_probabilities(self) -> Array:
-        """How likely each landmark (L,) rests in its hand, 0 to 1; rest_detection.py."""
+        """How likely each landmark (L,) rests in its hand, 0 to 1; rest/."""
         return self._state.rest.probability.copy()

@@ -20,8 +20,8 @@ from services.fusion.kalman.recent_observations import (
     no_observations,
     remember,
 )
-from services.fusion.kalman.rest_detection import update_rest
-from services.fusion.kalman.rigid_body import RestState, empty_rest
+from services.fusion.kalman.rest.rest_detection import update_rest
+from services.fusion.kalman.rest.rigid_body import RestState, empty_rest
 from services.fusion.kalman.track_history import TrackHistory, empty_history
 from services.fusion.kalman.track_insertion import ACCEPTED, insert
 
@@ -53,14 +53,14 @@ def update_frame(
     state: FilterState,
     frame: FrameRays,
     cameras: Extrinsics,
-    densities: Array,
+    models: Array,
     gate: float,
     new: bool,
 ) -> Ints:
     """Take in a frame; returns what became of its observations (n,), NO_TRACK where there is none.
 
-    densities (M,): the jerk densities of the motion models. gate: the largest squared Mahalanobis
-    distance that a track accepts. new: observations to remember, not remembered ones.
+    models (M, 3): as motion_model.discretize has them. gate: the largest squared Mahalanobis
+    distance that a model takes. new: observations to remember, not remembered ones.
     """
     if new:
         remember(state.recent, frame)
@@ -69,7 +69,7 @@ def update_frame(
         landmark = frame.landmarks[n]
         if state.history.size[landmark] > 0:
             observed = observation(frame, n)
-            codes[n] = insert(state.history, landmark, observed, gate, cameras, densities)
+            codes[n] = insert(state.history, landmark, observed, gate, cameras, models)
         if codes[n] == ACCEPTED:
             accepted_s = state.recent.accepted_s[landmark]  # (C,)
             accepted_s[frame.camera] = max(accepted_s[frame.camera], frame.times_s[n])

@@ -1,12 +1,15 @@
-"""The motion model of a landmark: position, velocity, a fading acceleration; driven by white jerk.
+"""The motion model of a landmark: position, velocity, acceleration; driven by white jerk.
 
 Singer, "Estimating Optimal Tracking Filter Performance for Manned Maneuvering Targets", IEEE TAES
-6(4), 1970: acceleration is exponentially correlated over ACCELERATION_TIME_S. Over one frame it is
-the constant-acceleration model; over a gap the prediction does not run away.
+6(4), 1970: acceleration is exponentially correlated. Over one frame it is the constant-acceleration
+model; over a gap the prediction does not run away. Velocity may fade as well, so that a lively
+model's speed is bounded, as a hand's is: where cameras take turns, a sharp turn in one view looks
+like metres a second of depth.
 
 A state (9,) is position, velocity, acceleration in the rig frame (m, s), its covariance (9, 9).
-dt_s >= 0. Exact for any dt: two short steps equal one long step, which the smoother relies on.
-Compiled.
+A model (3,) is its jerk density (m^2/s^5) and the rates (1/s) at which velocity and acceleration
+fade: the velocity's may be 0, and they must differ. dt_s >= 0. Exact for any dt but for the
+quadrature of noise: two short steps equal one long step, which the smoother relies on. Compiled.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
@@ -35,103 +39,104 @@ class Gaussian(NamedTuple):
     cov: Array  # (n, n)
 
 
-@njit(cache=True)
-def transition(dt_s: float) -> tuple[float, float, float, float]:
-    """The elements f01, f02, f12, f22 of F = [[1, f01, f02], [0, 1, f12], [0, 0, f22]] (x I3)."""
-    a = dt_s / ACCELERATION_TIME_S
-    # Below 1e-3 the difference of nearly equal numbers would lose digits; the series' next term is
-    # under 1e-10 of the value.
-    if a < 1e-3:
-        return (
-            dt_s,
-            dt_s * dt_s * (0.5 - a / 6.0 + a * a / 24.0),
-            dt_s * (1.0 - 0.5 * a + a * a / 6.0),
-            math.exp(-a),
-        )
-    e = math.exp(-a)
-    return (
-        dt_s,
-        ACCELERATION_TIME_S * ACCELERATION_TIME_S * (a - 1.0 + e),
-        ACCELERATION_TIME_S * (1.0 - e),
-        e,
-    )
+class Step(NamedTuple):
+    """A motion model over some time; of one axis, the others are alike. Arrays written in place."""
+
+    F: Array  # (3, 3) transition of position, velocity, acceleration; F[0, 0] = 1, F[1:, 0] = 0
+    Q: Array  # (3, 3) process noise
 
 
 @njit(cache=True)
-def unit_process_noise(dt_s: float, Q: Array) -> None:
-    """Process noise Q (3, 3) over dt for a jerk density of 1, of one axis; written in place.
+def empty_step() -> Step:
+    """To be filled by discretize."""
+    return Step(np.empty((3, 3)), np.empty((3, 3)))
 
-    The integral over dt of g g^T, g = the last column of F.
+
+@njit(cache=True)
+def transition(dt_s: float, velocity_rate: float, acceleration_rate: float, F: Array) -> None:
+    """Transition F (3, 3) over dt of a velocity and an acceleration that fade; written in place.
+
+    The exponential of A = [[0, 1, 0], [0, 0, 1], [0, -ab, -a - b]] dt, for rates a != b (1/s).
     """
+    a, b = velocity_rate, acceleration_rate
+    # 1 - exp(-a t), and that divided by a: expm1 keeps the digits of short steps.
+    fade_a, fade_b = -math.expm1(-a * dt_s), -math.expm1(-b * dt_s)
+    time_a = fade_a / a if a > 0.0 else dt_s
+    time_b = fade_b / b
+    apart = b - a
+    F[0, 0] = 1.0
+    F[1, 0] = 0.0
+    F[2, 0] = 0.0
+    F[0, 1] = (b * time_a - a * time_b) / apart
+    F[0, 2] = (time_a - time_b) / apart
+    F[1, 1] = 1.0 - (b * fade_a - a * fade_b) / apart
+    F[1, 2] = (fade_b - fade_a) / apart
+    F[2, 1] = -a * b * F[1, 2]
+    F[2, 2] = 1.0 - (b * fade_b - a * fade_a) / apart
+
+
+@njit(cache=True)
+def discretize(dt_s: float, model: Array, step: Step) -> None:
+    """A model (3,) over dt_s; written in place."""
+    density, a, b = model[0], model[1], model[2]
+    F, Q = step.F, step.Q
     Q[:] = 0.0
     for k in range(3):
-        _, g0, g1, g2 = transition(dt_s * _NODES[k])
-        weight = dt_s * _WEIGHTS[k]
-        Q[0, 0] += weight * g0 * g0
-        Q[0, 1] += weight * g0 * g1
-        Q[0, 2] += weight * g0 * g2
-        Q[1, 1] += weight * g1 * g1
-        Q[1, 2] += weight * g1 * g2
-        Q[2, 2] += weight * g2 * g2
-    Q[1, 0] = Q[0, 1]
-    Q[2, 0] = Q[0, 2]
-    Q[2, 1] = Q[1, 2]
+        transition(dt_s * _NODES[k], a, b, F)
+        weight = density * dt_s * _WEIGHTS[k]
+        for i in range(3):
+            for j in range(3):
+                Q[i, j] += weight * F[i, 2] * F[j, 2]
+    transition(dt_s, a, b, F)
 
 
 @njit(cache=True)
-def predict(
-    last: Gaussian, dt_s: float, density: float, unit_Q: Array, predicted: Gaussian
-) -> None:
-    """The estimate (9,), (9, 9) dt_s after the last: x = F x, P = F P F^T + Q; written in place.
-
-    Q = density * unit_Q (3, 3) of unit_process_noise, alike for the three axes.
-    """
-    f01, f02, f12, f22 = transition(dt_s)
+def predict(last: Gaussian, step: Step, predicted: Gaussian) -> None:
+    """The estimate (9,), (9, 9) a step after the last: x = F x, P = F P F^T + Q; in place."""
+    F, Q = step.F, step.Q
     for axis in range(3):
         p, v, a = last.mean[axis], last.mean[axis + 3], last.mean[axis + 6]
-        predicted.mean[axis] = p + f01 * v + f02 * a
-        predicted.mean[axis + 3] = v + f12 * a
-        predicted.mean[axis + 6] = f22 * a
-    propagate_cov(last.cov, 3, dt_s, predicted.cov)
+        predicted.mean[axis] = p + F[0, 1] * v + F[0, 2] * a
+        predicted.mean[axis + 3] = F[1, 1] * v + F[1, 2] * a
+        predicted.mean[axis + 6] = F[2, 1] * v + F[2, 2] * a
+    propagate_cov(last.cov, 3, F, predicted.cov)
     for i in range(3):
         for j in range(3):
             for axis in range(3):
-                predicted.cov[3 * i + axis, 3 * j + axis] += density * unit_Q[i, j]
+                predicted.cov[3 * i + axis, 3 * j + axis] += Q[i, j]
 
 
 @njit(cache=True)
-def propagate_cov(P: Array, axes: int, dt_s: float, out: Array) -> None:
+def propagate_cov(P: Array, axes: int, F: Array, out: Array) -> None:
     """F P F^T (3 axes, 3 axes) of positions, velocities, accelerations along `axes` directions."""
-    f01, f02, f12, f22 = transition(dt_s)
     for i in range(axes):  # F P
         for j in range(3 * axes):
             p, v, a = P[i, j], P[i + axes, j], P[i + 2 * axes, j]
-            out[i, j] = p + f01 * v + f02 * a
-            out[i + axes, j] = v + f12 * a
-            out[i + 2 * axes, j] = f22 * a
+            out[i, j] = p + F[0, 1] * v + F[0, 2] * a
+            out[i + axes, j] = F[1, 1] * v + F[1, 2] * a
+            out[i + 2 * axes, j] = F[2, 1] * v + F[2, 2] * a
     for i in range(3 * axes):  # (F P) F^T
         for j in range(axes):
             p, v, a = out[i, j], out[i, j + axes], out[i, j + 2 * axes]
-            out[i, j] = p + f01 * v + f02 * a
-            out[i, j + axes] = v + f12 * a
-            out[i, j + 2 * axes] = f22 * a
+            out[i, j] = p + F[0, 1] * v + F[0, 2] * a
+            out[i, j + axes] = F[1, 1] * v + F[1, 2] * a
+            out[i, j + 2 * axes] = F[2, 1] * v + F[2, 2] * a
 
 
 @njit(cache=True)
-def adjoint_predict(adjoint: Array, information: Array, dt_s: float) -> None:
-    """The smoother's step back over dt_s, in place: F^T adjoint (9,), F^T information F (9, 9)."""
-    f01, f02, f12, f22 = transition(dt_s)
+def adjoint_predict(adjoint: Array, information: Array, F: Array) -> None:
+    """The smoother's step back over F (3, 3): F^T adjoint (9,), F^T information F (9, 9)."""
     for i in range(3):
         p, v, a = adjoint[i], adjoint[i + 3], adjoint[i + 6]
-        adjoint[i + 3] = f01 * p + v
-        adjoint[i + 6] = f02 * p + f12 * v + f22 * a
+        adjoint[i + 3] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
+        adjoint[i + 6] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a
     for i in range(3):
         for j in range(9):
             p, v, a = information[i, j], information[i + 3, j], information[i + 6, j]
-            information[i + 3, j] = f01 * p + v
-            information[i + 6, j] = f02 * p + f12 * v + f22 * a
+            information[i + 3, j] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
+            information[i + 6, j] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a
     for i in range(9):
         for j in range(3):
             p, v, a = information[i, j], information[i, j + 3], information[i, j + 6]
-            information[i, j + 3] = f01 * p + v
-            information[i, j + 6] = f02 * p + f12 * v + f22 * a
+            information[i, j + 3] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
+            information[i, j + 6] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a

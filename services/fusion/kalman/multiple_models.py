@@ -2,12 +2,11 @@
 
 Multiple-model adaptive estimation (Magill, IEEE TAC 10(4), 1965): the motion models differ in their
 jerk density. So a resting hand is averaged and a fast one is followed, and the covariance is right
-for both. Compiled; nothing here raises.
+for both. Each gates observations for itself (model_choice.py). Compiled; nothing here raises.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,37 +16,48 @@ from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.measurement import (
     NOT_VISIBLE,
+    Innovation,
     Measurement,
     innovate,
     mahalanobis_squared,
     update,
 )
-from services.fusion.kalman.motion_model import predict, unit_process_noise
+from services.fusion.kalman.model_choice import (
+    OUT,
+    PASSED_OVER,
+    count_strikes,
+    update_probabilities,
+)
+from services.fusion.kalman.motion_model import discretize, empty_step, predict
 from services.fusion.kalman.track_history import (
     TrackHistory,
     filtered,
     innovation_of,
 )
 
-# Share of probability that leaks to the other models at each observation; keeps every model ready
-# to take over within an observation or two.
-_LEAK = 0.003
-
 
 class Fit(NamedTuple):
     """How well an observation fits a track."""
 
-    mahalanobis_squared: float  # of the best model; infinite if no model has it before the camera
+    visible: bool  # some model has the landmark before the camera
+    taken_by_any: bool
+    taken: bool  # the likeliest model took it
     log_likelihood: float  # of all models, weighted as before the observation
 
 
 @njit(cache=True)
 def filter_node(
-    history: TrackHistory, landmark: int, index: int, cameras: Extrinsics, densities: Array
+    history: TrackHistory,
+    landmark: int,
+    index: int,
+    cameras: Extrinsics,
+    models: Array,
+    gate: float,
 ) -> Fit:
     """Predict, then update: all models' estimates after node `index` from the node before it.
 
-    densities (M,): the jerk densities of the motion models.
+    models (M, 3): as motion_model.discretize has them. gate: the largest squared Mahalanobis
+    distance of an innovation that a model takes.
     """
     last = history.order[landmark, index - 1]
     node = history.order[landmark, index]
@@ -60,40 +70,62 @@ def filter_node(
         history.clock_variance[landmark, node],
     )
     dt_s = history.time_s[landmark, node] - history.time_s[landmark, last]
-    unit_Q = np.empty((3, 3))
-    unit_process_noise(dt_s, unit_Q)
-    log_likelihoods = np.empty(densities.shape[0])
-    nearest = np.inf
-    for m in range(densities.shape[0]):
+    step = empty_step()
+    log_likelihoods = np.empty(models.shape[0])
+    took = np.zeros(models.shape[0], dtype=np.bool_)
+    for m in range(models.shape[0]):
         state = filtered(history, landmark, node, m)
         innovation = innovation_of(history, landmark, node, m)
-        predict(filtered(history, landmark, last, m), dt_s, densities[m], unit_Q, state)
+        history.model[landmark, node, m] = models[m]
+        discretize(dt_s, models[m], step)
+        predict(filtered(history, landmark, last, m), step, state)
         log_likelihoods[m] = innovate(state, measured, innovation)
-        if log_likelihoods[m] > NOT_VISIBLE:
-            nearest = min(nearest, mahalanobis_squared(innovation.nu, innovation.S_inverse))
-            update(state, innovation)
+        if log_likelihoods[m] == NOT_VISIBLE:
+            _pass_over(innovation)
+        elif mahalanobis_squared(innovation.nu, innovation.S_inverse) > gate:
+            log_likelihoods[m] = PASSED_OVER
+            _pass_over(innovation)
         else:
-            innovation.H[:] = 0.0
-            innovation.nu[:] = 0.0
-            innovation.S_inverse[:] = 0.0
-            innovation.K[:] = 0.0
-    prior = history.probability[landmark, last]
+            update(state, innovation)
+            took[m] = True
     posterior = history.probability[landmark, node]
-    return Fit(nearest, _update_model_probabilities(prior, log_likelihoods, posterior))
+    log_likelihood = update_probabilities(
+        history.probability[landmark, last], log_likelihoods, posterior
+    )
+    likeliest = int(np.argmax(posterior))
+    strikes = history.strikes[landmark, node]
+    count_strikes(history.strikes[landmark, last], took, likeliest, strikes)
+    for m in range(models.shape[0]):
+        if strikes[m] >= OUT:
+            _go_on_from(history, landmark, index, likeliest, m)
+    visible = log_likelihoods.max() > NOT_VISIBLE
+    return Fit(visible, bool(took.any()), bool(took[likeliest]), log_likelihood)
 
 
 @njit(cache=True)
-def _update_model_probabilities(prior: Array, log_likelihoods: Array, posterior: Array) -> float:
-    """Bayes' rule over models (M,), written to posterior (M,); returns the total log-likelihood."""
-    models = prior.shape[0]
-    best = NOT_VISIBLE
-    for m in range(models):
-        if log_likelihoods[m] > best:
-            best = log_likelihoods[m]
-    total = 0.0
-    for m in range(models):
-        leaked = (1.0 - _LEAK) * prior[m] + _LEAK / models
-        posterior[m] = leaked * math.exp(max(log_likelihoods[m] - best, -700.0))
-        total += posterior[m]
-    posterior /= total
-    return best + math.log(total)
+def _pass_over(innovation: Innovation) -> None:
+    """An observation that a model does not take: it tells the smoother nothing."""
+    innovation.H[:] = 0.0
+    innovation.nu[:] = 0.0
+    innovation.S_inverse[:] = 0.0
+    innovation.K[:] = 0.0
+
+
+@njit(cache=True)
+def _go_on_from(
+    history: TrackHistory, landmark: int, index: int, likeliest: int, model: int
+) -> None:
+    """A model takes over the likeliest one's estimates, with all their past up to node `index`.
+
+    The past too, as the smoother goes back along it: with the steps that led there.
+    """
+    history.strikes[landmark, history.order[landmark, index], model] = 0
+    for k in range(index + 1):
+        node = history.order[landmark, k]
+        history.model[landmark, node, model] = history.model[landmark, node, likeliest]
+        history.state[landmark, node, model] = history.state[landmark, node, likeliest]
+        history.cov[landmark, node, model] = history.cov[landmark, node, likeliest]
+        history.H[landmark, node, model] = history.H[landmark, node, likeliest]
+        history.nu[landmark, node, model] = history.nu[landmark, node, likeliest]
+        history.S_inverse[landmark, node, model] = history.S_inverse[landmark, node, likeliest]
+        history.K[landmark, node, model] = history.K[landmark, node, likeliest]

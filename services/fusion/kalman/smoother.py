@@ -17,8 +17,10 @@ from services.fusion.kalman.measurement import Innovation
 from services.fusion.kalman.motion_model import (
     Gaussian,
     adjoint_predict,
+    discretize,
+    empty_step,
     predict,
-    unit_process_noise,
+    transition,
 )
 from services.fusion.kalman.track_history import (
     TrackHistory,
@@ -31,12 +33,12 @@ from services.fusion.kalman.track_history import (
 
 @njit(cache=True)
 def smooth_landmark(
-    history: TrackHistory, landmark: int, time_s: float, densities: Array, out: Gaussian
+    history: TrackHistory, landmark: int, time_s: float, models: Array, out: Gaussian
 ) -> bool:
     """Position and velocity (6,), (6, 6) of a landmark at an instant; written in place.
 
-    densities (M,): the jerk densities of the motion models. False if its track does not reach back
-    that far, or there is none.
+    models (M, 3): as motion_model.discretize has them; between two observations it is the step that
+    was taken. False if its track does not reach back that far, or there is none.
     """
     index = nodes_until(history, landmark, time_s)
     if index == 0:
@@ -44,14 +46,16 @@ def smooth_landmark(
     last = history.order[landmark, index - 1]
     probability = history.probability[landmark, newest_node(history, landmark)]  # (M,)
     dt_s = time_s - history.time_s[landmark, last]
-    unit_Q = np.empty((3, 3))
-    unit_process_noise(dt_s, unit_Q)
-    models = densities.shape[0]
-    means = np.empty((models, 9))
-    covs = np.empty((models, 9, 9))
-    for m in range(models):
+    step = empty_step()
+    means = np.empty((models.shape[0], 9))
+    covs = np.empty((models.shape[0], 9, 9))
+    for m in range(models.shape[0]):
         state = Gaussian(means[m], covs[m])
-        predict(filtered(history, landmark, last, m), dt_s, densities[m], unit_Q, state)
+        model = models[m]
+        if index < history.size[landmark]:
+            model = history.model[landmark, history.order[landmark, index], m]
+        discretize(dt_s, model, step)
+        predict(filtered(history, landmark, last, m), step, state)
         if index < history.size[landmark]:
             _smooth(history, landmark, index, m, time_s, state)
     _mix(probability, means, covs, out)
@@ -60,14 +64,14 @@ def smooth_landmark(
 
 @njit(cache=True)
 def smooth_all(
-    history: TrackHistory, time_s: float, densities: Array, means: Array, covs: Array
+    history: TrackHistory, time_s: float, models: Array, means: Array, covs: Array
 ) -> Bools:
     """Which landmarks have an estimate at an instant (L,); to means (L, 6) and covs (L, 6, 6)."""
     found = np.zeros(history.size.shape[0], dtype=np.bool_)
     for landmark in range(history.size.shape[0]):
         if history.size[landmark] > 0:
             out = Gaussian(means[landmark], covs[landmark])
-            found[landmark] = smooth_landmark(history, landmark, time_s, densities, out)
+            found[landmark] = smooth_landmark(history, landmark, time_s, models, out)
     return found
 
 
@@ -93,13 +97,16 @@ def _smooth(
     """Smooth model m's prediction to time_s by the nodes from `index` on, all later; in place."""
     adjoint = np.zeros(9)
     information = np.zeros((9, 9))
+    F = np.empty((3, 3))
     for k in range(history.size[landmark] - 1, index - 1, -1):
         node = history.order[landmark, k]
         before_s = time_s
         if k > index:
             before_s = history.time_s[landmark, history.order[landmark, k - 1]]
         adjoint_update(adjoint, information, innovation_of(history, landmark, node, m))
-        adjoint_predict(adjoint, information, history.time_s[landmark, node] - before_s)
+        model = history.model[landmark, node, m]
+        transition(history.time_s[landmark, node] - before_s, model[1], model[2], F)
+        adjoint_predict(adjoint, information, F)
     _apply_adjoint(adjoint, information, state)
 
 

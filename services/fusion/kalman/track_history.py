@@ -38,6 +38,8 @@ class TrackHistory(NamedTuple):
     ray_variance: Array  # (L, NODES) of each ray coordinate
     clock_variance: Array  # (L, NODES) of the camera's clock, s^2
     probability: Array  # (L, NODES, M) of each model
+    strikes: Ints  # (L, NODES, M) model_choice.count_strikes
+    model: Array  # (L, NODES, M, 3) motion model of the step to a node
     state: Array  # (L, NODES, M, 9) filtered
     cov: Array  # (L, NODES, M, 9, 9)
     H: Array  # (L, NODES, M, 2, 3) and what follows: measurement.Innovation
@@ -59,6 +61,8 @@ def empty_history(landmarks: int, models: int) -> TrackHistory:
         ray_variance=np.zeros(nodes),
         clock_variance=np.zeros(nodes),
         probability=np.zeros((*nodes, models)),
+        model=np.zeros((*nodes, models, 3)),
+        strikes=np.zeros((*nodes, models), dtype=np.int64),
         state=np.zeros((*nodes, models, 9)),
         cov=np.zeros((*nodes, models, 9, 9)),
         H=np.zeros((*nodes, models, 2, 3)),
@@ -86,6 +90,7 @@ def start_track(
     # its sigmas, so by 2.1.
     history.probability[landmark, node] = 0.01
     history.probability[landmark, node, models - 1] = 1.0 - 0.01 * (models - 1)
+    history.strikes[landmark, node] = 0
     history.state[landmark, node] = 0.0
     history.cov[landmark, node] = 0.0
     for m in range(models):

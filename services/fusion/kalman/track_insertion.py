@@ -37,29 +37,28 @@ def insert(
     observed: Observation,
     gate: float,
     cameras: Extrinsics,
-    densities: Array,
+    models: Array,
 ) -> int:
     """Filter one observation into a running track: ACCEPTED, or GATED, LATE, NOT_SEEN.
 
-    gate is the largest squared Mahalanobis distance of the innovation that is accepted; densities
-    (M,) are the jerk densities of the motion models. Whatever is not accepted leaves the track
-    unchanged, but for the oldest node of a full one. An infinite gate accepts even what no model
-    has in front of the camera; that changes no estimate.
+    gate is the largest squared Mahalanobis distance of an innovation that a model takes; models
+    (M, 3) as motion_model.discretize has them. GATED: the likeliest model did not take it. What no
+    model takes leaves the track unchanged, but for the oldest node of a full one.
     """
     index = nodes_until(history, landmark, observed.time_s)
     if index == 0 or (index == 1 and history.size[landmark] == NODES):
         return LATE
     index = _insert_node(history, landmark, index, observed)
-    fit = filter_node(history, landmark, index, cameras, densities)
+    fit = filter_node(history, landmark, index, cameras, models, gate)
     history.log_likelihood[landmark] = fit.log_likelihood
-    if fit.mahalanobis_squared > gate:
+    if not fit.taken_by_any:
         _remove_node(history, landmark, index)
-        return GATED if fit.mahalanobis_squared < np.inf else NOT_SEEN
+        return GATED if fit.visible else NOT_SEEN
     for later in range(index + 1, history.size[landmark]):
-        filter_node(history, landmark, later, cameras, densities)
+        filter_node(history, landmark, later, cameras, models, gate)
     if history.size[landmark] in _RESTART_SIZES:
-        _restart_from_smoothed_prior(history, landmark, cameras, densities)
-    return ACCEPTED
+        _restart_from_smoothed_prior(history, landmark, cameras, models, gate)
+    return ACCEPTED if fit.taken else GATED
 
 
 @njit(cache=True)
@@ -104,7 +103,7 @@ def _remove_node(history: TrackHistory, landmark: int, index: int) -> None:
 
 @njit(cache=True)
 def _restart_from_smoothed_prior(
-    history: TrackHistory, landmark: int, cameras: Extrinsics, densities: Array
+    history: TrackHistory, landmark: int, cameras: Extrinsics, models: Array, gate: float
 ) -> None:
     """Filter a young track once more, from where its own observations, smoothed, put its beginning.
 
@@ -114,9 +113,9 @@ def _restart_from_smoothed_prior(
     node = history.order[landmark, 0]
     prior = Gaussian(np.empty(6), np.empty((6, 6)))
     if history.camera[landmark, node] >= 0 or not smooth_landmark(
-        history, landmark, history.time_s[landmark, node], densities, prior
+        history, landmark, history.time_s[landmark, node], models, prior
     ):
         return
     history.state[landmark, node, :, :3] = prior.mean[:3]
     for index in range(1, history.size[landmark]):
-        filter_node(history, landmark, index, cameras, densities)
+        filter_node(history, landmark, index, cameras, models, gate)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from services.fusion.kalman import frame_update, rest_mixing, smoother, track_history
+from services.fusion.kalman import frame_update, smoother, track_history
+from services.fusion.kalman.rest import rest_mixing
 from services.fusion.output import paint_centroid
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands

@@ -10,7 +10,8 @@ import pytest
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.frame_rays import Observation
-from services.fusion.kalman.rigid_body import RestState, empty_rest, start_body
+from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
+from services.fusion.kalman.rest.rigid_body import RestState, empty_rest, start_body
 from services.fusion.kalman.smoother import smooth_all
 from services.fusion.kalman.track_history import empty_history, start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, insert
@@ -24,8 +25,9 @@ class OneTrack:
     SIGMA = 1e-4  # of each ray coordinate
 
     def __init__(self, densities: Sequence[float] = (40.0,), start_s: float = 0.0) -> None:
+        """densities: of the models' jerk; all slow down alike."""
         self.cameras = extrinsics(tuple(SyntheticRig().rig().values()))
-        self.densities = np.array(densities)
+        self.models = np.array([[density, 0.0, 1.0 / ACCELERATION_TIME_S] for density in densities])
         self.history = empty_history(1, len(densities))
         start_track(self.history, 0, start_s, self.START_M, np.array([0.02, 0.5, 5.0]))
 
@@ -37,12 +39,12 @@ class OneTrack:
     def add(self, time_s: float, camera: int, ray: Array, gate: float = np.inf) -> int:
         """What became of an observation."""
         observed = Observation(time_s, camera, ray, self.SIGMA**2, 0.0)
-        return int(insert(self.history, 0, observed, gate, self.cameras, self.densities))
+        return int(insert(self.history, 0, observed, gate, self.cameras, self.models))
 
     def at(self, time_s: float) -> tuple[Array, Array]:
         """Mean (6,) and covariance (6, 6) at an instant."""
         means, covs = np.zeros((1, 6)), np.zeros((1, 6, 6))
-        assert smooth_all(self.history, time_s, self.densities, means, covs)[0]
+        assert smooth_all(self.history, time_s, self.models, means, covs)[0]
         return means[0], covs[0]
 
     def newest(self) -> int:

@@ -18,11 +18,11 @@ from testing.synthetic_points import SyntheticRig
 
 PLACES = np.array([[0.0, 0.0, 0.6], [0.05, 0.02, 0.6], [0.02, -0.05, 0.6]])
 CAMERAS = extrinsics(tuple(SyntheticRig().rig().values()))
-DENSITIES = np.array([1.0, 100.0])
+MODELS = np.array([[0.1, 0.0, 3.0], [1000.0, 0.0, 3.0]])
 
 
 def update(state, frame, *, new=True):
-    return update_frame(state, frame, CAMERAS, DENSITIES, 30.0, new).tolist()
+    return update_frame(state, frame, CAMERAS, MODELS, 30.0, new).tolist()
 
 
 def test_every_observation_is_remembered_and_told_of():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.fusion.kalman.motion_model import transition, unit_process_noise
+from services.fusion.kalman.motion_model import discretize, empty_step
 
 
 def rts(track):
@@ -14,11 +14,10 @@ def rts(track):
     x, P, times = history.state[0, nodes, 0], history.cov[0, nodes, 0], history.time_s[0, nodes]
     xs, Ps = x.copy(), P.copy()
     for k in range(len(nodes) - 2, -1, -1):
-        dt, unit_Q = times[k + 1] - times[k], np.empty((3, 3))
-        f01, f02, f12, f22 = transition(dt)
-        F = np.kron(np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.eye(3))
-        unit_process_noise(dt, unit_Q)
-        prior = F @ P[k] @ F.T + track.densities[0] * np.kron(unit_Q, np.eye(3))
+        step = empty_step()
+        discretize(times[k + 1] - times[k], track.models[0], step)
+        F = np.kron(step.F, np.eye(3))
+        prior = F @ P[k] @ F.T + np.kron(step.Q, np.eye(3))
         C = P[k] @ F.T @ np.linalg.inv(prior)
         xs[k] = x[k] + C @ (xs[k + 1] - F @ x[k])
         Ps[k] = P[k] + C @ (Ps[k + 1] - prior) @ C.T

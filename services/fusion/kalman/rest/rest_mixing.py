@@ -12,8 +12,8 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools
-from services.fusion.kalman.rest_detection import FADE_S, FRESH_S, REACH_S, REST_THRESHOLD
-from services.fusion.kalman.rigid_body import RestState, place_in_body
+from services.fusion.kalman.rest.rest_detection import FADE_S, FRESH_S, REACH_S, REST_THRESHOLD
+from services.fusion.kalman.rest.rigid_body import RestState, place_in_body
 
 
 @njit(cache=True)

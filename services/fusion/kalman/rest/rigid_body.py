@@ -16,12 +16,19 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
-from services.fusion.kalman.motion_model import propagate_cov, transition, unit_process_noise
+from services.fusion.kalman.motion_model import (
+    ACCELERATION_TIME_S,
+    discretize,
+    empty_step,
+    propagate_cov,
+)
 
 # Jerk densities of a resting hand's translation (m^2/s^5) and rotation (rad^2/s^5): a sway of
 # millimetres and half a degree below 1 Hz. Still depth is up to 11 % worse with ten times as much,
 # and 30 % with a tenth.
 TRANSLATION_DENSITY, ROTATION_DENSITY = 0.003, 0.03
+# Its motion at a jerk density of 1.
+_UNIT_MODEL = np.array([1.0, 0.0, 1.0 / ACCELERATION_TIME_S])
 # Random walk of a marker in its hand (m^2/s): .3 mm within a second. Fingers that keep still to a
 # hundredth of a millimetre are known half again as well with 1e-9, but such that wander by a tenth
 # are then off by 1.25 of their sigmas, in a synthetic hand; so by .97.
@@ -151,18 +158,19 @@ def advance_body(rest: RestState, hand: int, time_s: float) -> None:
 @njit(cache=True)
 def _predict_body(motion: Array, cov: Array, dt_s: float) -> None:
     """Motion (3, 6) and its covariance (18, 18) dt_s later, in place: F x, F P F^T + Q."""
-    Q = np.empty((3, 3))
-    unit_process_noise(dt_s, Q)
+    step = empty_step()
+    discretize(dt_s, _UNIT_MODEL, step)
+    F, Q = step.F, step.Q
     predicted_cov = np.empty((18, 18))
-    propagate_cov(cov, 6, dt_s, predicted_cov)
+    propagate_cov(cov, 6, F, predicted_cov)
     for i in range(3):
         for j in range(3):
             for axis in range(6):
                 density = TRANSLATION_DENSITY if axis < 3 else ROTATION_DENSITY
                 predicted_cov[6 * i + axis, 6 * j + axis] += Q[i, j] * density
     cov[:] = predicted_cov
-    f01, f02, f12, f22 = transition(dt_s)
     for axis in range(6):
-        motion[0, axis] += f01 * motion[1, axis] + f02 * motion[2, axis]
-        motion[1, axis] += f12 * motion[2, axis]
-        motion[2, axis] *= f22
+        p, v, a = motion[0, axis], motion[1, axis], motion[2, axis]
+        motion[0, axis] = p + F[0, 1] * v + F[0, 2] * a
+        motion[1, axis] = F[1, 1] * v + F[1, 2] * a
+        motion[2, axis] = F[2, 1] * v + F[2, 2] * a

@@ -27,9 +27,9 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.frame_rays import FrameRays, Observation, observation
-from services.fusion.kalman.body_update import update_body
 from services.fusion.kalman.measurement import Measurement
-from services.fusion.kalman.rigid_body import RestState, advance_body, is_lost, start_body
+from services.fusion.kalman.rest.body_update import update_body
+from services.fusion.kalman.rest.rigid_body import RestState, advance_body, is_lost, start_body
 from services.fusion.kalman.track_history import TrackHistory, filtered, newest_node
 from services.fusion.kalman.track_insertion import ACCEPTED
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.fusion.kalman.motion_model import transition, unit_process_noise
-from services.fusion.kalman.rigid_body import (
+from services.fusion.kalman.motion_model import ACCELERATION_TIME_S, discretize, empty_step
+from services.fusion.kalman.rest.rigid_body import (
     ANCHOR_WALK,
     LOST_SIGMA,
     ROTATION_DENSITY,
@@ -41,12 +41,11 @@ def test_advancing_is_the_textbook_prediction(rest):
     place, J = np.empty(3), np.empty((3, 6))
     place_in_body(rest, 1, 0.02, place, J)
     anchors = rest.anchor.copy()
-    motion, cov, unit_Q = rest.motion[0].copy(), rest.cov[0].copy(), np.empty((3, 3))
+    motion, cov, step = rest.motion[0].copy(), rest.cov[0].copy(), empty_step()
     advance_body(rest, 0, 1.02)
-    f01, f02, f12, f22 = transition(0.02)
-    F = np.kron(np.array([[1.0, f01, f02], [0.0, 1.0, f12], [0.0, 0.0, f22]]), np.eye(6))
-    unit_process_noise(0.02, unit_Q)
-    Q = np.kron(unit_Q, np.diag([TRANSLATION_DENSITY] * 3 + [ROTATION_DENSITY] * 3))
+    discretize(0.02, np.array([1.0, 0.0, 1.0 / ACCELERATION_TIME_S]), step)
+    F = np.kron(step.F, np.eye(6))
+    Q = np.kron(step.Q, np.diag([TRANSLATION_DENSITY] * 3 + [ROTATION_DENSITY] * 3))
     np.testing.assert_allclose(rest.cov[0], F @ cov @ F.T + Q, rtol=1e-12, atol=1e-18)
     expected = (F @ motion.ravel()).reshape(3, 6)
     np.testing.assert_allclose(rest.anchor[1], anchors[1] + J @ expected[0], atol=1e-15)

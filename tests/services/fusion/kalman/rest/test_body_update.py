@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from services.fusion.geometry.projection import extrinsics
-from services.fusion.kalman.body_update import update_body
 from services.fusion.kalman.measurement import NOT_VISIBLE, Measurement
-from services.fusion.kalman.rigid_body import place_in_body
+from services.fusion.kalman.rest.body_update import update_body
+from services.fusion.kalman.rest.rigid_body import place_in_body
 from testing.synthetic_points import SyntheticRig
 
 R, t = extrinsics(tuple(SyntheticRig().rig().values()))

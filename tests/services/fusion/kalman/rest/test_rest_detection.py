@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rhot.files.rig_tables import Fusion
-from services.fusion.kalman.rest_detection import REST_THRESHOLD
+from services.fusion.kalman.rest.rest_detection import REST_THRESHOLD
 from testing.synthetic_points import COLORS, START_NS, MovingHand, RestingHand, SyntheticRig, frames
 
 RIG = SyntheticRig(clock_error_s=0.0, clock_sigma_s=2e-5, sigma_px=0.1)

@@ -17,7 +17,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import project
 from services.fusion.kalman.measurement import LOG_2PI, NOT_VISIBLE, Measurement
 from services.fusion.kalman.motion_model import Gaussian
-from services.fusion.kalman.rigid_body import RestState, place_in_body
+from services.fusion.kalman.rest.rigid_body import RestState, place_in_body
 
 
 @njit(cache=True)
