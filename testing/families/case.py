@@ -35,7 +35,8 @@ class Case:
 
     frames are in the order of their exposure. hands are what fusion and solver are *given*, usually
     the tables' hand at a guessed size, not the one that was painted. truth gives the middles of the
-    paint (n, L, 3) m in the rig frame at n instants, seconds of the master's clock since START_NS;
+    paint (n, L, 3) m in the rig frame at n instants, seconds of the master's clock since START_NS,
+    NaN where a recording has a gap;
     angles the joint angles (5, 4) rad, None where there is no skeleton. visible (f, L) is the share
     of each landmark's paint that the frame's camera sees.
     """
@@ -98,7 +99,7 @@ class Case:
         """The largest speed of any landmark."""
         times_s = np.arange(0.0, self.seconds, 5e-3)
         path = self.truth(times_s)
-        return float(np.linalg.norm(np.diff(path, axis=0), axis=2).max() / 5e-3)
+        return float(np.nanmax(np.linalg.norm(np.diff(path, axis=0), axis=2)) / 5e-3)
 
 
 @dataclass(frozen=True)

@@ -28,11 +28,10 @@ PICTURE_CODE = (
     "rhot/hand_tables.py",
     "rhot/messages",
     "services/simulator",
-    "testing/families",
+    *(f"testing/families/{name}.py" for name in ("motions", "people", "picture_motions")),
+    *(f"testing/families/{name}.py" for name in ("pictures", "recordings")),
 )
 MARKER_CODE = (*PICTURE_CODE, "services/pi_tracker")
-# These only say which cases there are, or what is made of them.
-_NO_MATTER = ("catalog.py", "point_catalog.py", "picture_catalog.py", "spline_bound.py")
 
 
 @cache
@@ -42,9 +41,8 @@ def code_digest(folders: tuple[str, ...]) -> str:
     for folder in folders:
         place = _ROOT / folder
         for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
-            if path.name not in _NO_MATTER:
-                digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0")
-                digest.update(path.read_bytes())
+            digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes())
     return digest.hexdigest()
 
 

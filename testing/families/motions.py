@@ -1,4 +1,4 @@
-"""Motions of six landmarks as functions of time: real ones, and sharp ones made up. Pure.
+"""Motions of six landmarks as functions of time: sharp ones made up. Pure.
 
 All are `Motion` of testing/synthetic_points.py: (n, 6, 3) m in the rig frame at times (n,) or, one
 for each landmark, (n, 6). Hands turn by 8 to 20 m/s^2 within a frame when they stop and go, flap
@@ -13,9 +13,7 @@ from scipy.interpolate import CubicSpline
 from rhot.geometry.transforms import Array
 from testing.synthetic_points import MovingHand
 
-# Middle of the cameras of SyntheticRig.
-_MIDDLE_X_M = 0.0375
-# Recordings that are shorter than a case go to and fro; they turn round within this time.
+# Motions are to and fro where a case is longer; they turn round within this time.
 _EASE_S = 0.06
 _STEP_S = 2e-3
 
@@ -51,12 +49,6 @@ def _eased(distance: Array) -> Array:
 def open_hand_m(distance_m: float) -> Array:
     """An open hand before the cameras; (6, 3)."""
     return MovingHand(distance_m=distance_m, speed_m_s=0.0)(np.zeros(1))[0]
-
-
-def placed(points_m: Array, distance_m: float) -> Array:
-    """Landmarks (n, 6, 3) moved as a whole, so that their middle is before the cameras."""
-    middle = points_m.reshape(-1, 3).mean(axis=0)
-    return points_m - middle + np.array([_MIDDLE_X_M, 0.0, distance_m])
 
 
 def stop_and_go_path(

@@ -112,6 +112,8 @@ _MOTION: dict[Half, _Recipes] = {
             moves=Moves("still", "stop_and_go", 10.0, seed=1), distance_m=0.6, seed=30
         ),
         "slow roll": Recipe(moves=Moves("piano", "roll", 25.0, hz=0.4), seed=43),
+        "leap grab": Recipe(recording="grab", tilt_deg=30.0, seed=47),
+        "leap wave": Recipe(recording="wave", tilt_deg=20.0, seed=48),
     },
     "held_out": {
         "stop and go 16 m/s2, fingers wander": Recipe(
@@ -119,6 +121,8 @@ _MOTION: dict[Half, _Recipes] = {
         ),
         "flapping .75 m/s": Recipe(moves=Moves("still", "flap", 50.0, hz=1.5, seed=11), seed=45),
         "roll and wait": Recipe(moves=Moves("wave", "roll", 40.0, hz=0.5, seed=12), seed=46),
+        "leap splay": Recipe(recording="HandSplay-110fps", tilt_deg=20.0, seed=49),
+        "leap pinch": Recipe(recording="pinch", tilt_deg=30.0, seed=50),
     },
 }
 _FAMILIES: dict[str, dict[Half, _Recipes]] = {

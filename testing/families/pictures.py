@@ -24,7 +24,11 @@ from services.pi_tracker.step import TrackerStep
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.camera.visibility import patch_visibility
 from services.simulator.files.fit_colors import fit_ranges, sample_pixels
+from services.simulator.hands.gestures import Motion
+from services.simulator.recorded_motion.before_cameras import RecordedGesture
+from services.simulator.recorded_motion.playback import Playback
 from services.simulator.render.renderer import Renderer
+from services.simulator.scene.actors import MIDDLE_M
 from services.simulator.scene.catalog import Light, SceneSpec
 from services.simulator.scene.paints import SKIN, Rgb
 from services.simulator.scene.scene import Scene, build_scene
@@ -32,6 +36,7 @@ from testing.families.case import Case
 from testing.families.marker_cache import MARKER_CODE, PICTURE_CODE, kept
 from testing.families.people import TABLES, PaintJob, Person
 from testing.families.picture_motions import Moves
+from testing.families.recordings import leap_hand
 from testing.synthetic_points import START_NS
 
 _RIG = Path(__file__).parents[2] / "config" / "sim.toml"
@@ -52,6 +57,8 @@ class Recipe:
     """
 
     moves: Moves = field(default_factory=Moves)
+    # A Leap recording: its hand and its motion, instead of `moves` and `person`.
+    recording: str = ""
     person: Person = TABLES
     paint: PaintJob = field(default_factory=PaintJob)
     light: Light = field(default_factory=Light)
@@ -70,7 +77,8 @@ class Recipe:
 
     def hand(self) -> HandModel:
         """The painted hand itself."""
-        return self.paint.on(self.person.model())
+        model = leap_hand(self.recording).model if self.recording else self.person.model()
+        return self.paint.on(model)
 
     def config(self) -> RigConfig:
         """The rig: sim.toml's cameras, a hand of the guessed size, nothing else."""
@@ -79,7 +87,9 @@ class Recipe:
         settings = msgspec.structs.replace(
             config.simulator, jpeg=self.jpeg, sharpen=self.sharpen, denoise=self.denoise
         )
-        return msgspec.structs.replace(config, hand={"right": table}, object=[], simulator=settings)
+        return msgspec.structs.replace(
+            config, hand={self.hand().hand: table}, object=[], simulator=settings
+        )
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; seed: of another one in the same light, 0: of this one."""
@@ -95,31 +105,36 @@ class Recipe:
             uneven=self.paint.uneven,
         )
         model, seed = self.hand(), seed or self.seed
-        scene = build_scene(self.config(), spec, "families", seed, models={"right": model})
-        hand = dataclasses.replace(
-            scene.hands["right"], motion=self.moves.motion(model, 2 * seed + 1)
-        )
-        return dataclasses.replace(scene, hands={"right": hand})
+        scene = build_scene(self.config(), spec, "families", seed, models={model.hand: model})
+        hand = dataclasses.replace(scene.hands[model.hand], motion=self._motion(model, seed))
+        return dataclasses.replace(scene, hands={model.hand: hand})
+
+    def _motion(self, model: HandModel, seed: int) -> Motion:
+        if not self.recording:
+            return self.moves.motion(model, 2 * seed + 1)
+        driven = leap_hand(self.recording)
+        playback = Playback(float(driven.times_s[-1]), to_and_fro=True)
+        return RecordedGesture(driven, playback, MIDDLE_M)
 
 
 def picture_case(name: str, recipe: Recipe) -> Case:
     """A case of pictures."""
-    scene = recipe.scene()
+    scene, hand = recipe.scene(), recipe.hand().hand
     frames = kept("markers", recipe, MARKER_CODE, lambda: detected(recipe, scene))
     shares = kept("visible", recipe, PICTURE_CODE, lambda: visible_shares(recipe, scene))
     clocks = scene.clocks
-    truth = _Truth(scene, recipe.hand(), tuple(scene.hands["right"].landmarks))
+    truth = _Truth(scene, recipe.hand(), tuple(scene.hands[hand].landmarks))
     return Case(
         name=name,
         config=scene.config,
         cameras=scene.cameras,
-        hands={"right": default_hand("right", recipe.given_scale)},
+        hands={hand: default_hand(hand, recipe.given_scale)},
         frames=frames,
         visible=np.array([shares[frame.camera][frame.seq] for frame in frames]),
         landmarks=truth.landmarks,
         truth=truth,
         seconds=recipe.seconds,
-        angles=lambda at_s: scene.hand_states(at_s)["right"].angles_rad,
+        angles=lambda at_s: scene.hand_states(at_s)[hand].angles_rad,
         clock_errors_s={name: 1e-9 * clock.residual_ns for name, clock in clocks.items()},
     )
 
@@ -137,8 +152,8 @@ class _Truth:
         flat = np.asarray(times_s, dtype=np.float64).tolist()
         for at_s in flat:
             if at_s not in self._known:
-                state = self.scene.hand_states(at_s)["right"]
-                joints = self.scene.hands["right"].joints(state)
+                state = self.scene.hand_states(at_s)[self.model.hand]
+                joints = self.scene.hands[self.model.hand].joints(state)
                 self._known[at_s] = np.array(
                     [landmark_point(self.model, name, *joints) for name in self.landmarks]
                 )
@@ -182,26 +197,27 @@ def fitted_colors(scene: Scene, camera: str) -> Colors:
     renderer = Renderer(scene, camera)
     by_surface, other = sample_pixels(renderer, _CALIBRATION_FRAMES)
     surfaces = renderer.shapes.paint_surfaces
-    markers = scene.hands["right"].landmarks
     painted = {
-        color: by_surface[surfaces["right", landmark]] for landmark, color in markers.items()
+        color: by_surface[surfaces[name, landmark]]
+        for name, hand in scene.hands.items()
+        for landmark, color in hand.landmarks.items()
     }
     return fit_ranges(painted, other, "", "testing/families")
 
 
 def visible_shares(recipe: Recipe, scene: Scene) -> dict[str, Array]:
     """Of each camera, the share of each landmark's paint that is visible in each frame; (f, L)."""
-    landmarks = tuple(scene.hands["right"].landmarks)
+    ((hand, painted),) = ((name, item.landmarks) for name, item in scene.hands.items())
     shares = {}
     for name in scene.cameras:
         source = FrameSource(scene, name, recorded=True)
         count = int(recipe.seconds * scene.config.camera_named(name).fps)
-        table = np.zeros((count, len(landmarks)))
+        table = np.zeros((count, len(painted)))
         rows = np.arange(0, count, _VISIBILITY_STEP)
         for seq in rows.tolist():
             patches = patch_visibility(source.renderer, source.frame_time(seq).time_s)
-            for column, landmark in enumerate(landmarks):
-                table[seq, column] = patches["right", landmark].share
+            for column, landmark in enumerate(painted):
+                table[seq, column] = patches[hand, landmark].share
         for seq in np.setdiff1d(np.arange(count), rows).tolist():
             table[seq] = np.minimum(table[seq - 1], table[min(seq + 1, rows[-1])])
         shares[name] = table

@@ -1,65 +1,61 @@
-"""Recorded hands of RHOT_DATA as motions of six landmarks.
+"""Recorded hands of $RHOT_DATA: as motions of six landmarks, and as hands with bones of their own.
 
-Leap: the wrist's marker lies 60 mm behind the palm's centre, against the palm's direction; the
-cameras look at the palm as the sensor did. Qualisys: the glove's marker on the back of the hand
-stands for the wrist's.
+Read by services/simulator/recorded_motion; shown to and fro where they are shorter than a case.
 """
 
 from __future__ import annotations
 
-import csv
-import gzip
 import os
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from rhot.geometry.transforms import Array
-from testing.families.motions import SampledMotion, placed
+from services.simulator.recorded_motion.before_cameras import RecordedMotion
+from services.simulator.recorded_motion.bones import DrivenHand
+from services.simulator.recorded_motion.playback import Playback
+from services.simulator.recorded_motion.recording import RecordedPoints
+from services.simulator.recorded_motion.scenes import load_motion
+from services.simulator.scene.actors import PalmView, Travel, place_hand
 
-_DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[3] / "shared" / "data"))
-_LEAP_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-_GLOVE = ("hand_top", "thumb_tip", "index_tip", "middle_tip", "ring_tip", "little_tip")
-# From the palm's centre to the wrist's marker.
-_WRIST_M = 0.06
-
-
-def _path(name: str) -> Path:
-    """A recording; raises SystemExit that says where recordings are looked for."""
-    path = _DATA / "hand_motion" / name
-    if not path.is_file():
-        raise SystemExit(f"no recording {path}; set RHOT_DATA to the folder of real recordings")
-    return path
+# Middle of the cameras of SyntheticRig.
+_MIDDLE_X_M = 0.0375
+# How the cameras see the palm on the average.
+_VIEW = PalmView(20.0, 0.0, 0.0)
 
 
-def leap_motion(name: str, distance_m: float = 0.5, stretch: float = 1.0) -> SampledMotion:
-    """A Leap recording; stretch 2 is half its speed."""
-    with _path(f"leap/{name}.csv").open() as file:
-        rows = list(csv.DictReader(file))
+def leap_hand(name: str) -> DrivenHand:
+    """The hand of a Leap recording, with the bones that the sensor found.
 
-    def vectors(of: str, scale: float) -> Array:
-        return scale * np.array([[float(row[f"{of}_{axis}"]) for axis in "xyz"] for row in rows])
-
-    times_s = 1e-6 * stretch * np.array([float(row["timestamp_us"]) for row in rows])
-    wrist = vectors("palm", 1e-3) - _WRIST_M * vectors("direction", 1.0)
-    points = np.stack([wrist, *(vectors(f"{f}_tip", 1e-3) for f in _LEAP_FINGERS)], axis=1)
-    # The sensor lies on the table, its y up and its z towards the user; cameras look along y.
-    points = np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=2)
-    fresh = np.concatenate([[True], np.diff(times_s) > 1e-4])
-    return SampledMotion(times_s[fresh], placed(points[fresh], distance_m))
+    Raises CaptureError if the recording is not there.
+    """
+    driven = _loaded(f"leap/{name}.csv")
+    assert isinstance(driven, DrivenHand)
+    return driven
 
 
-def glove_motion(first: int, last: int, distance_m: float = 0.5) -> SampledMotion:
-    """Frames first..last (100 a second) of the Qualisys recording; gaps are bridged."""
-    with gzip.open(_path("qualisys/recording.tsv.gz"), "rt") as file:
-        table = [line.rstrip("\n").split("\t") for line in file]
-    begin = next(k for k, row in enumerate(table) if row[0] == "Frame")
-    columns = [table[begin].index(f"{name} X") for name in _GLOVE]
-    rows = [row for row in table[begin + 1 :] if len(row) > max(columns) + 2][first:last]
-    points = 1e-3 * np.array(
-        [[[float(row[c + k] or "nan") for k in range(3)] for c in columns] for row in rows]
-    )
-    times_s = np.array([float(row[1]) for row in rows])
-    whole = (np.isfinite(points) & (points != 0.0)).all(axis=(1, 2))
-    points = points * np.array([1.0, -1.0, -1.0])
-    return SampledMotion(times_s[whole], placed(points[whole], distance_m))
+def leap_motion(name: str, distance_m: float = 0.5) -> RecordedMotion:
+    """Wrist and tips of a Leap recording before SyntheticRig's cameras."""
+    return _shown(leap_hand(name), distance_m)
+
+
+def glove_motion(first: int, last: int, distance_m: float = 0.5) -> RecordedMotion:
+    """Frames first..last (100 a second) of the Qualisys recording; NaN in its gaps."""
+    whole = _loaded("qualisys/recording.tsv.gz")
+    assert isinstance(whole, RecordedPoints)
+    times_s = whole.times_s[first:last]
+    part = RecordedPoints(whole.hand, times_s - times_s[0], whole.points_m[first:last])
+    return _shown(part, distance_m)
+
+
+@cache
+def _loaded(name: str) -> DrivenHand | RecordedPoints:
+    data = os.environ.get("RHOT_DATA", Path(__file__).parents[3] / "shared" / "data")
+    return load_motion(Path(data) / "hand_motion" / name)
+
+
+def _shown(recorded: DrivenHand | RecordedPoints, distance_m: float) -> RecordedMotion:
+    middle = np.array([_MIDDLE_X_M, 0.0, distance_m])
+    place = place_hand(np.eye(4), middle, _VIEW, Travel((0.0, 0.0, 0.0), 1.0))
+    playback = Playback(float(recorded.times_s[-1]), to_and_fro=True)
+    return RecordedMotion(recorded, playback, place.rotation, middle)
