@@ -40,6 +40,11 @@ class Capture:
     def objects(self) -> Path:
         return self.folder / "objects.jsonl"
 
+    @property
+    def markers(self) -> Path:
+        """Of a capture without pictures."""
+        return self.folder / "markers.jsonl"
+
     def video(self, camera: str) -> Path:
         return self.folder / f"{camera}.mkv"
 

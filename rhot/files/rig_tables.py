@@ -199,6 +199,11 @@ class HandTable(Table, frozen=True, kw_only=True):
 class Simulator(Table, frozen=True, kw_only=True):
     # What simulated cameras see; `rhot simulate --list` names the scenes.
     scene: str = "piano"
+    # Instead of a scene, a recorded hand that goes to and fro: a file as `rhot simulate --motion`
+    # takes it, with bones that fit; relative to this file. Empty: the scene.
+    motion: str = ""
+    # Of a recorded hand from the cameras.
+    motion_distance_m: Annotated[float, msgspec.Meta(ge=0.1, le=3.0)] = 0.5
     # Of noise, paint and the room: the same seed gives the same pictures.
     seed: Annotated[int, msgspec.Meta(ge=0)] = 1
     # Of the motion, against the hand's own.

@@ -24,7 +24,8 @@ from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.computer_clocks import ComputerClocks
-from services.simulator.scene.scene import Scene, load_scene
+from services.simulator.recorded_motion.scenes import live_scene
+from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
 # From the last row's exposure to the picture in memory: the image processor of a Raspberry Pi.
@@ -72,7 +73,7 @@ async def serve(service: Service) -> None:
     """Renders a virtual rig live: camera pictures, tracker poses and the ground truth."""
     cv2.setNumThreads(1)
     config = service.config
-    scene = load_scene(config)
+    scene = live_scene(config)
     names = [c.name for c in config.camera if c.source == "simulator"]
     with ThreadPoolExecutor(max(1, len(names)), "camera") as threads:
         sources = [

@@ -28,11 +28,22 @@ _CSV_SIGMA_NS, _UNKNOWN_SIGMA_NS = 500_000, -1
 
 @dataclass(frozen=True)
 class Job:
-    """All that one run reads; objects is the capture's objects.jsonl or None."""
+    """All that one run reads; objects is the capture's objects.jsonl or None.
+
+    markers is the markers.jsonl of a capture without pictures: there are no inputs then.
+    """
 
     config: RigConfig
     inputs: list[CameraInput]
     objects: Path | None
+    markers: Path | None = None
+
+    @property
+    def cameras(self) -> list[str]:
+        """Names of the cameras whose pictures or markers are read."""
+        if self.markers is not None:
+            return [camera.name for camera in self.config.camera]
+        return [one.camera for one in self.inputs]
 
 
 def job_of(sources: Sequence[str], config: Path | None, rates: Sequence[str] = ()) -> Job:
@@ -69,6 +80,9 @@ def _capture(capture: Capture, config: Path | None) -> Job:
             f"{config or capture.rig_toml}: has no [[camera]]; a capture's rig.toml names its "
             "cameras"
         )
+    objects = capture.objects if capture.objects.exists() else None
+    if capture.markers.is_file() and not any(capture.video(c.name).exists() for c in rig.camera):
+        return Job(rig, [], objects, capture.markers)
     inputs = [
         CameraInput(
             camera.name,
@@ -78,7 +92,7 @@ def _capture(capture: Capture, config: Path | None) -> Job:
         )
         for camera in rig.camera
     ]
-    return Job(rig, inputs, capture.objects if capture.objects.exists() else None)
+    return Job(rig, inputs, objects)
 
 
 def _videos(sources: Sequence[str], path: Path | None, rates: Sequence[str]) -> Job:

@@ -80,6 +80,10 @@ class Pipeline:
         markers = self._trackers[frame.camera].step(
             frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera]
         )
+        return self.fuse(markers)
+
+    def fuse(self, markers: MarkerFrame) -> Output:
+        """One frame of markers through fusion and solver."""
         points = self._fusion.step(markers) if self._fusion is not None else []
         return Output([markers], points, self._solve(points))
 

@@ -5,12 +5,14 @@ An error leaves no result, an interruption .partial files (results.py).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
-from rhot.errors import CalibrationError
+from rhot.errors import CalibrationError, CaptureError
 from rhot.files.calibration import load_colors, load_lens, load_objects
 from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
+from rhot.messages import MarkerFrame
 from rhot.messages.objects import ObjectPose, OpenVrPose
 from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
@@ -27,9 +29,8 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
 
     Raises RhotError if anything needed is missing, or if no frame could be read.
     """
-    names = [one.camera for one in job.inputs]
-    cameras, markers_only = geometry(job.config, names)
-    trackers = {name: tracker_step(job.config, name) for name in names}
+    cameras, markers_only = geometry(job.config, job.cameras)
+    trackers = {one.camera: tracker_step(job.config, one.camera) for one in job.inputs}
     clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
     with ResultWriter(out) as writer:
@@ -61,11 +62,10 @@ def _track_frames(
     progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """All frames through the pipeline into the result; the counts by camera."""
-    counters = {one.camera: CameraCounter() for one in job.inputs}
+    counters = {name: CameraCounter() for name in job.cameras}
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
     try:
-        for frame in merged([one.frames() for one in job.inputs]):
-            output = pipeline.step(frame)
+        for output in _outputs(job, pipeline):
             for markers in output.markers:
                 counters[markers.camera].add(markers)
             _write(writer, output, contacts)
@@ -74,6 +74,20 @@ def _track_frames(
     finally:
         shown.end()
     return counters
+
+
+def _outputs(job: Job, pipeline: Pipeline) -> Iterator[Output]:
+    """What each frame leads to: of pictures, or of markers that somebody found already."""
+    if job.markers is None:
+        yield from map(pipeline.step, merged([one.frames() for one in job.inputs]))
+        return
+    for number, frame in enumerate(read_lines(job.markers, MarkerFrame), start=1):
+        if frame.camera not in job.cameras:
+            raise CaptureError(
+                f"{job.markers}: line {number}: camera {frame.camera!r} is not in rig.toml; it has"
+                f" {', '.join(job.cameras)}"
+            )
+        yield pipeline.fuse(frame)
 
 
 def tracker_step(config: RigConfig, name: str) -> TrackerStep:

@@ -100,6 +100,19 @@ def _markers(
     ]
 
 
+def share_in_view(scene: PointScene, seconds: float) -> float:
+    """Share of the landmarks that the recording knows and all cameras have in their pictures."""
+    points = scene.motion(np.arange(0.0, seconds, 1.0 / 30.0)).reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    seen = np.ones(len(points), dtype=bool)
+    for camera in scene.cameras.values():
+        depth_m = (points - camera.centre_rig) @ camera.T_rig_from_camera[:3, 2]
+        last_px = np.array(camera.size_px) - 1
+        pixels = camera.project(points)
+        seen &= (depth_m > 0.0) & ((pixels >= 0.0) & (pixels <= last_px)).all(axis=1)
+    return float(seen.mean())
+
+
 def point_truth(scene: PointScene, seconds: float, start_ns: int) -> Iterator[HandPoints]:
     """The truth at each instant of the first camera: the landmarks that the recording knows."""
     clock = next(iter(scene.clocks.values()))

@@ -24,6 +24,7 @@ from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.mkv_ids import fix_identifiers, is_cut_off
 from services.simulator.files.rig_toml import rig_toml
 from services.simulator.hands.families import VARIED
+from services.simulator.recorded_motion.bones import RECORDED
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
 
@@ -45,9 +46,9 @@ def write_capture(
     """
     if not seconds > 0.0:
         raise CaptureError(f"cannot write a capture of {seconds} s; give a duration above 0")
-    capture = _make_folder(folder)
+    capture = make_folder(folder)
     try:
-        _copy_rig(scene.config, capture)
+        copy_rig(scene.config, capture)
         _save_hands(scene, capture)
         write_lines(capture.objects, _object_lines(scene, seconds))
         write_lines(capture.truth, _truth_lines(scene, seconds))
@@ -56,7 +57,8 @@ def write_capture(
         raise CaptureError(f"{folder}: cannot be written: {error}") from None
 
 
-def _make_folder(folder: Path) -> Capture:
+def make_folder(folder: Path) -> Capture:
+    """A new or empty folder for a capture. Raises CaptureError."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise CaptureError(
             f"{folder}: exists and is not an empty folder; name a new one or empty it"
@@ -68,7 +70,7 @@ def _make_folder(folder: Path) -> Capture:
     return Capture(folder)
 
 
-def _copy_rig(config: RigConfig, capture: Capture) -> None:
+def copy_rig(config: RigConfig, capture: Capture) -> None:
     """rig.toml with this folder as its source, and the calibration of its cameras, hands and
     objects.
     """
@@ -85,9 +87,11 @@ def _copy_rig(config: RigConfig, capture: Capture) -> None:
 
 
 def _save_hands(scene: Scene, capture: Capture) -> None:
-    """The hands of a family (hands/families.py), as if somebody had measured them."""
+    """The hands of a family (hands/families.py) or of a recording, as if somebody had measured
+    them.
+    """
     for name, hand in scene.hands.items():
-        if hand.model.origin == VARIED:
+        if hand.model.origin in (VARIED, RECORDED):
             save(capture.folder / "calibration" / f"hand.{name}.json", hand.model)
 
 

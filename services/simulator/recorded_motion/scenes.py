@@ -30,6 +30,7 @@ from services.simulator.scene.scene import (
     Scene,
     build_scene,
     hand_placement,
+    load_scene,
     rig_cameras,
     seed_of_hand,
 )
@@ -83,6 +84,25 @@ def recorded_scene(config: RigConfig, driven: DrivenHand, view: MotionView) -> S
     motion = RecordedGesture(driven, _playback(driven.times_s, view), MIDDLE_M)
     hand = replace(scene.hands[driven.hand], motion=motion)
     return replace(scene, hands={driven.hand: hand})
+
+
+def live_scene(config: RigConfig) -> Scene:
+    """What [simulator] of rig.toml asks for: a named scene, or a recorded hand.
+
+    Raises ConfigError for a recording that has nothing to render, CaptureError for none.
+    """
+    settings = config.simulator
+    if not settings.motion:
+        return load_scene(config)
+    path = Path(config.folder) / settings.motion
+    driven = load_motion(path)
+    if isinstance(driven, RecordedPoints):
+        raise ConfigError(
+            f"[simulator] motion = {settings.motion!r}: no bones fit that recording, so there is"
+            " nothing to render live; `rhot simulate --motion` writes its markers"
+        )
+    view = MotionView(None, settings.motion_distance_m, settings.speed, settings.seed)
+    return recorded_scene(config, driven, view)
 
 
 def point_scene(

@@ -15,6 +15,7 @@ from rhot.hand import BASIC_LANDMARKS
 from services.simulator.recorded_motion.bones import DrivenHand
 from services.simulator.recorded_motion.scenes import (
     MotionView,
+    live_scene,
     load_motion,
     point_scene,
     recorded_scene,
@@ -100,3 +101,25 @@ def test_a_left_hand_takes_over_the_paint(config: RigConfig, tmp_path: Path) -> 
     assert scene.hands["left"].landmarks == config.hand["right"].markers
     with pytest.raises(ConfigError, match="needs a hand"):
         recorded_scene(msgspec.structs.replace(config, hand={}), driven, MotionView())
+
+
+def test_a_live_scene_is_the_recording_that_rig_toml_names(
+    config: RigConfig, rhot_data: Path
+) -> None:
+    settings = msgspec.structs.replace(
+        config.simulator,
+        motion=str(rhot_data / "hand_motion/leap/wave.csv"),
+        motion_distance_m=0.4,
+    )
+    scene = live_scene(msgspec.structs.replace(config, simulator=settings))
+    assert scene.name == "recorded"
+    # It goes on for ever, and stays where it is.
+    points = _points(scene, np.arange(100.0, 102.0, 0.05))
+    assert points[..., 2].mean() == pytest.approx(0.4, abs=0.03)
+    assert np.ptp(points[:, 3, 0]) > 0.05
+    assert live_scene(config).name == config.simulator.scene
+    glove = msgspec.structs.replace(
+        settings, motion=str(rhot_data / "hand_motion/qualisys/recording.tsv.gz")
+    )
+    with pytest.raises(ConfigError, match="nothing to render live"):
+        live_scene(msgspec.structs.replace(config, simulator=glove))
