@@ -1,6 +1,7 @@
 """What every method of fusion offers: observations of one camera in, landmarks at an instant out.
 
-FusionStep owns one of the three (kalman, triangulate, disparity) and knows no more of it than this.
+FusionStep owns one of the four (kalman, joint, triangulate, disparity) and knows no more of it than
+this.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
@@ -25,6 +26,7 @@ from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSou
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder
+from services.fusion.joint.estimator import JointMethod
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
@@ -75,11 +77,7 @@ class FusionStep:
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         periods_s = 1.0 / self._fps
-        self.method: Method = (
-            KalmanMethod(list(self._rows.values()), self._cameras, periods_s, config.fusion)
-            if config.fusion.method == "kalman"
-            else PairedMethod(len(self._landmarks), self._cameras, periods_s, config.fusion)
-        )
+        self.method = self._method(config.fusion, periods_s)
         self.clocks = ClockOffsetEstimator(
             self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
         )
@@ -90,6 +88,15 @@ class FusionStep:
         self._schedule = OutputSchedule(self._fps, self._lag_frames)
         self._epoch_ns = 0
         self._seq = 0
+
+    def _method(self, settings: Fusion, periods_s: Array) -> Method:
+        """What rig.toml asks for; periods_s (C,): the cameras' frame times."""
+        hands = list(self._rows.values())
+        if settings.method == "kalman":
+            return KalmanMethod(hands, self._cameras, periods_s, settings)
+        if settings.method == "joint":
+            return JointMethod(hands, self._cameras, periods_s, settings)
+        return PairedMethod(len(self._landmarks), self._cameras, periods_s, settings)
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:

@@ -1,0 +1,264 @@
+"""A node filtered from the one before it: all models predicted, gated, updated and weighed.
+
+Multiple-model adaptive estimation as in kalman/multiple_models.py, but a model is one motion of the
+whole hand, and it is weighed by all landmarks of a frame. A model that has been improbable for long
+goes on from the likeliest one's estimate. Compiled; nothing here raises.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools, Ints
+from services.fusion.geometry.normal_equations import invert_symmetric
+from services.fusion.geometry.projection import Extrinsics
+from services.fusion.joint.history import HandHistory, make_room, nodes_until
+from services.fusion.joint.measurement import (
+    NOT_USED,
+    Innovation,
+    Look,
+    update,
+)
+from services.fusion.joint.motion_models import (
+    MotionModels,
+    add_noise,
+    centred,
+    predict_cov,
+    predict_state,
+    transition,
+    turn_gram,
+)
+
+# Share of probability that leaks to the other models at each frame.
+LEAK = 0.003
+# A model less probable than this for so many frames goes on from the likeliest model's estimate.
+BEHIND_BELOW, BEHIND_FRAMES = 0.02, 15
+# Log-likelihood of a look that a model does not use: one look in 300 is of something else, anywhere
+# in an image (rays x/z, y/z of about 1 by 1). So a model that explains five looks of a frame well
+# and calls the sixth a stray one competes with a livelier one that explains all six, less well.
+STRAY = math.log(0.003)
+# Sigmas of a new landmark's place about where its rays meet (m), of its speed (m/s) and of its
+# acceleration (m/s^2), of which little is known yet.
+START_SIGMAS = (0.3, 1.0, 10.0)
+
+
+@njit(cache=True)
+def filter_node(
+    history: HandHistory, index: int, cameras: Extrinsics, models: MotionModels, gate: float
+) -> None:
+    """All estimates after node `index` (1 or more) from the node before it."""
+    last = history.order[index - 1]
+    node = history.order[index]
+    dt_s = history.time_s[node] - history.time_s[last]
+    before = history.alive[last]
+    likeliest = int(np.argmax(history.probability[last]))
+    gram = np.empty((3 * before.shape[0], 3 * before.shape[0]))
+    turn_gram(history.state[last, likeliest], before, gram)
+    for m in range(models.rate.shape[0]):
+        parent = m
+        if history.behind[last, m] >= BEHIND_FRAMES:
+            parent = likeliest
+        history.parent[node, m] = parent
+        x, P = history.state[node, m], history.cov[node, m]
+        F = transition(models.rate[m], dt_s)
+        if parent != m and models.walk[m] > 0.0:
+            T = body_transform(history.state[last, parent], before)
+            predict_state(T @ history.state[last, parent], F, x)
+            predict_cov(T @ history.cov[last, parent] @ T.T, F, P)
+        else:
+            predict_state(history.state[last, parent], F, x)
+            predict_cov(history.cov[last, parent], F, P)
+        add_noise(models, m, dt_s, gram, before, P)
+    _begin(history, node, before)
+    log_likelihoods = np.zeros(models.rate.shape[0])
+    for m in range(models.rate.shape[0]):
+        log_likelihoods[m] = _update(history, node, m, cameras, gate)
+    _weigh(history, last, node, log_likelihoods)
+    _end(history, node)
+
+
+@njit(cache=True)
+def _begin(history: HandHistory, node: int, before: Bools) -> None:
+    """Landmarks that begin at a node: nothing of what they were is left in any model."""
+    axes = 3 * before.shape[0]
+    for k in range(before.shape[0]):
+        history.alive[node, k] = before[k] or history.begins[node, k]
+        if not history.begins[node, k]:
+            continue
+        for m in range(history.state.shape[1]):
+            x, P = history.state[node, m], history.cov[node, m]
+            for r in range(3):
+                for i in range(3):
+                    at = r * axes + 3 * k + i
+                    P[at] = 0.0
+                    P[:, at] = 0.0
+                    P[at, at] = START_SIGMAS[r] ** 2
+                    x[at] = history.motion[node, k, 3 * r + i]
+
+
+@njit(cache=True)
+def _end(history: HandHistory, node: int) -> None:
+    """Landmarks that end with a node: no model holds anything of them."""
+    count = history.alive.shape[1]
+    for k in range(count):
+        if history.ends[node, k]:
+            history.alive[node, k] = False
+            for m in range(history.state.shape[1]):
+                for r in range(3):
+                    for i in range(3):
+                        at = 3 * r * count + 3 * k + i
+                        history.cov[node, m, at] = 0.0
+                        history.cov[node, m, :, at] = 0.0
+
+
+@njit(cache=True)
+def look_of(history: HandHistory, node: int, k: int, cameras: Extrinsics) -> Look:
+    """The observation of landmark k in a node's frame."""
+    camera = history.camera[node]
+    return Look(
+        k,
+        history.delay_s[node, k],
+        history.ray[node, k],
+        history.ray_variance[node, k],
+        cameras.R[camera],
+        cameras.t[camera],
+    )
+
+
+@njit(cache=True)
+def innovation_of(history: HandHistory, node: int, m: int, k: int) -> Innovation:
+    """Model m's innovation by landmark k at a node; views, to read or to write."""
+    return Innovation(
+        history.H[node, m, k],
+        history.drift[node, m, k],
+        history.nu[node, m, k],
+        history.S_inverse[node, m, k],
+        history.K[node, m, k],
+    )
+
+
+@njit(cache=True)
+def _update(history: HandHistory, node: int, m: int, cameras: Extrinsics, gate: float) -> float:
+    """Update a model by the looks within its gate; the log-likelihood of all."""
+    x, P = history.state[node, m], history.cov[node, m]
+    clock = x.shape[0] - 1
+    P[clock, clock] = history.clock_variance[node]
+    total = 0.0
+    for k in range(history.looked.shape[1]):
+        history.used_by[node, m, k] = False
+        if history.looked[node, k] and history.alive[node, k]:
+            look = look_of(history, node, k, cameras)
+            log_likelihood = update(x, P, look, gate, innovation_of(history, node, m, k))
+            history.used_by[node, m, k] = log_likelihood > NOT_USED
+            total += max(log_likelihood, STRAY)
+    return total
+
+
+@njit(cache=True)
+def _weigh(history: HandHistory, last: int, node: int, log_likelihoods: Array) -> None:
+    """Bayes' rule over the models, by a frame's log-likelihoods (M,)."""
+    prior, posterior = history.probability[last], history.probability[node]
+    models = prior.shape[0]
+    best = log_likelihoods.max()
+    total = 0.0
+    for m in range(models):
+        leaked = (1.0 - LEAK) * prior[m] + LEAK / models
+        posterior[m] = leaked * math.exp(max(log_likelihoods[m] - best, -700.0))
+        total += posterior[m]
+    for m in range(models):
+        posterior[m] /= total
+        behind = history.behind[last, m] + 1 if history.parent[node, m] == m else 0
+        history.behind[node, m] = behind if posterior[m] < BEHIND_BELOW else 0
+    history.used[node] = history.used_by[node, int(np.argmax(posterior))]
+
+
+@njit(cache=True)
+def body_projection(x: Array, alive: Bools) -> Array:
+    """The projection (3 N, 3 N) of landmarks' velocities onto those of a rigid body."""
+    count = alive.shape[0]
+    number = np.count_nonzero(alive)
+    arms = centred(x, alive)  # (N, 3)
+    inertia = np.zeros((3, 3))
+    for n in range(count):
+        for i in range(3):
+            for j in range(3):
+                inertia[i, j] -= arms[n, i] * arms[n, j]
+            inertia[i, i] += arms[n, 0] ** 2 + arms[n, 1] ** 2 + arms[n, 2] ** 2
+    inverse = np.zeros((3, 3))
+    if number < 3 or not invert_symmetric(inertia, inverse):
+        inverse[:] = 0.0
+    projection = np.zeros((3 * count, 3 * count))
+    left = np.zeros((3, 3))
+    right = np.zeros((3, 3))
+    for n in range(count):
+        _cross_matrix(arms[n], left)
+        for k in range(count):
+            if alive[n] and alive[k]:
+                _cross_matrix(arms[k], right)
+                block = left @ inverse @ right.T
+                for i in range(3):
+                    block[i, i] += 1.0 / number
+                projection[3 * n : 3 * n + 3, 3 * k : 3 * k + 3] = block
+    return projection
+
+
+@njit(cache=True)
+def _cross_matrix(v: Array, out: Array) -> None:
+    """[v]x (3, 3): out @ w = v x w."""
+    out[0, 1], out[0, 2] = -v[2], v[1]
+    out[1, 0], out[1, 2] = v[2], -v[0]
+    out[2, 0], out[2, 1] = -v[1], v[0]
+
+
+@njit(cache=True)
+def body_transform(x: Array, alive: Bools) -> Array:
+    """T (D, D): T x is the state (D,) whose landmarks move as one rigid body."""
+    axes = 3 * alive.shape[0]
+    projection = body_projection(x, alive)
+    T = np.eye(x.shape[0])
+    T[axes : 2 * axes, axes : 2 * axes] = projection
+    T[2 * axes : 3 * axes, 2 * axes : 3 * axes] = projection
+    return T
+
+
+@njit(cache=True)
+def insert_frame(history: HandHistory, time_s: float, camera: int, clock_variance: float) -> int:
+    """Room for a frame where it belongs in time; its index, or -1 if it is too late.
+
+    Its looks are the caller's to write, and to filter (filter_from).
+    """
+    index = nodes_until(history, time_s)
+    if index == 0 or (index == 1 and history.size[0] == history.order.shape[0]):
+        return -1
+    index = make_room(history, index)
+    node = history.order[index]
+    history.time_s[node] = time_s
+    history.camera[node] = camera
+    history.clock_variance[node] = clock_variance
+    return index
+
+
+@njit(cache=True)
+def filter_from(
+    history: HandHistory, index: int, cameras: Extrinsics, models: MotionModels, gate: float
+) -> None:
+    """Filter a node and all later ones anew."""
+    for later in range(index, history.size[0]):
+        filter_node(history, later, cameras, models, gate)
+
+
+@njit(cache=True)
+def oldest_with(history: HandHistory, landmark: int, since_s: float) -> Ints:
+    """Indices of nodes, none the first, that show a landmark at since_s or later."""
+    found = np.zeros(history.size[0], dtype=np.int64)
+    count = 0
+    for index in range(1, history.size[0]):
+        node = history.order[index]
+        if history.looked[node, landmark] and history.time_s[node] >= since_s:
+            found[count] = index
+            count += 1
+    return found[:count]

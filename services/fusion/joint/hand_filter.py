@@ -1,0 +1,180 @@
+"""One hand's filter: frames in, landmarks begun, restarted and dropped; estimates out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools, Ints
+from services.fusion.geometry.projection import Extrinsics
+from services.fusion.joint.filtering import filter_from, insert_frame, oldest_with
+from services.fusion.joint.history import empty_history, start_history
+from services.fusion.joint.motion_models import MotionModels
+from services.fusion.joint.smoother import smooth_hand
+from services.fusion.joint.starting import Looks, fit_start
+from services.fusion.method import Counts
+
+MODELS = MotionModels(
+    rate=np.array([3.0, 6.0, 3.0, 12.0, 3.0, 3.0]),
+    shift=np.array([0.003, 3.0, 30.0, 30.0, 300.0, 3e4]),
+    turn=np.array([0.03, 30.0, 300.0, 300.0, 3000.0, 3e5]),
+    own=np.array([1e-9, 0.5, 1.0, 100.0, 20.0, 3e3]),
+    walk=np.array([1e-7, 0.0, 0.0, 0.0, 0.0, 0.0]),
+)
+# Innovations beyond this squared Mahalanobis distance (2 degrees of freedom) are taken for another
+# marker: chance exceeds 30 once in three million.
+GATE = 30.0
+# Looks of this long begin a landmark, or begin it again.
+START_WINDOW_S = 0.05
+RESTART_WINDOW_S = 0.1
+# Looks that miss a motion by more sigmas than this are of two things.
+START_RESIDUAL = 4.0
+# Looks that contradict a landmark within RESTART_WINDOW_S, after which it may begin again.
+CONTRADICTIONS = 2
+# So many landmarks, each seen by two cameras, tell where a hand is.
+BODY_MARKERS = 3
+
+
+class HandFilter:
+    """The landmarks (N,) of one hand, by their index in it."""
+
+    def __init__(
+        self,
+        landmarks: int,
+        cameras: Extrinsics,
+        hold_s: float,
+        max_distance_m: float,
+        counts: Counts,
+    ) -> None:
+        self._cameras = cameras
+        self._hold_s = hold_s
+        self._max_distance_m = max_distance_m
+        self._counts = counts
+        self._history = empty_history(landmarks, len(MODELS.rate))
+        shape = (landmarks, len(cameras.t))
+        self.accepted_s = np.full(shape, -np.inf)  # (N, C) last observation that was used
+        self.observed_s = np.full(shape, -np.inf)  # (N, C) last observation
+        self._begun_s = np.full(landmarks, -np.inf)
+
+    def observe(
+        self,
+        camera: int,
+        landmarks: Ints,
+        times_s: Array,
+        rays: Array,
+        variances: Array,
+        clock_variance: float,
+    ) -> None:
+        """Take in a frame's n looks: landmarks (n,), times (n,), rays (n, 2), variances (n,)."""
+        time_s = float(times_s.mean())
+        self.drop_lost(time_s)
+        history = self._history
+        if history.size[0] == 0:
+            start_history(history, time_s - 1e-6)
+        index = insert_frame(history, time_s, camera, clock_variance)
+        if index < 0:
+            self._counts.late += len(landmarks)
+            return
+        node = history.order[index]
+        history.looked[node] = False
+        history.looked[node, landmarks] = True
+        history.delay_s[node, landmarks] = times_s - time_s
+        history.ray[node, landmarks] = rays
+        history.ray_variance[node, landmarks] = variances
+        self._filter_from(index)
+        alive, used = history.alive[node, landmarks], history.used[node, landmarks]
+        self.observed_s[landmarks, camera] = np.maximum(self.observed_s[landmarks, camera], times_s)
+        self._counts.accepted += int(np.count_nonzero(used))
+        self._counts.gated += int(np.count_nonzero(alive & ~used))
+        self._note_used(landmarks[used], camera, times_s[used])
+        if not used.all():
+            for landmark in landmarks[~alive].tolist():
+                self._begin(landmark, time_s, START_WINDOW_S)
+            for landmark in landmarks[alive & ~used].tolist():
+                self._begin_again(landmark, time_s)
+
+    def _note_used(self, landmarks: Ints, camera: int, times_s: Array) -> None:
+        self.accepted_s[landmarks, camera] = np.maximum(self.accepted_s[landmarks, camera], times_s)
+
+    def _filter_from(self, index: int) -> None:
+        filter_from(self._history, index, self._cameras, MODELS, GATE)
+
+    def _looks(self, landmark: int, indices: Ints) -> Looks:
+        history = self._history
+        nodes = history.order[indices]
+        return Looks(
+            time_s=history.time_s[nodes] + history.delay_s[nodes, landmark],
+            camera=history.camera[nodes],
+            ray=history.ray[nodes, landmark],
+            variance=history.ray_variance[nodes, landmark],
+            clock_variance=history.clock_variance[nodes],
+        )
+
+    def _begin(self, landmark: int, now_s: float, window_s: float) -> bool:
+        """Begin a landmark with its looks of the last window_s, if two cameras' agree."""
+        history = self._history
+        indices = oldest_with(history, landmark, now_s - window_s)
+        looks = self._looks(landmark, indices)
+        if len(np.unique(looks.camera)) < 2:
+            return False
+        start = fit_start(looks, self._cameras, self._max_distance_m, np.zeros(3))
+        if start is None or start.residual > START_RESIDUAL:
+            self._counts.refused += 1
+            return False
+        index = int(indices[0])
+        node = history.order[index]
+        history.begins[node, landmark] = True
+        # From the first look's instant to its node's.
+        back_s = -history.delay_s[node, landmark]
+        motion = start.motion.copy()
+        motion[:3] += back_s * motion[3:6]
+        history.motion[node, landmark] = motion
+        for later in history.order[index : history.size[0]]:
+            history.ends[later, landmark] = False
+            if later != node:
+                history.begins[later, landmark] = False
+        self._filter_from(index)
+        for k in indices.tolist():
+            at = history.order[k]
+            if history.used[at, landmark]:
+                self._note_used(
+                    np.array([landmark]),
+                    int(history.camera[at]),
+                    history.time_s[at : at + 1] + history.delay_s[at, landmark],
+                )
+        self._counts.started += 1
+        self._begun_s[landmark] = now_s
+        return True
+
+    def _begin_again(self, landmark: int, now_s: float) -> None:
+        """Begin a landmark again that its latest looks contradict, if those agree."""
+        history = self._history
+        indices = oldest_with(history, landmark, now_s - RESTART_WINDOW_S)
+        nodes = history.order[indices]
+        if np.count_nonzero(~history.used[nodes, landmark]) >= CONTRADICTIONS:
+            self._begin(landmark, now_s, RESTART_WINDOW_S)
+
+    def drop_lost(self, now_s: float) -> None:
+        """End landmarks unseen for hold_s: by two cameras, or by one where two see their hand."""
+        history = self._history
+        if history.size[0] == 0:
+            return
+        newest = history.order[history.size[0] - 1]
+        seen_by = np.count_nonzero(self.accepted_s >= now_s - self._hold_s, axis=1)  # (N,)
+        least = 1 if np.count_nonzero(seen_by >= 2) >= BODY_MARKERS else 2
+        lost = history.alive[newest] & (seen_by < least)
+        if lost.any():
+            history.ends[newest] |= lost
+            self._counts.dropped += int(np.count_nonzero(lost))
+            if history.size[0] > 1:
+                self._filter_from(int(history.size[0]) - 1)
+            else:
+                history.alive[newest] &= ~lost
+
+    def estimate(self, time_s: float) -> tuple[Bools, Array, Array]:
+        """Which landmarks (N,) there are at an instant, places (N, 3), covs (N, 3, 3)."""
+        count = len(self._begun_s)
+        places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
+        if self._history.size[0] == 0:
+            return np.zeros(count, dtype=np.bool_), places, covs
+        return smooth_hand(self._history, MODELS, time_s, places, covs), places, covs

@@ -1,0 +1,83 @@
+"""A hand's landmarks begin, follow the others, begin again and end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from testing.synthetic_points import MovingHand
+
+
+def test_two_frames_begin_a_hand(one_hand):
+    hand = one_hand()
+    hand.run(range(2))
+    assert hand.counts.started == 6
+    hand.run(range(2, 12))
+    found, errors = hand.errors_m(10 / 60.0)
+    assert found.all()
+    assert np.linalg.norm(errors, axis=1).max() < 0.005
+
+
+def test_a_hand_begins_with_fewer_than_all(one_hand):
+    hand = one_hand()
+    for k in range(20):
+        hand.see(hand.frame(k), seen=(0, 2) if k < 10 else (0, 2, 3))
+    found, errors = hand.errors_m(18 / 60.0)
+    assert found.tolist() == [True, False, True, True, False, False]
+    assert np.linalg.norm(errors[found], axis=1).max() < 0.005
+
+
+def test_a_wild_look_moves_nothing(one_hand):
+    hand = one_hand()
+    hand.run(range(30))
+    camera, times_s, rays = hand.frame(30)
+    wild = rays.copy()
+    wild[2] += [0.02, 0.01]
+    hand.see((camera, times_s, wild))
+    assert hand.counts.gated == 1
+    _, errors = hand.errors_m(30 / 60.0)
+    assert np.linalg.norm(errors, axis=1).max() < 0.008
+    hand.run(range(31, 40))
+    assert hand.counts.started == 6
+
+
+def test_a_hand_elsewhere_is_found_again(one_hand):
+    hand = one_hand()
+    hand.run(range(30))
+    hand.path = MovingHand(distance_m=0.5, seed=9)
+    hand.run(range(30, 60))
+    found, errors = hand.errors_m(58 / 60.0)
+    assert found.all()
+    assert np.linalg.norm(errors, axis=1).max() < 0.005
+
+
+def test_a_landmark_that_nobody_sees_ends(one_hand):
+    hand = one_hand()
+    hand.run(range(20))
+    for k in range(20, 40):
+        hand.see(hand.frame(k), seen=(0, 1, 2, 3, 4))
+    found, _ = hand.errors_m(39 / 60.0)
+    assert found.tolist() == [True] * 5 + [False]
+    assert hand.counts.dropped == 1
+
+
+def test_a_landmark_that_one_camera_sees_stays_with_its_hand(one_hand):
+    """Test: the other camera does not see a tip for a third of a second.
+
+    Expected: it is told all the time, and not much farther off than its sigma.
+    """
+    hand = one_hand()
+    hand.run(range(30))
+    for k in range(30, 50):
+        hand.see(hand.frame(k), seen=range(6) if k % 2 else (0, 1, 3, 4, 5))
+        found, places, covs = hand.filter.estimate(k / 60.0)
+        error = places[2] - hand.path(np.array([k / 60.0]))[0, 2]
+        assert found[2]
+        assert error @ np.linalg.solve(covs[2], error) < 30.0
+    assert hand.counts.dropped == 0
+
+
+def test_a_hand_that_one_camera_sees_ends(one_hand):
+    hand = one_hand()
+    hand.run(range(30))
+    hand.run(range(30, 60, 2))
+    assert not hand.errors_m(58 / 60.0)[0].any()

@@ -1,0 +1,105 @@
+"""The update by one ray, and its adjoint, against dense algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.fusion.geometry.projection import extrinsics
+from services.fusion.joint.measurement import (
+    NOT_USED,
+    Innovation,
+    Look,
+    adjoint_update,
+    predict_ray,
+    update,
+)
+from testing.synthetic_points import SyntheticRig
+
+LANDMARK, SIZE, DELAY_S = 1, 28, 0.004
+
+
+@pytest.fixture
+def look() -> Look:
+    """Of the second of three landmarks."""
+    cameras = extrinsics(tuple(SyntheticRig(toe_in_rad=0.05).rig().values()))
+    return Look(LANDMARK, DELAY_S, np.array([0.11, 0.02]), 1e-8, cameras.R[1], cameras.t[1])
+
+
+@pytest.fixture
+def state() -> tuple[np.ndarray, np.ndarray]:
+    """Mean (28,) and covariance (28, 28) of three landmarks and the clock."""
+    random = np.random.default_rng(1)
+    x = random.normal(0.0, 0.1, SIZE)
+    x[[2, 5, 8]] += 0.7
+    x[27] = 1e-4
+    root = random.normal(0.0, 1e-3, (SIZE, SIZE))
+    return x, root @ root.T
+
+
+def empty() -> Innovation:
+    return Innovation(
+        np.zeros((2, 3)), np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.zeros((2, SIZE))
+    )
+
+
+def dense_jacobian(innovation: Innovation) -> np.ndarray:
+    """H (2, 28) of the ray by the whole state."""
+    H = np.zeros((2, SIZE))
+    for order, weight in enumerate((1.0, DELAY_S, 0.5 * DELAY_S**2)):
+        at = 9 * order + 3 * LANDMARK
+        H[:, at : at + 3] = weight * innovation.H
+    H[:, 27] = innovation.drift
+    return H
+
+
+def test_jacobian_by_finite_differences(look, state):
+    x, _ = state
+    innovation = empty()
+    assert predict_ray(x, look, innovation)
+    H = dense_jacobian(innovation)
+    x[27] = 0.0  # the drift itself depends on the velocity, by clock errors of .1 ms
+    for i in range(27):
+        step = np.zeros(SIZE)
+        step[i] = 1e-6
+        ahead, back = empty(), empty()
+        predict_ray(x + step, look, ahead)
+        predict_ray(x - step, look, back)
+        np.testing.assert_allclose((back.nu - ahead.nu) / 2e-6, H[:, i], atol=1e-6)
+
+
+def test_update_is_the_dense_one(look, state):
+    x, P = state
+    innovation = empty()
+    new_x, new_P = x.copy(), P.copy()
+    assert update(new_x, new_P, look, np.inf, innovation) > NOT_USED
+    H = dense_jacobian(innovation)
+    S = H @ P @ H.T + look.ray_variance * np.eye(2)
+    K = P @ H.T @ np.linalg.inv(S)
+    np.testing.assert_allclose(new_x, x + K @ innovation.nu, rtol=1e-9)
+    np.testing.assert_allclose(new_P, P - K @ S @ K.T, atol=1e-12)
+
+
+def test_what_is_beyond_the_gate_changes_nothing(look, state):
+    x, P = state
+    new_x, new_P = x.copy(), P.copy()
+    assert update(new_x, new_P, look, 1e-6, empty()) == NOT_USED
+    np.testing.assert_array_equal(new_x, x)
+    np.testing.assert_array_equal(new_P, P)
+
+
+def test_adjoint_is_the_dense_one(look, state):
+    x, P = state
+    innovation = empty()
+    update(x, P.copy(), look, np.inf, innovation)
+    H = dense_jacobian(innovation)
+    random = np.random.default_rng(2)
+    root = random.normal(size=(SIZE, SIZE))
+    adjoint, information = random.normal(size=SIZE), root @ root.T
+    left = np.eye(SIZE) - innovation.K.T @ H
+    expected = left.T @ adjoint - H.T @ innovation.S_inverse @ innovation.nu
+    expected_information = left.T @ information @ left + H.T @ innovation.S_inverse @ H
+    adjoint_update(adjoint, information, LANDMARK, DELAY_S, innovation)
+    scale = np.abs(expected_information).max()
+    np.testing.assert_allclose(adjoint, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+    np.testing.assert_allclose(information, expected_information, atol=1e-10 * scale)
