@@ -30,7 +30,7 @@ def initial_poses(problem: Problem, x: Array) -> Poses:
         trial = np.where(bent[problem.segment_of], guess, 0.0)
         angles = problem.angles(measures, Poses(R, t, trial, problem.expected))
         landmarks = landmarks_of(parameters, measures, angles, parameters.table.side)
-        trial_R, trial_t, cost = _align(landmarks.points, problem.points, seen)
+        trial_R, trial_t, cost = align(landmarks.points, problem.points, seen)
         better = cost < best
         R = np.where(better[:, None, None], trial_R, R)
         t = np.where(better[:, None], trial_t, t)
@@ -53,9 +53,7 @@ def _exercised_flexions(problem: Problem) -> npt.NDArray[np.bool_]:
     )
 
 
-def _align(
-    model: Array, measured: Array, seen: npt.NDArray[np.bool_]
-) -> tuple[Array, Array, Array]:
+def align(model: Array, measured: Array, seen: npt.NDArray[np.bool_]) -> tuple[Array, Array, Array]:
     """Rotations (n, 3, 3) and translations (n, 3) of model points (n, m, 3) onto measured ones, and
     the mean squares that remain (n,).
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS, TIPS, HandModel
-from services.calibrator.hand.adjust import Adjustment
 from services.calibrator.hand.hand_parameters import (
     BASE_ROWS,
     METACARPAL_ROWS,
@@ -54,14 +53,17 @@ class _Estimate(NamedTuple):
 
 
 def estimated_lengths(
-    parameters: HandParameters, found: Adjustment, table: HandModel
+    parameters: HandParameters, x: Array, covariance: Array, table: HandModel
 ) -> list[Length]:
-    """Metacarpal, bones and reach of every digit, compared with the hand table."""
-    model = parameters.model(found.x)
-    G = parameters.geometry(found.x).G
+    """Metacarpal, bones and reach of every digit of the hand x (p,), compared with the hand table.
+
+    covariance (p, p) of x.
+    """
+    model = parameters.model(x)
+    G = parameters.geometry(x).G
     # The size is known from the open hand at once; what is asked here is what the exercises add.
     G_of_known_size = np.delete(G, SIZE, axis=1)
-    posterior = G @ found.covariance @ G.T
+    posterior = G @ covariance @ G.T
     prior = G_of_known_size @ G_of_known_size.T
     return [
         _length(estimate, prior, posterior)

@@ -48,7 +48,9 @@ class _Linearised(NamedTuple):
 def normal_equations(problem: Problem, x: Array, poses: Poses) -> NormalEquations:
     """Linearise everything at the hand x (p,) and the poses."""
     linear = _linearise(problem, x, poses)
-    weights, distances, data_cost = _robust_weights(problem, linear.error, poses.rotations)
+    R = poses.rotations
+    turned = np.einsum("nji,nmj,njk->nmik", R, problem.weights, R)
+    weights, distances, data_costs = robust_weights(turned, linear.error)
     weighted_error = np.einsum("nmij,nmj->nmi", weights, linear.error)
     by_frame, by_constant = linear.by_frame, linear.by_constant
     W_frame, W_constant, W_hand = (
@@ -75,7 +77,7 @@ def normal_equations(problem: Problem, x: Array, poses: Poses) -> NormalEquation
     g_constant = problem.sum_by_segment(np.einsum("nmia,nmi->na", by_constant, weighted_error))
 
     return NormalEquations(
-        cost=float(data_cost + prior_cost + (poses.varying * varying_pull).sum() + x @ x),
+        cost=float(data_costs.sum() + prior_cost + (poses.varying * varying_pull).sum() + x @ x),
         H_frame=H_frame,
         H_frame_constant=np.einsum("nmia,nmib->nab", by_frame, W_constant),
         H_frame_hand=np.einsum("nmia,nmib->nab", by_frame, W_hand),
@@ -107,13 +109,13 @@ def _linearise(problem: Problem, x: Array, poses: Poses) -> _Linearised:
     return _Linearised(error, by_frame, by_constant, by_hand)
 
 
-def _robust_weights(problem: Problem, error: Array, R: Array) -> tuple[Array, Array, float]:
-    """Weights (n, m, 3, 3) in the wrist frame with Huber's factor, whitened distances (n, m), the
-    sum of Huber's costs.
+def robust_weights(weights: Array, error: Array) -> tuple[Array, Array, Array]:
+    """Weights (n, m, 3, 3) with Huber's factor, whitened distances (n, m) and Huber's costs (n, m).
+
+    weights are information matrices in the frame of error (n, m, 3).
     """
-    weights = np.einsum("nji,nmj,njk->nmik", R, problem.weights, R)
     square = np.maximum(np.einsum("nmi,nmij,nmj->nm", error, weights, error), 0.0)
     distance = np.sqrt(square)
     factor = np.where(distance <= _HUBER, 1.0, _HUBER / np.maximum(distance, _HUBER))
-    cost = float(np.where(distance <= _HUBER, square, _HUBER * (2.0 * distance - _HUBER)).sum())
-    return weights * factor[:, :, None, None], distance, cost
+    costs = np.where(distance <= _HUBER, square, _HUBER * (2.0 * distance - _HUBER))
+    return weights * factor[:, :, None, None], distance, costs

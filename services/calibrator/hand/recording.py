@@ -51,9 +51,14 @@ def sort_exercises(
     Raises CalibrationError if wrist and finger tips were never measured together or no beginning
     fits.
     """
-    names = _measured_names(messages, model)
+    names = measured_names(messages, model)
     points, sigmas = _arrays(messages, names)
     times = np.array([(message.stamp_ns - messages[0].stamp_ns) * 1e-9 for message in messages])
+    if times[-1] < CYCLE_S - EXERCISE_S:
+        raise CalibrationError(
+            f"the exercises take {CYCLE_S:.0f} s, the recording lasts {times[-1]:.0f} s: follow "
+            "them to the end, or use `rhot calibrate hand --free`, which needs no exercises"
+        )
     if start_s is None:
         start_s = find_start(times, points, names)
     phase = (times - start_s) % CYCLE_S
@@ -72,7 +77,7 @@ def sort_exercises(
     )
 
 
-def _measured_names(messages: Sequence[HandPoints], model: HandModel) -> tuple[str, ...]:
+def measured_names(messages: Sequence[HandPoints], model: HandModel) -> tuple[str, ...]:
     """The basic landmarks, and what else was measured and has paint in the model."""
     measured = {
         point.name for message in messages for point in message.points if point.source == "measured"

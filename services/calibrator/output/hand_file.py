@@ -5,8 +5,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from rhot.hand import Digit, HandModel
+from rhot.hand import DIGITS, Digit, HandModel
 from services.calibrator.hand.adjust import Adjustment
+from services.calibrator.hand.free_motion.estimate import Estimate
+from services.calibrator.hand.free_motion.frames import Seen
 from services.calibrator.hand.lengths import Length, estimated_lengths
 from services.calibrator.hand.problem import Problem
 
@@ -26,6 +28,12 @@ class HandFile(HandModel, frozen=True, kw_only=True):
     # Largest angles the exercises showed, deg: of each finger at the knuckle and at its middle
     # joint.
     reached_deg: dict[str, float] = msgspec.field(default_factory=dict)
+    # Of free motion: size against the average adult's, how well each knuckle is known, for how long
+    # the hand was seen, and fingers that were not bent.
+    size: float = 0.0
+    knuckle_sigma_m: dict[str, float] = msgspec.field(default_factory=dict)
+    seconds: float = 0.0
+    not_bent: list[str] = msgspec.field(default_factory=list)
 
 
 def hand_file(
@@ -50,8 +58,32 @@ def hand_file(
             "inputs": inputs,
             "frames": len(distances),
             "residual_m": round(residual_m, 6),
-            "lengths": estimated_lengths(parameters, found, table),
+            "lengths": estimated_lengths(parameters, found.x, found.covariance, table),
             "reached_deg": reached,
+        }
+    )
+
+
+def free_hand_file(
+    found: Estimate, seen: Seen, table: HandModel, *, date: str, inputs: str
+) -> HandFile:
+    """The same of free motion, which has no exercises."""
+    model = found.model
+    sigmas = zip(DIGITS[1:], found.knuckle_sigmas_m().tolist(), strict=True)
+    return HandFile(
+        **{name: getattr(model, name) for name in model.__struct_fields__}
+        | {
+            "origin": "measured",
+            "date": date,
+            "tool": "rhot calibrate hand",
+            "inputs": inputs,
+            "frames": len(seen.frames.points),
+            "residual_m": round(found.residual_m, 6),
+            "lengths": estimated_lengths(found.parameters, found.x, found.covariance, table),
+            "size": round(found.size, 4),
+            "knuckle_sigma_m": {digit: round(sigma, 6) for digit, sigma in sigmas},
+            "seconds": round(seen.seconds, 1),
+            "not_bent": list(seen.not_bent),
         }
     )
 

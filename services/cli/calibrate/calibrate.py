@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from services.cli.calibrate.camera import camera, colors
 from services.cli.calibrate.depth import depth
-from services.cli.calibrate.hand import hand
+from services.cli.calibrate.hand.command import hand
 from services.cli.calibrate.lens import lens
 from services.cli.calibrate.objects.command import objects
 from services.cli.calibrate.refine import refine

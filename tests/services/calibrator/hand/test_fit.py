@@ -159,7 +159,7 @@ def test_refusals_say_why(other_hand, guided_messages) -> None:
         sort_exercises(guided_messages(truth, still=True), table)
     with pytest.raises(CalibrationError, match="the little tip did not move"):
         fit_hand(sort_exercises(guided_messages(truth, still=True), table, start_s=0.0), table)
-    with pytest.raises(CalibrationError, match="fist: nothing was recorded"):
+    with pytest.raises(CalibrationError, match="take 48 s, the recording lasts 20 s"):
         fit_hand(sort_exercises(messages[:300], table, start_s=0.0), table)
     blind = [
         msgspec.structs.replace(m, points=[p for p in m.points if p.name != "ring_tip"])

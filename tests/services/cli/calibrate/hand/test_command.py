@@ -14,7 +14,8 @@ from rhot.files.config import RigConfig
 from rhot.hand_exercises import EXERCISES
 from rhot.messages import HandPoints
 from services.cli.calibrate.calibrate import calibrate
-from services.cli.calibrate.hand import lengths_of, recorded
+from services.cli.calibrate.hand.command import lengths_of
+from services.cli.calibrate.hand.recorded import recorded
 from services.recorder.recorder import Recorder
 
 
