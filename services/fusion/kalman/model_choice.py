@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
@@ -26,7 +27,9 @@ LEAK = 0.003
 PASSED_OVER = 0.0
 # Passing over what the likeliest model took counts STRIKE, taking an observation takes one back; at
 # OUT a model is out: twice running, or three times every other one. Once may be due to another
-# thing; a model that is off in depth fits one camera always and the other never.
+# thing; a model that is off in depth fits one camera always and the other never. Going on from the
+# likeliest wherever that is the likelier way to be in a model now (Viterbi's) instead: maxima at
+# lag 2 of the glove 40 for 24 mm, errors of taps 15 % larger; no difference elsewhere.
 STRIKE, OUT = 2, 4
 
 
@@ -54,8 +57,16 @@ def count_strikes(before: Ints, took: Bools, likeliest: int, after: Ints) -> Non
     before, after: the counts at the last observation and at this one, which those models took (M,).
     """
     for m in range(took.shape[0]):
-        after[m] = before[m]
+        after[m] = 0 if before[m] >= OUT else before[m]
         if took[m]:
-            after[m] = max(0, before[m] - 1)
+            after[m] = max(0, after[m] - 1)
         elif took[likeliest]:
-            after[m] = before[m] + STRIKE
+            after[m] += STRIKE
+
+
+@njit(cache=True)
+def choose_parents(probability: Array, strikes: Ints, parent: Ints) -> None:
+    """From which model's estimate each model (M,) goes on: its own, or the likeliest's if out."""
+    likeliest = int(np.argmax(probability))
+    for m in range(probability.shape[0]):
+        parent[m] = likeliest if strikes[m] >= OUT else m

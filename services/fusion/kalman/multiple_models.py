@@ -23,8 +23,8 @@ from services.fusion.kalman.measurement import (
     update,
 )
 from services.fusion.kalman.model_choice import (
-    OUT,
     PASSED_OVER,
+    choose_parents,
     count_strikes,
     update_probabilities,
 )
@@ -70,15 +70,17 @@ def filter_node(
         history.clock_variance[landmark, node],
     )
     dt_s = history.time_s[landmark, node] - history.time_s[landmark, last]
+    prior = history.probability[landmark, last]
+    parent = history.parent[landmark, node]
+    choose_parents(prior, history.strikes[landmark, last], parent)
     step = empty_step()
     log_likelihoods = np.empty(models.shape[0])
     took = np.zeros(models.shape[0], dtype=np.bool_)
     for m in range(models.shape[0]):
         state = filtered(history, landmark, node, m)
         innovation = innovation_of(history, landmark, node, m)
-        history.model[landmark, node, m] = models[m]
         discretize(dt_s, models[m], step)
-        predict(filtered(history, landmark, last, m), step, state)
+        predict(filtered(history, landmark, last, parent[m]), step, state)
         log_likelihoods[m] = innovate(state, measured, innovation)
         if log_likelihoods[m] == NOT_VISIBLE:
             _pass_over(innovation)
@@ -89,15 +91,10 @@ def filter_node(
             update(state, innovation)
             took[m] = True
     posterior = history.probability[landmark, node]
-    log_likelihood = update_probabilities(
-        history.probability[landmark, last], log_likelihoods, posterior
-    )
+    log_likelihood = update_probabilities(prior, log_likelihoods, posterior)
     likeliest = int(np.argmax(posterior))
     strikes = history.strikes[landmark, node]
     count_strikes(history.strikes[landmark, last], took, likeliest, strikes)
-    for m in range(models.shape[0]):
-        if strikes[m] >= OUT:
-            _go_on_from(history, landmark, index, likeliest, m)
     visible = log_likelihoods.max() > NOT_VISIBLE
     return Fit(visible, bool(took.any()), bool(took[likeliest]), log_likelihood)
 
@@ -109,23 +106,3 @@ def _pass_over(innovation: Innovation) -> None:
     innovation.nu[:] = 0.0
     innovation.S_inverse[:] = 0.0
     innovation.K[:] = 0.0
-
-
-@njit(cache=True)
-def _go_on_from(
-    history: TrackHistory, landmark: int, index: int, likeliest: int, model: int
-) -> None:
-    """A model takes over the likeliest one's estimates, with all their past up to node `index`.
-
-    The past too, as the smoother goes back along it: with the steps that led there.
-    """
-    history.strikes[landmark, history.order[landmark, index], model] = 0
-    for k in range(index + 1):
-        node = history.order[landmark, k]
-        history.model[landmark, node, model] = history.model[landmark, node, likeliest]
-        history.state[landmark, node, model] = history.state[landmark, node, likeliest]
-        history.cov[landmark, node, model] = history.cov[landmark, node, likeliest]
-        history.H[landmark, node, model] = history.H[landmark, node, likeliest]
-        history.nu[landmark, node, model] = history.nu[landmark, node, likeliest]
-        history.S_inverse[landmark, node, model] = history.S_inverse[landmark, node, likeliest]
-        history.K[landmark, node, model] = history.K[landmark, node, likeliest]

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.arrays import Bools
+from services.fusion.arrays import Bools, Ints
 from services.fusion.kalman.measurement import Innovation
 from services.fusion.kalman.motion_model import (
     Gaussian,
@@ -49,15 +49,14 @@ def smooth_landmark(
     step = empty_step()
     means = np.empty((models.shape[0], 9))
     covs = np.empty((models.shape[0], 9, 9))
+    path = np.empty(history.size[landmark], dtype=np.int64)
     for m in range(models.shape[0]):
+        before = _follow(history, landmark, index, m, path)
         state = Gaussian(means[m], covs[m])
-        model = models[m]
-        if index < history.size[landmark]:
-            model = history.model[landmark, history.order[landmark, index], m]
-        discretize(dt_s, model, step)
-        predict(filtered(history, landmark, last, m), step, state)
-        if index < history.size[landmark]:
-            _smooth(history, landmark, index, m, time_s, state)
+        discretize(dt_s, models[path[index] if index < path.shape[0] else m], step)
+        predict(filtered(history, landmark, last, before), step, state)
+        if index < path.shape[0]:
+            _smooth(history, landmark, index, path, models, time_s, state)
     _mix(probability, means, covs, out)
     return True
 
@@ -91,20 +90,38 @@ def _mix(probability: Array, means: Array, covs: Array, out: Gaussian) -> None:
 
 
 @njit(cache=True)
+def _follow(history: TrackHistory, landmark: int, index: int, m: int, path: Ints) -> int:
+    """Which models' estimates led to model m's newest, at the nodes from `index` on; to path.
+
+    Returns that of the node before.
+    """
+    for k in range(path.shape[0] - 1, index - 1, -1):
+        path[k] = m
+        m = history.parent[landmark, history.order[landmark, k], m]
+    return m
+
+
+@njit(cache=True)
 def _smooth(
-    history: TrackHistory, landmark: int, index: int, m: int, time_s: float, state: Gaussian
+    history: TrackHistory,
+    landmark: int,
+    index: int,
+    path: Ints,
+    models: Array,
+    time_s: float,
+    state: Gaussian,
 ) -> None:
-    """Smooth model m's prediction to time_s by the nodes from `index` on, all later; in place."""
+    """Smooth a prediction to time_s by the nodes from `index` on, all later, of path; in place."""
     adjoint = np.zeros(9)
     information = np.zeros((9, 9))
     F = np.empty((3, 3))
-    for k in range(history.size[landmark] - 1, index - 1, -1):
+    for k in range(path.shape[0] - 1, index - 1, -1):
         node = history.order[landmark, k]
         before_s = time_s
         if k > index:
             before_s = history.time_s[landmark, history.order[landmark, k - 1]]
-        adjoint_update(adjoint, information, innovation_of(history, landmark, node, m))
-        model = history.model[landmark, node, m]
+        adjoint_update(adjoint, information, innovation_of(history, landmark, node, path[k]))
+        model = models[path[k]]
         transition(history.time_s[landmark, node] - before_s, model[1], model[2], F)
         adjoint_predict(adjoint, information, F)
     _apply_adjoint(adjoint, information, state)

@@ -39,7 +39,7 @@ class TrackHistory(NamedTuple):
     clock_variance: Array  # (L, NODES) of the camera's clock, s^2
     probability: Array  # (L, NODES, M) of each model
     strikes: Ints  # (L, NODES, M) model_choice.count_strikes
-    model: Array  # (L, NODES, M, 3) motion model of the step to a node
+    parent: Ints  # (L, NODES, M) from which model's estimate at the node before each one goes on
     state: Array  # (L, NODES, M, 9) filtered
     cov: Array  # (L, NODES, M, 9, 9)
     H: Array  # (L, NODES, M, 2, 3) and what follows: measurement.Innovation
@@ -61,8 +61,8 @@ def empty_history(landmarks: int, models: int) -> TrackHistory:
         ray_variance=np.zeros(nodes),
         clock_variance=np.zeros(nodes),
         probability=np.zeros((*nodes, models)),
-        model=np.zeros((*nodes, models, 3)),
         strikes=np.zeros((*nodes, models), dtype=np.int64),
+        parent=np.zeros((*nodes, models), dtype=np.int64),
         state=np.zeros((*nodes, models, 9)),
         cov=np.zeros((*nodes, models, 9, 9)),
         H=np.zeros((*nodes, models, 2, 3)),

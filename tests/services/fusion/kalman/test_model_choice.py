@@ -8,6 +8,7 @@ import pytest
 from services.fusion.kalman.model_choice import (
     LEAK,
     OUT,
+    choose_parents,
     count_strikes,
     update_probabilities,
 )
@@ -41,6 +42,15 @@ def test_what_nobody_likely_takes_is_no_strike():
     after = np.empty(2, dtype=np.int64)
     count_strikes(np.array([2, 1]), np.array([False, False]), 0, after)
     assert after.tolist() == [2, 1]
+
+
+def test_who_is_out_goes_on_from_the_likeliest_and_begins_anew():
+    parent, after = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    strikes = np.array([OUT, 0, OUT - 1])
+    choose_parents(np.array([0.1, 0.2, 0.7]), strikes, parent)
+    assert parent.tolist() == [2, 1, 2]
+    count_strikes(strikes, np.array([True, True, True]), 2, after)
+    assert after.tolist() == [0, 0, OUT - 2]
 
 
 def still_track(one_track):
