@@ -38,6 +38,9 @@ class InterpolatedRay:
     ray: Array  # (2,)
     sigma: float  # of each coordinate
     samples: int  # from how many it is interpolated
+    bend: (
+        Array  # (2,) by how much the parabolas through the first and the last three of four differ
+    )
 
 
 def polynomial_weights(times_s: Array, at_s: float) -> Array:
@@ -54,6 +57,18 @@ def polynomial_weights(times_s: Array, at_s: float) -> Array:
             if i != j:
                 weights[i] *= (at_s - times_s[j]) / (times_s[i] - times_s[j])
     return weights
+
+
+def parabolas_apart(times_s: Array, rays: Array, at_s: float) -> Array:
+    """The parabola through the last three of four rays (4, 2) less that through the first three.
+
+    At at_s: (2,), from the third divided difference. Nothing on samples and on parabolas; the
+    cubic lies between the two, and what it misses where an acceleration jumps is a share of it.
+    """
+    apart = times_s[:, None] - times_s[None, :] + np.eye(4)  # (4, 4)
+    third = (1.0 / np.prod(apart, axis=1)) @ rays  # (2,)
+    span = (at_s - times_s[1]) * (at_s - times_s[2]) * (times_s[3] - times_s[0])
+    return np.asarray(span * third)
 
 
 class RayTrack:
@@ -106,11 +121,13 @@ class RayTrack:
             return None
         if pairing == "hermite":
             around = [k for k in range(after - 2, after + 2) if 0 <= k < len(self._times)]
-        weights = polynomial_weights(np.array([self._times[k] for k in around]), time_s)
+        times_s = np.array([self._times[k] for k in around])
+        weights = polynomial_weights(times_s, time_s)
         rays = np.array([self._rays[k] for k in around])
         sigmas = np.array([self._sigmas[k] for k in around])
         sigma = float(np.sqrt(np.sum((weights * sigmas) ** 2)))
-        return InterpolatedRay(weights @ rays, sigma, len(around))
+        bend = parabolas_apart(times_s, rays, time_s) if len(around) == 4 else np.zeros(2)
+        return InterpolatedRay(weights @ rays, sigma, len(around), bend)
 
     def _nearest(self, around: list[int], time_s: float, period_s: float) -> InterpolatedRay | None:
         """The nearest of the samples `around` an instant, as it is.
@@ -127,5 +144,5 @@ class RayTrack:
         if elapsed_s > 0.0:
             speed = float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s
         return InterpolatedRay(
-            self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), samples=1
+            self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), 1, np.zeros(2)
         )

@@ -2,14 +2,15 @@
 
 Two views of one instant agree in height above the baseline (the epipolar constraint). If a camera's
 stamps are late by tau, its markers' heights are those of tau earlier: the difference is tau times
-their speed in the image. A small Kalman filter over all pairs of cameras estimates each camera's
-tau from that, beginning with the uncertainty its clock estimate claims, and beside it each pair's
-constant height error, which tells a bumped camera. At 0.7 m, 1 ms is 2-5 mm of depth of a moving
+their speed in the image. For each pair of cameras a robust regression over the last seconds of
+motion finds tau and the constant height errors (shift_regression.py); with what the clock estimates
+claim of themselves that gives each camera's clock. At 0.7 m, 1 ms is 2-5 mm of depth of a moving
 hand, so this is worth a lot.
 
-A still hand, or one that moves along the baseline only, tells nothing: the offsets stay, their
-uncertainty grows slowly. A clock that was set anew (its announced offset jumps), or views that
-contradict for long, start the estimation again.
+What is learned is bounded by what was announced, as wrong markers must not lead clocks astray, and
+rests on the last seconds alone: it is unlearned as fast as it was learned. A still hand, or one
+that moves along the baseline only, tells nothing: the offsets stay, their uncertainty grows slowly.
+A clock that was set anew (its announced offset jumps) starts the estimation again.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import CLOCK_SIGMA_MAX_S, View
 from services.fusion.intake.ray_interpolation import RayTrack
 from services.fusion.monitors.epipolar_error import EpipolarError, epipolar_error
+from services.fusion.monitors.height_window import HeightWindow
 from services.fusion.monitors.moved_camera import MovedCameraMonitor
+from services.fusion.monitors.shift_regression import NOTHING
 
-# Seconds between two updates by one pair of cameras: each costs 1 ms, and ten a second of six
-# markers reach .05 ms within a second or two.
+# Seconds between two updates by the only pair of cameras: each costs 1 ms, and ten a second of six
+# markers reach .05 ms within a second or two. Of several pairs each is asked less often.
 UPDATE_S = 0.1
 # No stamp is better than this (a tenth of an exposure's jitter); keeps the filter able to follow.
 _CLOCK_FLOOR_S = 2e-5
@@ -33,16 +36,18 @@ _CLOCK_FLOOR_S = 2e-5
 # px, half of it in height).
 _HEIGHT_SIGMA_PX = 1.0
 _NOISE_PX = 0.1
-# Random walks per square root of a second: an uncorrected drift of 50 ppm is .05 ms a second; a
-# warming mount moves slower than this.
-_CLOCK_WALK_S, _HEIGHT_WALK_PX = 1e-4, 0.01
-# Innovations beyond this many sigmas are of two different things; so many more of them than good
-# ones mean that the clocks have changed.
-_GATE, _CONTRADICTIONS = 4.0, 24
-# So long without a common instant of two views, as their clocks are taken to be more than a frame
-# apart (interpolation reaches no further), means that they are not: a camera that is bumped and put
-# back drove them there.
-_LOST_S = 2.0
+# Random walk per square root of a second: an uncorrected drift of 50 ppm is .05 ms a second.
+_CLOCK_WALK_S = 1e-4
+# A clock is not taken to be farther off than this many of its announced sigmas, or this: two
+# cameras may then differ by 5 ms, which a track survives. What is farther off is another matter.
+_BOUND_SIGMAS, _BOUND_S = 3.0, 2.5e-3
+# Two seconds of motion that contradict the announced clocks by more sigmas than this outweigh them.
+_OUTWEIGHS, _INSTANTS = 4.0, 20
+# The last instants (a second) outweigh what was learned before if they contradict it by so much:
+# by 4, noise of 3 px that lasts for some frames does so now and then. Looked at now and then.
+_RECENT, _CONTRADICTS, _LOOK_BACK = 10, 6.0, 4
+# What residuals explain by chance is not learned: a shift counts for what is beyond so many sigmas.
+_CHANCE = 1.3
 # Share of a new squared residual in its running mean: over the last hundred or so observations.
 _NEW_RESIDUAL = 0.01
 
@@ -62,9 +67,9 @@ class ClockOffsetEstimator:
         self._landmarks = landmarks
         self._periods_s = periods_s
         self._enabled = enabled
-        self._moved = MovedCameraMonitor(len(self._pairs))
         self.updates = 0
         self.gated = 0
+        self._every_s = 0.5 * UPDATE_S * (1 + len(self._pairs))
         # Mean square of the epipolar residual, in px^2 of the mean focal length.
         self._residual_px2 = 0.0
         self.reset()
@@ -74,20 +79,21 @@ class ClockOffsetEstimator:
         cameras = len(self._names)
         self._tracks = [[RayTrack() for _ in range(cameras)] for _ in range(self._landmarks)]
         self._updated_s = dict.fromkeys(self._pairs, -np.inf)
-        self._compared_s = dict.fromkeys(self._pairs, np.inf)
         # By camera: its announced offset (ns) and how far that may be off (s).
         self._announced: list[tuple[int, float] | None] = [None] * cameras
-        self._state = np.zeros(cameras + len(self._pairs))  # (C + P,)
-        self._cov = self._prior_cov()
-        self._contradictions = 0
-
-    def _prior_cov(self) -> Array:
-        """Covariance (C + P, C + P) while nothing is known."""
-        clocks = [CLOCK_SIGMA_MAX_S**2] * len(self._names)
-        height_sigmas = np.array(
-            [_HEIGHT_SIGMA_PX / pair.focal_px for pair in self._pairs.values()]
-        )
-        return np.diag([*clocks, *(height_sigmas**2).tolist()])
+        self._windows = {
+            pair: HeightWindow(
+                _NOISE_PX / place.focal_px,
+                _HEIGHT_SIGMA_PX / place.focal_px,
+                _CLOCK_WALK_S * np.sqrt(self._every_s),
+            )
+            for pair, place in self._pairs.items()
+        }
+        self._found = dict.fromkeys(self._pairs, NOTHING)
+        self._compared_s: dict[tuple[int, int, int], float] = {}
+        self._moved = MovedCameraMonitor(len(self._pairs))
+        self._late_s = np.zeros(cameras)  # (C,)
+        self._cov = np.diag(np.full(cameras, CLOCK_SIGMA_MAX_S**2))  # (C, C)
 
     @property
     def epipolar_px(self) -> float:
@@ -100,15 +106,16 @@ class ClockOffsetEstimator:
     @property
     def late_s(self) -> dict[str, float]:
         """By how much each camera's stamps are late, beyond its announced offset."""
-        return {name: float(late_s) for name, late_s in zip(self._names, self._state, strict=False)}
+        return dict(zip(self._names, self._late_s.tolist(), strict=True))
 
     @property
     def heights_px(self) -> dict[str, float]:
         """The constant height error of each pair of cameras, by `first_second`: a bumped camera."""
-        heights = self._state[len(self._names) :]
         return {
-            f"{self._names[first]}_{self._names[second]}": float(height) * pair.focal_px
-            for ((first, second), pair), height in zip(self._pairs.items(), heights, strict=True)
+            f"{self._names[first]}_{self._names[second]}": (
+                self._found[first, second].height * pair.focal_px
+            )
+            for (first, second), pair in self._pairs.items()
         }
 
     @property
@@ -138,11 +145,11 @@ class ClockOffsetEstimator:
             newest_s = float(times_s.max())
             for index, pair in enumerate(self._pairs):
                 elapsed_s = newest_s - self._updated_s[pair]
-                if view.camera in pair and elapsed_s >= UPDATE_S * len(self._pairs):
-                    self._predict(elapsed_s)
+                if view.camera in pair and elapsed_s >= self._every_s:
                     self._updated_s[pair] = newest_s
-                    self._update_pair(index, pair, view, newest_s)
-        return float(self._state[view.camera]), self._pairing_sigma_s(view.camera)
+                    self._update_pair(index, pair, newest_s)
+                    self._combine(newest_s)
+        return float(self._late_s[view.camera]), self._pairing_sigma_s(view.camera)
 
     def _note_announced(self, view: View) -> None:
         """Start anew for a camera whose clock was set, or is heard of for the first time."""
@@ -150,73 +157,98 @@ class ClockOffsetEstimator:
         c = view.camera
         known = self._announced[c]
         if known is None or abs(view.clock_offset_ns - known[0]) * 1e-9 > max(1e-3, 3.0 * known[1]):
-            self._state[c] = 0.0
+            for pair in self._pairs:
+                if c in pair:
+                    self._windows[pair].clear()
+                    self._found[pair] = NOTHING
+            self._late_s[c] = 0.0
             self._cov[c, :] = 0.0
             self._cov[:, c] = 0.0
             self._cov[c, c] = sigma_s**2
         self._announced[c] = (view.clock_offset_ns, sigma_s)
 
-    def _predict(self, elapsed_s: float) -> None:
-        """Process noise: uncertainty grows, up to what the clock estimates themselves claim."""
-        elapsed_s = min(elapsed_s, 1.0) / len(self._pairs)
-        for c, announced in enumerate(self._announced):
-            limit_s = CLOCK_SIGMA_MAX_S if announced is None else announced[1]
-            grown = self._cov[c, c] + _CLOCK_WALK_S**2 * elapsed_s
-            self._cov[c, c] = max(self._cov[c, c], min(grown, limit_s**2))
-        for n, pair in enumerate(self._pairs.values(), start=len(self._names)):
-            self._cov[n, n] += (_HEIGHT_WALK_PX / pair.focal_px) ** 2 * elapsed_s
-
-    def _update_pair(
-        self, index: int, cameras: tuple[int, int], view: View, newest_s: float
-    ) -> None:
-        """Update by all landmarks of a view that the other camera of a pair has seen as well."""
-        first, second = cameras
-        pair = self._pairs[cameras]
-        period_s = float(self._periods_s[second])
-        for landmark in view.landmarks.tolist():
-            tracks = self._tracks[landmark]
-            shift_s = float(self._state[second] - self._state[first])
-            error = epipolar_error(pair, tracks[first], tracks[second], shift_s, period_s)
-            if error is not None:
-                self._compared_s[cameras] = newest_s
-                self._moved.observe(index, abs(error.height) * pair.focal_px)
-                self._update(index, cameras, error)
-        apart_s = abs(float(self._state[second] - self._state[first]))
-        if newest_s - self._compared_s[cameras] > _LOST_S and apart_s > period_s:
-            self._state[:] = 0.0
-            self._cov = self._prior_cov()
-
-    def _update(self, index: int, cameras: tuple[int, int], error: EpipolarError) -> None:
-        """The Kalman update by one landmark's height difference."""
+    def _update_pair(self, index: int, cameras: tuple[int, int], newest_s: float) -> None:
+        """Compare the newest heights of all landmarks in two cameras, and find the clocks anew."""
         first, second = cameras
         focal_px = self._pairs[cameras].focal_px
-        height_row = len(self._names) + index
-        H = np.zeros(len(self._state))  # (C + P,)
-        H[first] = -error.speed
-        H[second] = error.speed
-        H[height_row] = 1.0
-        PHt = self._cov @ H  # (C + P,)
-        S = float(H @ PHt) + error.variance + (_NOISE_PX / focal_px) ** 2
-        # The clocks' part is in the height already: it was taken with this state's shift.
-        innovation = error.height - float(self._state[height_row])
-        residual_px2 = min((innovation * focal_px) ** 2, 1e6)
-        self._residual_px2 += _NEW_RESIDUAL * (residual_px2 - self._residual_px2)
-        if innovation * innovation > _GATE**2 * S:
-            self._note_gated()
+        window = self._windows[cameras]
+        shift_s = float(self._late_s[second] - self._late_s[first])
+        errors = self._errors(cameras, shift_s)
+        if not errors:
             return
-        self.updates += 1
-        self._contradictions = max(0, self._contradictions - 1)
-        if self._enabled:
-            self._state += PHt * (innovation / S)
-            self._cov -= np.outer(PHt, PHt) / S
+        self._moved.observe(
+            index, newest_s, {row: error.height * focal_px for row, error in errors.items()}
+        )
+        for error in errors.values():
+            left_px2 = ((error.height - self._found[cameras].height) * focal_px) ** 2
+            self._residual_px2 += _NEW_RESIDUAL * (min(left_px2, 1e6) - self._residual_px2)
+        bound_s = float(self._bounds_s()[[first, second]].sum())
+        taken = window.add(errors, shift_s, bound_s)
+        self.updates += taken
+        self.gated += len(errors) - taken
+        found = window.fit(shift_s)
+        if window.instants > 2 * _RECENT and window.newest % _LOOK_BACK == 0:
+            recent = window.fit(shift_s, _RECENT)
+            contradicts_s = _CONTRADICTS * np.sqrt(found.variance + recent.variance)
+            if abs(recent.shift_s - found.shift_s) > contradicts_s:
+                window.keep(_RECENT)
+                found = recent
+        window.adapt_memory(found)
+        self._found[cameras] = found
 
-    def _note_gated(self) -> None:
-        """Something does not fit: a wrong marker now and then, or clocks that have changed."""
-        self.gated += 1
-        self._contradictions += 1
-        if self._contradictions >= _CONTRADICTIONS:
-            self._contradictions = 0
-            self._cov = self._prior_cov()
+    def _errors(self, cameras: tuple[int, int], shift_s: float) -> dict[int, EpipolarError]:
+        """The newest height difference of each landmark in two cameras that is not known yet."""
+        first, second = cameras
+        period_s = float(self._periods_s[second])
+        errors = {}
+        for landmark, tracks in enumerate(self._tracks):
+            error = epipolar_error(
+                self._pairs[cameras], tracks[first], tracks[second], shift_s, period_s
+            )
+            if error is None or self._compared_s.get((*cameras, landmark)) == error.time_s:
+                continue
+            self._compared_s[(*cameras, landmark)] = error.time_s
+            errors[landmark] = error
+        return errors
+
+    def _bounds_s(self) -> Array:
+        """How far each camera's clock (C,) may be off."""
+        return np.maximum(_BOUND_SIGMAS * self._announced_s(), _BOUND_S)
+
+    def _announced_s(self) -> Array:
+        """How far each camera's clock (C,) may be off by its own account."""
+        sigmas = [CLOCK_SIGMA_MAX_S if known is None else known[1] for known in self._announced]
+        return np.array(sigmas)
+
+    def _combine(self, newest_s: float) -> None:
+        """The clocks that the announced offsets and all pairs' shifts make likeliest."""
+        if not self._enabled:
+            return
+        sigmas, bounds_s = self._announced_s(), self._bounds_s()
+        told: list[tuple[Array, float, float]] = []
+        for (first, second), found in self._found.items():
+            if not np.isfinite(found.variance):
+                continue
+            window = self._windows[first, second]
+            still_s = max(newest_s - window.moved_s, 0.0)
+            variance = found.variance + _CLOCK_WALK_S**2 * still_s
+            both = [first, second]
+            announced = float(np.sum(sigmas[both] ** 2))
+            contradicts_s = _OUTWEIGHS * np.sqrt(announced + variance)
+            if window.instants >= _INSTANTS and abs(found.shift_s) > contradicts_s:
+                widened = np.minimum(0.5 * abs(found.shift_s), bounds_s[both])
+                sigmas[both] = np.maximum(sigmas[both], widened)
+            difference = np.zeros(len(self._names))  # (C,)
+            difference[both] = [-1.0, 1.0]
+            beyond = 1.0 - _CHANCE**2 * variance / max(found.shift_s**2, variance)
+            told.append((difference, max(beyond, 0.0) * found.shift_s, variance))
+        information = np.diag(1.0 / sigmas**2)  # (C, C)
+        weighted = np.zeros(len(self._names))  # (C,)
+        for difference, shift_s, variance in told:
+            information += np.outer(difference, difference) / variance
+            weighted += difference * shift_s / variance
+        self._cov = np.linalg.inv(information)
+        self._late_s = np.clip(self._cov @ weighted, -bounds_s, bounds_s)
 
     def _pairing_sigma_s(self, camera: int) -> float:
         """Uncertainty of a camera's clock against the others'.
@@ -226,5 +258,5 @@ class ClockOffsetEstimator:
         n = len(self._names)
         weights = np.full(n, -1.0 / n)
         weights[camera] += 1.0
-        variance = weights @ self._cov[:n, :n] @ weights
+        variance = weights @ self._cov @ weights
         return float(np.sqrt(max(variance, 0.0) * n / max(n - 1, 1)))

@@ -55,6 +55,20 @@ def test_noise_passes_as_the_weights_say():
     )
 
 
+def test_the_bend_is_what_two_parabolas_differ_by():
+    times, at = PERIOD_S * np.array([0.0, 1.0, 2.1, 3.0]), 1.4 * PERIOD_S
+    heights = np.array([0.0, 0.1, 0.3, 0.2])
+    first, last = (
+        polynomial_weights(times[part], at) @ heights[part] for part in (slice(3), slice(1, 4))
+    )
+    track = track_of(lambda t: np.interp(t, times, heights), times)
+    bend = track.at(at, "hermite", PERIOD_S).bend
+    np.testing.assert_allclose(bend, [last - first, first - last], rtol=1e-9)
+    straight = track_of(lambda t: 1.0 + 2.0 * t - t**2, times)
+    np.testing.assert_allclose(straight.at(at, "hermite", PERIOD_S).bend, 0.0, atol=1e-12)
+    assert not track.at(0.5 * PERIOD_S, "hermite", PERIOD_S).bend.any()
+
+
 def test_waits_for_what_it_needs_and_says_when_it_has_less():
     track = track_of(lambda t: t, [0.0, PERIOD_S])
     assert track.at(1.5 * PERIOD_S, "linear", PERIOD_S) is None

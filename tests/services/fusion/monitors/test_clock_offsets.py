@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from rhot.files.rig_tables import Fusion
+from rhot.messages import MarkerFrame
 from services.fusion.intake.observations import ObservationBuilder
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
+from testing.families.motions import flapping, stop_and_go
 from testing.synthetic_points import START_NS, MovingHand, SyntheticRig, frames
+from testing.wrong_markers import with_clock_error, with_correlated_errors, with_static_markers
 
 FPS = 30.0
 
@@ -22,15 +25,25 @@ def estimate(
     enabled: bool = True,
     edit=lambda frame: frame,
 ) -> ClockOffsetEstimator:
+    return learn(setup, [edit(frame) for frame in frames(setup, path, seconds)], enabled=enabled)[0]
+
+
+def learn(
+    setup: SyntheticRig, given: list[MarkerFrame], *, enabled: bool = True
+) -> tuple[ClockOffsetEstimator, np.ndarray]:
+    """The estimator at the end; time (s), disagreement and its sigma (ms) after each frame."""
     cameras = setup.rig()
     builder = ObservationBuilder(setup.config(), cameras)
     estimator = ClockOffsetEstimator(
         tuple(cameras.values()), 6, np.full(len(cameras), 1.0 / FPS), enabled=enabled
     )
-    for frame in frames(setup, path, seconds):
-        view = builder.build(edit(frame))
-        estimator.observe(view, (view.instant_ns - START_NS) * 1e-9 + view.delay_s)
-    return estimator
+    told = []
+    for frame in given:
+        view = builder.build(frame)
+        time_s = (view.instant_ns - START_NS) * 1e-9
+        _, sigma_s = estimator.observe(view, time_s + view.delay_s)
+        told.append((time_s, disagreement_ms(estimator), 1e3 * np.sqrt(2.0) * sigma_s))
+    return estimator, np.array(told)
 
 
 def disagreement_ms(estimator: ClockOffsetEstimator) -> float:
@@ -137,3 +150,49 @@ def test_correction_is_worth_millimetres(run):
     # motion: 6 ms would be 16 mm otherwise.
     assert tuned.rms_mm < 1.0
     assert plain.rms_mm > 2.0
+
+
+TRUE = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4)
+
+
+@pytest.mark.parametrize("sigma_ns", [100_000, 5_000_000, -1])
+@pytest.mark.parametrize("motion", [stop_and_go(20.0, 3), flapping(1.5, 55.0, 3)])
+def test_sharp_turns_do_not_pass_for_clocks(motion, sigma_ns):
+    """What interpolation misses where an acceleration jumps is in what is claimed."""
+    given = with_clock_error(frames(TRUE, motion, 9.0), "right", 0.0, sigma_ns)
+    told = learn(TRUE, given)[1]
+    late = told[told[:, 0] > 2.0]
+    assert np.abs(late[:, 1]).max() < 0.6
+    assert np.mean((late[:, 1] / late[:, 2]) ** 2) < 2.0
+
+
+@pytest.mark.parametrize("sigma_ns", [100_000, 5_000_000, -1])
+@pytest.mark.parametrize("sigma_px", [1.0, 3.0])
+@pytest.mark.parametrize("speed_m_s", [0.2, 0.5])
+def test_errors_that_last_for_some_frames_do_not_pass_for_clocks(speed_m_s, sigma_px, sigma_ns):
+    path = MovingHand(speed_m_s=speed_m_s)
+    given = with_clock_error(frames(TRUE, path, 9.0), "right", 0.0, sigma_ns)
+    estimator, told = learn(TRUE, with_correlated_errors(given, sigma_px))
+    assert np.abs(told[told[:, 0] > 2.0, 1]).max() < 3.0
+    assert estimator.moved_px == {}
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+@pytest.mark.parametrize("camera", ["left", "right"])
+def test_two_seconds_of_wrong_markers_are_bounded_and_unlearned(camera, frozen):
+    given = frames(TRUE, flapping(1.5, 55.0, 3), 9.0)
+    given = with_static_markers(given, camera, (3.0, 5.0), frozen=frozen)
+    estimator, told = learn(TRUE, given)
+    assert np.abs(told[:, 1]).max() <= 5.0
+    assert np.abs(told[told[:, 0] > 7.0, 1]).max() < 0.3
+    assert estimator.moved_px == {}
+
+
+def test_motion_outweighs_a_sigma_that_is_announced_too_small():
+    given = with_clock_error(frames(TRUE, MovingHand(), 6.0), "right", 0.004)
+    estimator, told = learn(TRUE, given)
+    assert disagreement_ms(estimator) == pytest.approx(4.0, abs=0.2)
+    assert told[-1, 2] < 0.3
+    # Farther off than a few milliseconds it is not this estimator's matter.
+    bounded = learn(TRUE, with_clock_error(frames(TRUE, MovingHand(), 6.0), "right", 0.05))[0]
+    assert abs(disagreement_ms(bounded)) <= 5.0
