@@ -28,7 +28,8 @@ from services.solver.pose_message import (
     rounded,
     rounded_within_limits,
 )
-from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandEstimate, HandTracker
+from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandTracker
 from services.solver.whole_hand.landmarks import Observation, hand_landmarks
 from services.solver.whole_hand.point_check import usable_points
 
@@ -110,6 +111,6 @@ class _Hand:
 
 def _tip_in_wrist(estimate: HandEstimate, observation: Observation) -> TipObservation:
     """A painted tip in the wrist frame of an estimate."""
-    sigma = float(np.sqrt(np.mean(observation.inverse_sigma**-2)))
+    sigma = float(np.sqrt(np.trace(observation.covariance_m2) / 3.0))
     p_wrist = estimate.rotation.T @ (observation.point_m - estimate.position_m)
     return TipObservation(p_wrist, sigma, observation.measured)

@@ -3,32 +3,34 @@
 - The first pose needs the wrist and three tips in one message (initialise.py).
 - From then on every message is fitted from the motion prior.
 - A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
-  and every three seconds. It initialises the hand as if nothing were known, and its pose is taken
-  when it explains the landmarks clearly better twice running: so a mirrored orientation cannot
-  last.
+  and every three seconds. It initialises the hand as if nothing were known. Another pose that
+  explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
+  won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
+- What fits cost says how far the hand model is to be believed (model_misfit.py).
 - The hand is forgotten after a gap in the stamps of more than a second, when stamps run backwards,
   and after a second with fewer than three landmarks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rhot.geometry.transforms import Array
 from rhot.hand import TIPS, HandModel
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import fit
-from services.solver.whole_hand.initialise import initialise
+from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.initialise import Hypothesis, initialise
 from services.solver.whole_hand.landmarks import (
     Landmark,
     Observation,
     Observations,
     observation_arrays,
 )
+from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import (
     UNKNOWNS,
     PosePrior,
@@ -37,6 +39,7 @@ from services.solver.whole_hand.motion_prior import (
 )
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
+from services.solver.whole_hand.rival import Rival, same_pose
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -49,22 +52,10 @@ BAD_COST_PER_COORDINATE = 16.0
 # Updates between restarts, and while fits are bad: a restart takes 5 ms, i.e. 0.05 and 1.2 ms an
 # update.
 RESTART_INTERVAL, RESTART_INTERVAL_BAD = 90, 4
-# How much cheaper (in squared standard deviations) a restart must be, and how often running. Equal
-# posture: differences below 1; a truth that a single message explains worse than another posture:
-# up to 7 (720 simulated messages).
-MIN_COST_GAIN, WINS_NEEDED = 12.0, 2
-
-
-@dataclass(frozen=True)
-class HandEstimate:
-    """The hand after one message."""
-
-    rotation: Array  # (3, 3) wrist in the rig frame
-    position_m: Array  # (3,)
-    angles_rad: Array  # (5, 4) within limits
-    covariance: Array  # (26, 26) of rotation, position and angles (rad, m)
-    cost: float  # squared standard deviations
-    iterations: int
+# Another pose is followed as a rival unless the odds against it exceed this (logarithm): a truth
+# that a single message explains worse than another posture does so by up to 7 units of cost, 3.5 of
+# this (720 simulated messages).
+START_ODDS = -4.0
 
 
 class HandTracker:
@@ -81,7 +72,8 @@ class HandTracker:
         # When there last were enough landmarks.
         self._located_ns = 0
         self._updates_to_restart = RESTART_INTERVAL
-        self._restart_wins = 0
+        self._misfit_m2 = 0.0
+        self._rival: Rival | None = None
         self._restart_landmarks: frozenset[str] = frozenset()
 
     def track(self, stamp_ns: int, observed: Mapping[str, Observation]) -> HandEstimate | None:
@@ -94,17 +86,34 @@ class HandTracker:
             self._estimate = None
         if len(observed) >= MIN_LANDMARKS:
             self._located_ns = stamp_ns
-        observations = observation_arrays(self._landmarks, observed)
         if self._estimate is None:
             if "wrist" not in observed or sum(name in observed for name in TIPS) < MIN_LANDMARKS:
                 return None
-            self._estimate = self._initialise(observations)
+            self._misfit_m2, seconds = 0.0, MAX_GAP_S
+        observations = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
+        if self._estimate is None:
+            own = self._initialise(observations)
         else:
-            self._estimate = self._update(self._estimate, seconds, observations)
-            if self._restart_due(self._estimate, frozenset(observed)):
-                self._estimate = self._compare_with_restart(self._estimate, observations)
-        self._stamp_ns = stamp_ns
-        return self._estimate
+            own = self._follow(self._estimate, seconds, observations)
+            if self._restart_due(own, frozenset(observed)):
+                self._consider_restart(own, observations)
+        self._misfit_m2 = learned_misfit(self._misfit_m2, observations.whitening, own.cost, seconds)
+        self._estimate, self._stamp_ns = own, stamp_ns
+        return own if self._rival is None else self._rival.told(own)
+
+    def _follow(
+        self, last: HandEstimate, seconds: float, observations: Observations
+    ) -> HandEstimate:
+        """Take in a message: the pose and its rival, of which one may have won."""
+        own = self._update(last, seconds, observations)
+        if self._rival is not None:
+            other = self._update(self._rival.estimate, seconds, observations)
+            self._rival = self._rival.after(own, other, seconds)
+            if self._rival.has_won():
+                own, self._rival = other, None
+            elif self._rival.is_over(own):
+                self._rival = None
+        return own
 
     def _is_lost(self, stamp_ns: int, seconds: float) -> bool:
         """Whether stamps ran backwards, or nothing was known of the hand for too long."""
@@ -112,11 +121,23 @@ class HandTracker:
         return not (0.0 <= seconds <= MAX_GAP_S and unseen_s <= MAX_GAP_S)
 
     def _initialise(self, observations: Observations) -> HandEstimate:
+        """The likeliest pose; the next that differs from it is followed as its rival."""
         self._updates_to_restart = RESTART_INTERVAL_BAD
-        self._restart_wins = 0
         self._restart_landmarks = frozenset()
-        cost, pose, information = initialise(self.chains, self._uninformed, observations)
-        return HandEstimate(*pose, spd_inverse(information), cost, 0)
+        best, *others = initialise(self.chains, self._uninformed, observations)
+        self._rival = None
+        own = _estimate_of(best)
+        self._challenge(own, best.cost, others)
+        return own
+
+    def _challenge(self, own: HandEstimate, own_cost: float, found: Sequence[Hypothesis]) -> None:
+        """Have the first other pose followed that explains a message about as well as the pose."""
+        for hypothesis in found:
+            odds, other = 0.5 * (own_cost - hypothesis.cost), _estimate_of(hypothesis)
+            if odds > START_ODDS and not same_pose(own, other):
+                if self._rival is None or not same_pose(self._rival.estimate, other):
+                    self._rival = Rival(other, min(odds, -START_ODDS), 0.0)
+                return
 
     def _update(
         self, last: HandEstimate, seconds: float, observations: Observations
@@ -142,21 +163,10 @@ class HandTracker:
         self._updates_to_restart, self._restart_landmarks = RESTART_INTERVAL, names
         return True
 
-    def _compare_with_restart(
-        self, estimate: HandEstimate, observations: Observations
-    ) -> HandEstimate:
-        """The estimate, or that of a restart when it has won often enough."""
+    def _consider_restart(self, own: HandEstimate, observations: Observations) -> None:
         # Without the motion prior, both are judged by the same measure: landmarks and habit.
-        own_cost = self._cost_without_history(estimate, observations)
-        cost, pose, information = initialise(self.chains, self._uninformed, observations)
-        won = cost < own_cost - MIN_COST_GAIN
-        self._restart_wins = self._restart_wins + 1 if won else 0
-        if self._restart_wins:
-            self._updates_to_restart = 1
-        if self._restart_wins < WINS_NEEDED:
-            return estimate
-        self._restart_wins = 0
-        return HandEstimate(*pose, spd_inverse(information), cost, estimate.iterations)
+        own_cost = self._cost_without_history(own, observations)
+        self._challenge(own, own_cost, initialise(self.chains, self._uninformed, observations))
 
     def _cost_without_history(self, estimate: HandEstimate, observations: Observations) -> float:
         """The least cost near the estimate where the prior says nothing of the wrist."""
@@ -166,3 +176,7 @@ class HandTracker:
         unused = np.empty((UNKNOWNS, UNKNOWNS))
         cost, _ = fit(self.chains, observations, self._uninformed, pose, MAX_ITERATIONS, unused)
         return cost
+
+
+def _estimate_of(found: Hypothesis) -> HandEstimate:
+    return HandEstimate(*found.pose, spd_inverse(found.information), found.cost, 0)

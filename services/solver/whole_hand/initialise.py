@@ -52,8 +52,13 @@ class Hypothesis(NamedTuple):
     information: Array  # (26, 26)
 
 
-def initialise(chains: HandChains, prior: PosePrior, observations: Observations) -> Hypothesis:
-    """The best pose for landmarks when nothing is known of the wrist. Deterministic; about 3 ms."""
+def initialise(
+    chains: HandChains, prior: PosePrior, observations: Observations
+) -> list[Hypothesis]:
+    """Poses for landmarks when nothing is known of the wrist, best first.
+
+    Some may be the same. Deterministic; about 3 ms.
+    """
     found = []
     centroid = observations.point_m.mean(axis=0)  # (3,)
     for angles in initial_postures(chains):
@@ -68,7 +73,7 @@ def initialise(chains: HandChains, prior: PosePrior, observations: Observations)
         _improved(chains, prior, observations, hypothesis, _FINE_ITERATIONS)
         for hypothesis in found[:_FINISHED]
     ]
-    return min(finished, key=lambda hypothesis: hypothesis.cost)
+    return sorted(finished, key=lambda hypothesis: hypothesis.cost)
 
 
 def initial_postures(chains: HandChains) -> list[Array]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import JOINTS, HandModel, landmark_point
@@ -31,19 +33,22 @@ class Observation:
     """One measured landmark."""
 
     point_m: Array  # (3,) rig frame
-    inverse_sigma: Array  # (3,) 1/m along each rig axis
-    measured: bool  # whether a camera saw it; else fusion predicted it
+    covariance_m2: Array  # (3, 3) of its error, rig frame
+    measured: bool  # whether cameras saw all of it; else fusion predicted some of it
 
 
 class Observations(NamedTuple):
-    """m measured landmarks as arrays; the fields are those of Landmark and Observation."""
+    """m measured landmarks as arrays; the fields are those of Landmark and Observation.
+
+    whitening @ (an error in the rig frame) has unit covariance, whichever way the rig's axes lie.
+    """
 
     joint: Integers  # (m,)
     digit: Integers  # (m,)
     depth: Integers  # (m,)
     offset_m: Array  # (m, 3)
     point_m: Array  # (m, 3) rig frame
-    inverse_sigma: Array  # (m, 3) 1/m along each rig axis
+    whitening: Array  # (m, 3, 3) 1/m, lower triangles
 
 
 def hand_landmarks(model: HandModel) -> dict[str, Landmark]:
@@ -69,17 +74,24 @@ def frames_in_wrist(chains: HandChains, angles: Array) -> tuple[Array, Array]:
 
 
 def observation_arrays(
-    landmarks: Mapping[str, Landmark], observed: Mapping[str, Observation]
+    landmarks: Mapping[str, Landmark],
+    observed: Mapping[str, Observation],
+    misfit_m: float = 0.0,
 ) -> Observations:
-    """What was observed, by landmark, joined with where each landmark sits."""
+    """What was observed, by landmark, joined with where each landmark sits.
+
+    misfit_m: one standard deviation along each axis of where the model puts a landmark, beside that
+    of where it was seen.
+    """
     where = [landmarks[name] for name in observed]
+    covariances = [observation.covariance_m2 for observation in observed.values()]
     return Observations(
         joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
         digit=np.array([landmark.digit for landmark in where], dtype=np.int64),
         depth=np.array([landmark.depth for landmark in where], dtype=np.int64),
         offset_m=_rows([landmark.offset_m for landmark in where]),
         point_m=_rows([observation.point_m for observation in observed.values()]),
-        inverse_sigma=_rows([observation.inverse_sigma for observation in observed.values()]),
+        whitening=_whitening(np.array(covariances).reshape(-1, 3, 3), misfit_m**2),
     )
 
 
@@ -98,6 +110,24 @@ def _landmark(model: HandModel, name: str, open_hand_m: Array) -> Landmark:
     elif name != "wrist":
         offset = offset + metacarpal_m[name.removesuffix("_metacarpal")]  # type: ignore[index]
     return Landmark(joint, -1, 0, offset, reach)
+
+
+@njit(cache=True)
+def _whitening(covariances: Array, more_m2: float) -> Array:
+    """Inverse Cholesky factors of covariances (m, 3, 3) + more_m2 times the identity; (m, 3, 3)."""
+    out = np.zeros_like(covariances)
+    for m in range(covariances.shape[0]):
+        C, W = covariances[m], out[m]
+        a = math.sqrt(C[0, 0] + more_m2)
+        b, d = C[1, 0] / a, C[2, 0] / a
+        c = math.sqrt(C[1, 1] + more_m2 - b * b)
+        e = (C[2, 1] - b * d) / c
+        f = math.sqrt(C[2, 2] + more_m2 - d * d - e * e)
+        W[0, 0], W[1, 1], W[2, 2] = 1.0 / a, 1.0 / c, 1.0 / f
+        W[1, 0] = -b / (a * c)
+        W[2, 1] = -e / (c * f)
+        W[2, 0] = (b * e / c - d) / (a * f)
+    return out
 
 
 def _rows(vectors: list[Array]) -> Array:

@@ -2,8 +2,9 @@
 
 Values may be absurd (1e300, all equal, from another hand). A point is dropped when it is unknown, a
 repetition, not finite, out of range, or too uncertain to say anything; and of points that lie
-further apart than one hand can be, those that disagree with most others. Missing points are no
-error: fewer equations.
+further apart than one hand can be, those that disagree with most others. A point that one camera
+sees says enough: where it is across that camera's ray. Missing points are no error: fewer
+equations.
 """
 
 from __future__ import annotations
@@ -13,17 +14,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rhot.geometry.transforms import Array
 from rhot.messages import HandPoint, HandPoints
 from services.solver.whole_hand.landmarks import Landmark, Observation
 
 # No camera of this kind sees a finger tip 10 m away.
 _MAX_RANGE_M = 10.0
-# A point known to no better than a hand's length says nothing of a posture; one better than 0.3 mm
-# is not skin.
+# A point known to no better than a hand's length says nothing of a posture, unless one camera sees
+# it: then two directions are known better, and the third may be anything. One better than 0.3 mm is
+# not skin.
 _MIN_SIGMA_M, _MAX_SIGMA_M = 3e-4, 0.15
-# A point carried on by fusion is trusted a third as much as one seen: its sigma says how it was
+# Along a camera's ray: no more than the distance at which cameras of this kind see a hand well.
+_MAX_RAY_SIGMA_M = 1.0
+# A point that no camera sees is trusted a third as much as one seen: its sigma says how it was
 # filtered, not that it turned.
 _PREDICTED_SIGMA_FACTOR = 3.0
+# So many of its own sigmas further than it reaches may a point seem to be: the distance along a
+# single camera's ray is hardly known.
+_VAGUE_SIGMAS = 2.0
 # Two points of one hand may be further apart than the model says when its bones were never
 # measured.
 _REACH_MARGIN = 1.25
@@ -33,18 +41,34 @@ def usable_points(points: HandPoints, landmarks: Mapping[str, Landmark]) -> dict
     """The points worth solving with, by landmark, in the order of the message."""
     observed: dict[str, Observation] = {}
     for point in points.points:
-        if point.name in landmarks and point.name not in observed and _is_plausible(point):
-            measured = point.source == "measured"
-            factor = 1.0 if measured else _PREDICTED_SIGMA_FACTOR
-            sigma = np.clip(point.sigma_m, _MIN_SIGMA_M, _MAX_SIGMA_M) * factor
-            observed[point.name] = Observation(np.array(point.position_m), 1.0 / sigma, measured)
+        if point.name in landmarks and point.name not in observed:
+            covariance = _covariance(point)
+            if covariance is not None:
+                position, measured = np.array(point.position_m), point.source == "measured"
+                observed[point.name] = Observation(position, covariance, measured)
     return _reject_outliers(observed, landmarks)
 
 
-def _is_plausible(point: HandPoint) -> bool:
-    """Whether a point's values are finite and within range."""
-    in_range = all(math.isfinite(v) and abs(v) <= _MAX_RANGE_M for v in point.position_m)
-    return in_range and all(math.isfinite(s) and s <= _MAX_SIGMA_M for s in point.sigma_m)
+def _covariance(point: HandPoint) -> Array | None:
+    """What a point's error is believed to be (3, 3), m^2; None: nothing, or it is not plausible."""
+    values = point.covariance_m2 or (point.sigma_m[0], 0, 0, point.sigma_m[1], 0, point.sigma_m[2])
+    known = (*point.position_m, *values)
+    if not all(math.isfinite(v) and abs(v) <= _MAX_RANGE_M for v in known):
+        return None
+    if point.covariance_m2 is None:
+        sigmas, axes = np.array(point.sigma_m), np.eye(3)
+    else:
+        xx, xy, xz, yy, yz, zz = point.covariance_m2
+        variances, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        if variances[0] < -(_MIN_SIGMA_M**2):
+            return None
+        sigmas = np.sqrt(np.maximum(variances, 0.0))
+    if np.count_nonzero(sigmas <= _MAX_SIGMA_M) < 2:
+        return None
+    seen = point.source == "measured" or bool(point.cameras)
+    factor = 1.0 if seen else _PREDICTED_SIGMA_FACTOR
+    sigmas = factor * np.clip(sigmas, _MIN_SIGMA_M, _MAX_RAY_SIGMA_M)
+    return axes * sigmas**2 @ axes.T
 
 
 def _reject_outliers(
@@ -55,6 +79,8 @@ def _reject_outliers(
         names = list(observed)
         points = np.array([observed[name].point_m for name in names])  # (m, 3)
         reach = np.array([landmarks[name].reach_m for name in names])  # (m,)
+        vague = np.sqrt([np.trace(observed[name].covariance_m2) for name in names])  # (m,) sigmas
+        reach += _VAGUE_SIGMAS * vague
         apart = np.linalg.norm(points[:, None] - points[None], axis=2)  # (m, m)
         conflicts = (apart > _REACH_MARGIN * (reach[:, None] + reach[None])).sum(axis=1)
         worst = int(conflicts.argmax())

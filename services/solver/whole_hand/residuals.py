@@ -1,7 +1,8 @@
 """Residuals of the whole-hand problem and their normal equations: observed landmarks and the prior.
 
 The 26 unknowns are the wrist's rotation (a rotation vector about the rig's axes) and position, then
-the angles of the five digits. A residual is a distance along one rig axis in standard deviations.
+the angles of the five digits. A landmark's residual is its distance whitened by its covariance: in
+standard deviations, and the same however the rig's axes lie.
 
 Functions that take a tuple of arrays are inlined by force, as in finger/dls_step.py: calls that
 count references cost a tenth of the fit's time.
@@ -138,22 +139,28 @@ def _add_observation(
 ) -> float:
     """Add one landmark's normal equations, lower triangle of H; returns its Huber cost.
 
-    point (3,): where the pose puts it, rig frame; jacobian (3, 10) of it by the unknowns `columns`.
+    point (3,): where the pose puts it, rig frame; jacobian (3, 10) of it by the unknowns `columns`,
+    whitened here in place.
     """
-    inverse_sigma = observations.inverse_sigma[index]
+    W = observations.whitening[index]
     e = np.empty(3)
     square = 0.0
-    for i in range(3):
-        e[i] = (point[i] - observations.point_m[index, i]) * inverse_sigma[i]
+    for i in range(2, -1, -1):
+        e[i] = 0.0
+        for k in range(i + 1):
+            e[i] += W[i, k] * (point[k] - observations.point_m[index, k])
         square += e[i] * e[i]
+        # From the last row up: those above are still as they came.
+        for a in range(columns.size):
+            jacobian[i, a] *= W[i, i]
+            for k in range(i):
+                jacobian[i, a] += W[i, k] * jacobian[k, a]
     distance = math.sqrt(square)
     weight = 1.0 if distance <= _HUBER_SIGMAS else _HUBER_SIGMAS / distance
     for i in range(3):
-        w = weight * inverse_sigma[i]
         for a in range(columns.size):
-            ga = w * jacobian[i, a]
+            ga = weight * jacobian[i, a]
             normal.g[columns[a]] += ga * e[i]
-            ga *= inverse_sigma[i]
             for b in range(a + 1):
                 normal.H[columns[a], columns[b]] += ga * jacobian[i, b]
     return square if distance <= _HUBER_SIGMAS else _HUBER_SIGMAS * (2.0 * distance - _HUBER_SIGMAS)

@@ -127,8 +127,7 @@ def observe() -> Callable[..., Observations]:
 
     def make(model: HandModel, points: dict[str, Array], sigma_m: float = 1e-3) -> Observations:
         observed = {
-            name: Observation(point, np.full(3, 1.0 / sigma_m), True)
-            for name, point in points.items()
+            name: Observation(point, sigma_m**2 * np.eye(3), True) for name, point in points.items()
         }
         return observation_arrays(hand_landmarks(model), observed)
 

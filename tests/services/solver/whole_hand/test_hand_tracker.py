@@ -20,7 +20,7 @@ FRAME_NS = 33_333_333
 def _observed(points_m: dict, rng: np.random.Generator | None = None) -> dict[str, Observation]:
     noise = rng.normal(0.0, 1e-3, (len(points_m), 3)) if rng else np.zeros((len(points_m), 3))
     return {
-        name: Observation(p + n, np.full(3, 1e3), True)
+        name: Observation(p + n, 1e-6 * np.eye(3), True)
         for (name, p), n in zip(points_m.items(), noise, strict=True)
     }
 

@@ -18,7 +18,7 @@ from services.solver.whole_hand.posture_prior import posture_prior
 
 def _initialise(model: HandModel, observations: Observations) -> Hypothesis:
     prior = uninformed_prior(posture_prior(model))
-    return initialise(hand_chains(model), prior, observations)
+    return initialise(hand_chains(model), prior, observations)[0]
 
 
 @pytest.mark.parametrize("hand", ["right", "left"])

@@ -22,7 +22,7 @@ def test_every_landmark_has_a_place(world: Callable) -> None:
 def test_observations_keep_the_order_they_came_in(world: Callable) -> None:
     landmarks = hand_landmarks(world("right").model)
     seen = {
-        name: Observation(np.full(3, float(i)), np.full(3, 1e3), True)
+        name: Observation(np.full(3, float(i)), 1e-6 * np.eye(3), True)
         for i, name in enumerate(("ring_tip", "wrist"))
     }
     arrays = observation_arrays(landmarks, seen)
@@ -33,4 +33,14 @@ def test_observations_keep_the_order_they_came_in(world: Callable) -> None:
 def test_no_observation_is_no_error(world: Callable) -> None:
     arrays = observation_arrays(hand_landmarks(world("right").model), {})
     assert arrays.joint.shape == (0,)
-    assert arrays.point_m.shape == arrays.offset_m.shape == arrays.inverse_sigma.shape == (0, 3)
+    assert arrays.point_m.shape == arrays.offset_m.shape == (0, 3)
+    assert arrays.whitening.shape == (0, 3, 3)
+
+
+def test_whitened_errors_have_unit_covariance(world: Callable) -> None:
+    A = np.random.default_rng(1).normal(0.0, 1e-2, (3, 3))
+    seen = {"wrist": Observation(np.zeros(3), A @ A.T, True)}
+    for misfit_m in (0.0, 5e-3):
+        (W,) = observation_arrays(hand_landmarks(world("right").model), seen, misfit_m).whitening
+        C = A @ A.T + misfit_m**2 * np.eye(3)
+        np.testing.assert_allclose(W @ C @ W.T, np.eye(3), atol=1e-9)

@@ -35,7 +35,7 @@ def test_good_points_pass(message: HandPoints, landmarks: dict[str, Landmark]) -
     observed = usable_points(message, landmarks)
     assert list(observed) == [point.name for point in message.points]
     assert all(observation.measured for observation in observed.values())
-    np.testing.assert_allclose(observed["wrist"].inverse_sigma, 1e3)
+    np.testing.assert_allclose(observed["wrist"].covariance_m2, 1e-6 * np.eye(3))
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, np.nan, np.inf, 11.0])
@@ -50,21 +50,56 @@ def test_absurd_positions_are_dropped(
 def test_points_that_know_nothing_are_dropped(
     message: HandPoints, landmarks: dict[str, Landmark], sigma: float
 ) -> None:
-    vague = _replaced(message, 1, sigma_m=(1e-3, sigma, 1e-3))
+    vague = _replaced(message, 1, sigma_m=(1e-3, sigma, sigma))
     assert len(usable_points(vague, landmarks)) == 5
+
+
+def test_a_point_that_one_camera_sees_is_known_across_its_ray(
+    message: HandPoints, landmarks: dict[str, Landmark]
+) -> None:
+    ray = np.array([0.6, 0.0, 0.8])
+    long = 1e-6 * np.eye(3) + 0.3**2 * np.outer(ray, ray)
+    seen = _replaced(
+        message,
+        1,
+        sigma_m=tuple(np.sqrt(np.diag(long)).tolist()),
+        covariance_m2=tuple(long[np.triu_indices(3)].tolist()),
+        cameras=["left"],
+        source="predicted",
+    )
+    observed = usable_points(seen, landmarks)["thumb_tip"]
+    assert not observed.measured
+    np.testing.assert_allclose(observed.covariance_m2, long, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "covariance",
+    [
+        (np.nan, 0.0, 0.0, 1e-6, 0.0, 1e-6),
+        (1e300, 0.0, 0.0, 1e-6, 0.0, 1e-6),
+        (1e-6, 1e-3, 0.0, 1e-6, 0.0, 1e-6),
+        (-1e-3, 0.0, 0.0, 1e-6, 0.0, 1e-6),
+        (0.1, 0.0, 0.0, 0.1, 0.0, 1e-6),
+    ],
+)
+def test_absurd_covariances_are_dropped(
+    message: HandPoints, landmarks: dict[str, Landmark], covariance: tuple
+) -> None:
+    assert len(usable_points(_replaced(message, 1, covariance_m2=covariance), landmarks)) == 5
 
 
 def test_too_good_a_sigma_is_not_believed(
     message: HandPoints, landmarks: dict[str, Landmark]
 ) -> None:
     observed = usable_points(_replaced(message, 1, sigma_m=(0.0, 0.0, 0.0)), landmarks)
-    assert np.all(observed["thumb_tip"].inverse_sigma < 1e4)
+    assert np.linalg.eigvalsh(observed["thumb_tip"].covariance_m2).min() > 1e-8
 
 
 def test_predicted_points_weigh_less(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
-    observed = usable_points(_replaced(message, 1, source="predicted"), landmarks)
+    unseen = _replaced(message, 1, source="predicted", cameras=[])
+    observed = usable_points(unseen, landmarks)
     assert not observed["thumb_tip"].measured
-    np.testing.assert_allclose(observed["thumb_tip"].inverse_sigma, 1e3 / 3.0)
+    np.testing.assert_allclose(observed["thumb_tip"].covariance_m2, 9e-6 * np.eye(3))
 
 
 def test_unknown_names_and_repetitions(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
