@@ -18,6 +18,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HandName, landmark_point
 from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.step import FusionStep
+from services.simulator.hands.families import VARIED
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import Scene, build_scene
 from services.solver.step import SolverStep
@@ -119,8 +120,11 @@ class Pictures:
         self.distance_m = distance_m
         self._scenes = [make_scene(config, motion, distance_m, travel_m, seed) for seed in seeds]
         self._given = [detector(config, scene, seconds) for scene in self._scenes]
+        # The hands that are rendered: what fusion is told of them is exact.
         self._hands: dict[HandName, Any] = {
-            hand: load_hand(config.calibration_dir, hand, table.scale)
+            hand: msgspec.structs.replace(
+                load_hand(config.calibration_dir, hand, table.scale), origin=VARIED
+            )
             for hand, table in config.hand.items()
         }
         # What each scene's truth was asked for already: kinematics take longer than fusion.

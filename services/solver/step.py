@@ -4,8 +4,8 @@ whole_hand/ finds the wrist's pose (and about how every digit is bent) from all 
 config.solver.method decides how each digit's angles are then found (finger/). None until the wrist
 and three tips were seen in one message. Late messages: the prior is blurred by the time that
 passed; a second's gap starts anew. Missing landmarks: fewer equations, and what is not measured
-says `predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml. Absurd
-points are dropped (whole_hand/point_check.py).
+says `predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml, and
+sigmas that say so (model_error.py). Absurd points are dropped (whole_hand/point_check.py).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rhot.messages import HandPoints, HandPose
 from services.solver.finger.solve_fingers import FingerSolution, TipObservation, solve_fingers
 from services.solver.maths.kinematics import hand_frames
 from services.solver.model_check import check_model
+from services.solver.model_error import ModelError
 from services.solver.pose_message import (
     Skeleton,
     hand_pose,
@@ -58,21 +59,23 @@ class _Hand:
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
         self._tracker = HandTracker(model, self._landmarks)
+        self._model_error = ModelError(model, self._tracker.chains, self._landmarks)
         self._radii: list[float] = rounded(joint_radii_m(model))
 
     def step(self, points: HandPoints) -> HandPose | None:
-        observed = usable_points(points, self._landmarks)
+        observed = self._model_error.widened(usable_points(points, self._landmarks))
         estimate = self._tracker.track(points.stamp_ns, observed)
         if estimate is None:
             return None
         fingers = self._solve_fingers(estimate, observed)
         limits = self._tracker.chains.limits_rad
+        covariance = self._model_error.pose_covariance(points.stamp_ns, estimate, observed)
         return hand_pose(
             points,
             self._settings.method,
             self._skeleton(estimate, fingers, observed),
             fingers,
-            pose_uncertainty(estimate.covariance, limits),
+            pose_uncertainty(covariance, limits),
         )
 
     def _solve_fingers(

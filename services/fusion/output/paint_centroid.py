@@ -129,6 +129,64 @@ def located_shift(
 
 
 @njit(cache=True)
+def expected_shift(
+    table: Array,
+    p_rig: Array,
+    finger: tuple[Array, float, float],
+    cameras: Extrinsics,
+    shift: Array,
+    covariance: Array,
+) -> bool:
+    """located_shift of a finger that is not known exactly, and its covariance (3, 3).
+
+    finger: its direction (3,), one standard deviation of that in rad about each axis across it, and
+    of its radius as a share. The direction is tried so far to either side about two axes (an
+    unscented transform); beyond a radian it is not known at all. False if the cameras cannot locate
+    it.
+    """
+    direction, sigma_rad, radius_sd = finger
+    if not located_shift(table, p_rig, direction, cameras, shift):
+        return False
+    covariance[:] = 0.0
+    # The shift of a longer or shorter stretch of paint is the same to .1 mm, that of a thicker
+    # finger larger in proportion.
+    _add_square(shift, radius_sd**2, covariance)
+    cosine, sine = math.cos(min(sigma_rad, 1.0)), math.sin(min(sigma_rad, 1.0))
+    across = np.empty((2, 3))
+    _across(direction, across)
+    tried = np.empty(3)
+    for n in range(4):
+        sign = 1.0 if n < 2 else -1.0
+        turned = cosine * direction + sign * sine * across[n % 2]
+        if not located_shift(table, p_rig, turned, cameras, tried):
+            return False
+        _add_square(tried - shift, 0.5, covariance)
+    return True
+
+
+@njit(cache=True)
+def _across(direction: Array, out: Array) -> None:
+    """Two unit vectors (2, 3) across a unit direction and each other."""
+    least = 0
+    for i in range(1, 3):
+        if abs(direction[i]) < abs(direction[least]):
+            least = i
+    axis = np.zeros(3)
+    axis[least] = 1.0
+    out[0] = np.cross(direction, axis)
+    out[0] /= math.sqrt(out[0] @ out[0])
+    out[1] = np.cross(direction, out[0])
+
+
+@njit(cache=True)
+def _add_square(v: Array, weight: float, cov: Array) -> None:
+    """Add v v' times a weight to cov (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            cov[i, j] += weight * v[i] * v[j]
+
+
+@njit(cache=True)
 def _seen_shift(
     table: Array, p_rig: Array, direction: Array, R: Array, t: Array, out: Array
 ) -> None:

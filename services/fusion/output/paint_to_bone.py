@@ -15,9 +15,11 @@ against the middle of the painted axis is
 so there is nothing to push: a push by the radius would be 6.3 mm wrong. What depends on the
 finger's direction is taken off when a pose tells it (paint_centroid.py; on rendered scenes the RMS
 error fell from .49, 1.17, 1.75 to .23, .35, .91 mm along x, y, z). Without a pose it stays, and the
-covariance says so. A dab (radius 0) marks the point of the skin under its middle, but skin falls
-away from there: the centre of what is seen lies deeper, by `dab_sag_m` against the skin's normal.
-What light, background and detector do to a centre is systematic_error.py's matter.
+covariance says so; with one it says how unsure the pose's directions are, and how thick a finger
+may be that was never measured. A dab (radius 0) marks the point of the skin under its
+middle, but skin falls away from there: the centre of what is seen lies deeper, by `dab_sag_m`
+against the skin's normal. What light, background and detector do to a centre is
+systematic_error.py's matter.
 """
 
 from __future__ import annotations
@@ -34,21 +36,26 @@ from rhot.messages import HandPose
 from services.fusion.arrays import Bools
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.paint_centroid import located_shift, shift_table
+from services.fusion.output.paint_centroid import expected_shift, shift_table
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
 SIGMA_UNKNOWN = (0.29, 0.16)
-# With the solver's directions (7 deg off), along and across: SIDE of a finger seen from the side,
-# and END times a power of the cosine between finger and viewing ray beside it. Errors of rendered
-# tips at .5-.7 m, all causes: .4-.6 and .13 mm from the side, .7 and .25 at a cosine of -.6,
-# 1.4-2.2 and .4-.5 pointing at the cameras, where the visible end depends on the direction most.
-# Speed makes no difference.
+# With the solver's directions, beside what their own uncertainty makes (paint_centroid.py), along
+# and across: SIDE of a finger seen from the side, and END times a power of the cosine between
+# finger and viewing ray. Errors of rendered tips at .5-.7 m with directions 7 deg off, all causes:
+# .4-.6 and .13 mm from the side, .7 and .25 at a cosine of -.6, 1.4-2.2 and .4-.5 pointing at the
+# cameras, where the visible end depends on the direction most.
 SIGMA_SIDE = (0.02, 0.012)
-SIGMA_END, _END_POWER = (0.25, 0.10), (4, 2)
+SIGMA_END, _END_POWER = (0.2, 0.08), (4, 2)
 # Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.45 mm
 # deep, of which their sag explains 1.58.
 SIGMA_DAB = 0.025
+# How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
+# a hand measures bones. (How long the paint is does not matter: paint_centroid.py.)
+_RADIUS_SD = {"tables": 0.12, "measured": 0.08}
+# What directions were off on average when poses did not say how sure they were.
+_UNTOLD_DIRECTION_RAD = 0.12
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
 
@@ -97,6 +104,9 @@ class PaintToBone:
             ]
         )
         self._tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
+        self._radius_sds = [
+            _RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks
+        ]
         self._extrinsics = extrinsics(cameras)
         # The middle of the cameras, which stands for all of them.
         self._viewpoint_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
@@ -105,11 +115,16 @@ class PaintToBone:
     def reset(self) -> None:
         """Time starts anew: no direction is known."""
         self._directions = np.zeros((len(self._landmarks), 3))
+        self._direction_sigmas = np.zeros(len(self._landmarks))
         self._stamps_ns = [-_POSE_AGE_NS - 1] * len(self._landmarks)
 
     def note_pose(self, pose: HandPose) -> None:
         """Remember a solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
         joints = {joint.name: joint for joint in pose.joints if joint.source != "predicted"}
+        sigmas = {
+            f"{finger.name}_tip": _direction_sigma(pose.wrist_sigma_rad, finger.sigma_rad)
+            for finger in pose.fingers
+        }
         for row, landmark in enumerate(self._landmarks):
             joint = joints.get(landmark.name)
             if landmark.hand != pose.hand or joint is None or not self.extended[row]:
@@ -119,6 +134,7 @@ class PaintToBone:
                 R = rotation_from_quaternion(quaternion)
                 is_tip = self._radii_m[row] > 0.0
                 self._directions[row] = -R[:, 2] if is_tip else R @ self._normals[row]
+                self._direction_sigmas[row] = sigmas.get(landmark.name, 0.0)
                 self._stamps_ns[row] = pose.stamp_ns
 
     def correct(
@@ -133,26 +149,34 @@ class PaintToBone:
         # Skin that a camera sees faces it, more or less.
         positions = positions_m - self._sags_m[:, None] * rays
         sigmas = np.tile(SIGMA_UNKNOWN, (len(positions), 1))  # (L, 2) along and across, in radii
+        shift, shift_covariance, covariances = np.empty(3), np.empty((3, 3)), covariances_m2.copy()
         for row, stamp_ns in enumerate(self._stamps_ns):
             if abs(instant_ns - stamp_ns) > _POSE_AGE_NS:
                 continue
             if self._radii_m[row] == 0.0:
                 positions[row] = positions_m[row] + self._sags_m[row] * self._directions[row]
                 continue
-            shift = self._tip_shift(row, positions_m[row], seen_by[row])
-            if shift is not None:
+            if self._tip_shift(row, positions_m[row], seen_by[row], shift, shift_covariance):
                 positions[row] -= shift
+                covariances[row] += shift_covariance
                 sigmas[row] = _tip_sigmas(float(rays[row] @ self._directions[row]))
-        return positions, covariances_m2 + self._paint_covariances(sigmas, rays)
+        return positions, covariances + self._paint_covariances(sigmas, rays)
 
-    def _tip_shift(self, row: int, position_m: Array, seen_by: Bools) -> Array | None:
-        """The located centroid of a tip whose direction is known, minus the landmark (3,)."""
+    def _tip_shift(
+        self, row: int, position_m: Array, seen_by: Bools, shift: Array, covariance: Array
+    ) -> bool:
+        """The located centroid of a tip minus the landmark (3,), and its covariance (3, 3).
+
+        By a pose's direction. False if the cameras cannot locate it.
+        """
         cameras = seen_by if np.count_nonzero(seen_by) >= 2 else np.ones_like(seen_by)
         chosen = self._extrinsics.of(np.flatnonzero(cameras))
-        shift = np.zeros(3)
-        if located_shift(self._tables[row], position_m, self._directions[row], chosen, shift):
-            return shift
-        return None
+        finger = (
+            self._directions[row],
+            float(self._direction_sigmas[row]),
+            self._radius_sds[row],
+        )
+        return expected_shift(self._tables[row], position_m, finger, chosen, shift, covariance)
 
     def _paint_covariances(self, sigmas: Array, rays: Array) -> Array:
         """Covariances (L, 3, 3) by sigmas (L, 2) along and across the viewing rays (L, 3)."""
@@ -162,6 +186,17 @@ class PaintToBone:
         dab_variances = (SIGMA_DAB * self._dabs_m[:, None]) ** 2  # (L, 1)
         variances = tip_variances + dab_variances
         return variances[:, 0, None, None] * along + variances[:, 1, None, None] * across
+
+
+def _direction_sigma(wrist_rad: float | None, finger_rad: float | None) -> float:
+    """One standard deviation of a tip's direction about each axis across it.
+
+    wrist_rad is the length of the wrist's error, three axes of it; finger_rad of each of the
+    digit's angles; None if the pose does not say.
+    """
+    if wrist_rad is None or finger_rad is None:
+        return _UNTOLD_DIRECTION_RAD
+    return math.hypot(wrist_rad / math.sqrt(3.0), finger_rad)
 
 
 def _tip_sigmas(cosine: float) -> list[float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -111,8 +112,8 @@ def _angles_of(pose: HandPose) -> Array:
 
 @pytest.fixture(scope="session")
 def world() -> Callable[[HandName], World]:
-    """World of a hand of the tables."""
-    return lambda hand: World(default_hand(hand))
+    """World of a hand of the tables that is known to be one: its model says nothing is unknown."""
+    return lambda hand: World(msgspec.structs.replace(default_hand(hand), origin="simulated"))
 
 
 @pytest.fixture(scope="session")

@@ -121,7 +121,8 @@ def _leap_hand(fist: RecordedJoints, driven: DrivenHand) -> HandModel:
         name: msgspec.structs.replace(p, offset_m=(0.0, 0.0, 0.0))
         for name, p in driven.model.paint.items()
     }
-    return msgspec.structs.replace(driven.model, paint={**paint, "wrist": dab})
+    paint = {**paint, "wrist": dab}
+    return msgspec.structs.replace(driven.model, paint=paint, origin="recording")
 
 
 def test_the_fist_is_followed_from_palm_and_tips(

@@ -29,7 +29,8 @@ KNUCKLE = (*BASIC_LANDMARKS, "middle_proximal")
 
 
 def _solver(hand: HandName = "right", method: str = "dls") -> SolverStep:
-    return SolverStep(RigConfig(solver=Solver(method=method)), {hand: default_hand(hand)})
+    model = msgspec.structs.replace(default_hand(hand), origin="simulated")
+    return SolverStep(RigConfig(solver=Solver(method=method)), {hand: model})
 
 
 def _run(

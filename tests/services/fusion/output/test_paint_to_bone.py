@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -35,7 +36,7 @@ def paint() -> PaintToBone:
     )
 
 
-def pose(stamp_ns: int, wxyz, source="solved") -> HandPose:
+def pose(stamp_ns: int, wxyz, source="solved", sigma_rad: float | None = None) -> HandPose:
     joints = [
         HandJoint(
             name=name,
@@ -49,7 +50,14 @@ def pose(stamp_ns: int, wxyz, source="solved") -> HandPose:
     angles = FingerAngles(abduction=0.0, mcp=0.0, pip=0.0, dip=0.0)
     names = ("thumb", "index", "middle", "ring", "little")
     fingers = [
-        FingerPose(name=name, angles_rad=angles, residual_m=0.0, iterations=1, status="solved")
+        FingerPose(
+            name=name,
+            angles_rad=angles,
+            residual_m=0.0,
+            iterations=1,
+            status="solved",
+            sigma_rad=sigma_rad,
+        )
         for name in names
     ]
     wrist = WristPose(position_m=(0.0, 0.0, 0.5), orientation_wxyz=wxyz)
@@ -61,6 +69,7 @@ def pose(stamp_ns: int, wxyz, source="solved") -> HandPose:
         wrist=wrist,
         joints=joints,
         fingers=fingers,
+        wrist_sigma_rad=sigma_rad,
     )
 
 
@@ -145,7 +154,8 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
     sigmas_mm = []
     for angle in (0.0, 0.5, 1.5):
         turn = rotation_from_vector([angle, 0.0, 0.0])
-        paint.note_pose(pose(10**18, tuple(quaternion_from_rotation(turn).tolist())))
+        wxyz = tuple(quaternion_from_rotation(turn).tolist())
+        paint.note_pose(pose(10**18, wxyz, sigma_rad=0.03))
         sigmas_mm.append(
             1e3 * np.sqrt(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1, [1, 2], [1, 2]])
         )
@@ -164,3 +174,59 @@ def test_absurd_or_predicted_poses_are_ignored(paint, wxyz):
     paint.note_pose(pose(10**18, wxyz))
     paint.note_pose(pose(10**18, TOWARDS, source="predicted"))
     assert is_untouched(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
+
+
+def depth_sigmas_m(origin: str, sigma_rad: float | None) -> tuple[float, float]:
+    """Along x and z, of a tip that points at the cameras, tilted by half a radian."""
+    model = msgspec.structs.replace(default_hand("right"), origin=origin)
+    paint = PaintToBone(LANDMARKS, {"right": model}, tuple(SyntheticRig().rig().values()))
+    paint.note_pose(pose(10**18, TOWARDS, sigma_rad=sigma_rad))
+    variances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1]
+    return float(np.sqrt(variances[0, 0])), float(np.sqrt(variances[2, 2]))
+
+
+def test_an_unsure_direction_makes_an_unsure_tip():
+    """As unsure as without a direction, or nearly so, once it may be any."""
+    for axis in range(2):
+        told = [depth_sigmas_m("simulated", sigma)[axis] for sigma in (0.02, 0.1, 0.3, 0.8)]
+        assert np.all(np.diff(told) > 0.0)
+    assert depth_sigmas_m("simulated", 0.05)[1] < depth_sigmas_m("simulated", None)[1]
+    unknown = 0.29 * 6.8e-3
+    assert depth_sigmas_m("simulated", 0.02)[1] < 0.55 * unknown
+    assert 0.7 * unknown < depth_sigmas_m("simulated", 1.5)[1] < 2.0 * unknown
+
+
+def test_sigmas_hold_a_direction_that_is_off(random_fingers):
+    """Ray-cast tips, corrected by directions that are off by what the pose says."""
+    random, squares = np.random.default_rng(2), []
+    model = msgspec.structs.replace(default_hand("right"), origin="simulated")
+    paint = PaintToBone(LANDMARKS, {"right": model}, tuple(SyntheticRig().rig().values()))
+    for point, direction, located in random_fingers(120, hidden=0.5):
+        axis = np.cross(direction, random.normal(size=3))
+        off = rotation_from_vector(random.normal(0.0, 0.25) * axis / np.linalg.norm(axis))
+        away = rotation_between(np.array([0.0, 0.0, -1.0]), off @ direction)
+        # A digit's angles share the blame with the wrist.
+        told = pose(10**18, tuple(quaternion_from_rotation(away).tolist()), sigma_rad=0.15)
+        paint.note_pose(told)
+        places, covariances = paint.correct(
+            np.array([POSITIONS[0], located]), COVARIANCES, BOTH, 10**18
+        )
+        error = places[1] - point
+        squares.append(error @ np.linalg.solve(covariances[1], error) / 3.0)
+    assert 0.2 < np.mean(squares) < 2.0
+
+
+def rotation_between(a, b):
+    """A rotation that turns unit vector a to unit vector b."""
+    axis = np.cross(a, b)
+    sine = np.linalg.norm(axis)
+    return rotation_from_vector(axis / max(sine, 1e-9) * np.arctan2(sine, a @ b))
+
+
+def test_a_finger_that_was_not_measured_makes_an_unsure_tip():
+    for axis in range(2):
+        known, measured, table = (
+            depth_sigmas_m(origin, 0.05)[axis] for origin in ("simulated", "measured", "tables")
+        )
+        assert known <= measured <= table
+    assert known < measured < table
