@@ -23,6 +23,7 @@ and of pictures, through the real tracker, solved with a hand of the tables at a
     skin        tuning: tanned; held out: dark, pale.
     light       tuning: from the left, dim. Held out: warm from below with strong flicker; cold.
     processing  tuning: sharpened, JPEG 90. Held out: denoised and sharpened, JPEG 70, wrong range.
+    room        coloured things behind. Tuning: a hand that plays; held out: a small one that waves.
     motion      tuning: Leap grab and wave, stop and go at 10 m/s^2, slow rolls. Held out: splay and
                 pinch, 16 m/s^2, flapping, rolls that wait.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -72,7 +72,13 @@ def _seconds(message: HandPoints) -> float:
     return (message.stamp_ns - START_NS) * 1e-9
 
 
-def scores(case: Case, fusion_of: MakeFusion = make_fusion, *, feedback: bool) -> Figures:
+def scores(
+    case: Case,
+    fusion_of: MakeFusion = make_fusion,
+    *,
+    feedback: bool,
+    lags: Sequence[int] = LAGS,
+) -> Figures:
     """Figures of a case by lag, mm; names end in the lag, or in `spline`.
 
     share: of instants and landmarks that all cameras see (per cent), those with a point. Errors are
@@ -81,7 +87,7 @@ def scores(case: Case, fusion_of: MakeFusion = make_fusion, *, feedback: bool) -
     """
     figures: Figures = {}
     told = Told(np.empty(0), np.empty((0, 0, 3)), np.empty((0, 0, 3, 3)))
-    for lag in LAGS:
+    for lag in lags:
         told = run(case, fusion_of(case, lag), feedback=feedback)
         found = _figures(case, told)
         figures |= {f"{name}_{lag}": value for name, value in found.items()}
@@ -146,7 +152,7 @@ def _largest(values: Array) -> float:
 MIN_SHARE, NEES, MAX_MM, MAX_SPEED, LAG_0 = 99.5, (0.5, 2.0), 30.0, 1.5, 2.0
 
 
-def misses(figures: Figures) -> list[str]:
+def misses(figures: Figures, lags: Sequence[int] = LAGS) -> list[str]:
     """Which targets a case misses, in a word each.
 
     tail2: 95 % or maximum worse than the spline's at lag 2; tail0: more than twice at lag 0;
@@ -159,11 +165,11 @@ def misses(figures: Figures) -> list[str]:
             for kind in ("p95", "max")
         ):
             found.append(name)
-    if any(not figures[f"share_{lag}"] >= MIN_SHARE for lag in LAGS):
+    if any(not figures[f"share_{lag}"] >= MIN_SHARE for lag in lags):
         found.append("share")
-    if any(not NEES[0] <= figures[f"nees_{lag}"] <= NEES[1] for lag in LAGS):
+    if any(not NEES[0] <= figures[f"nees_{lag}"] <= NEES[1] for lag in lags):
         found.append("nees")
-    largest = max(figures[f"unhidden_max_{lag}"] for lag in LAGS)
+    largest = max(figures[f"unhidden_max_{lag}"] for lag in lags)
     if figures["speed"] <= MAX_SPEED and not largest <= MAX_MM:
         found.append("30mm")
     return found

@@ -106,6 +106,18 @@ _PICTURES: dict[Half, _Recipes] = {
         "limited range taken for full": Recipe(moves=Moves("fist"), wrong_range=True, seed=42),
     },
 }
+_ROOM: dict[Half, _Recipes] = {
+    "tuning": {"coloured things behind": Recipe(moves=_PIANO, clutter=True, seed=51)},
+    "held_out": {
+        "coloured things, a child waves": Recipe(
+            moves=Moves("wave", "roll", 15.0, hz=0.7, seed=13),
+            person=Person(0.8, seed=14),
+            given_scale=0.85,
+            clutter=True,
+            seed=52,
+        ),
+    },
+}
 _MOTION: dict[Half, _Recipes] = {
     "tuning": {
         "stop and go 10 m/s2": Recipe(
@@ -131,6 +143,7 @@ _FAMILIES: dict[str, dict[Half, _Recipes]] = {
     "skin": _SKIN,
     "light": _LIGHT,
     "processing": _PICTURES,
+    "room": _ROOM,
     "motion": _MOTION,
 }
 

@@ -7,7 +7,9 @@ paint and lamps. Everything but the truth comes from disk where it was made befo
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,6 +41,8 @@ from testing.families.picture_motions import Moves
 from testing.families.recordings import leap_hand
 from testing.synthetic_points import START_NS
 
+# Makes a context in which something is off.
+Without = Callable[[], contextlib.AbstractContextManager[None]]
 _RIG = Path(__file__).parents[2] / "config" / "sim.toml"
 # As synchronisation leaves a camera's clock, by its own account.
 _CLOCK_SIGMA_NS = 500_000
@@ -72,6 +76,8 @@ class Recipe:
     sharpen: float = 0.0
     denoise: float = 0.0
     wrong_range: bool = False
+    # Objects in saturated colours in the background.
+    clutter: bool = False
     seconds: float = 5.0
     seed: int = 1
 
@@ -103,6 +109,7 @@ class Recipe:
             light=self.light,
             skin=self.skin,
             uneven=self.paint.uneven,
+            clutter=self.clutter,
         )
         model, seed = self.hand(), seed or self.seed
         scene = build_scene(self.config(), spec, "families", seed, models={model.hand: model})
@@ -120,7 +127,7 @@ class Recipe:
 def picture_case(name: str, recipe: Recipe) -> Case:
     """A case of pictures."""
     scene, hand = recipe.scene(), recipe.hand().hand
-    frames = kept("markers", recipe, MARKER_CODE, lambda: detected(recipe, scene))
+    frames = kept("markers", recipe, MARKER_CODE, lambda: detected(recipe, scene)[""])
     shares = kept("visible", recipe, PICTURE_CODE, lambda: visible_shares(recipe, scene))
     clocks = scene.clocks
     truth = _Truth(scene, recipe.hand(), tuple(scene.hands[hand].landmarks))
@@ -160,22 +167,38 @@ class _Truth:
         return np.array([self._known[at_s] for at_s in flat]).reshape(-1, len(self.landmarks), 3)
 
 
-def detected(recipe: Recipe, scene: Scene) -> list[MarkerFrame]:
-    """All cameras' frames in order of exposure, with what the tracker detects in their pictures."""
-    found: list[tuple[float, MarkerFrame]] = []
+def detected(
+    recipe: Recipe, scene: Scene, trackers: Mapping[str, Without] | None = None
+) -> dict[str, list[MarkerFrame]]:
+    """All cameras' frames in order of exposure, with what each tracker detects in their pictures.
+
+    trackers: contexts in which a tracker works, by name; each tracker has a state of its own.
+    """
+    trackers = trackers or {"": contextlib.nullcontext}
+    found: dict[str, list[tuple[float, MarkerFrame]]] = {name: [] for name in trackers}
     calibration = recipe.scene(seed=recipe.seed + 1000)
-    for name in scene.cameras:
-        source = FrameSource(scene, name, recorded=True)
-        colors = fitted_colors(calibration, name)
-        tracker = TrackerStep(
-            name, colors, scene.config.tracker, source.camera.size_px, scene.config.colors
-        )
-        for seq in range(int(recipe.seconds * scene.config.camera_named(name).fps)):
+    for camera in scene.cameras:
+        source = FrameSource(scene, camera, recorded=True)
+        colors = fitted_colors(calibration, camera)
+        steps = {
+            name: TrackerStep(
+                camera, colors, scene.config.tracker, source.camera.size_px, scene.config.colors
+            )
+            for name in trackers
+        }
+        for seq in range(int(recipe.seconds * scene.config.camera_named(camera).fps)):
             taken = source.take(seq, START_NS)
-            if taken.image is not None:
-                frame = _frame(taken, full_range=recipe.wrong_range)
-                found.append((taken.time_s, tracker.step(frame, 0, _CLOCK_SIGMA_NS)))
-    return [frame for _, frame in sorted(found, key=lambda entry: entry[0])]
+            if taken.image is None:
+                continue
+            frame = _frame(taken, full_range=recipe.wrong_range)
+            for name, without in trackers.items():
+                with without():
+                    markers = steps[name].step(frame, 0, _CLOCK_SIGMA_NS)
+                found[name].append((taken.time_s, markers))
+    return {
+        name: [frame for _, frame in sorted(frames, key=lambda entry: entry[0])]
+        for name, frames in found.items()
+    }
 
 
 def _frame(taken: TakenFrame, *, full_range: bool) -> Frame:
