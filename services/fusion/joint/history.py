@@ -130,19 +130,13 @@ def make_room(history: HandHistory, index: int) -> int:
 
     Returns its index, one less if the oldest was dropped.
     """
-    # Alike in kalman/track_insertion.py, which goes with the tracks if this filter replaces them.
     order = history.order
-    size = history.size[0]
-    if size == NODES:
-        oldest = order[0]
-        for k in range(NODES - 1):
-            order[k] = order[k + 1]
-        order[NODES - 1] = oldest
+    size = min(history.size[0], NODES - 1)
+    if history.size[0] == NODES:
+        order[:] = np.roll(order, -1)
         index -= 1
-        size -= 1
     node = order[size]
-    for k in range(size, index, -1):
-        order[k] = order[k - 1]
+    order[index + 1 : size + 1] = order[index:size].copy()
     order[index] = node
     history.size[0] = size + 1
     clear_events(history, node)
