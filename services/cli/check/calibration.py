@@ -107,7 +107,8 @@ def _hands(config: RigConfig) -> list[Problem]:
         if not path.exists():
             text = (
                 f"no such file: the {hand} hand has the bones of an average adult, "
-                f"times {table.scale:g} ([hand.{hand}] scale)"
+                f"times {table.scale:g} ([hand.{hand}] scale), knuckles 10 to 45 mm off; "
+                f"`rhot calibrate hand {hand} --watch` measures it while somebody uses the rig"
             )
             problems.append(note(path, text))
         model = load_or_report(partial(load_hand, config.calibration_dir, hand), problems, path)

@@ -16,6 +16,7 @@ import typer
 import uvloop
 
 from rhot.files.config import RigConfig, load_rig
+from rhot.hand import HandName
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.live.supervisor import Child, Supervisor, service_argv
 from services.cli.options import VerboseOption
@@ -66,6 +67,14 @@ def up(
     uvloop.run(_up(load_rig(config), config, viewer, Terminal(verbose=verbose)))
 
 
+def unmeasured_hands(config: RigConfig) -> list[HandName]:
+    """Hands of a rig that are tracked with the bones of the tables."""
+    if not config.has_depth:
+        return []
+    folder = config.calibration_dir
+    return [hand for hand in config.hand if not (folder / f"hand.{hand}.json").exists()]
+
+
 async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -> None:
     stopping = stop_on_signals()
     supervisor = Supervisor(terminal.log)
@@ -80,5 +89,10 @@ async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -
                 terminal.line(f"cameras expected from {', '.join(remote)}")
             if config.objects.host and config.object:
                 terminal.line(f"SteamVR's trackers expected from {config.objects.host}")
+            for hand in unmeasured_hands(config):
+                terminal.line(
+                    f"the {hand} hand was never measured: `rhot calibrate hand {hand} --watch "
+                    f"--config {path}` does it while somebody uses the rig"
+                )
             watch = RigWatch(config, path, [child.name for child in children], terminal.line)
             await watch.run(supervisor.reasons)

@@ -17,6 +17,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HandModel
 from services.calibrator.hand.free_motion.frames import Seen
 from services.calibrator.hand.free_motion.marginal import (
+    ALIKE,
     HandEquations,
     Plausibility,
     hand_equations,
@@ -103,7 +104,7 @@ def estimate_hand(
             hand = _hand(parameters, now, found.x)
             at = plausibility(hand, found.x, frames, at.poses, _SPREAD_ROUNDS)
         found = _climb(parameters, now, frames, found.x, at.poses)
-    covariance = np.asarray(np.linalg.inv(found.equations.A), dtype=np.float64)[:p, :p]
+    covariance = ALIKE * np.asarray(np.linalg.inv(found.equations.A), dtype=np.float64)[:p, :p]
     seen_coordinates = 3 * int((frames.weights[:, :, 0, 0] > 0.0).sum())
     missing = frames.weights[:, :, :1, 0] == 0.0
     error = np.where(missing, 0.0, found.at.linear.error)

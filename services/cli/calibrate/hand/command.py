@@ -1,13 +1,14 @@
-"""`rhot calibrate hand right`: a person's bones, live from the exercises or from a recording of any
-motion.
+"""`rhot calibrate hand right`: a person's bones from exercises or any motion, live or recorded.
 
-Live, it says which exercise is due and which markers are missing. A recording that does not
-determine the hand is refused with the reason, and nothing is written. Lengths measured by hand
-(--length) are kept as given.
+Live, it says which exercise is due and which markers are missing; --watch asks for no exercises.
+A recording that does not determine the hand is refused with the reason, and nothing is written.
+Lengths measured by hand (--length) are kept as given.
 """
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,10 +20,13 @@ from rhot.files.calibration import save
 from rhot.hand import DIGITS, HandName
 from rhot.hand_exercises import EXERCISE_S, EXERCISES
 from rhot.messages import HandPoints
+from services.calibrator.hand.free_motion.frames import GOOD_SECONDS, MIN_SECONDS
 from services.cli.calibrate import options
 from services.cli.calibrate.hand.exercises import follow_exercises
 from services.cli.calibrate.hand.fitting import Wanted, from_either, from_exercises, from_motion
 from services.cli.calibrate.hand.recorded import recorded
+from services.cli.calibrate.hand.watch import watch_hand
+from services.cli.option_groups import grouped
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints
 
@@ -33,25 +37,43 @@ _BONES = {"proximal": 0, "middle": 1, "distal": 2}
 _THUMB_BONES = {"metacarpal": 0, "proximal": 1, "distal": 2}
 
 
-def hand(
-    which: Annotated[HandName, typer.Argument(metavar="HAND", help="left or right")] = "right",
+@dataclass(frozen=True)
+class SourceOptions:
+    """What the hand is measured from; the exercises, live, if nothing is given."""
+
     recording: Annotated[
         Path | None,
         typer.Option("--from", help="a capture, a result of rhot track, points.jsonl or .mcap"),
-    ] = None,
-    config: options.ConfigOption = None,
-    out: options.OutOption = None,
-    connect: ConnectOption = None,
+    ] = None
     start: Annotated[
         float | None,
         typer.Option(
             min=0.0, help="with --from: second at which the exercises begin; default: found"
         ),
-    ] = None,
+    ] = None
     free: Annotated[
         bool,
         typer.Option("--free", help="with --from: any motion; default: exercises, if it has them"),
-    ] = False,
+    ] = False
+    watch: Annotated[
+        bool, typer.Option("--watch", help="live, from any motion, while somebody uses the rig")
+    ] = False
+    seconds: Annotated[
+        float, typer.Option(min=MIN_SECONDS, max=600.0, help="with --watch: how long in view")
+    ] = GOOD_SECONDS
+    yes: Annotated[
+        bool, typer.Option("--yes", help="with --watch: take the hand over without asking")
+    ] = False
+
+
+@grouped
+def hand(
+    which: Annotated[HandName, typer.Argument(metavar="HAND", help="left or right")] = "right",
+    config: options.ConfigOption = None,
+    out: options.OutOption = None,
+    connect: ConnectOption = None,
+    *,
+    source: SourceOptions,
     length: Annotated[
         list[str] | None, typer.Option(metavar="DIGIT:BONE=MM", help="measured by hand; repeatable")
     ] = None,
@@ -59,27 +81,42 @@ def hand(
     exercises: Annotated[bool, typer.Option("--list", help="show the exercises")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Measure a hand from a guided recording: follow the exercises, live, or give a recording of
-    them.
+    """Measure a hand: follow the exercises, live, or give a recording of them or of any motion.
+
+    With --watch, it measures itself while somebody uses the rig.
     """
     if exercises:
         for number, exercise in enumerate(EXERCISES):
             typer.echo(f"{EXERCISE_S * number:3.0f} s  {exercise.prompt}")
         return
     rig, endpoints = rig_and_endpoints(config, connect)
-    source = f"live, rig {rig.rig.name}" if recording is None else str(recording)
-    wanted = Wanted(which, source, options.now_text(), lengths_of(length or []), start)
-    if recording is None:
-        made = from_exercises(uvloop.run(follow_exercises(rig, endpoints, which)), wanted)
-    else:
-        made = _of_recording(recorded(recording, which, config), wanted, free)
+    known = lengths_of(length or [])
     target = options.out_folder(out, rig if config else None) / f"hand.{which}.json"
+    live = f"live, rig {rig.rig.name}"
+    inputs = live if source.recording is None else str(source.recording)
+    wanted = Wanted(which, inputs, options.now_text(), known, source.start)
+    if source.recording is not None:
+        made = _of_recording(recorded(source.recording, which, config), wanted, source.free)
+    elif source.watch:
+        made = watch_hand(rig, endpoints, wanted, source.seconds)
+        dry_run = dry_run or not (source.yes or _agreed(target))
+    else:
+        made = from_exercises(uvloop.run(follow_exercises(rig, endpoints, which)), wanted)
     if not dry_run:
         save(target, made)
     if as_json:
         options.echo_json(made)
         return
     _report(made, None if dry_run else target)
+
+
+def _agreed(target: Path) -> bool:
+    """Whether the person wants the hand; where nobody can be asked, no."""
+    if not sys.stdin.isatty():
+        typer.echo("nothing is written without --yes where nobody can be asked", err=True)
+        return False
+    replaced = f" (it replaces {target})" if target.exists() else ""
+    return typer.confirm(f"take it over?{replaced}", err=True)
 
 
 def _of_recording(messages: list[HandPoints], wanted: Wanted, free: bool) -> HandFile:

@@ -24,9 +24,7 @@ async def follow_exercises(
     rig: RigConfig, endpoints: list[str], which: HandName
 ) -> list[HandPoints]:
     """One pass through the exercises, with what to do now and what is missing on standard error."""
-    if which not in rig.hand:
-        others = ", ".join(hand for hand in HANDS if hand in rig.hand) or "no hand"
-        raise CalibrationError(f"rig.toml has no [hand.{which}.markers]; it has {others}")
+    require_hand(rig, which)
     teller, messages, shown = Terminal(), [], -1
     async with router_session(rig.rig.name, endpoints) as bus:
         stream = RigClient(bus).hand_points(which, queue=256)
@@ -51,6 +49,13 @@ async def follow_exercises(
                 note = f"  (not seen: {missing})" if missing else ""
                 teller.line(f"{number + 1:2}/{len(EXERCISES)}  {EXERCISES[number].prompt}{note}")
     return messages
+
+
+def require_hand(rig: RigConfig, which: HandName) -> None:
+    """Raises CalibrationError if rig.toml has no such hand."""
+    if which not in rig.hand:
+        others = ", ".join(hand for hand in HANDS if hand in rig.hand) or "no hand"
+        raise CalibrationError(f"rig.toml has no [hand.{which}.markers]; it has {others}")
 
 
 def _missing(message: HandPoints) -> str:

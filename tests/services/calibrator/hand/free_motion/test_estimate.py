@@ -48,8 +48,6 @@ def test_knuckles_of_a_small_hand(free) -> None:
     before = np.linalg.norm(_knuckles(table) - _knuckles(truth), axis=1)
     assert np.median(errors) < 6e-3 < np.median(before)
     assert found.residual_m < 2e-3
-    # The same messages, the same hand.
-    assert np.array_equal(found.x, estimate_hand(seen, table).x)
 
 
 def test_lengths_measured_by_hand_stay(free) -> None:
