@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,8 @@ from rhot.hand import TIPS, HandModel
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains
 from services.solver.maths.kinematics import digit_frames
-from services.solver.whole_hand.hand_tracker import MAX_GAP_S, HandEstimate
+from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.hand_tracker import MAX_GAP_S
 from services.solver.whole_hand.landmarks import (
     Landmark,
     Observation,
@@ -91,11 +93,7 @@ class ModelError:
         if self._landmark_m == 0.0:
             return dict(observed)
         return {
-            name: Observation(
-                seen.point_m,
-                1.0 / np.hypot(1.0 / seen.inverse_sigma, self._landmark_m),
-                seen.measured,
-            )
+            name: replace(seen, covariance_m2=seen.covariance_m2 + self._landmark_m**2 * np.eye(3))
             for name, seen in observed.items()
         }
 
@@ -122,10 +120,16 @@ class ModelError:
         _fill_derivatives(
             self._chains, observations, columns, estimate.rotation, estimate.angles_rad, (H, J)
         )
-        weighed = H * (observations.inverse_sigma.ravel() ** 2)[:, None]
-        self._S -= estimate.covariance @ (weighed.T @ (H @ self._S + J))
+        H, J = _whitened(observations.whitening, H), _whitened(observations.whitening, J)
+        self._S -= estimate.covariance @ (H.T @ (H @ self._S + J))
         scaled = self._S * self._sigmas
         return covariance + scaled @ scaled.T
+
+
+def _whitened(whitening: Array, derivatives: Array) -> Array:
+    """Derivatives (3 m, n) of m landmarks, in their standard deviations."""
+    m, n = len(whitening), derivatives.shape[1]
+    return np.asarray((whitening @ derivatives.reshape(m, 3, n)).reshape(3 * m, n))
 
 
 @njit(cache=True)

@@ -131,7 +131,7 @@ def test_what_a_pose_forgets_and_what_it_starts_with(world: Callable) -> None:
     chains, landmarks = hand_chains(model), hand_landmarks(model)
     joints = forward(model, np.eye(3), np.array([0.0, 0.0, 0.5]), np.full((5, 4), 0.2))
     observed = {
-        name: Observation(landmark_point(model, name, *joints), np.full(3, 200.0), True)
+        name: Observation(landmark_point(model, name, *joints), 2.5e-5 * np.eye(3), True)
         for name in NAMES
     }
     estimate = HandEstimate(
@@ -152,9 +152,9 @@ def test_what_a_pose_forgets_and_what_it_starts_with(world: Callable) -> None:
 
 
 def test_landmarks_are_known_no_better_than_where_they_sit() -> None:
-    seen = {"wrist": Observation(np.zeros(3), np.full(3, 1e3), True)}
+    seen = {"wrist": Observation(np.zeros(3), 1e-6 * np.eye(3), True)}
     for origin, at_least_m in (("tables", 4e-3), ("measured", 1.2e-3), ("simulated", 1e-3)):
         model = msgspec.structs.replace(default_hand(), origin=origin)
         errors = ModelError(model, hand_chains(model), hand_landmarks(model))
-        sigma_m = 1.0 / errors.widened(seen)["wrist"].inverse_sigma
+        sigma_m = np.sqrt(np.diag(errors.widened(seen)["wrist"].covariance_m2))
         assert np.all((sigma_m >= 0.999 * at_least_m) & (sigma_m < 1.5 * at_least_m))
