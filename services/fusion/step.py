@@ -34,6 +34,7 @@ from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import coherent, hand_reach_m
 from services.fusion.output.paint_to_bone import PaintToBone
+from services.fusion.output.pose_feedback import PoseFeedback
 from services.fusion.output.schedule import OutputSchedule
 from services.fusion.output.systematic_error import SystematicError
 from services.fusion.paired.estimator import PairedMethod
@@ -75,6 +76,7 @@ class FusionStep:
         self._reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
+        self._poses = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
@@ -103,6 +105,11 @@ class FusionStep:
         """All landmarks of the rig's hands, in the order of their indices."""
         return self._landmarks
 
+    @property
+    def late_poses(self) -> int:
+        """Poses that came too late for points which should rest on them."""
+        return self._poses.late
+
     def step(self, frame: MarkerFrame) -> list[HandPoints]:
         """Take in one frame; the points that are due with it, one message per hand, or none."""
         view = self._builder.build(frame)
@@ -128,10 +135,11 @@ class FusionStep:
     def note_pose(self, pose: HandPose) -> None:
         """Learn from the solver which way the fingers point: where in its paint a tip is.
 
-        Optional, and worth a millimetre.
+        Optional, and worth a millimetre. It counts from a fixed time after its own instant on
+        (output/pose_feedback.py), whenever it comes.
         """
         if pose.hand in self._rows:
-            self._paint.note_pose(pose)
+            self._poses.add(pose)
 
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
@@ -156,9 +164,12 @@ class FusionStep:
         self.method.reset()
         self.clocks.reset()
         self._paint.reset()
+        self._poses.reset()
 
     def _points_at(self, instant_ns: int) -> list[HandPoints]:
         """One message per hand for an instant (master clock)."""
+        for pose in self._poses.take(instant_ns):
+            self._paint.note_pose(pose)
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
         positions, covariances = self._paint.correct(
             estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
