@@ -1,6 +1,7 @@
 """What each correction buys on the held-out half: one of them off at a time.
 
-`python benchmarks/ablate.py [--points | --pictures] [--tuning] [--part NAME] [--json FILE]`
+`python benchmarks/ablate.py [--points | --pictures] [--family NAME] [--part NAME] [--tuning]
+[--json FILE]`
 
 Rows are parts of fusion and of the tracker. A part is taken out from here, by replacing it for the
 run: the product has no switches for it. Columns are what the cases say without
@@ -35,7 +36,7 @@ from services.pi_tracker.identify import group_consistency
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.marker_identity import MarkerIdentity
 from testing.families.case import Case, CaseSpec, Half, Kind
-from testing.families.catalog import cases
+from testing.families.catalog import FAMILIES, cases
 from testing.families.marker_cache import MARKER_CODE, kept
 from testing.families.picture_catalog import recipes
 from testing.families.pictures import Without, detected
@@ -196,6 +197,7 @@ def main() -> int:
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--points", action="store_true", help="points alone")
     kinds.add_argument("--pictures", action="store_true", help="pictures alone")
+    parser.add_argument("--family", choices=FAMILIES, help="this one alone")
     parser.add_argument("--tuning", action="store_true", help="the tuning half instead")
     parser.add_argument("--part", choices=PARTS, help="this part alone")
     parser.add_argument("--json", type=Path, help="write all figures to this file")
@@ -211,7 +213,10 @@ def main() -> int:
             if options.part in (None, name)
             and (kind == "pictures" or not (part.tracker or name in _OF_PAINT))
         ]
-        found = measure(cases(half, kind), of_kind)
+        specs = cases(half, kind, options.family)
+        if not specs or not of_kind:
+            continue
+        found = measure(specs, of_kind)
         print(f"\n{kind}, {'TUNING HALF' if options.tuning else 'held-out half'}")
         print(summary(found), flush=True)
         document[kind] = found

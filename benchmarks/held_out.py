@@ -45,6 +45,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from held_out_score import LAGS, Figures, misses, scores
@@ -99,6 +100,28 @@ def summary(found: dict[str, Figures]) -> str:
     return "\n".join(lines)
 
 
+def by_family(found: dict[str, Figures]) -> dict[str, Figures]:
+    """The worst of each family's cases, but for RMS and 95 %, of which it is the median."""
+    families: dict[str, list[Figures]] = {}
+    for name, figures in found.items():
+        families.setdefault(name.split(":")[0], []).append(figures)
+    result: dict[str, Figures] = {}
+    for family, every in families.items():
+        nees = [figures[f"nees_{lag}"] for figures in every for lag in LAGS]
+        result[family] = {
+            "cases": len(every),
+            "reach": sum(not misses(figures) for figures in every),
+            "share": min(figures[f"share_{lag}"] for figures in every for lag in LAGS),
+            "nees_least": min(nees),
+            "nees_most": max(nees),
+        }
+        for of in (*LAGS, "spline"):
+            for kind, combine in (("rms", np.median), ("p95", np.median), ("max", max)):
+                value = float(combine([figures[f"{kind}_{of}"] for figures in every]))
+                result[family][f"{kind}_{of}"] = round(value, 3)
+    return result
+
+
 def measure(specs: Sequence[CaseSpec]) -> dict[str, Figures]:
     """Figures of every case, printed as they come."""
     print(_HEAD)
@@ -127,17 +150,17 @@ def main() -> int:
     half: Half = "tuning" if options.tuning else "held_out"
     wanted: list[Kind] = ["points"] if not options.pictures else []
     wanted += ["pictures"] if not options.points else []
-    figures: dict[str, dict[str, Figures]] = {}
+    document: dict[str, Any] = {"half": half}
     for kind in wanted:
         specs = cases(half, kind, options.family)
         if not specs:
             continue
         title = "TUNING HALF, not evidence" if options.tuning else "held-out half"
         print(f"\n{kind}, {title}; errors in mm, NEES and misses: see --help")
-        figures[kind] = measure(specs)
-        print(summary(figures[kind]))
+        found = measure(specs)
+        print(summary(found))
+        document[kind] = {"families": by_family(found), "cases": found}
     if options.json:
-        document = {"half": half, **figures}
         options.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 

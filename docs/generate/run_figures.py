@@ -68,6 +68,7 @@ RUNS = {
         "--first-seed 11 --seeds 1 --frames 8",
         6,
     ),
+    "held_out": _script("held_out", "", "--family skin", 8),
     "objects_grasp_pictures": _script(
         "objects_grasp_pictures", "--passes 6", "--hands 1 --passes 1", 10
     ),
