@@ -33,15 +33,15 @@ from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
 from services.fusion.method import Counts, Estimates
 
-# The models from a resting hand to a fast finger: jerk density (m^2/s^5), and how fast velocity and
-# acceleration fade (1/s). Squared error over variance stays within .82 and 1.19 for synthetic hands
-# at 0, .02, .1, .5 and 1 m/s and lags of 0 to 2 frames; with 1, 30, 300, 5000 it is .79 to 1.25 and
-# rendered hands with two frames of lag are 2 % worse; with four models (.01, 3, 100, 5000) .72 to
-# 1.11, with a top of 1500 errors at 1 m/s are 30 % larger. Without the first, a still hand is 1.6
-# times as restless, and nothing moving gains. The last follows sharp turns (a waving hand, .8 m/s
-# RMS: 50 m/s^2 in one instant of twenty): its velocity fades, or it takes what one camera sees for
-# depth and runs off (lag 2 of a recorded wave, RMS and maximum: 5 and 22 mm; without it 76 and 935;
-# 1e5 without fading velocity 73 and 1460; 3e4, 3, 12: 31 and 619; 3e5, 10, 40: 7 and 187).
+# The models from a resting hand to a waving one: jerk density (m^2/s^5), and how fast velocity and
+# acceleration fade (1/s). Squared error over variance stays within .78 and 1.02 for synthetic hands
+# at 0, .02, .1 and .5 m/s and lags of 0 to 2 frames. Without the first, a still hand is 1.6 times
+# as restless, and nothing moving gains; .5, 30, 1500 in the place of .3 to 1500: 11 % worse at
+# .1 m/s. The last two follow sharp turns (a recorded wave: .8 m/s RMS, 50 m/s^2 in one instant of
+# twenty). Their velocity fades, or they take for depth what one camera sees before the other and
+# run off. The wave at lag 2, RMS and maximum: 5 and 22 mm; without them 76 and 935; one of 1e5
+# whose velocity lasts 73 and 1460; of (3e4, 3, 12) 31 and 619; of (1e5, 12, 25) 5 and 32, but then
+# stop-and-go at 14 m/s^2 has 29 for 20 mm, and is 10 % worse without lag.
 SLOWING = 1.0 / ACCELERATION_TIME_S
 MODELS = np.array(
     [
@@ -49,8 +49,9 @@ MODELS = np.array(
         [0.3, 0.0, SLOWING],
         [10.0, 0.0, SLOWING],
         [80.0, 0.0, SLOWING],
-        [3000.0, 0.0, SLOWING],
-        [1e5, 12.0, 25.0],
+        [1500.0, 0.0, SLOWING],
+        [2e4, 8.0, 20.0],
+        [2e5, 15.0, 40.0],
     ]
 )
 # Innovations beyond this squared Mahalanobis distance (2 degrees of freedom) are taken for another
@@ -108,10 +109,21 @@ class KalmanMethod:
         self.counts.gated += gated
         self.counts.late += late
         self.counts.refused += len(codes) - accepted - gated - late - new
-        if new:
-            for n, code in enumerate(codes):
-                if code == NO_TRACK:
-                    self._start(int(view.landmarks[n]), float(times_s[n]), clock_sigma_s)
+        for n, code in enumerate(codes):
+            landmark = int(view.landmarks[n])
+            if code == NO_TRACK or (code == GATED and self._is_contradicted(landmark)):
+                self._start(landmark, float(times_s[n]), clock_sigma_s)
+
+    def _is_contradicted(self, landmark: int) -> bool:
+        """Whether two cameras see a landmark, and its track has accepted nothing lately.
+
+        One camera alone may see another thing, and one observation of each may be wild: starting
+        anew at the second, where rays meet, put hands that stop and go 217 mm off for a moment.
+        """
+        recent = self._state.recent
+        since_s = recent.observed_s[landmark].max() - START_WINDOW_S
+        seen_by = np.count_nonzero(recent.observed_s[landmark] >= since_s)
+        return bool(seen_by >= 2 and recent.accepted_s[landmark].max() < since_s)
 
     def _update(self, frame: FrameRays, gate: float, *, new: bool) -> list[int]:
         codes: Ints = update_frame(self._state, frame, self._extrinsics, MODELS, gate, new)

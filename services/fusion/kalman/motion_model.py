@@ -91,6 +91,19 @@ def discretize(dt_s: float, model: Array, step: Step) -> None:
 
 
 @njit(cache=True)
+def discretize_next(dt_s: float, models: Array, m: int, step: Step) -> None:
+    """Model m of models (M, 3) over dt_s, where step is still that of model m - 1; in place.
+
+    Models whose rates are alike differ in their noise only.
+    """
+    if m > 0 and models[m, 1] == models[m - 1, 1] and models[m, 2] == models[m - 1, 2]:
+        Q = step.Q
+        Q *= models[m, 0] / models[m - 1, 0]
+    else:
+        discretize(dt_s, models[m], step)
+
+
+@njit(cache=True)
 def predict(last: Gaussian, step: Step, predicted: Gaussian) -> None:
     """The estimate (9,), (9, 9) a step after the last: x = F x, P = F P F^T + Q; in place."""
     F, Q = step.F, step.Q

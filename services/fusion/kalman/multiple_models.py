@@ -28,7 +28,7 @@ from services.fusion.kalman.model_choice import (
     count_strikes,
     update_probabilities,
 )
-from services.fusion.kalman.motion_model import discretize, empty_step, predict
+from services.fusion.kalman.motion_model import discretize_next, empty_step, predict
 from services.fusion.kalman.track_history import (
     TrackHistory,
     filtered,
@@ -79,7 +79,7 @@ def filter_node(
     for m in range(models.shape[0]):
         state = filtered(history, landmark, node, m)
         innovation = innovation_of(history, landmark, node, m)
-        discretize(dt_s, models[m], step)
+        discretize_next(dt_s, models, m, step)
         predict(filtered(history, landmark, last, parent[m]), step, state)
         log_likelihoods[m] = innovate(state, measured, innovation)
         if log_likelihoods[m] == NOT_VISIBLE:

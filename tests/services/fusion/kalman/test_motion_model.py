@@ -10,6 +10,7 @@ from services.fusion.kalman.motion_model import (
     Gaussian,
     adjoint_predict,
     discretize,
+    discretize_next,
     empty_step,
     predict,
 )
@@ -66,6 +67,15 @@ def test_two_short_steps_equal_a_long_one(estimate, model):
     np.testing.assert_allclose(whole[0], halves[0], rtol=1e-12)
     # What is left is the noise's quadrature.
     np.testing.assert_allclose(whole[1], halves[1], rtol=1e-7 if model[1] == 0.0 else 2e-3)
+
+
+def test_models_of_one_kind_differ_in_their_noise_only():
+    models = np.array([[1.0, 0.0, 3.0], [7.0, 0.0, 3.0], [7.0, 5.0, 9.0]])
+    step = empty_step()
+    for m, model in enumerate(models):
+        discretize_next(0.02, models, m, step)
+        np.testing.assert_allclose(step.F, over(0.02, model).F)
+        np.testing.assert_allclose(step.Q, over(0.02, model).Q, rtol=1e-12)
 
 
 def test_a_velocity_that_fades_is_bounded():
