@@ -112,6 +112,11 @@ FUSION = (
         "see `clock_offset_ms` in that tracker's health; restart its tracker",
     ),
     warning(
+        "camera_clock_aligned",
+        "a camera's stamps are off the others'; its markers are shifted to where their motion fits",
+        "see `clock_offset_ms` in that tracker's health; restart its tracker",
+    ),
+    warning(
         "camera_unknown",
         "markers arrive of a camera that rig.toml does not name",
         "add a [[camera]] table, or stop that tracker",

@@ -10,6 +10,7 @@ from collections import Counter
 
 from rhot.files.config import RigConfig
 from rhot.process.fault_log import FaultLog
+from services.fusion.alignment.clock_alignment import Correction
 from services.fusion.monitors.camera_arrivals import CameraArrivals
 from services.fusion.monitors.unseen_markers import (
     UnseenMarker,
@@ -66,6 +67,10 @@ class FusionFaults:
         self._arrivals.look(admitted, rejected, now_s, expected=session_running)
         self._report_rejected()
         self._report_silent(now_s)
+        aligned = step.alignment.corrections
+        self._faults.replace(
+            "camera_clock_aligned", {name: _aligned_text(name, aligned[name]) for name in aligned}
+        )
         moved, mirrored = step.clocks.moved_px, step.mirrors.mirrored
         self._faults.replace(
             "camera_moved", {_name(pair): _moved_text(pair, moved[pair]) for pair in moved}
@@ -121,6 +126,15 @@ class FusionFaults:
 
 def _name(pair: Pair) -> str:
     return f"{pair[0]} and {pair[1]}"
+
+
+def _aligned_text(camera: str, found: Correction) -> str:
+    late = "late" if found.late_s > 0.0 else "early"
+    return (
+        f"the stamps of camera {camera} are {1e3 * abs(found.late_s):.0f} ms {late} by the motion"
+        f" of the hand, and claim {1e3 * found.claimed_sigma_s:.1f} ms: its markers are used with"
+        " that taken off"
+    )
 
 
 def _moved_text(pair: Pair, height_px: float) -> str:

@@ -23,6 +23,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
+from services.fusion.alignment.clock_alignment import ClockAlignment
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder
@@ -83,6 +84,7 @@ class FusionStep:
         self.clocks = ClockOffsetEstimator(
             self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
         )
+        self.alignment = ClockAlignment(self._cameras, enabled=config.fusion.tune_clocks)
         self.mirrors = MirrorMonitor(self._cameras)
         self.unseen_markers = UnseenMarkerMonitor(self._cameras, self._landmarks)
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
@@ -117,7 +119,12 @@ class FusionStep:
             return self._reject(view.value, frame.camera)
         self.refusals["marker"] += view.ignored
         stamp_ns = view.instant_ns + view.clock_offset_ns
+        realigned = self.alignment.observe(view)
+        view = self.alignment.aligned(view)
         verdict = self._admission.admit(view.camera, view.instant_ns, stamp_ns, frame.seq)
+        astray = verdict is Verdict.ASTRAY
+        if self.alignment.note_verdict(view.camera, astray=astray) or realigned:
+            self._restart(self._admission.newest_ns or view.instant_ns)
         if verdict in (Verdict.TWICE, Verdict.ASTRAY):
             return self._reject(verdict.value, frame.camera)
         self.admitted[frame.camera] += 1

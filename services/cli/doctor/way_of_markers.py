@@ -23,7 +23,7 @@ _PICTURE = (
     "camera_unsynced",
     "source_lost",
 )
-_CLOCK = ("clock_unknown", "camera_clock_off")
+_CLOCK = ("clock_unknown", "camera_clock_off", "camera_clock_aligned")
 _COLORS = ("colors_missing", "color_drifted")
 CAMERA_CODES = {*_PICTURE, *_CLOCK, *_COLORS, "marker_not_seen"}
 # As in rhot/bus/stats.py: one frame lost in five is where a user should look.

@@ -114,6 +114,21 @@ def test_a_camera_that_is_wrong_is_named_until_it_is_right(change, code, words):
     assert found[-1] == set()
 
 
+def test_a_clock_that_is_off_is_put_right_and_named_until_it_is_right():
+    def late(frame: MarkerFrame) -> MarkerFrame:
+        return replace(frame, stamp_ns=frame.stamp_ns + 700_000_000)
+
+    run = Run()
+    run.play(8, of_right(late))
+    assert run.only.code == "camera_clock_aligned"
+    assert run.only.subject == "right"
+    assert "the stamps of camera right are 700 ms late" in run.only.text
+    assert "claim 0.1 ms" in run.only.text
+    found = Run().play(20, of_right(late, 0.0, 9.0))
+    assert "camera_clock_aligned" in found[8]
+    assert found[-1] == set()
+
+
 def test_a_camera_that_falls_silent_is_named_with_its_host():
     config = RIG.config()
     cameras = [replace(c, host=f"pi-{c.name}") for c in config.camera]

@@ -1,0 +1,173 @@
+"""Clocks that are off by more than the tuner of clocks may learn: found from motion, put right.
+
+Every two seconds of frames, whether they are admitted or not, each camera's heights are compared
+with those of a reference camera over all offsets within 2.5 s (offset_search.py). Where the views
+fit at another offset than the one in use, by more than the tuner reaches, twice in a row, that
+camera's frames are shifted by it from then on: some seconds of motion outweigh what a clock claims
+of itself. It comes before the timeline, which refuses frames half a second astray. A clock that is
+set, or stamps that are right again, end it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from rhot.geometry.camera import Camera
+from services.fusion.alignment.height_memory import HeightMemory
+from services.fusion.alignment.offset_search import Offset, find_offset
+from services.fusion.geometry.rectified_pair import rectified_pairs
+from services.fusion.intake.observations import View
+
+# A search takes 5 to 10 ms; every two seconds that is a few in a thousand. The first comes when
+# there is enough to compare, and one that found something is soon followed by another.
+_EVERY_S, _FIRST_S, _AGAIN_S = 2.0, 3.0, 1.0
+# The tuner reaches so far: three announced sigmas, 5 ms at least; beyond 15 ms this is quicker.
+_REACH_SIGMAS, _REACH_S, _REACH_MAX_S = 3.0, 5e-3, 15e-3
+# An offset is used if it differs from the one in use by more of its sigmas than this, ...
+_SIGMAS = 4.0
+# ... and if the next search says the same within so much.
+_AGREE_S = 3e-3
+# How well a clock is known that was put right (the tuner finds the rest).
+_SIGMA_S = 1.5e-3
+# An announced offset that moves by more than this was found anew: what was put right is not known
+# any more.
+_SET_S = 3e-3
+# Frames refused in a row that are more than held up by the network.
+_ASTRAY = 3
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A camera whose clock is put right, and by how much its stamps are late."""
+
+    late_s: float
+    claimed_sigma_s: float
+
+
+class ClockAlignment:
+    """The offsets in use of all C cameras, beyond those that they announce."""
+
+    def __init__(self, cameras: tuple[Camera, ...], *, enabled: bool) -> None:
+        """Not enabled, nothing is put right."""
+        self._names = [camera.name for camera in cameras]
+        self._pairs = rectified_pairs(cameras)
+        self._enabled = enabled
+        self._memory = HeightMemory(len(cameras))
+        self._corrections: dict[int, Correction] = {}
+        # By camera: an offset that was found once and differs from the one in use.
+        self._candidates: dict[int, float] = {}
+        # By camera: its announced offset (ns) and sigma (s), and whether its frames are refused.
+        self._announced: dict[int, tuple[int, float]] = {}
+        # By camera: how many frames in a row were refused.
+        self._astray = [0] * len(cameras)
+        self._searched_s: dict[int, float] = {}
+        self.searches = 0
+
+    @property
+    def corrections(self) -> dict[str, Correction]:
+        """The cameras whose clocks are put right."""
+        return {self._names[camera]: one for camera, one in sorted(self._corrections.items())}
+
+    def observe(self, view: View) -> bool:
+        """Take in a frame as announced; whether clocks are put right otherwise than before."""
+        if not self._enabled:
+            return False
+        changed = self._note_announced(view)
+        self._memory.add(view)
+        newest_s = self._memory.newest_s(view.camera)
+        known_s = self._memory.length_s(view.camera)
+        since_s = 0.0 if newest_s is None else newest_s - self._searched_s.get(view.camera, -np.inf)
+        wait_s = _AGAIN_S if view.camera in self._candidates else _EVERY_S
+        due = known_s >= _FIRST_S and not 0.0 <= since_s < wait_s
+        reference = self._reference()
+        if due and newest_s is not None and view.camera != reference:
+            self._searched_s[view.camera] = newest_s
+            changed |= self._search(reference, view.camera)
+        return changed
+
+    def aligned(self, view: View) -> View:
+        """A view with its clock put right."""
+        known = self._corrections.get(view.camera)
+        if known is None:
+            return view
+        return dataclasses.replace(
+            view,
+            instant_ns=view.instant_ns - round(known.late_s * 1e9),
+            clock_sigma_s=max(view.clock_sigma_s, _SIGMA_S),
+        )
+
+    def note_verdict(self, camera: int, *, astray: bool) -> bool:
+        """Whether a frame was refused for its instant; True if its clock is not put right any more.
+
+        A camera whose clock is put right is refused only where its stamps have changed.
+        """
+        self._astray[camera] = self._astray[camera] + 1 if astray else 0
+        if self._astray[camera] < _ASTRAY or camera not in self._corrections:
+            return False
+        self._forget(camera)
+        return True
+
+    def _forget(self, camera: int) -> None:
+        self._corrections.pop(camera, None)
+        self._candidates.pop(camera, None)
+        self._memory.clear(camera)
+
+    def _note_announced(self, view: View) -> bool:
+        """Forget a camera's offset if its clock was set; whether there was one."""
+        known = self._announced.get(view.camera)
+        self._announced[view.camera] = (view.clock_offset_ns, view.clock_sigma_s)
+        if known is None:
+            return False
+        moved_s = abs(view.clock_offset_ns - known[0]) * 1e-9
+        if moved_s <= max(_SET_S, _REACH_SIGMAS * known[1]):
+            return False
+        had_one = view.camera in self._corrections
+        self._forget(view.camera)
+        return had_one
+
+    def _reference(self) -> int:
+        """The camera that others are compared with: one whose frames are admitted as they are."""
+        known = sorted(self._announced)
+        as_announced = [c for c in known if not self._astray[c] and c not in self._corrections]
+        if as_announced:
+            return min(as_announced, key=lambda c: (self._announced[c][1], c))
+        return known[0]
+
+    def _search(self, reference: int, camera: int) -> bool:
+        """Compare a camera with the reference; whether its clock is put right otherwise now."""
+        pair = (min(reference, camera), max(reference, camera))
+        if pair not in self._pairs:
+            return False
+        self.searches += 1
+        sign = 1.0 if pair[1] == camera else -1.0
+        found = find_offset(*self._memory.tracks(*pair, self._pairs[pair]), together=True)
+        late_s = sign * found.offset_s + self._late_s(reference)
+        candidate = self._candidates.pop(camera, None)
+        if not found.decided or not self._beyond_reach(reference, camera, late_s, found):
+            return False
+        if candidate is None or abs(late_s - candidate) > _AGREE_S:
+            self._candidates[camera] = late_s
+            return False
+        if abs(late_s) <= self._reach_s(reference, camera):
+            self._corrections.pop(camera)
+        else:
+            self._corrections[camera] = Correction(late_s, self._announced[camera][1])
+        return True
+
+    def _late_s(self, camera: int) -> float:
+        known = self._corrections.get(camera)
+        return 0.0 if known is None else known.late_s
+
+    def _reach_s(self, reference: int, camera: int) -> float:
+        """How far apart two clocks may be that are left to the tuner."""
+        sigmas_s = self._announced[reference][1] + self._announced[camera][1]
+        return float(np.clip(_REACH_SIGMAS * sigmas_s, _REACH_S, _REACH_MAX_S))
+
+    def _beyond_reach(self, reference: int, camera: int, late_s: float, found: Offset) -> bool:
+        """Whether an offset differs from the one in use by more than the tuner will find."""
+        away_s = abs(late_s - self._late_s(camera))
+        reach_s = max(self._reach_s(reference, camera), _REACH_SIGMAS * _SIGMA_S)
+        return away_s > max(reach_s, _SIGMAS * found.sigma_s)

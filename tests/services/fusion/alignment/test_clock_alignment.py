@@ -1,0 +1,118 @@
+"""Clocks off by more than a tuner may learn are put right; right ones are left alone."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from rhot.messages import MarkerFrame
+from services.fusion.alignment.clock_alignment import ClockAlignment
+from services.fusion.intake.observations import ObservationBuilder
+from testing.families.motions import flapping, stop_and_go
+from testing.synthetic_points import MovingHand, RestingHand, SyntheticRig, frames
+from testing.wrong_markers import with_clock_error, with_correlated_errors, with_static_markers
+
+RIG = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4)
+MOTIONS = {
+    "sinusoids": MovingHand(),
+    "stop and go": stop_and_go(14.0, 2),
+    "flapping": flapping(1.3, 40.0, 1),
+    "resting": RestingHand(distance_m=0.6),
+    "still": MovingHand(speed_m_s=0.0),
+}
+
+
+def corrected_ms(
+    given: list[MarkerFrame], setup: SyntheticRig = RIG
+) -> tuple[dict[str, float], int]:
+    """By how much which cameras are put right in the end (ms), and how often that changed."""
+    cameras = setup.rig()
+    builder = ObservationBuilder(setup.config(), cameras)
+    alignment = ClockAlignment(tuple(cameras.values()), enabled=True)
+    changes = sum(alignment.observe(builder.build(frame)) for frame in given)
+    return {name: 1e3 * one.late_s for name, one in alignment.corrections.items()}, changes
+
+
+@pytest.mark.parametrize("late_s", [-0.7, -0.02, 0.02, 0.137, 2.0])
+@pytest.mark.parametrize("name", ["sinusoids", "stop and go", "flapping"])
+def test_an_offset_is_found_within_seconds_whatever_is_claimed(name, late_s):
+    given = with_clock_error(frames(RIG, MOTIONS[name], 6.0), "right", late_s)
+    found, changes = corrected_ms(given)
+    assert changes == 1
+    assert found == {"right": pytest.approx(1e3 * late_s, abs=1.5)}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize(
+    ("late_s", "sigma_ns"), [(0.0, 100_000), (0.001, 500_000), (0.005, 5_000_000), (0.005, -1)]
+)
+@pytest.mark.parametrize("sigma_px", [0.0, 2.0])
+def test_honest_clocks_are_left_to_the_tuner(name, late_s, sigma_ns, sigma_px):
+    given = with_clock_error(frames(RIG, MOTIONS[name], 9.0), "right", late_s, sigma_ns)
+    if sigma_px:
+        given = with_correlated_errors(given, sigma_px)
+    assert corrected_ms(given) == ({}, 0)
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_wrong_markers_put_nothing_right(frozen):
+    given = frames(RIG, MOTIONS["sinusoids"], 12.0)
+    assert corrected_ms(with_static_markers(given, "left", (4.0, 7.0), frozen=frozen)) == ({}, 0)
+
+
+def test_of_three_cameras_the_one_that_is_off_is_put_right():
+    setup = SyntheticRig(cameras=3, phase_s=1 / 90, clock_error_s=0.0, clock_sigma_s=1e-4)
+    given = with_clock_error(frames(setup, MOTIONS["sinusoids"], 6.0), "camera3", -0.2)
+    assert corrected_ms(given, setup)[0] == {"camera3": pytest.approx(-200.0, abs=1.5)}
+
+
+def test_a_clock_that_is_set_is_forgotten_at_once():
+    given = with_clock_error(frames(RIG, MOTIONS["sinusoids"], 6.0), "right", 0.137)
+    again = msgspec.structs.replace(
+        given[-1], camera="right", clock_offset_ns=given[-1].clock_offset_ns + 137_000_000
+    )
+    assert corrected_ms(given)[0] != {}
+    assert corrected_ms([*given, again])[0] == {}
+
+
+def test_stamps_that_are_right_again_are_found_or_refused():
+    given = frames(RIG, MOTIONS["sinusoids"], 16.0)
+    late = with_clock_error(given, "right", 0.05)
+    found, changes = corrected_ms([*late[: len(late) // 2], *given[len(given) // 2 :]])
+    assert (found, changes) == ({}, 2)
+    cameras = RIG.rig()
+    alignment = ClockAlignment(tuple(cameras.values()), enabled=True)
+    builder = ObservationBuilder(RIG.config(), cameras)
+    for frame in late[: len(late) // 2]:
+        alignment.observe(builder.build(frame))
+    told = [alignment.note_verdict(1, astray=True) for _ in range(3)]
+    assert told == [False, False, True]
+    assert alignment.corrections == {}
+
+
+def test_switched_off_it_does_nothing():
+    cameras = RIG.rig()
+    builder = ObservationBuilder(RIG.config(), cameras)
+    alignment = ClockAlignment(tuple(cameras.values()), enabled=False)
+    for frame in with_clock_error(frames(RIG, MOTIONS["sinusoids"], 5.0), "right", 0.2):
+        view = builder.build(frame)
+        assert not alignment.observe(view)
+        assert alignment.aligned(view) is view
+    assert alignment.searches == 0
+
+
+def test_a_view_is_shifted_by_what_was_found():
+    cameras = RIG.rig()
+    builder = ObservationBuilder(RIG.config(), cameras)
+    alignment = ClockAlignment(tuple(cameras.values()), enabled=True)
+    given = with_clock_error(frames(RIG, MOTIONS["sinusoids"], 6.0), "right", 2.0)
+    for frame in given:
+        view = builder.build(frame)
+        alignment.observe(view)
+    right = next(frame for frame in reversed(given) if frame.camera == "right")
+    view = builder.build(right)
+    shifted = alignment.aligned(view)
+    assert view.instant_ns - shifted.instant_ns == pytest.approx(2e9, abs=1.5e6)
+    assert shifted.clock_sigma_s == pytest.approx(1.5e-3)
+    np.testing.assert_array_equal(shifted.rays, view.rays)
