@@ -34,6 +34,7 @@ from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
 from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import coherent, hand_reach_m
+from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.pose_feedback import PoseFeedback
 from services.fusion.output.schedule import OutputSchedule
@@ -79,6 +80,8 @@ class FusionStep:
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._poses = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
+        centres = np.array([camera.centre_rig for camera in self._cameras])
+        self._hidden = HiddenPaint(centres, self._paint.round)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
         self.clocks = ClockOffsetEstimator(
@@ -134,8 +137,10 @@ class FusionStep:
         self.unseen_markers.observe(view)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.observe(view, times_s)
-        white = dataclasses.replace(view, sigmas=self._systematic.white_sigmas(view))
-        self.method.observe(white, times_s - late_s, clock_sigma_s)
+        hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
+        white = np.hypot(self._systematic.white_sigmas(view), hidden)
+        view = dataclasses.replace(view, sigmas=white)
+        self.method.observe(view, times_s - late_s, clock_sigma_s)
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._points_at(due_ns)
 
@@ -172,6 +177,7 @@ class FusionStep:
         self.clocks.reset()
         self._paint.reset()
         self._poses.reset()
+        self._hidden.reset()
 
     def _points_at(self, instant_ns: int) -> list[HandPoints]:
         """One message per hand for an instant (master clock)."""
@@ -181,7 +187,10 @@ class FusionStep:
         positions, covariances = self._paint.correct(
             estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
         )
-        covariances = covariances + self._systematic.covariances(positions, estimates.seen_by)
+        self._hidden.note_places(positions)
+        covariances = covariances + self._systematic.covariances(
+            positions, estimates.seen_by, self._hidden.sigmas
+        )
         variances = np.einsum("nii->ni", covariances)  # (L, 3)
         sigmas = np.sqrt(np.maximum(variances, 0.0))
         usable = estimates.found & np.isfinite(positions).all(axis=1)

@@ -59,6 +59,7 @@ class View:
     delay_s: Array  # (n,) of each observation after instant_ns
     rays: Array  # (n, 2) undistorted x/z, y/z
     sigmas: Array  # (n,) of each ray coordinate
+    areas: Array  # (n,) of the markers, in the rays' units squared
     clock_offset_ns: int  # as announced, already taken off
     clock_sigma_s: float
     ignored: int  # markers left out
@@ -100,6 +101,7 @@ class ObservationBuilder:
         sigmas_px = np.array(
             [min(max(marker.sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for marker in markers]
         )
+        areas_px2 = np.array([marker.area_px for marker in markers])
         rays, scale, valid = undistort(camera, pixels)
         return View(
             camera=index,
@@ -108,6 +110,7 @@ class ObservationBuilder:
             delay_s=((pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9)[valid],
             rays=rays[valid],
             sigmas=(sigmas_px * scale)[valid],
+            areas=(areas_px2 * scale**2)[valid],
             clock_offset_ns=frame.clock_offset_ns,
             clock_sigma_s=clock_sigma_s(frame.clock_sigma_ns),
             ignored=self._count_of_hands(frame) - int(np.count_nonzero(valid)),

@@ -88,6 +88,8 @@ class PaintToBone:
         self._dabs_m = np.array(
             [paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints]
         )
+        # Which landmarks are painted all round (L,), as tips are.
+        self.round: Bools = self._radii_m > 0.0
         # Which landmarks are paint of some size (L,), not points.
         self.extended: Bools = np.array(
             [paint.radius_m > 0.0 or paint.extent_m > 0.0 for paint in paints], dtype=bool

@@ -47,7 +47,7 @@ class _Sigmas(NamedTuple):
     """Systematic errors of a ray's coordinates."""
 
     shared: Array  # (L,) by all cameras
-    own: Array  # (C,) each camera's
+    own: Array  # (L, C) each camera's
 
 
 class SystematicError:
@@ -71,13 +71,15 @@ class SystematicError:
         )
         return white
 
-    def covariances(self, positions_m: Array, seen_by: Bools) -> Array:
+    def covariances(self, positions_m: Array, seen_by: Bools, hidden: Array) -> Array:
         """What to add to the covariances of points (L, 3); (L, 3, 3) m^2.
 
-        seen_by (L, C) tells which cameras located them.
+        seen_by (L, C) tells which cameras located them, hidden (L, C) how far each one's ray may be
+        off since paint is hidden from it (hidden_paint.py).
         """
         covs = np.zeros((len(positions_m), 3, 3))
-        sigmas = _Sigmas(SHARED_SHARE * self._running_sigmas, self._own_sigmas)
+        own = np.hypot(self._own_sigmas, hidden)
+        sigmas = _Sigmas(SHARED_SHARE * self._running_sigmas, own)
         _add_covariances(positions_m, seen_by, self._extended, sigmas, self._extrinsics, covs)
         return covs
 
@@ -131,7 +133,7 @@ def _add_covariances(
                 continue
             for i in range(3):
                 for j in range(3):
-                    A[i, j] += (H[0, i] * H[0, j] + H[1, i] * H[1, j]) / sigmas.own[c] ** 2
+                    A[i, j] += (H[0, i] * H[0, j] + H[1, i] * H[1, j]) / sigmas.own[row, c] ** 2
             if is_first:
                 _add_shared_error(p_rig, sigmas.shared[row], R[c], t[c], covs[row])
                 is_first = False

@@ -20,6 +20,7 @@ FOCAL_PX = CAMERAS[0].focal_px[0]
 DISTANCE_M = 0.6
 POINTS = np.tile([0.0375, 0.0, DISTANCE_M], (2, 1))
 BOTH = np.ones((2, 2), dtype=bool)
+WHOLE = np.zeros((2, 2))
 
 
 @pytest.fixture
@@ -36,6 +37,7 @@ def view(sigma_px: float, camera: int = 0) -> View:
         delay_s=np.zeros(2),
         rays=np.zeros((2, 2)),
         sigmas=np.full(2, sigma_px / FOCAL_PX),
+        areas=np.zeros(2),
         clock_offset_ns=0,
         clock_sigma_s=0.0,
         ignored=0,
@@ -53,7 +55,7 @@ def test_only_a_part_of_a_large_sigma_is_noise(errors):
 def test_own_errors_are_disparity_and_shared_ones_are_not(errors):
     for _ in range(100):
         errors.white_sigmas(view(0.2))
-    covariances = errors.covariances(POINTS, BOTH)
+    covariances = errors.covariances(POINTS, BOTH, WHOLE)
     depth_per_px = DISTANCE_M**2 / (FOCAL_PX * 0.075)
     assert np.sqrt(covariances[0, 2, 2]) == pytest.approx(
         np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02
@@ -65,10 +67,22 @@ def test_own_errors_are_disparity_and_shared_ones_are_not(errors):
 
 def test_a_point_seen_by_one_camera_counts_as_seen_by_all(errors):
     one = np.array([[True, False], [True, False]])
-    np.testing.assert_array_equal(errors.covariances(POINTS, one), errors.covariances(POINTS, BOTH))
+    np.testing.assert_array_equal(
+        errors.covariances(POINTS, one, WHOLE), errors.covariances(POINTS, BOTH, WHOLE)
+    )
 
 
 def test_points_behind_the_cameras_add_nothing_and_nan_nowhere(errors):
     errors.white_sigmas(view(0.2))
-    assert not errors.covariances(-POINTS, BOTH).any()
-    assert np.isfinite(errors.covariances(POINTS * 1e6, BOTH)).all()
+    assert not errors.covariances(-POINTS, BOTH, WHOLE).any()
+    assert np.isfinite(errors.covariances(POINTS * 1e6, BOTH, WHOLE)).all()
+
+
+def test_a_ray_that_paint_is_hidden_from_is_off_by_so_much(errors):
+    hidden = WHOLE.copy()
+    hidden[0, 1] = 2.0 / FOCAL_PX
+    more = errors.covariances(POINTS, BOTH, hidden) - errors.covariances(POINTS, BOTH, WHOLE)
+    assert np.sqrt(more[0, 2, 2]) == pytest.approx(
+        2.0 * DISTANCE_M**2 / (FOCAL_PX * 0.075), rel=0.02
+    )
+    assert not more[1].any()
