@@ -122,7 +122,8 @@ class Fusion(Table, frozen=True, kw_only=True):
     filter: Literal["one_euro", "none"] = "one_euro"
     # Instants a result waits for later observations, in frames of the fastest camera.
     lag_frames: Annotated[int, msgspec.Meta(ge=0, le=2)] = 0
-    # A landmark not seen by two cameras is carried on this long, then dropped.
+    # A landmark that no camera sees is carried on this long, then dropped; paired methods need two
+    # cameras. What one camera sees is told as long as it does: known across its ray.
     hold_s: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.15
     # Working volume in front of the cameras; points outside it are mismatches. RHOT section 6: 100
     # x 100 x 100 cm.

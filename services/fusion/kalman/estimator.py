@@ -2,10 +2,11 @@
 
 Each landmark has a track: extended Kalman filters over position, velocity and acceleration, several
 motion models side by side (multiple_models.py). A track starts where the rays of two cameras meet.
-Observations that contradict it are gated by their innovation. A track that a single camera sees
-coasts on with growing sigma as `predicted`, and is dropped when no second camera has seen it for
-hold_s. Views may come from 2..N cameras in any order; late ones are inserted as long as the track's
-history reaches back. Landmarks of a hand at rest share its motion (rest/).
+Observations that contradict it are gated by their innovation. A track that a single camera sees is
+`predicted`: its sigma grows along that camera's ray. It is dropped when no camera has seen it for
+hold_s, or when a second one has seen only what contradicts it for so long. Views may come from 2..N
+cameras in any order; late ones are inserted as long as the track's history reaches back. Landmarks
+of a hand at rest share its motion (rest/).
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ START_WINDOW_S = 0.05
 # things.
 START_RESIDUAL = 4.0
 # A point this uncertain is of no use to anybody (the width of a hand); a track that young is not
-# shown yet.
+# shown yet. Of one that a single camera sees, across its ray: bones tell the solver the rest.
 SHOW_SIGMA_M = 0.05
 # A camera counts as seeing a landmark if its last observation is not older than this many frames:
 # one frame, and jitter.
@@ -166,10 +167,14 @@ class KalmanMethod:
         self.counts.started += 1
 
     def _drop(self, now_s: float) -> None:
-        """End the tracks that no two cameras have seen for hold_s."""
+        """End the tracks that are lost."""
         history, rest, recent = self._state
         self.counts.dropped += drop_lost_tracks(
-            history.size, rest.probability, recent.accepted_s, now_s - self._hold_s
+            history.size,
+            rest.probability,
+            recent.accepted_s,
+            recent.observed_s,
+            now_s - self._hold_s,
         )
 
     def estimate(self, time_s: float) -> Estimates:
@@ -183,9 +188,13 @@ class KalmanMethod:
         mix_rest(rest, time_s, found, means, covs)
         largest_sigma = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1)
-        found &= (largest_sigma > 0.0) & (largest_sigma <= SHOW_SIGMA_M)
         seen_since_s = SEEN_FRAMES * self._periods_s  # (C,)
         seen_by = time_s - recent.accepted_s <= seen_since_s  # (L, C)
+        by_one = found & (largest_sigma > SHOW_SIGMA_M) & (seen_by.sum(axis=1) == 1)
+        for row in np.flatnonzero(by_one):
+            # The middle one of three: the larger one across the ray.
+            largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
+        found &= (largest_sigma > 0.0) & (largest_sigma <= SHOW_SIGMA_M)
         detected_by = time_s - recent.observed_s <= seen_since_s
         return Estimates(
             found=found,

@@ -50,12 +50,16 @@ def test_every_observation_is_remembered_and_told_of():
     assert (state.rest.probability > 0.0).tolist() == [True, False, False]
 
 
-def test_a_track_that_two_cameras_have_not_seen_lately_ends():
-    size, probability = np.array([3, 3, 0, 5]), np.array([0.9, 0.9, 0.0, 0.9])
-    accepted_s = np.array([[1.0, 1.1, 0.0], [1.0, 0.3, 0.2], [0.0, 0.0, 0.0], [0.2, 1.0, 0.9]])
-    assert drop_lost_tracks(size, probability, accepted_s, 0.5) == 1
-    assert size.tolist() == [3, 0, 0, 5]
-    assert probability.tolist() == [0.9, 0.0, 0.0, 0.9]
+def test_a_track_ends_unseen_or_when_a_second_camera_sees_something_else():
+    size, probability = np.array([3, 3, 0, 5, 4]), np.array([0.9, 0.9, 0.0, 0.9, 0.9])
+    accepted_s = np.array(
+        [[1.0, 1.1, 0.0], [1.0, 0.3, 0.2], [0.0] * 3, [0.2, 0.4, 0.3], [1.0, 0, 0]]
+    )
+    observed_s = accepted_s.copy()
+    observed_s[4, 1] = 1.1
+    assert drop_lost_tracks(size, probability, accepted_s, observed_s, 0.5) == 2
+    assert size.tolist() == [3, 3, 0, 0, 0]
+    assert probability.tolist() == [0.9, 0.9, 0.0, 0.0, 0.0]
 
 
 def test_remembered_observations_are_not_remembered_twice():

@@ -69,7 +69,10 @@ def test_a_point_that_one_camera_sees_is_known_across_its_ray(
     )
     observed = usable_points(seen, landmarks)["thumb_tip"]
     assert not observed.measured
-    np.testing.assert_allclose(observed.covariance_m2, long, atol=1e-12)
+    across = np.array([[0.8, 0.0, -0.6], [0.0, 1.0, 0.0]])
+    found = across @ observed.covariance_m2 @ across.T
+    np.testing.assert_allclose(found, 1e-6 * np.eye(2), atol=1e-9)
+    assert ray @ observed.covariance_m2 @ ray > 1.0
 
 
 @pytest.mark.parametrize(
