@@ -41,6 +41,11 @@ BEHIND_BELOW, BEHIND_FRAMES = 0.02, 15
 # in an image (rays x/z, y/z of about 1 by 1). So a model that explains five looks of a frame well
 # and calls the sixth a stray one competes with a livelier one that explains all six, less well.
 STRAY = math.log(0.003)
+# The same landmark stray again, with no look in between that fits, is rather a motion that the
+# model does not know: it costs so much more each time, to the third.
+AGAIN = 30.0
+# So many looks of a landmark in a row that a model passes over and the likeliest uses.
+OUT = 2
 # Sigmas of a new landmark's place about where its rays meet (m), of its speed (m/s) and of its
 # acceleration (m/s^2), of which little is known yet.
 START_SIGMAS = (0.3, 1.0, 10.0)
@@ -59,9 +64,7 @@ def filter_node(
     gram = np.empty((3 * before.shape[0], 3 * before.shape[0]))
     turn_gram(history.state[last, likeliest], before, gram)
     for m in range(models.rate.shape[0]):
-        parent = m
-        if history.behind[last, m] >= BEHIND_FRAMES:
-            parent = likeliest
+        parent = likeliest if _goes_on_from(history, last, m, likeliest) else m
         history.parent[node, m] = parent
         x, P = history.state[node, m], history.cov[node, m]
         F = transition(models.rate[m], dt_s)
@@ -76,9 +79,25 @@ def filter_node(
     _begin(history, node, before)
     log_likelihoods = np.zeros(models.rate.shape[0])
     for m in range(models.rate.shape[0]):
+        history.strikes[node, m] = history.strikes[last, history.parent[node, m]]
         log_likelihoods[m] = _update(history, node, m, cameras, gate)
     _weigh(history, last, node, log_likelihoods)
     _end(history, node)
+
+
+@njit(cache=True)
+def _goes_on_from(history: HandHistory, last: int, m: int, likeliest: int) -> bool:
+    """Whether a model gives its estimate up for the likeliest one's.
+
+    It has been improbable for long; or it passes looks of a landmark over again and again that the
+    likeliest uses: what it then has of that landmark grows so wide that one look sends it anywhere.
+    """
+    if history.behind[last, m] >= BEHIND_FRAMES:
+        return True
+    for k in range(history.strikes.shape[2]):
+        if history.strikes[last, m, k] >= OUT and history.strikes[last, likeliest, k] == 0:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -153,8 +172,14 @@ def _update(history: HandHistory, node: int, m: int, cameras: Extrinsics, gate: 
         if history.looked[node, k] and history.alive[node, k]:
             look = look_of(history, node, k, cameras)
             log_likelihood = update(x, P, look, gate, innovation_of(history, node, m, k))
-            history.used_by[node, m, k] = log_likelihood > NOT_USED
-            total += max(log_likelihood, STRAY)
+            used = log_likelihood > NOT_USED
+            history.used_by[node, m, k] = used
+            if history.begins[node, k]:
+                history.strikes[node, m, k] = 0
+            if not used:
+                log_likelihood = STRAY - min(history.strikes[node, m, k], 3) * AGAIN
+            history.strikes[node, m, k] = 0 if used else history.strikes[node, m, k] + 1
+            total += log_likelihood
     return total
 
 

@@ -42,6 +42,7 @@ class HandHistory(NamedTuple):
     alive: Bools  # (NODES, N) it has an estimate
     used: Bools  # (NODES, N) its observation updated the likeliest model
     used_by: Bools  # (NODES, M, N) its observation updated this model
+    strikes: Ints  # (NODES, M, N) how many of its latest looks in a row this model did not use
     probability: Array  # (NODES, M) of each model
     behind: Ints  # (NODES, M) how many frames it has been improbable
     parent: Ints  # (NODES, M) the model whose estimate at the node before it was predicted from
@@ -75,6 +76,7 @@ def empty_history(landmarks: int, models: int) -> HandHistory:
         alive=np.zeros(each, dtype=np.bool_),
         used=np.zeros(each, dtype=np.bool_),
         used_by=np.zeros((*by_model, landmarks), dtype=np.bool_),
+        strikes=np.zeros((*by_model, landmarks), dtype=np.int64),
         probability=np.full(by_model, 1.0 / models),
         behind=np.zeros(by_model, dtype=np.int64),
         parent=np.zeros(by_model, dtype=np.int64),
@@ -104,6 +106,7 @@ def start_history(history: HandHistory, time_s: float) -> None:
     history.probability[node] = 0.01
     history.probability[node, models - 1] = 1.0 - 0.01 * (models - 1)
     history.behind[node] = 0
+    history.strikes[node] = 0
     history.state[node] = 0.0
     history.cov[node] = 0.0
 

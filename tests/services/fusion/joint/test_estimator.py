@@ -39,7 +39,7 @@ def test_a_fifth_of_the_markers_missing_costs_little(fuse):
     ]
     _, messages = fuse(SyntheticRig(), given, Fusion(method="joint", lag_frames=2))
     assert all(len(message.points) == 6 for message in messages[30:-3])
-    assert point_errors(messages, MovingHand()).within(1.0).rms_mm < 2.1
+    assert point_errors(messages, MovingHand()).within(1.0).rms_mm < 2.3
 
 
 def test_two_runs_are_the_same(fuse):
