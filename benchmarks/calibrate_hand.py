@@ -2,11 +2,17 @@
 with true ones.
 
     python benchmarks/calibrate_hand.py --hands 4 --json calibrate_hand.json
+    python benchmarks/calibrate_hand.py --hands 8 --only free
 
 Simulated hands whose bones differ by 10 % from the tables, each finger by a factor of its own (kind
 "finger") or each bone by its own (kind "bone", harder). The recording is the simulator's guided
 scene as points with 1 mm noise, wrist + 5 tips; the error is measured on random motion with 1 mm
 noise. Ratios of means against the true bones, in one process; deterministic.
+
+Kind "free": people of any size (.8 to 1.15) whose bones differ by up to 10 % each, knuckles, paint
+and directions besides, in a minute of free motion (random, fist, piano, wave, pinch, grab, or
+without random); only odd seeds, for constants were chosen on even ones. Places of the knuckles in
+the wrist frame, what their sigmas say, and the solver's errors, also with tables of the right size.
 """
 
 from __future__ import annotations
@@ -15,14 +21,23 @@ import argparse
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import Array, angle_between, rotation_from_quaternion
-from rhot.hand import HandModel, default_hand
+from rhot.geometry.transforms import (
+    Array,
+    angle_between,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
+from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
 from rhot.hand_exercises import CYCLE_S
 from rhot.messages import HandPoints, HandPose
 from services.calibrator.hand.fit import fit_hand
+from services.calibrator.hand.free_motion.estimate import estimate_hand
+from services.calibrator.hand.free_motion.frames import seen_frames
 from services.calibrator.hand.recording import sort_exercises
 from services.simulator.hands.calibration_exercises import guided
 from services.simulator.hands.gestures import MOTIONS, Motion
@@ -31,16 +46,22 @@ from services.solver.step import SolverStep
 from testing.synthetic_hands import hand_message, noisy_points, with_bone_factors, wrist_rotation
 
 _FPS = 30.0
+# Of free motion; half of the people do not move at random.
+_SCENES = ("random", "fist", "piano", "wave", "pinch", "grab")
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hands", type=int, default=4, help="of each kind")
+    parser.add_argument("--only", choices=["finger", "bone", "free"], help="one kind alone")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     print(f"{'kind':8}{'bones':12}{'flexion_deg':>12}{'orientation_deg':>17}{'ratios to true':>22}")
-    results = {kind: measure(kind, options.hands) for kind in ("finger", "bone")}
+    kinds = [options.only] if options.only else ["finger", "bone", "free"]
+    results: dict[str, dict[str, float]] = {}
+    for kind in kinds:
+        results[kind] = free(options.hands) if kind == "free" else measure(kind, options.hands)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 
@@ -56,6 +77,85 @@ def measure(kind: str, hands: int) -> dict[str, float]:
         calibrated = problem.parameters.model(found.x)
         for name, model in (("true", truth), ("tables", table), ("calibrated", calibrated)):
             errors.setdefault(name, []).append(solver_error(truth, model, seed))
+    return ratios(kind, errors)
+
+
+def free(hands: int) -> dict[str, float]:
+    """The same from free motion, and errors of the knuckles."""
+    errors: dict[str, list[tuple[float, float]]] = {}
+    knuckles: dict[str, list[float]] = {}
+    told: list[float] = []
+    for seed in range(1, 2 * hands, 2):
+        truth, size = person(seed)
+        table, sized = default_hand(truth.hand), default_hand(truth.hand, size)
+        scenes = _SCENES if seed % 4 == 1 else _SCENES[1:]
+        published = [
+            message
+            for k, scene in enumerate(scenes)
+            for message in later(truth, scene, seed + k, 60.0 / len(scenes), 60.0 * k)
+        ]
+        found = estimate_hand(seen_frames(published, table), table)
+        models = {"true": truth, "tables": table, "tables_sized": sized, "free": found.model}
+        for name, model in models.items():
+            errors.setdefault(name, []).append(solver_error(truth, model, seed))
+            off = 1e3 * np.linalg.norm(_knuckles(model) - _knuckles(truth), axis=1)
+            knuckles.setdefault(name, []).extend(off.tolist())
+        told += (1e3 * found.knuckle_sigmas_m()).tolist()
+    figures = ratios("free", errors)
+    for name, off in knuckles.items():
+        figures[f"{name}_knuckles_mm"] = round(float(np.median(off)), 2)
+        figures[f"{name}_knuckles_90_mm"] = round(float(np.percentile(off, 90)), 2)
+        if name != "true":
+            shown = f"median {np.median(off):.1f}, 90 % {np.percentile(off, 90):.1f}"
+            print(f"{name:12} knuckles, mm: {shown}")
+    figures["told_mm"] = round(float(np.median(told)), 2)
+    square = np.mean((np.array(knuckles["free"]) / told) ** 2)
+    figures["error_by_sigma"] = round(float(np.sqrt(square)), 2)
+    print(f"told {figures['told_mm']} mm; errors over sigmas, RMS: {figures['error_by_sigma']}")
+    return figures
+
+
+def _knuckles(model: HandModel) -> Array:
+    return np.array([digit.base_m for digit in model.digits[1:]])
+
+
+def person(seed: int) -> tuple[HandModel, float]:
+    """Somebody, and the size against the average adult's."""
+    random = np.random.default_rng([seed, 99])
+    size = float(random.uniform(0.8, 1.15))
+    model = with_bone_factors(default_hand("right", size), random.uniform(0.9, 1.1, (5, 4)))
+    digits = []
+    for digit in model.digits:
+        turn = rotation_from_vector(np.deg2rad(random.normal(0.0, 2.0, 3)))
+        R = turn @ rotation_from_quaternion(digit.base_wxyz)
+        base = np.array(digit.base_m) + random.normal(0.0, 1.5e-3, 3)
+        digits.append(
+            msgspec.structs.replace(
+                digit,
+                base_m=tuple(base.tolist()),
+                base_wxyz=tuple(quaternion_from_rotation(R).tolist()),
+                coupling=float(random.normal(2.0 / 3.0, 0.05)),
+            )
+        )
+    paint = dict(model.paint)
+    for name in BASIC_LANDMARKS:
+        spread = (2e-3,) * 3 if name == "wrist" else (0.0, 0.0, 1.5e-3)
+        offset = np.array(paint[name].offset_m) + random.normal(0.0, spread)
+        paint[name] = msgspec.structs.replace(paint[name], offset_m=tuple(offset.tolist()))
+    return msgspec.structs.replace(model, digits=tuple(digits), paint=paint), size
+
+
+def later(
+    model: HandModel, scene: str, seed: int, seconds: float, begin_s: float
+) -> list[HandPoints]:
+    """A scene as fusion would publish it, from begin_s on."""
+    published, _ = messages(model, MOTIONS[scene](model, seed), seed, seconds)
+    shift_ns = round(1e9 * begin_s)
+    return [msgspec.structs.replace(m, stamp_ns=m.stamp_ns + shift_ns) for m in published]
+
+
+def ratios(kind: str, errors: dict[str, list[tuple[float, float]]]) -> dict[str, float]:
+    """Print and return mean errors, and their ratios to those with true bones."""
     means = {name: np.mean(values, axis=0) for name, values in errors.items()}
     figures: dict[str, float] = {}
     for name, mean in means.items():

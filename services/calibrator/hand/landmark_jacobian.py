@@ -112,6 +112,6 @@ def _cross_columns(v: Array) -> Array:
     """Columns e_j x v; (n, 3) -> (n, 3, 3)."""
     columns = np.zeros((len(v), 3, 3))
     x, y, z = v.T
-    columns[:, 1, 0], columns[:, 2, 0], columns[:, 2, 1] = z, -y, x
-    columns[:, 0, 1], columns[:, 0, 2], columns[:, 1, 2] = -z, y, -x
+    columns[:, 1, 0], columns[:, 2, 0], columns[:, 2, 1] = -z, y, -x
+    columns[:, 0, 1], columns[:, 0, 2], columns[:, 1, 2] = z, -y, x
     return columns

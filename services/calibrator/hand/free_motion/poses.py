@@ -20,7 +20,7 @@ from services.calibrator.hand.landmark_jacobian import FIRST_ANGLE, POSE_UNKNOWN
 from services.calibrator.hand.normal_equations import robust_weights
 from services.calibrator.hand.problem import coupling_matrix
 
-_DAMPING_START, _DAMPING_DOWN, _DAMPING_UP = 1e-2, 0.2, 8.0
+_DAMPING_START, _DAMPING_DOWN, _DAMPING_UP, _DAMPING_MAX = 1e-2, 0.2, 8.0, 1e6
 # Squared standard deviations that are worth no further step.
 _MIN_GAIN = 1e-3
 # Postures to start from, deg: MCP and PIP of the fingers (DIP follows).
@@ -135,7 +135,7 @@ def improved(hand: Hand, frames: Frames, poses: HandPoses, rounds: int) -> tuple
         trial = poses.moved(step)
         other = linearise(hand, frames, trial)
         better = other.cost < found.cost
-        gain = float(np.where(better, found.cost - other.cost, 0.0).max(initial=0.0))
+        settled = better & (found.cost - other.cost < _MIN_GAIN)
         poses = poses.where(better, trial)
         found = Linear(
             *(
@@ -144,7 +144,7 @@ def improved(hand: Hand, frames: Frames, poses: HandPoses, rounds: int) -> tuple
             )
         )
         damping = np.where(better, damping * _DAMPING_DOWN, damping * _DAMPING_UP)
-        if gain < _MIN_GAIN and bool(better.any()):
+        if bool((settled | (damping > _DAMPING_MAX)).all()):
             break
     return poses, found
 
