@@ -3,7 +3,7 @@
 What is looked for is the most plausible hand, its coupling and its mean posture, with the postures
 of all frames integrated out (marginal.py); in turn with how much this person's joints move
 (posture.respread). Gauss and Newton's steps on the hand, damped and no longer than two standard
-deviations of what people differ by. 72 frames take about two seconds.
+deviations of what people differ by. 72 frames take 3 to 5 s.
 """
 
 from __future__ import annotations
