@@ -37,7 +37,7 @@ from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.marker_identity import MarkerIdentity
 from testing.families.case import Case, CaseSpec, Half, Kind
 from testing.families.catalog import FAMILIES, cases
-from testing.families.marker_cache import MARKER_CODE, kept
+from testing.families.marker_cache import kept
 from testing.families.picture_catalog import recipes
 from testing.families.pictures import Without, detected
 
@@ -143,10 +143,10 @@ def _with_settings(case: Case, part: Part) -> Any:
 def without_in_tracker(spec: CaseSpec, case: Case, name: str) -> Case:
     """A case of pictures with the markers of a tracker that lacks a part."""
     recipe = recipes(spec.half)[f"{spec.family}: {spec.name}"]
-    frames = kept(
-        "ablated", recipe, MARKER_CODE, lambda: detected(recipe, recipe.scene(), _TRACKERS)
-    )[name]
-    return dataclasses.replace(case, frames=frames)
+    found = kept(
+        "ablated", recipe, lambda: detected(recipe, recipe.scene(), _TRACKERS), tracker=True
+    )
+    return dataclasses.replace(case, frames=found[name])
 
 
 def measure(specs: Sequence[CaseSpec], wanted: Sequence[str]) -> dict[str, dict[str, Figures]]:

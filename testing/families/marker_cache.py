@@ -17,41 +17,36 @@ from pathlib import Path
 from typing import TypeVar
 
 from rhot.process.numba_cache import cache_root
+from testing.source_tree import relative, uses
 
 Made = TypeVar("Made")
-_ROOT = Path(__file__).parents[2]
-# What the pictures depend on, and what the tracker makes of them.
-PICTURE_CODE = (
-    "rhot/files",
-    "rhot/geometry",
-    "rhot/hand.py",
-    "rhot/hand_tables.py",
-    "rhot/messages",
-    "services/simulator",
-    *(f"testing/families/{name}.py" for name in ("motions", "people", "picture_motions")),
-    *(f"testing/families/{name}.py" for name in ("pictures", "recordings")),
-)
-MARKER_CODE = (*PICTURE_CODE, "services/pi_tracker")
+_HERE = Path(__file__).parent
+# What makes pictures here; what they import counts too.
+_MAKERS = ("motions", "people", "picture_motions", "pictures", "recordings")
 
 
 @cache
-def code_digest(folders: tuple[str, ...]) -> str:
-    """Of these files of the source tree, and of every Python file below these folders."""
+def code_digest(*, tracker: bool) -> str:
+    """Of all code that makes pictures and, if wanted, of the tracker that finds markers in them."""
+    files: set[Path] = set()
+    found = {_HERE / f"{name}.py" for name in _MAKERS}
+    while found:
+        files |= found
+        used = {path for file in found for path in uses(file)}
+        found = {path for path in used - files if tracker or "pi_tracker" not in path.parts}
     digest = hashlib.sha256()
-    for folder in folders:
-        place = _ROOT / folder
-        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
-            digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0")
-            digest.update(path.read_bytes())
+    for path in sorted(files):
+        digest.update(relative(path).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def kept(name: str, recipe: object, folders: tuple[str, ...], make: Callable[[], Made]) -> Made:
+def kept(name: str, recipe: object, make: Callable[[], Made], *, tracker: bool) -> Made:
     """What `make` makes, from disk if it was made before of the same recipe by the same code.
 
-    recipe must have a repr that says everything about it.
+    recipe must have a repr that says everything about it; tracker: the tracker's code counts too.
     """
-    key = hashlib.sha256(f"{name}\0{recipe!r}\0{code_digest(folders)}".encode()).hexdigest()
+    code = code_digest(tracker=tracker)
+    key = hashlib.sha256(f"{name}\0{recipe!r}\0{code}".encode()).hexdigest()
     path = cache_root() / "families" / f"{name}-{key[:32]}.pickle.z"
     try:
         found: Made = pickle.loads(zlib.decompress(path.read_bytes()))

@@ -35,7 +35,7 @@ from services.simulator.scene.catalog import Light, SceneSpec
 from services.simulator.scene.paints import SKIN, Rgb
 from services.simulator.scene.scene import Scene, build_scene
 from testing.families.case import Case
-from testing.families.marker_cache import MARKER_CODE, PICTURE_CODE, kept
+from testing.families.marker_cache import kept
 from testing.families.people import TABLES, PaintJob, Person
 from testing.families.picture_motions import Moves
 from testing.families.recordings import leap_hand
@@ -127,8 +127,8 @@ class Recipe:
 def picture_case(name: str, recipe: Recipe) -> Case:
     """A case of pictures."""
     scene, hand = recipe.scene(), recipe.hand().hand
-    frames = kept("markers", recipe, MARKER_CODE, lambda: detected(recipe, scene)[""])
-    shares = kept("visible", recipe, PICTURE_CODE, lambda: visible_shares(recipe, scene))
+    frames = kept("markers", recipe, lambda: detected(recipe, scene)[""], tracker=True)
+    shares = kept("visible", recipe, lambda: visible_shares(recipe, scene), tracker=False)
     clocks = scene.clocks
     truth = _Truth(scene, recipe.hand(), tuple(scene.hands[hand].landmarks))
     return Case(

@@ -82,12 +82,20 @@ def test_a_second_time_comes_from_disk_and_is_the_same(case, monkeypatch):
 def test_a_damaged_file_is_made_again(folder, monkeypatch):
     monkeypatch.setattr(marker_cache, "cache_root", lambda: folder / "damaged")
     made = iter(("first", "second", "third"))
+
+    def keep(recipe):
+        return marker_cache.kept("word", recipe, lambda: next(made), tracker=False)
+
     for expected in ("first", "first"):
-        assert marker_cache.kept("word", 1, ("rhot/geometry",), lambda: next(made)) == expected
+        assert keep(1) == expected
     for path in (folder / "damaged" / "families").iterdir():
         path.write_bytes(b"no such thing")
-    assert marker_cache.kept("word", 1, ("rhot/geometry",), lambda: next(made)) == "second"
-    assert marker_cache.kept("word", 2, ("rhot/geometry",), lambda: next(made)) == "third"
+    assert keep(1) == "second"
+    assert keep(2) == "third"
+
+
+def test_the_digest_covers_what_is_imported():
+    assert marker_cache.code_digest(tracker=True) != marker_cache.code_digest(tracker=False)
 
 
 def test_the_halves_share_no_case():
