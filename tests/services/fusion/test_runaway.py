@@ -44,7 +44,7 @@ def share_beyond(found: PointErrors, sigmas: float) -> float:
     [
         (lambda: stop_and_go(20.0, seed=12), 25.0),
         (lambda: flapping(2.0, 30.0, seed=7), 27.0),
-        pytest.param(lambda: leap_motion("grab"), 20.0, marks=real),
+        pytest.param(lambda: leap_motion("grab"), 36.0, marks=real),
         pytest.param(lambda: leap_motion("wave"), 45.0, marks=real),
     ],
     ids=["stop and go", "flapping", "grasp", "wave"],
