@@ -23,15 +23,15 @@ from rhot.hand import (
     HANDS,
     HandModel,
     chain_forward,
-    default_hand,
     forward,
     landmark_point,
 )
 from rhot.messages import HandPoint, HandPoints
 from services.solver.maths.chains import Chain, digit_chain, hand_chains
 from services.solver.step import SolverStep
+from testing.synthetic_hands import known_hand
 
-MODEL = default_hand()
+MODEL = known_hand()
 CHAINS = hand_chains(MODEL)
 INDEX = digit_chain(CHAINS, 1)
 FRAMES, RATE_HZ = 150, 30.0
@@ -171,7 +171,7 @@ def with_painted(extra: Sequence[str], seeds: int) -> tuple[float, float, float,
     """
     rows = []
     for seed, kind, hand in itertools.product(range(seeds), ("random", "fist"), HANDS):
-        model = default_hand(hand)
+        model = known_hand(hand)
         rng = np.random.default_rng([seed, kind == "fist", hand == "left"])
         rows.append(errors_of(model, moving(model, rng, kind), (*BASIC_LANDMARKS, *extra), rng))
     flexion, turn, thumb, abduction = np.mean(rows, axis=0).tolist()

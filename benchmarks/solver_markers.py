@@ -18,8 +18,9 @@ import numpy as np
 from solver_hands import FRAMES, RATE_HZ, Motion, errors_of, moving, with_painted
 
 from rhot.geometry.transforms import Array, rotation_from_vector
-from rhot.hand import BASIC_LANDMARKS, HandModel, default_hand
+from rhot.hand import BASIC_LANDMARKS, HandModel
 from services.simulator.hands.gestures import CURVED, FIST, OPEN, LimitScaling, bump
+from testing.synthetic_hands import known_hand
 
 _JOINTS = ("proximal", "intermediate")
 CANDIDATES = (
@@ -80,7 +81,7 @@ def on_the_other_side(name: str, told: bool) -> tuple[float, ...]:
     """Errors when a dab sits on the palm side of a joint, and the hand file says so or not."""
     rows = []
     for seed in range(4):
-        back, rng = default_hand(), np.random.default_rng(seed)
+        back, rng = known_hand(), np.random.default_rng(seed)
         x, y, z = back.paint[name].offset_m
         turned = msgspec.structs.replace(back.paint[name], offset_m=(x, -y, z))
         palm = msgspec.structs.replace(back, paint={**back.paint, name: turned})
@@ -108,7 +109,7 @@ def main() -> int:
     for name in (*GESTURES, *SWINGS):
         rows = []
         for seed in range(4):
-            model, rng = default_hand(), np.random.default_rng([seed, 3])
+            model, rng = known_hand(), np.random.default_rng([seed, 3])
             rows.append(errors_of(model, gesture(model, name, rng), BASIC_LANDMARKS, rng))
         found[name] = tuple(np.mean(rows, axis=0).tolist())
     for name, (flexion, turn, thumb, abduction) in found.items():

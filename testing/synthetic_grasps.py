@@ -28,7 +28,6 @@ from rhot.hand import (
     BASIC_LANDMARKS,
     HandModel,
     HandName,
-    default_hand,
     forward,
     joint_radii_m,
     landmark_point,
@@ -38,6 +37,7 @@ from rhot.messages import FingerAngles, HandPoint, HandPoints, HandPose, WristPo
 from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import HandTruth, ObjectTruth, Truth
 from services.solver.step import SolverStep
+from testing.synthetic_hands import known_hand
 
 START_NS = 10**18
 # Open and closed, in degrees: thumb (abduction, cmc, mcp, dip), fingers (abduction, mcp, pip, dip).
@@ -90,7 +90,7 @@ class GraspScene:
     def __init__(self, setting: Setting) -> None:
         """Raises ValueError where that hand finds no place to hold that cup."""
         self.setting = setting
-        self.model: HandModel = default_hand(setting.hand, setting.scale)
+        self.model: HandModel = known_hand(setting.hand, setting.scale)
         self.solid = Cylinder(setting.diameter_m, setting.height_m)
         self._rng = np.random.default_rng([setting.seed, 17])
         self._radii = joint_radii_m(self.model)

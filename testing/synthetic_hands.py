@@ -10,7 +10,14 @@ import msgspec
 import numpy as np
 
 from rhot.geometry.transforms import Array, rotation_from_vector
-from rhot.hand import BASIC_LANDMARKS, HandModel, forward, landmark_point
+from rhot.hand import (
+    BASIC_LANDMARKS,
+    HandModel,
+    HandName,
+    default_hand,
+    forward,
+    landmark_point,
+)
 from rhot.messages import HandPoint, HandPoints
 from services.simulator.hands.gestures import Gesture
 
@@ -18,6 +25,11 @@ from services.simulator.hands.gestures import Gesture
 NOISE_M = 1e-3
 # The resting wrist in the rig frame.
 _START = rotation_from_vector(np.array([1.2, 0.3, 0.1]))
+
+
+def known_hand(hand: HandName = "right", scale: float = 1.0) -> HandModel:
+    """The tables' hand as if its bones were known exactly: the solver trusts it."""
+    return msgspec.structs.replace(default_hand(hand, scale), origin="simulated")
 
 
 def with_bone_factors(model: HandModel, factors: Array) -> HandModel:

@@ -187,7 +187,8 @@ class FusionStep:
         positions, covariances = self._paint.correct(
             estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
         )
-        self._hidden.note_places(positions)
+        # Rows of landmarks that were not found hold no place.
+        self._hidden.note_places(np.where(estimates.found[:, None], positions, np.nan))
         covariances = covariances + self._systematic.covariances(
             positions, estimates.seen_by, self._hidden.sigmas
         )

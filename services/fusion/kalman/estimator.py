@@ -28,6 +28,7 @@ from services.fusion.kalman.frame_update import (
     update_frame,
 )
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
+from services.fusion.kalman.one_camera import LastLocated
 from services.fusion.kalman.rest.rest_mixing import mix_rest
 from services.fusion.kalman.smoother import smooth_all
 from services.fusion.kalman.track_history import start_track
@@ -87,6 +88,7 @@ class KalmanMethod:
         self.counts = Counts()
         self._hands = hands
         self._extrinsics = extrinsics(cameras)
+        self._centres_rig = np.array([camera.centre_rig for camera in cameras])  # (C, 3)
         self._periods_s = periods_s
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
@@ -95,6 +97,7 @@ class KalmanMethod:
     def reset(self) -> None:
         """Forget all observations."""
         self._state = empty_state(self._hands, len(self._periods_s), len(MODELS))
+        self._located = LastLocated(sum(map(len, self._hands)))
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
@@ -186,14 +189,22 @@ class KalmanMethod:
         covs = np.zeros((landmarks, 6, 6))
         found = smooth_all(history, time_s, MODELS, means, covs)
         mix_rest(rest, time_s, found, means, covs)
-        largest_sigma = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
         found &= np.isfinite(means).all(axis=1)
         seen_since_s = SEEN_FRAMES * self._periods_s  # (C,)
         seen_by = time_s - recent.accepted_s <= seen_since_s  # (L, C)
-        by_one = found & (largest_sigma > SHOW_SIGMA_M) & (seen_by.sum(axis=1) == 1)
-        for row in np.flatnonzero(by_one):
+        measured = seen_by.sum(axis=1) >= 2
+        self._located.note(found & measured, means[:, :3], time_s)
+        for row in np.flatnonzero(found & (seen_by.sum(axis=1) == 1)).tolist():
+            estimate = means[row, :3], covs[row, :3, :3]
+            centre = self._centres_rig[int(seen_by[row].argmax())]
+            told = self._located.told(row, time_s, estimate, centre)
+            if told is not None:
+                means[row, :3], covs[row, :3, :3] = told
+        largest_sigma = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
+        for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
             # The middle one of three: the larger one across the ray.
-            largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
+            if seen_by[row].any():
+                largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
         found &= (largest_sigma > 0.0) & (largest_sigma <= SHOW_SIGMA_M)
         detected_by = time_s - recent.observed_s <= seen_since_s
         return Estimates(
@@ -201,7 +212,7 @@ class KalmanMethod:
             positions_m=means[:, :3],
             covariances_m2=covs[:, :3, :3],
             seen_by=seen_by,
-            measured=seen_by.sum(axis=1) >= 2,
+            measured=measured,
             detected=detected_by.sum(axis=1) >= 2,
         )
 

@@ -53,7 +53,7 @@ class HiddenPaint:
         self._places = np.full((shape[0], 3), np.nan)
 
     def note_places(self, positions_m: Array) -> None:
-        """Where the landmarks are (L, 3): how far from each camera, and how it is turned to it."""
+        """Where the landmarks are (L, 3), NaN where that is unknown."""
         self._places[:] = positions_m
 
     def observe(self, view: View, time_s: float) -> Array:

@@ -89,7 +89,7 @@ x = 1
         "`hand.right.markers.thumb_tip`",
         "colour 'red' is used 2 times",
         "'left' is used 2 times",
-        "'kalmann'; valid: disparity, kalman, triangulate",
+        "'kalmann'; valid: disparity, joint, kalman, triangulate",
         "`fusion.one_euro.beta`",
         "unknown key `bogus`",
     ):

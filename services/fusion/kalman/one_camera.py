@@ -1,0 +1,58 @@
+"""A landmark that one camera sees alone: known across its ray, and along it hardly farther than
+the hand may have moved since two cameras saw it.
+
+The filter goes on with the velocity it had. Within some tenths of a second that velocity's error
+takes the landmark decimetres along the ray, metres within seconds, far outside what its covariance
+says, as all of it rests on one straight line through a turn. So the distance from the camera is
+told as that of the last sight by two cameras, as unsure as hands move, weighed against the
+filter's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+
+# How far a hand's distance changes, 1 sigma: as fast as this at first, never more than so far.
+# Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s, stop and go at 14 m/s^2),
+# one camera gone for 2 s.
+_RATE_M_S, _FARTHEST_M = 0.35, 0.12
+# The filter's own sigma along the ray is worth half in so long.
+_TRUST_S = 0.1
+
+
+class LastLocated:
+    """Where each of L landmarks was when two cameras saw it last."""
+
+    def __init__(self, landmarks: int) -> None:
+        self._positions = np.full((landmarks, 3), np.nan)
+        self._times_s = np.full(landmarks, -np.inf)
+
+    def note(self, located: Array, positions_m: Array, time_s: float) -> None:
+        """Positions (L, 3) of landmarks that two cameras see (L,)."""
+        self._positions[located] = positions_m[located]
+        self._times_s[located] = time_s
+
+    def told(
+        self, row: int, time_s: float, estimate: tuple[Array, Array], centre_rig: Array
+    ) -> tuple[Array, Array] | None:
+        """The position (3,) and covariance (3, 3) of a landmark by one camera at centre_rig (3,).
+
+        estimate: the filter's. None if two cameras never saw it.
+        """
+        age_s = time_s - self._times_s[row]
+        distance = float(np.linalg.norm(self._positions[row] - centre_rig))
+        if not (age_s >= 0.0 and np.isfinite(distance)):
+            return None
+        position, cov = estimate
+        ray = position - centre_rig
+        own = float(np.linalg.norm(ray))
+        along = ray / own
+        own_variance = float(along @ cov @ along) * (1.0 + age_s / _TRUST_S) ** 2
+        held_variance = min(_RATE_M_S * age_s, _FARTHEST_M) ** 2 + 1e-6
+        variance = own_variance * held_variance / (own_variance + held_variance)
+        told = variance * (own / own_variance + distance / held_variance)
+        across = np.eye(3) - np.outer(along, along)
+        told_cov = (told / own) ** 2 * (across @ cov @ across) + variance * np.outer(along, along)
+        return centre_rig + told * along, told_cov
