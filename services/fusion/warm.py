@@ -16,7 +16,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.geometry.projection import extrinsics
-from services.fusion.output.paint_centroid import located_shift, shift_table
+from services.fusion.output.paint_centroid import expected_shift, shift_table
 from services.fusion.step import FusionStep
 
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
@@ -41,8 +41,9 @@ def warm_up(
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, config.colors)))
     # What only a pose from the solver would call.
     table = shift_table(0.007, 0.014)
-    finger = np.array([0.0, -1.0, 0.0])
-    located_shift(table, point.copy(), finger, extrinsics(tuple(cameras.values())), np.zeros(3))
+    finger = np.array([0.0, -1.0, 0.0]), 0.1, 0.1
+    chosen = extrinsics(tuple(cameras.values()))
+    expected_shift(table, point.copy(), finger, chosen, np.zeros(3), np.zeros((3, 3)))
     return messages + len(step.flush())
 
 

@@ -20,7 +20,7 @@ LIVE = (
 def test_warming_up_exercises_the_whole_of_fusion():
     setup = SyntheticRig(cameras=3)
     assert warm_up(setup.config(), setup.rig(), point_hands()) == 8
-    for compiled in (*LIVE, paint_centroid.located_shift, paint_centroid._fill_table):
+    for compiled in (*LIVE, paint_centroid.expected_shift, paint_centroid._fill_table):
         assert compiled.signatures, compiled
 
 
