@@ -64,8 +64,10 @@ exec tail -f /dev/null"""
         ("WM0", False, True),
     ]
     assert [pose.eTrackingResult for pose in poses] == [200, 200, 201, 201]
-    stamps = [pose.stamp_ns for pose in poses]
-    assert stamps == sorted(stamps)
+    # Of each device: what comes late on a busy machine shifts the others.
+    for serial in ("WM0", "T20"):
+        stamps = [pose.stamp_ns for pose in poses if pose.device.serial == serial]
+        assert stamps == sorted(stamps)
 
 
 @pytest.mark.parametrize(
