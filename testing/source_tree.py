@@ -7,7 +7,8 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-CODE = sorted([*(ROOT / "rhot").rglob("*.py"), *(ROOT / "services").rglob("*.py")])
+ROOTS = ("rhot", "services", "studies")
+CODE = sorted(path for root in ROOTS for path in (ROOT / root).rglob("*.py"))
 BESIDE = sorted(
     path
     for folder in ("testing", "tests", "benchmarks", "docs", "examples")
@@ -64,12 +65,15 @@ def file_of(name: str) -> Path | None:
 @cache
 def uses(path: Path) -> frozenset[Path]:
     """Files of ours that a file imports, also inside functions and for types."""
-    found = {file_of(name) for name in imports_of(path) if name.startswith(("rhot", "services"))}
+    found = {file_of(name) for name in imports_of(path) if name.startswith(ROOTS)}
     return frozenset(one for one in found if one is not None and one != path)
 
 
 def room_of(path: Path) -> str:
-    """The room of a file: its folder below rhot/ or services/<name>/; beside the rooms, itself."""
+    """The room of a file: its folder below rhot/, services/<name>/, studies/<name>/.
+
+    Beside the rooms, the file itself.
+    """
     parts = path.relative_to(ROOT).with_suffix("").parts
     doors = 1 if parts[0] == "rhot" else 2
     return "/".join(parts[: doors + 1]) if len(parts) > doors else "/".join(parts)

@@ -118,12 +118,25 @@ def test_every_file_of_rhot_is_on_a_floor_and_imports_only_from_below():
 def test_rhot_imports_no_service_and_services_not_each_other(path):
     parts = path.relative_to(ROOT).parts
     for name in imports_of(path):
-        if not name.startswith("services."):
+        # A study stands on the services' pure steps, as the command does.
+        if not name.startswith("services.") or parts[0] == "studies":
             continue
         assert parts[0] == "services", f"{relative(path)} imports {name}: rhot knows no service"
         assert parts[1] in {name.split(".")[1], *COMPOSERS} or file_of(name) is None, (
             f"{relative(path)} imports {name}: services meet on the bus only"
         )
+
+
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_only_the_command_knows_studies_and_no_study_the_command(path):
+    parts = path.relative_to(ROOT).parts
+    names = {name for name in imports_of(path) if name.startswith("studies.")}
+    assert not names or parts[0] == "studies" or parts[:2] == ("services", "cli"), (
+        f"{relative(path)} imports {sorted(names)}: studies stand above the services"
+    )
+    if parts[0] == "studies":
+        command = {name for name in imports_of(path) if name.startswith("services.cli")}
+        assert not command, f"{relative(path)} imports {sorted(command)}: the command uses studies"
 
 
 @pytest.mark.parametrize("path", CODE, ids=relative)
@@ -190,8 +203,9 @@ def test_no_assert_on_input(path):
 
 def test_tests_mirror_the_tree():
     """A test file of a service lies in the room of what it tests, or at the service's door."""
-    for path in (ROOT / "tests" / "services").rglob("test_*.py"):
-        room = path.parent.relative_to(ROOT / "tests")
+    tests = ROOT / "tests"
+    for path in [*(tests / "services").rglob("test_*.py"), *(tests / "studies").rglob("test_*.py")]:
+        room = path.parent.relative_to(tests)
         assert (ROOT / room).is_dir(), f"{relative(path)}: there is no {room.as_posix()}/"
         tested = ROOT / room / f"{path.stem.removeprefix('test_')}.py"
         assert (
@@ -251,7 +265,7 @@ def test_the_plan_of_the_house_names_every_room_and_no_other():
     assert plan, "docs/architecture.md has no list of rooms"
     named = set(re.findall(r"^(\S+/) ", plan[1], re.MULTILINE))
     there = {f"{relative(folder)}/" for folder in {path.parent for path in CODE}} | {"testing/"}
-    there -= {"services/"}
+    there -= {"services/", "studies/"}
     assert named == there, f"not named: {there - named}; not there: {named - there}"
 
 

@@ -99,10 +99,14 @@ async def test_messages_larger_than_their_topic_allows_do_not_pass(buses):
     publisher = left.publisher(topics.MARKERS, camera="left")
     await _connected(publisher)
     limit = topics.MARKERS.max_bytes
-    for size in (limit + 1, 10 * limit, 50_000_000, limit):
+    for size in (limit + 1, 10 * limit, 50_000_000):
         publisher.put_bytes(b"x" * size)
+    # The 50 MB hold the link for a while, and live data behind them may be dropped: asked again.
     async with asyncio.timeout(DEADLINE_S):
-        assert len((await anext(arrived)).payload) == limit
+        while not arrived._queue:
+            publisher.put_bytes(b"x" * limit)
+            await asyncio.sleep(0.2)
+    assert {len(message.payload) for message in arrived._queue} == {limit}
     # Also at who would reject them unread: they did not come this far.
     assert arrived.stats.rejected == 0
 
