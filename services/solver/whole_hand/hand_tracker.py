@@ -1,6 +1,7 @@
 """One hand followed over time: predict, fit, and compare with a restart when in doubt.
 
-- The first pose needs the wrist and three tips in one message (initialise.py).
+- The first pose needs the wrist and three tips in one message, all of them where somebody knows
+  (initialise.py): from one camera's first look they may be anywhere along its rays.
 - From then on every message is fitted from the motion prior.
 - A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
   and every three seconds. It initialises the hand as if nothing were known. Another pose that
@@ -45,6 +46,9 @@ from services.solver.whole_hand.rival import Rival, same_pose
 MIN_LANDMARKS = 3
 # Longer gaps leave nothing to continue from: a hand is anywhere after a second.
 MAX_GAP_S = 1.0
+# A landmark less sure than that, the RMS of its axes, begins no hand: a hand's fingers are as long.
+# (Live rigs: the first message of one camera told 0.6 m, and the pose was 200 mm off.)
+_PLACED_SIGMA_M = 0.1
 # Iterations of one update: 4 on average, 25 at worst on simulated hands; 30 are 0.2 ms.
 MAX_ITERATIONS = 30
 # A fit whose squared distances exceed this per landmark coordinate is bad (expected: below 1).
@@ -87,7 +91,8 @@ class HandTracker:
         if len(observed) >= MIN_LANDMARKS:
             self._located_ns = stamp_ns
         if self._estimate is None:
-            if "wrist" not in observed or sum(name in observed for name in TIPS) < MIN_LANDMARKS:
+            placed = {name for name, seen in observed.items() if _is_placed(seen)}
+            if "wrist" not in placed or len(placed.intersection(TIPS)) < MIN_LANDMARKS:
                 return None
             self._misfit_m2, seconds = 0.0, MAX_GAP_S
         observations = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
@@ -176,6 +181,11 @@ class HandTracker:
         unused = np.empty((UNKNOWNS, UNKNOWNS))
         cost, _ = fit(self.chains, observations, self._uninformed, pose, MAX_ITERATIONS, unused)
         return cost
+
+
+def _is_placed(seen: Observation) -> bool:
+    """Whether a landmark's place is known well enough to begin a hand with."""
+    return float(np.trace(seen.covariance_m2)) <= 3.0 * _PLACED_SIGMA_M**2
 
 
 def _estimate_of(found: Hypothesis) -> HandEstimate:

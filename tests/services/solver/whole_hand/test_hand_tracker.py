@@ -41,6 +41,20 @@ def test_nothing_before_the_wrist_and_three_tips(world: Callable, tracker: HandT
     assert tracker.track(3, _observed({name: found[name] for name in names})) is not None
 
 
+def test_landmarks_that_may_be_anywhere_on_a_ray_begin_no_hand(
+    world: Callable, tracker: HandTracker
+) -> None:
+    ours = world("right")
+    certain = _observed(ours.points(ours.motion(1, 1)[0]))
+    along_ray = np.diag([1e-6, 1e-6, 0.36])
+    vague = {n: replace(seen, covariance_m2=along_ray) for n, seen in certain.items()}
+    assert tracker.track(0, vague) is None
+    assert tracker.track(1, vague | {"wrist": certain["wrist"]}) is None
+    assert tracker.track(2, certain) is not None
+    # A hand that is known goes on with them.
+    assert tracker.track(3, vague) is not None
+
+
 def test_follows_and_is_surer_than_a_single_message(world: Callable, tracker: HandTracker) -> None:
     ours, rng = world("right"), np.random.default_rng(2)
     model, errors, alone = ours.model, [], []
