@@ -6,16 +6,17 @@
 
 Streams end with the `async with` block. Nothing arrives while nothing is sent; a router that dies
 and returns is met again by itself. By default a stream skips to the newest message (`latest`); with
-queue=n it delivers every message through a queue of n that drops the oldest.
+queue=n it delivers every message through a queue of n that drops the oldest. Without asyncio:
+rhot.open (rhot/blocking.py).
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Generic, TypeVar, get_args
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
@@ -38,6 +39,9 @@ Event = TypeVar("Event")
 # Contacts waiting for who awaits events: 4 s of two hands at 30 Hz. Their state is whole, so that
 # what is dropped loses no grasp.
 _EVENT_QUEUE = 256
+# How long `connect` looks for a router: one that starts at the same time is there in two seconds.
+CONNECT_S = 10.0
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 class RigClient:
@@ -46,18 +50,32 @@ class RigClient:
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
         self._followed: dict[str, _Followed] = {}
+        self._newest: dict[str | None, _Newest[HandPose]] = {}
 
     def hand_poses(
         self, hand: HandName | None = None, queue: int | None = None
     ) -> Subscription[HandPose]:
         """Full hand poses, of one hand or of both."""
-        return self._stream(topics.POSE, queue, hand=hand)
+        return self._stream(topics.POSE, queue, hand=_known(hand))
+
+    async def latest_pose(
+        self, hand: HandName | None = None, max_age_s: float = 0.5
+    ) -> HandPose | None:
+        """The newest pose, at once if it came within max_age_s; else the next, waited for as long.
+
+        None if there is none, so that a loop of its own rhythm (a game's, a robot's) never hangs.
+        The first call begins to follow that hand.
+        """
+        newest = self._newest.get(hand)
+        if newest is None:
+            newest = self._newest[hand] = _Newest(self.hand_poses(hand))
+        return await newest.within(max_age_s)
 
     def hand_points(
         self, hand: HandName | None = None, queue: int | None = None
     ) -> Subscription[HandPoints]:
         """3D landmarks, of one hand or of both."""
-        return self._stream(topics.POINTS, queue, hand=hand)
+        return self._stream(topics.POINTS, queue, hand=_known(hand))
 
     def object_poses(
         self, name: str | None = None, queue: int | None = None
@@ -186,6 +204,41 @@ class _Followed:
             self.heard.set()
 
 
+class _Newest(Generic[T]):
+    """The newest message of a stream and when it came, kept up to date."""
+
+    def __init__(self, messages: Subscription[T]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._message: T | None = None
+        self._came_s = 0.0
+        self._arrival = asyncio.Event()
+        self._task = asyncio.create_task(self._follow(messages))
+
+    async def within(self, seconds: float) -> T | None:
+        """A message that came in the last seconds, or comes in the next; else None."""
+        # Who asks in a loop without another await must let the messages in.
+        await asyncio.sleep(0)
+        if self._message is None or self._loop.time() - self._came_s > seconds:
+            self._arrival.clear()
+            try:
+                await asyncio.wait_for(self._arrival.wait(), seconds)
+            except TimeoutError:
+                return None
+        return self._message
+
+    async def _follow(self, messages: Subscription[T]) -> None:
+        async for message in messages:
+            self._message, self._came_s = message, self._loop.time()
+            self._arrival.set()
+
+
+def _known(hand: HandName | None) -> HandName | None:
+    """The hand as it is; raises ValueError if there is no such hand, whose poses never came."""
+    if hand is not None and hand not in get_args(HandName):
+        raise ValueError(f"there is no hand {hand!r}; give 'left', 'right', or None for both")
+    return hand
+
+
 def _one(answers: list[T], camera: str) -> T:
     if not answers:
         raise BusError(
@@ -197,18 +250,37 @@ def _one(answers: list[T], camera: str) -> T:
 
 @contextlib.asynccontextmanager
 async def connect(
-    endpoint: str = "tcp/127.0.0.1:7447",
+    endpoint: str = DEFAULT_ENDPOINT,
     rig: str = "*",
     certificates: str | Path | None = None,
+    timeout_s: float | None = CONNECT_S,
 ) -> AsyncIterator[RigClient]:
-    """A session with the router at endpoint; waits for it as long as it takes (cancel, or use
-    asyncio.timeout, to give up).
+    """A session with the router at endpoint, looked for for timeout_s; None: as long as it takes.
 
     rig is the name in [rig] of rig.toml; "*" listens to every rig of that router. certificates is
     the folder of this host's ca.pem, own.pem and own.key, for an endpoint like
-    tls/master.local:7448; raises BusError if they are the reason that there is no session.
+    tls/master.local:7448. Raises BusError if no router answers in time, or if certificates are the
+    reason that there is no session.
     """
     folder = None if certificates is None else Path(certificates)
     endpoints = with_certificates([endpoint], folder, "connect")
-    async with open_bus(rig, endpoints, despite_certificates=False) as bus:
+    async with contextlib.AsyncExitStack() as stack:
+        try:
+            async with asyncio.timeout(timeout_s):
+                bus = await stack.enter_async_context(
+                    open_bus(rig, endpoints, despite_certificates=False)
+                )
+        except TimeoutError:
+            raise BusError(
+                f"no router answers at {endpoint}; `rhot demo` and `rhot up` start one (and print "
+                "its endpoint), `rhot doctor` tells what is in the way. timeout_s=None waits for it"
+            ) from None
         yield RigClient(bus)
+
+
+def run(program: Coroutine[Any, Any, T]) -> T | None:
+    """asyncio.run() for a program that is ended by Ctrl-C: then it returns None, quietly."""
+    try:
+        return asyncio.run(program)
+    except KeyboardInterrupt:
+        return None

@@ -40,6 +40,7 @@ IMPURE_FILES = {
     "__main__.py",
     "rhot/clock.py",
     "rhot/client.py",
+    "rhot/blocking.py",
     "rhot/watch/follow.py",
 }
 IMPURE_ROOMS = {
@@ -69,6 +70,7 @@ FLOORS_OF_RHOT = (
     {"rhot/files", "rhot/bus"},
     {"rhot/process", "rhot/watch"},
     {"rhot/client"},
+    {"rhot/blocking"},
     {"rhot/__init__"},
 )
 # services/cli is the one place that knows all services: it composes their pure steps offline.

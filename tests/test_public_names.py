@@ -17,6 +17,6 @@ def test_the_public_names_are_those_of_the_list():
 
 
 def test_what_the_package_itself_offers():
-    assert sorted(rhot.__all__) == ["RigClient", "connect"]
+    assert sorted(rhot.__all__) == ["BlockingRig", "RigClient", "connect", "open", "run"]
     for name in rhot.__all__:
         assert getattr(rhot, name).__doc__

@@ -11,9 +11,11 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import msgspec
+import numpy as np
 
 from rhot.errors import RefusalCode
-from rhot.hand import HandName
+from rhot.geometry.transforms import Array
+from rhot.hand import DIGITS, JOINT_INDEX, JOINTS, HandName
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -98,6 +100,10 @@ class HandPoints(Message, frozen=True, kw_only=True):
     stamp_ns: Stamp
     points: Annotated[list[HandPoint], msgspec.Meta(max_length=64)]
     sent_ns: Stamp = 0
+
+    def point(self, name: str) -> HandPoint | None:
+        """A landmark by its name, None if it is not known now."""
+        return next((point for point in self.points if point.name == name), None)
 
 
 JointSource = Literal["measured", "solved", "predicted"]
@@ -187,6 +193,33 @@ class HandPose(Message, frozen=True, kw_only=True):
     wrist_sigma_m: NonNegative | None = None
     wrist_sigma_rad: NonNegative | None = None
     sent_ns: Stamp = 0
+
+    def joint(self, name: str) -> HandJoint:
+        """One of the 26 joints by its OpenXR name; raises ValueError with the valid ones."""
+        if name not in JOINT_INDEX:
+            raise ValueError(f"there is no joint {name!r}; there are {', '.join(JOINTS)}")
+        return self.joints[JOINT_INDEX[name]]
+
+    def finger(self, name: str) -> FingerPose:
+        """One digit by its name; raises ValueError with the valid ones."""
+        if name not in DIGITS:
+            raise ValueError(f"there is no finger {name!r}; there are {', '.join(DIGITS)}")
+        return self.fingers[DIGITS.index(name)]
+
+    @property
+    def positions_m(self) -> Array:
+        """All joints in the order of rhot.hand.JOINTS, (26, 3), rig frame."""
+        return np.array([joint.position_m for joint in self.joints])
+
+    @property
+    def orientations_wxyz(self) -> Array:
+        """All joints' orientations in the same order, (26, 4), rig frame."""
+        return np.array([joint.orientation_wxyz for joint in self.joints])
+
+    @property
+    def angles_rad(self) -> Array:
+        """All digits' angles, (5, 4), thumb to little: FingerPose.model_angles_rad."""
+        return np.array([finger.model_angles_rad for finger in self.fingers])
 
 
 class Session(Message, frozen=True, kw_only=True):
