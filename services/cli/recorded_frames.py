@@ -40,6 +40,17 @@ def frames_by_number(camera: str, path: Path, numbers: Sequence[int]) -> list[Fr
     return [found[number] for number in numbers]
 
 
+def frame_names(camera: str, path: Path, numbers: Sequence[int]) -> list[str]:
+    """What to call these frames, which there are: the files of a folder, else by their numbers."""
+    reader = _reader(camera, path)
+    if not isinstance(reader, FolderReader):
+        return [f"frame {number}" for number in numbers]
+    reader.open()
+    names = [reader.name_of(number) for number in numbers]
+    reader.close()
+    return names
+
+
 def _reader(camera: str, path: Path) -> Reader:
     if not path.is_dir():
         return VideoReader(camera, path, _FPS)

@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import typer
@@ -22,7 +22,7 @@ from services.cli.calibrate import options
 from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
 from services.cli.calibrate.live_pictures import next_frames
 from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
-from services.cli.recorded_frames import frames_by_number, spread_numbers
+from services.cli.recorded_frames import frame_names, frames_by_number, spread_numbers
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
@@ -32,6 +32,13 @@ from services.pi_tracker.image.frame import Frame, Image
 
 # Frames of a recording that --auto uses unless told otherwise.
 _AUTO_FRAMES = 6
+
+
+class Pictures(NamedTuple):
+    """Pictures, in the order in which pointers count them, and what warnings call them."""
+
+    frames: Sequence[Frame]
+    names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,8 @@ def from_recording(
     pointers += request.pointing.in_every_frame(range(first, len(numbers)))
     taken = frames_by_number(request.camera, video, numbers)
     inputs = {"recording": video.name, "frames": numbers}
-    made = fitted(request, taken, pointers, _known(path), rig.colors if rig else [], inputs)
+    named = Pictures(taken, frame_names(request.camera, video, numbers))
+    made = fitted(request, named, pointers, _known(path), rig.colors if rig else [], inputs)
     if not request.dry_run:
         save(path, made)
         typer.echo(f"written: {path}", err=True)
@@ -90,7 +98,7 @@ async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], co
         taken = await next_frames(bus, request.camera, count)
         pointers = request.pointing.in_every_frame(range(count))
         made = await asyncio.to_thread(
-            fitted, request, taken, pointers, known, rig.colors, {"pictures": count}
+            fitted, request, Pictures(taken), pointers, known, rig.colors, {"pictures": count}
         )
         if request.dry_run:
             return
@@ -107,7 +115,7 @@ async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], co
 
 def fitted(
     request: Request,
-    frames: Sequence[Frame],
+    pictures: Pictures,
     pointers: list[Pointer],
     known: Mapping[str, ColorRange],
     rig_colors: Sequence[str],
@@ -121,9 +129,9 @@ def fitted(
     """
     if request.pointing.auto:
         given = {pointer.color for pointer in pointers}
-        proposed = _proposed(frames, rig_colors, dry_run=request.dry_run)
+        proposed = _proposed(pictures.frames, rig_colors, dry_run=request.dry_run)
         pointers = pointers + [box for box in proposed if box.color not in given]
-    study = gather(frames, pointers)
+    study = gather(pictures.frames, pointers, pictures.names)
     ranges = fit(study.samples)
     others = {name: span for name, span in known.items() if name not in ranges}
     report = examine(study, ranges, others)
@@ -140,7 +148,7 @@ def fitted(
     for warning in report.warnings:
         typer.echo(f"warning: {warning}", err=True)
     if request.picture is not None:
-        _write_picture(request.picture, overlay(study, frames, made))
+        _write_picture(request.picture, overlay(study, pictures.frames, made))
     return made
 
 

@@ -1,8 +1,9 @@
 """HSV ranges of paints from patches that a person pointed at, against skin, background and others.
 
 Pure. Only pictures in which a colour was pointed at say what is not that colour: elsewhere its
-marker may be in view, too. A paint that cannot be told apart still gets a range, and the report
-(report.py) says so.
+marker may be in view, too. Each picture counts as much as another, however large its patch is: the
+light of one near marker must not outvote that of all others. A paint that cannot be told apart
+still gets a range, and the report (report.py) says so.
 """
 
 from __future__ import annotations
@@ -32,7 +33,11 @@ _RIM_CELLS, _RIM_SHARE = 3, 0.2
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What one colour is, and what it is not, in the pictures in which it was pointed at."""
+    """What one colour is, and what it is not, in the pictures in which it was pointed at.
+
+    paint holds as many cells of each picture: of large patches every so many, of small ones all,
+    repeatedly.
+    """
 
     color: str
     patches: tuple[PaintPatch, ...]
@@ -48,42 +53,54 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class TrainingSet:
-    """Pictures, the patches in them, and notes on pointers that were left out."""
+    """Pictures with their names, the patches in them, and notes on pointers that were left out.
 
+    pointed are the pictures, by number, in which somebody pointed at each colour.
+    """
+
+    names: list[str]
+    pointed: dict[str, set[int]]
     cells: list[Cells]  # (h, w) each
     covered: list[Mask]  # (h, w) each: patches with their rims
     samples: dict[str, Samples]
     notes: list[str]
 
 
-def gather(frames: Sequence[Frame], pointers: Sequence[Pointer]) -> TrainingSet:
+def gather(
+    frames: Sequence[Frame], pointers: Sequence[Pointer], names: Sequence[str] = ()
+) -> TrainingSet:
     """The samples of every colour.
 
     A pointer that shows nothing, or another colour than the rest, is noted and left out. frames are
-    in the order of Pointer.frame. Raises CalibrationError if a colour has no pointer that shows it.
+    in the order of Pointer.frame, and so are their names ("picture 1", ... if none are given).
+    Raises CalibrationError if a colour has no pointer that shows it.
     """
     if not pointers:
         raise CalibrationError(
             "nothing is pointed at; click on a marker in the picture, "
             "or give --box COLOR=x,y,width,height"
         )
+    pictures = list(names) or [f"picture {number + 1}" for number in range(len(frames))]
     cells = [cells_of(frame) for frame in frames]
-    patches, notes = _found_patches(cells, pointers)
+    patches, notes = _found_patches(cells, pointers, pictures)
     for color, found in patches.items():
         patches[color], outliers = _without_outliers(found, cells)
         notes += [
-            f"{color} in picture {patch.frame}: has another hue than in the others "
+            f"{color} in {pictures[patch.frame]}: has another hue than in the others "
             "(left out: was something else pointed at?)"
             for patch in outliers
         ]
     all_patches = [patch for found in patches.values() for patch in found]
     covered = [_covered(all_patches, number, part.shape) for number, part in enumerate(cells)]
     samples = {color: _samples(color, found, cells, covered) for color, found in patches.items()}
-    return TrainingSet(cells, covered, samples, notes)
+    pointed: dict[str, set[int]] = {}
+    for pointer in pointers:
+        pointed.setdefault(pointer.color, set()).add(pointer.frame)
+    return TrainingSet(pictures, pointed, cells, covered, samples, notes)
 
 
 def _found_patches(
-    cells: list[Cells], pointers: Sequence[Pointer]
+    cells: list[Cells], pointers: Sequence[Pointer], names: Sequence[str]
 ) -> tuple[dict[str, list[PaintPatch]], list[str]]:
     """The patches of every colour, and notes on pointers without one."""
     patches: dict[str, list[PaintPatch]] = {pointer.color: [] for pointer in pointers}
@@ -96,7 +113,8 @@ def _found_patches(
         try:
             patches[pointer.color].append(find_patch(cells[pointer.frame], pointer))
         except CalibrationError as error:
-            failures.setdefault(pointer.color, []).append(str(error))
+            text = f"{names[pointer.frame]}, {error}"
+            failures.setdefault(pointer.color, []).append(text)
     for color, found in patches.items():
         if not found:
             raise CalibrationError(failures[color][0])
@@ -143,10 +161,23 @@ def _samples(
     color: str, patches: list[PaintPatch], cells: list[Cells], covered: list[Mask]
 ) -> Samples:
     numbers = sorted({patch.frame for patch in patches})
-    paint = concatenate([cells[patch.frame][patch.core] for patch in patches])
+    paint = _balanced(
+        [
+            concatenate([cells[n][patch.core] for patch in patches if patch.frame == n])
+            for n in numbers
+        ]
+    )
     rest = concatenate([cells[number][~covered[number]] for number in numbers])
     skin = skin_mask(rest)
     return Samples(color, tuple(patches), paint, rest[skin], rest[~skin])
+
+
+def _balanced(pictures: list[Cells]) -> Cells:
+    """Cells (n,) of several pictures (k,), as many of each; about as many as there are in all."""
+    share = max(1, round(sum(part.y.size for part in pictures) / len(pictures)))
+    return concatenate(
+        [part[np.arange(share) * part.y.size // share] for part in pictures if part.y.size]
+    )
 
 
 def fit(samples: Mapping[str, Samples]) -> dict[str, ColorRange]:

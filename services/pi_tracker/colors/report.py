@@ -5,7 +5,7 @@ Pure. What was not in the pictures is not known of.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 
 from rhot.files.calibration import ColorRange, Colors
-from services.pi_tracker.colors.fit import TrainingSet
+from services.pi_tracker.colors.fit import Samples, TrainingSet
+from services.pi_tracker.colors.pointer import MIN_CELLS
 from services.pi_tracker.colors.separation import hue_gap, separation
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.chroma import Cells, Mask
@@ -35,10 +36,12 @@ class ColorResult:
     cells: int  # of its patches
     pictures: int
     hsv: tuple[int, int, int]  # typical
-    inside: float  # share of its patches within the range
+    inside: float  # share of its patches within the range, mean over the pictures
     skin: float  # d' from skin, -1: none seen
     room_px: int  # the largest foreign blob within the range
     room_at: tuple[int, int, int] | None  # its place: x, y in px, picture
+    missed: tuple[int, ...]  # pictures in which it was pointed at, and the range takes nothing
+    unseen: tuple[int, ...]  # all other pictures in which the range takes nothing
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ def examine(
         if a in fitted or b in fitted
     )
     warnings = [text for pair in pairs if (text := _pair_warning(pair, ranges))]
-    warnings += [text for result in results for text in _color_warnings(result)]
+    warnings += [text for result in results for text in _color_warnings(result, training.names)]
     return Report(results, pairs, tuple(warnings))
 
 
@@ -112,21 +115,50 @@ def _color(training: TrainingSet, color: str, number: int, labels: list[Array]) 
         round(float(np.median(saturation))),
         round(float(np.median(value))),
     )
-    inside = [labels[patch.frame][patch.core] == number for patch in own.patches]
+    inside = [_share_inside(own, labels[k] == number, k) for k in own.frames]
     foreign = [(labels[k] == number) & ~training.covered[k] for k in own.frames]
     blobs = [(*_largest_blob(mask), k) for mask, k in zip(foreign, own.frames, strict=True)]
     cells, x, y, picture = max(blobs)
     is_blob = cells >= _MIN_FOREIGN_CELLS
+    missed, unseen = _blind_pictures(training, color, [part == number for part in labels])
     return ColorResult(
         color,
-        int(own.paint.y.size),
+        sum(int(np.count_nonzero(patch.core)) for patch in own.patches),
         len(own.frames),
         typical,
-        round(float(np.concatenate(inside).mean()), 3),
+        round(float(np.mean(inside)), 3),
         round(separation(own.paint, own.skin), 1),
         4 * cells if is_blob else 0,
         (x, y, picture) if is_blob else None,
+        missed,
+        unseen,
     )
+
+
+def _share_inside(own: Samples, taken: Mask, picture: int) -> float:
+    """Share of a colour's patches in one picture that its range takes."""
+    return float(np.concatenate([taken[p.core] for p in own.patches if p.frame == picture]).mean())
+
+
+def _blind_pictures(
+    training: TrainingSet, color: str, taken: list[Mask]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Pictures in which a range takes nothing that the tracker would search.
+
+    First those with its patch, or in which it was pointed at in vain, then those in which nobody
+    pointed at it.
+    """
+    missed: list[int] = []
+    unseen: list[int] = []
+    patches = training.samples[color].patches
+    for number, mask in enumerate(taken):
+        own = [patch.whole for patch in patches if patch.frame == number]
+        # Where there is a patch, what is taken elsewhere is not it.
+        seen = mask & np.logical_or.reduce(own) if own else mask
+        if _largest_blob(seen)[0] >= MIN_CELLS:
+            continue
+        (missed if number in training.pointed.get(color, ()) else unseen).append(number)
+    return tuple(missed), tuple(unseen)
 
 
 def _largest_blob(mask: Mask) -> tuple[int, int, int]:
@@ -160,8 +192,17 @@ def _pair_warning(pair: PairResult, ranges: Mapping[str, ColorRange]) -> str:
     return ""
 
 
-def _color_warnings(result: ColorResult) -> list[str]:
-    found = []
+def _color_warnings(result: ColorResult, names: Sequence[str]) -> list[str]:
+    found = [
+        f"the range of {result.color} takes nothing in {names[k]}, although {result.color} was "
+        "pointed at there; look whether that picture has other light, or point again"
+        for k in result.missed
+    ]
+    found += [
+        f"the range of {result.color} takes nothing in {names[k]}; if {result.color} can be seen "
+        "there, point at it in that picture, too"
+        for k in result.unseen
+    ]
     if 0.0 <= result.skin < COLLIDE:
         found.append(
             f"{result.color} is the colour of skin (d' {result.skin}): "
@@ -176,7 +217,7 @@ def _color_warnings(result: ColorResult) -> list[str]:
         x, y, picture = result.room_at
         found.append(
             f"the room has the hue of {result.color}: {result.room_px} px at ({x}, {y}) "
-            f"in picture {picture + 1}; take it away, cover it, or use another paint"
+            f"in {names[picture]}; take it away, cover it, or use another paint"
         )
     return found
 

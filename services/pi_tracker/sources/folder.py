@@ -41,6 +41,10 @@ class FolderReader:
             valid = ", ".join("*" + suffix for suffix in _SUFFIXES)
             raise CaptureError(f"{self._folder}: has no images; it should hold files {valid}")
 
+    def name_of(self, number: int) -> str:
+        """The file of a frame's number, once the folder is open."""
+        return self._paths[number].name
+
     def read(self) -> Frame | None:
         number = self._frames.count
         if number >= len(self._paths):

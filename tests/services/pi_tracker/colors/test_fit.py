@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from rhot.errors import CalibrationError
-from rhot.files.calibration import Colors
+from rhot.files.calibration import ColorRange, Colors
 from rhot.files.rig_tables import Tracker
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
@@ -225,3 +225,46 @@ def test_hues_are_drawn_in_where_skin_begins(studio, tip, monkeypatch):
     assert one.room_px < 60
     # Skin has a hue of 11 here, the paint 28.
     assert 14 <= fitted["sand"].hsv_low[0] <= 27
+
+
+def test_a_large_blob_in_one_picture_does_not_outvote_small_ones_in_others(studio, tip):
+    """Two small tips in dim, bluish light, and one in good light that fills the picture."""
+    frames, pointers = [], []
+    for seq in range(3):
+        width, light = (90.0, (1.0, 1.0, 1.0)) if seq == 2 else (11.0, (0.5, 0.4, 0.3))
+        patch = tip("green", 100.0, 60.0, width_px=width, length_px=width)
+        clean, truth = studio.clean([patch], SIZE)
+        frames.append(studio.of(studio.bgr((clean * light).astype("uint8"), 2.0, seq)))
+        x, y = truth["green"]
+        pointers.append(Pointer("green", seq, x - width / 2, y - width / 2, width, width))
+    training = gather(frames, pointers)
+    counts = [int(patch.core.sum()) for patch in training.samples["green"].patches]
+    assert len(counts) == 3
+    assert counts[2] > 50 * max(counts[:2])
+    report = examine(training, fit(training.samples))
+    assert not [text for text in report.warnings if "takes nothing" in text]
+    assert report.colors[0].inside > 0.85
+    assert report.colors[0].cells == sum(counts)
+
+
+def test_each_picture_in_which_a_range_takes_nothing_is_named(hand):
+    frames, pointers = hand(3)
+    green = [p for p in pointers if p.color == "green"]
+    blue = next(p for p in pointers if p.color == "blue" and p.frame == 1)
+    training = gather(
+        frames, [green[0], Pointer("green", 1, blue.x_px, blue.y_px), green[2]], ["a", "b", "c"]
+    )
+    span = fit(training.samples)["green"]
+    dim = ColorRange(hsv_low=(span.hsv_low[0], 250, 0), hsv_high=span.hsv_high)
+    warnings = examine(training, {"green": dim}).warnings
+    for name in ("a", "b", "c"):
+        assert sum(f"takes nothing in {name}, although" in text for text in warnings) == 1
+
+
+def test_a_picture_in_which_nobody_pointed_and_nothing_is_taken_is_named(hand, studio):
+    frames, pointers = hand(2)
+    empty, _ = studio.frame([], seq=9, size_px=SIZE)
+    green = [p for p in pointers if p.color == "green"]
+    training = gather([*frames, empty], green, ["a", "b", "c"])
+    (warning,) = examine(training, fit(training.samples)).warnings
+    assert "takes nothing in c; if green can be seen there" in warning
