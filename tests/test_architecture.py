@@ -65,7 +65,7 @@ PURE_ROOMS = {"services/cli/check", "services/cli/evaluate", "services/cli/offli
 FLOORS_OF_RHOT = (
     {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
     {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises", "rhot/hand_skin"},
-    {"rhot/messages"},
+    {"rhot/messages", "rhot/hand_mesh"},
     {"rhot/topics", "rhot/faults", "rhot/object_motion", "rhot/contact_events"},
     {"rhot/files", "rhot/bus"},
     {"rhot/process", "rhot/watch"},

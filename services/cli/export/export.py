@@ -1,4 +1,4 @@
-"""`rhot export DIR|FILE.mcap`: a recording as flat tables, for spreadsheets, pandas or R."""
+"""`rhot export DIR|FILE.mcap`: a recording as flat tables, or as motion for other programs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ from typing import Annotated
 import typer
 
 from rhot.errors import CaptureError, ConfigError
+from services.cli.export.motion_options import (
+    BvhOption,
+    GltfOption,
+    MotOption,
+    TrcOption,
+    UpOption,
+)
 from services.cli.options import ProgressOption
 
 
@@ -24,14 +31,24 @@ def export(
     ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="as .csv (the default)")] = False,
     parquet: Annotated[bool, typer.Option("--parquet", help="as .parquet")] = False,
+    bvh: BvhOption = False,
+    trc: TrcOption = False,
+    mot: MotOption = False,
+    gltf: GltfOption = False,
+    up: UpOption = "-y",
     only: Annotated[
         list[str] | None,
         typer.Option(metavar="TABLE", help="only this table; may be given again; default: all"),
     ] = None,
     progress: ProgressOption = None,
 ) -> None:
-    """Write markers, points, poses, angles, objects and contacts as tables: s, mm, deg, px."""
+    """Write markers, points, poses, angles, objects and contacts as tables: s, mm, deg, px.
+
+    Or hands' motion, in the formats of other programs.
+    """
     # Not above: other commands should not wait for what these import.
+    from services.cli.export.motion.clip import UPS
+    from services.cli.export.motion.run import FORMATS, export_motion
     from services.cli.export.run import export as export_tables
     from services.cli.export.tables import TABLES
 
@@ -41,7 +58,17 @@ def export(
             raise ConfigError(f"--only {name}: there is no such table; valid: {', '.join(names)}")
     if not recording.exists():
         raise CaptureError(f"{recording}: no such folder or file")
-    formats = [name for name, wanted in (("csv", csv), ("parquet", parquet)) if wanted] or ["csv"]
+    if up not in UPS:
+        raise ConfigError(f"--up {up}: valid: {', '.join(UPS)}")
     folder = out or (recording if recording.is_dir() else recording.with_suffix(""))
-    for path, rows in export_tables(recording, folder, formats, only or (), progress).items():
+    motions = [name for name, wanted in zip(FORMATS, (bvh, trc, mot, gltf), strict=True) if wanted]
+    if motions:
+        for path, clip in export_motion(recording, folder, motions, up).items():
+            bridged = f"; {clip.gaps} gaps bridged" if clip.gaps else ""
+            typer.echo(f"{path}: {len(clip.wrist_m)} frames at {clip.rate_hz:g} Hz{bridged}")
+    formats = [name for name, wanted in (("csv", csv), ("parquet", parquet)) if wanted]
+    if motions and not formats:
+        return
+    tables = export_tables(recording, folder, formats or ["csv"], only or (), progress)
+    for path, rows in tables.items():
         typer.echo(f"{path}: {rows} rows")
