@@ -16,6 +16,7 @@ from services.cli.deploy.deploy import deploy
 from services.cli.doctor.doctor import doctor
 from services.cli.evaluate.score import score
 from services.cli.export.export import export
+from services.cli.grasp.grasp import grasp
 from services.cli.init.init import init
 from services.cli.live.router import router
 from services.cli.live.session import session
@@ -78,4 +79,5 @@ def application() -> typer.Typer:
     app.add_typer(calibrate)
     app.add_typer(tune, name="tune")
     app.add_typer(pki)
+    app.add_typer(grasp)
     return app

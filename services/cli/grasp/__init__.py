@@ -1,0 +1,1 @@
+"""`rhot grasp`: the grasp study, from a filmed finger to a report."""

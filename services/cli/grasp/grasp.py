@@ -1,0 +1,11 @@
+"""`rhot grasp`: each command is one function in the file of its name."""
+
+from __future__ import annotations
+
+from services.cli.grasp.render import render
+from services.cli.options import menu
+
+grasp = menu("grasp", "A filmed finger's joint angles, and the same from its tip's path alone.")
+
+for command in (render,):
+    grasp.command(name=command.__name__)(command)
