@@ -38,9 +38,9 @@ class Rectangle(NamedTuple):
         return np.array([(x, y), (x + w, y), (x + w, y + h), (x, y + h)])
 
 
-def backdrop(view: View, rectangle: Rectangle, seed: int) -> Picture:
-    """The picture without a hand; (h, w, 3), 0..1."""
-    wall = view.plane(WALL_Z_MM)
+def backdrop(view: View, directions: Array, rectangle: Rectangle, seed: int) -> Picture:
+    """The picture without a hand; (3, h, w), 0..1. directions as the view has them."""
+    wall = view.plane(directions, WALL_Z_MM)
     x, y = wall[..., 0], wall[..., 1]
     scale = mm_per_px(wall)
     rng = np.random.default_rng((seed, 4))
@@ -52,12 +52,11 @@ def backdrop(view: View, rectangle: Rectangle, seed: int) -> Picture:
     _blend(picture, cover(_DESK_Y_MM - y, scale), desk)
     _blend(picture, cover(np.abs(y - _DESK_Y_MM) - 1.0, scale), (0.16, 0.2, 0.25))
     _cable(picture, x, y, scale, rng)
-    card = view.plane(rectangle.z) if rectangle.z != WALL_Z_MM else wall
-    _card(picture, card, rectangle, seed)
+    _card(picture, view.plane(directions, rectangle.z), rectangle, seed)
     # A lamp to one side, and a lens that is darker at its edge.
-    height, width = picture.shape[:2]
-    across = np.linspace(-1.0, 1.0, width, dtype=np.float32)[None, :, None]
-    down = np.linspace(-1.0, 1.0, height, dtype=np.float32)[:, None, None]
+    height, width = picture.shape[1:]
+    across = np.linspace(-1.0, 1.0, width, dtype=np.float32)
+    down = np.linspace(-1.0, 1.0, height, dtype=np.float32)[:, None]
     return picture * (1.0 - np.float32(0.10) * across - np.float32(0.08) * down)
 
 
@@ -100,12 +99,17 @@ def _surface(
     kind: int,
 ) -> Picture:
     level = 1.0 + np.float32(depth) * textured(x, y, per_mm, seed, kind)
-    return level[..., None] * np.asarray(colour, dtype=np.float32)
+    return _planes(colour) * level
 
 
 def _blend(picture: Picture, share: Picture, colour: Picture | tuple[float, ...]) -> None:
     """Lays a colour over the picture, in place."""
-    picture += share[..., None] * (np.asarray(colour, dtype=np.float32) - picture)
+    over = colour if isinstance(colour, np.ndarray) else _planes(colour)
+    picture += share * (over - picture)
+
+
+def _planes(colour: tuple[float, ...]) -> Picture:
+    return np.asarray(colour, dtype=np.float32)[:, None, None]
 
 
 def _cable(

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from rhot.geometry.transforms import Array
 from studies.grasp.scene.backdrop import Rectangle, backdrop, mm_per_px
-from studies.grasp.scene.hand import BASE_DOT, THUMB_BASE, Layer, Look, Pixels, layers
+from studies.grasp.scene.flesh import Pixels
+from studies.grasp.scene.hand import BASE_DOT, THUMB_BASE, Layer, Look, layers
 from studies.grasp.scene.motion import Cycles, perform
 from studies.grasp.scene.skin import Light, blurred
 from studies.grasp.scene.subjects import Subject, chain
@@ -94,26 +95,29 @@ class Experiment:
                 self.look,
             )
         )
-        picture = self._backdrop * self._shadow(hand)[..., None]
-        for box, colour, share in hand:
-            part = picture[box]
-            part += share[..., None] * (colour - part)
+        picture = self._backdrop * self._shadow(hand)
+        for (rows, columns), colour, share in hand:
+            part = picture[:, rows, columns]
+            part += share * (colour - part)
         return self._developed(picture, frame)
 
     def _developed(self, picture: Picture, frame: int) -> npt.NDArray[np.uint8]:
         """Out of focus as lenses are, noisy as sensors are, 8 bits."""
         rng = np.random.default_rng((self.seed, 5, frame))
-        if self.options.focus > 0.0:
-            picture = blurred(picture, self.options.focus)
-        height, width = picture.shape[:2]
-        row, column = rng.integers(0, _NOISE_MARGIN, 2)
-        noise = self._noise[row : row + height, column : column + width]
+        height, width = picture.shape[1:]
         # Exposure control hunts a little.
-        gain = 255.0 * (1.0 + 0.006 * np.sin(0.21 * frame + self.seed))
-        level = picture * np.float32(gain)
-        # Photons: half of the noise grows with the light.
-        level += noise * (np.float32(0.6) + np.float32(0.5) * picture)
-        return cv2.convertScaleAbs(np.maximum(level, 0.0))
+        gain = np.float32(255.0 * (1.0 + 0.006 * np.sin(0.21 * frame + self.seed)))
+        planes = []
+        for plane, (row, column) in zip(
+            picture, rng.integers(0, _NOISE_MARGIN, (3, 2)), strict=True
+        ):
+            if self.options.focus > 0.0:
+                plane = blurred(plane, self.options.focus)
+            noise = self._noise[row : row + height, column : column + width]
+            # Photons: half of the noise grows with the light.
+            level = plane * gain + noise * (np.float32(0.6) + np.float32(0.5) * plane)
+            planes.append(cv2.convertScaleAbs(np.maximum(level, 0.0)))
+        return np.asarray(cv2.merge(planes))
 
     def _turned(self, frame: int) -> Array:
         """Finger's frame to plane; (2, 2)."""
@@ -159,7 +163,11 @@ class Experiment:
 
     @cached_property
     def _plane(self) -> Picture:
-        return self.view.plane()
+        return self.view.plane(self._directions)
+
+    @cached_property
+    def _directions(self) -> Array:
+        return self.view.directions()
 
     @cached_property
     def _mm_per_px(self) -> Picture:
@@ -167,15 +175,15 @@ class Experiment:
 
     @cached_property
     def _backdrop(self) -> Picture:
-        return backdrop(self.view, self.options.rectangle, self.seed)
+        return backdrop(self.view, self._directions, self.options.rectangle, self.seed)
 
     @cached_property
     def _noise(self) -> Picture:
-        """A sheet of noise, larger than the picture: each takes another part of it."""
+        """A sheet of noise, larger than a picture: each colour takes another part of it."""
         width, height = self.view.camera.size_px
         rng = np.random.default_rng((self.seed, 6))
         sheet = rng.standard_normal(
-            (height + _NOISE_MARGIN, width + _NOISE_MARGIN, 3), dtype=np.float32
+            (height + _NOISE_MARGIN, width + _NOISE_MARGIN), dtype=np.float32
         )
         # Demosaicing spreads noise over neighbours; the RMS stays.
         sheet = blurred(sheet, 0.6)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from studies.grasp.scene.flesh import Field, Limb, field_of
+from studies.grasp.scene.flesh import MARGIN_MM, Box, Field, Limb, Pixels, field_of
 from studies.grasp.scene.skin import (
     Light,
     Wrinkles,
@@ -40,8 +40,8 @@ _OTHERS = (
 class Layer(NamedTuple):
     """Something to be laid over the picture in its box (rows, columns)."""
 
-    box: tuple[slice, slice]
-    colour: Picture  # (h, w, 3)
+    box: Box
+    colour: Picture  # (3, h, w)
     share: Picture  # (h, w)
 
 
@@ -54,27 +54,6 @@ class Look(NamedTuple):
     thumb: bool
     light: Light
     seed: int
-
-
-class Pixels(NamedTuple):
-    """What the pixels see of the hand's plane, in the finger's frame; (h, w) each, mm."""
-
-    x: Picture
-    y: Picture
-    size: Picture
-    px_of: Array  # (2, 3): about where the finger's frame lies in the picture, px
-
-    def box(self, points: Array, margin_mm: float) -> tuple[slice, slice] | None:
-        """The pixels about points (n, 2) of the finger's frame; None if none is in the picture."""
-        spread = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)]) * margin_mm
-        corners = (points[:, None] + spread).reshape(-1, 2) @ self.px_of[:, :2].T
-        corners += self.px_of[:, 2]
-        limit = (self.x.shape[1], self.x.shape[0])
-        low = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, limit)
-        high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, limit)
-        if (high - low).min() < 3:
-            return None
-        return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
 
 
 def layers(
@@ -90,12 +69,12 @@ def layers(
         yield from _thumb(subject, thumb, pixels, look)
 
 
-def _seen(limb: Limb, pixels: Pixels) -> tuple[tuple[slice, slice], Field, Picture] | None:
+def _seen(limb: Limb, pixels: Pixels) -> tuple[Box, Field, Picture] | None:
     """A limb's box, its field and its silhouette there."""
-    box = pixels.box(limb.joints, float(np.max(limb.radii)) + 3.0)
+    box = pixels.box(limb.joints, float(np.max(limb.radii)) + MARGIN_MM)
     if box is None:
         return None
-    field = field_of(limb, pixels.x[box], pixels.y[box])
+    field = field_of(limb, pixels, box)
     return box, field, cover(field.distance, pixels.size[box])
 
 
@@ -134,7 +113,7 @@ def _palm(subject: Subject, pixels: Pixels, look: Look) -> Iterator[Layer]:
         share = share * cover(pixels.x[box] + 98.0, pixels.size[box])
         cloth = textured(pixels.x[box], pixels.y[box], 2.0, look.seed, 3)
         weave = 1.0 + np.float32(0.12) * cloth
-        albedo = weave[..., None] * np.asarray(_SLEEVE, dtype=np.float32)
+        albedo = np.asarray(_SLEEVE, dtype=np.float32)[:, None, None] * weave
         yield Layer(box, shade(field, albedo, look.light, 0.0), share)
 
 
@@ -180,9 +159,7 @@ def _thumb(subject: Subject, thumb: Array, pixels: Pixels, look: Look) -> Iterat
     yield Layer(box, shade(field, albedo, look.light), share)
 
 
-def _nail(
-    albedo: Picture, limb: Limb, pixels: Pixels, box: tuple[slice, slice], side: float = 1.0
-) -> None:
+def _nail(albedo: Picture, limb: Limb, pixels: Pixels, box: Box, side: float = 1.0) -> None:
     """From the side a nail is a pale sliver on the back of the last bone, which ends beyond it."""
     first, last = limb.joints[-2:]
     length = float(np.hypot(*(last - first)))
@@ -195,17 +172,21 @@ def _nail(
             last + u * (0.8 * radius) + back * (0.72 * radius),
         ]
     )
-    sliver = field_of(Limb(ends, np.array([1.3, 1.1]), 0.0, 0.0), pixels.x[box], pixels.y[box])
-    share = cover(sliver.distance, pixels.size[box])[..., None]
-    bright = np.asarray(_NAIL, dtype=np.float32) * np.float32(1.1 * albedo.mean() / 0.7)
-    albedo += np.float32(0.8) * share * (bright - albedo)
+    near = pixels.box(ends, 1.3 + MARGIN_MM)
+    if near is None:
+        return
+    sliver = field_of(Limb(ends, np.array([1.3, 1.1]), 0.0, 0.0), pixels, near)
+    # Its box lies within the limb's, whose margin is wider.
+    (rows, columns), (top, left) = near, (box[0].start, box[1].start)
+    part = albedo[:, rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+    share = cover(sliver.distance, pixels.size[near])
+    bright = np.asarray(_NAIL, dtype=np.float32)[:, None, None] * np.float32(1.6 * albedo.mean())
+    part += np.float32(0.8) * share * (bright - part)
     rim = np.abs(sliver.distance) - np.float32(0.15)
-    albedo *= 1.0 - np.float32(0.25) * cover(rim, pixels.size[box])[..., None]
+    part *= 1.0 - np.float32(0.25) * cover(rim, pixels.size[near])
 
 
-def _paint(
-    albedo: Picture, pixels: Pixels, box: tuple[slice, slice], dots: Array, look: Look
-) -> None:
+def _paint(albedo: Picture, pixels: Pixels, box: Box, dots: Array, look: Look) -> None:
     if look.dots is None:
         return
     x, y, size = pixels.x[box], pixels.y[box], pixels.size[box]

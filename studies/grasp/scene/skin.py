@@ -68,24 +68,26 @@ def blurred(picture: Picture, sigma_px: float) -> Picture:
 def skin_albedo(
     field: Field, colour: Sequence[float], wrinkles: Wrinkles, seed: int, kind: int
 ) -> Picture:
-    """What the skin reflects (h, w, 3), blue, green, red."""
+    """What the skin reflects (3, h, w), blue, green, red."""
     pores = textured(field.along, field.across, _TEXELS_PER_MM, seed, kind)
     dark = np.float32(1.0) + np.float32(0.035) * pores
-    side = field.across / field.radius  # -1 back .. 1 palm
+    side = np.clip(field.across / field.radius, -1.0, 1.0)  # -1 back .. 1 palm
     for where, bent in zip(wrinkles.along, wrinkles.bent, strict=True):
         # Wrinkles are not drawn with a ruler.
         offset = field.along - np.float32(where) + np.float32(0.35) * pores
-        step = np.clip((offset + _PROFILE_MM) * _PROFILE_STEPS, 0, _profiles().shape[1] - 1)
-        back, palm = _profiles()[:, step.astype(np.int32)]
+        near = np.flatnonzero((np.abs(offset) < _PROFILE_MM) & (field.distance < 1.0))
+        step = ((offset.flat[near] + _PROFILE_MM) * _PROFILE_STEPS).astype(np.int32)
+        back, palm = (profile.take(step, mode="clip") for profile in _profiles())
         # The back's skin is stretched flat by bending, the palm's folded.
-        share = float(np.clip(bent / 1.7, 0.0, 1.0))
-        on_back = np.clip(-1.5 * side - 0.15, 0.0, 1.0) * (wrinkles.depth * (1.0 - 0.8 * share))
-        on_palm = np.clip(1.6 * side - 0.2, 0.0, 1.0) * (wrinkles.depth * (0.5 + 0.5 * share))
-        dark *= 1.0 - on_back.astype(np.float32) * back - on_palm.astype(np.float32) * palm
+        share = min(max(float(bent) / 1.7, 0.0), 1.0)
+        there = side.flat[near]
+        back *= np.clip(-1.5 * there - 0.15, 0.0, 1.0) * (wrinkles.depth * (1.0 - 0.8 * share))
+        palm *= np.clip(1.6 * there - 0.2, 0.0, 1.0) * (wrinkles.depth * (0.5 + 0.5 * share))
+        dark.flat[near] *= 1.0 - back - palm
     dark *= 1.0 - np.float32(0.35) * field.fold
-    albedo = dark[..., None] * np.asarray(colour, dtype=np.float32)
+    albedo = np.asarray(colour, dtype=np.float32)[:, None, None] * dark
     # Palms are paler and redder than backs.
-    albedo[..., 2] *= 1.0 + np.float32(0.04) * np.clip(side, -1.0, 1.0)
+    albedo[2] *= 1.0 + np.float32(0.04) * side
     return albedo
 
 
@@ -105,20 +107,22 @@ def _profiles() -> Picture:
 
 
 def shade(field: Field, albedo: Picture, light: Light, gloss: float = 0.05) -> Picture:
-    """A round limb under the light; (h, w, 3), 0..1. The picture's axes are the light's."""
+    """A round limb under the light; (3, h, w), 0..1. The picture's axes are the light's."""
     dx = cv2.Sobel(field.distance, cv2.CV_32F, 1, 0, ksize=3)
     dy = cv2.Sobel(field.distance, cv2.CV_32F, 0, 1, ksize=3)
     size = np.sqrt(dx * dx + dy * dy) + np.float32(1e-6)
     # A finger is flatter than a cylinder in its middle.
-    out = np.clip(1.0 + field.distance / field.radius, 0.0, 1.0) ** 1.5
+    out = np.clip(1.0 + field.distance / field.radius, 0.0, 1.0)
+    out *= np.sqrt(out)
     towards = np.asarray(light.direction, dtype=np.float32)
     towards /= np.linalg.norm(towards)
     facing = np.sqrt(1.0 - np.minimum(out, 0.999) ** 2)
     lit = (dx * towards[0] + dy * towards[1]) * (out / size) + facing * towards[2]
     level = np.float32(light.ambient) * (np.float32(0.75) + np.float32(0.25) * facing)
-    level = level + np.float32(1.0 - light.ambient) * np.clip(lit, 0.0, 1.0) * np.float32(1.15)
-    shine = np.float32(gloss) * np.clip(lit, 0.0, 1.0) ** 12
-    return albedo * level[..., None] + shine[..., None]
+    lit = np.clip(lit, 0.0, 1.0)
+    level += np.float32(1.15 * (1.0 - light.ambient)) * lit
+    fourth = np.square(np.square(lit))
+    return albedo * level + np.float32(gloss) * fourth * fourth * fourth
 
 
 def cover(distance: Picture, mm_per_px: Picture) -> Picture:
@@ -147,9 +151,8 @@ def painted(
         dx, dy = dx[box], dy[box]
         angle = np.arctan2(dy, dx)
         edge = radius_mm * (1.0 + 0.07 * np.sin(2.0 * angle + number) + 0.04 * np.cos(5.0 * angle))
-        share = cover((np.hypot(dx, dy) - edge).astype(np.float32), mm_per_px[box])[..., None]
+        share = cover((np.hypot(dx, dy) - edge).astype(np.float32), mm_per_px[box])
         # Paint is thin: the skin's grain shows through.
-        paint = np.asarray(colour, dtype=np.float32) * (
-            0.85 + 0.3 * albedo[box].mean(-1)[..., None]
-        )
-        albedo[box] += share * np.float32(0.92) * (paint - albedo[box])
+        skin = albedo[:, box[0], box[1]]
+        paint = np.asarray(colour, dtype=np.float32)[:, None, None] * (0.85 + 0.3 * skin.mean(0))
+        skin += np.float32(0.92) * share * (paint - skin)

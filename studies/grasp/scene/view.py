@@ -16,7 +16,7 @@ from rhot.geometry.transforms import Array
 
 # Of a phone or a webcam. Near enough that the hand fills the picture, and far enough that this
 # height is seen: reference rectangle, finger and thumb.
-_HFOV_DEG, _NEAREST_MM, _HEIGHT_MM = 44.0, 295.0, 168.0
+_HFOV_DEG, _NEAREST_MM, _HEIGHT_MM = 44.0, 295.0, 178.0
 # Where the camera looks in the plane, so that the open hand and the fist are both in view.
 _AIM_MM = (0.0, 12.0)
 Picture = npt.NDArray[np.float32]
@@ -49,16 +49,19 @@ class View(NamedTuple):
             np.concatenate([flat, np.full((len(flat), 1), z_mm)], axis=1) / 1000.0
         )
 
-    def plane(self, z_mm: float = 0.0) -> Picture:
-        """What each pixel sees of a plane; (h, w, 2) mm."""
+    def directions(self) -> Array:
+        """Where each pixel looks, in the plane's frame; (h, w, 3), a second's work."""
         width, height = self.camera.size_px
         rows, columns = np.mgrid[0:height, 0:width]
         rays = self.camera.rays_from_pixels(np.stack([columns, rows], axis=-1).reshape(-1, 2))
         T = self.camera.T_rig_from_camera
-        directions = rays @ T[:3, :2].T + T[:3, 2]  # (h w, 3)
-        reach = (z_mm / 1000.0 - T[2, 3]) / directions[:, 2]
-        seen = 1000.0 * (T[:2, 3] + reach[:, None] * directions[:, :2])
-        return seen.reshape(height, width, 2).astype(np.float32)
+        return (rays @ T[:3, :2].T + T[:3, 2]).reshape(height, width, 3)
+
+    def plane(self, directions: Array, z_mm: float = 0.0) -> Picture:
+        """What each pixel sees of a plane; (h, w, 2) mm."""
+        centre = self.camera.centre_rig
+        reach = (z_mm / 1000.0 - centre[2]) / directions[..., 2:]
+        return (1000.0 * (centre[:2] + reach * directions[..., :2])).astype(np.float32)
 
 
 def place_camera(options: ViewOptions, seed: int) -> View:
