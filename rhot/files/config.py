@@ -100,6 +100,13 @@ class RigConfig(Table, frozen=True, kw_only=True):
                     return f"the {hand} hand's {landmark.replace('_', ' ')}"
         return next((f"the {o.name}'s tracker" for o in self.object if o.marker == color), "")
 
+    def counted(self, colors: Iterable[str]) -> list[str]:
+        """Of a camera's colours those that tell how well it sees: the hands'. An object's tracker
+        turns its paint away as it likes; without a hand all count.
+        """
+        own = self.hand_colors
+        return [name for name in colors if name in own or not own]
+
     def tracked_colors(self, calibrated: Iterable[str]) -> list[str]:
         """What a tracker looks for: markers' colours, and without a hand all calibrated ones."""
         return self.colors if self.hand else sorted({*self.colors, *calibrated})

@@ -44,7 +44,9 @@ class StandingFault(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CameraRow(msgspec.Struct, frozen=True, kw_only=True):
-    """A camera's stream: markers seen in its newest picture, of how many; -1 while unknown."""
+    """A camera's stream: the hands' markers seen in its newest picture, of how many; -1 while
+    unknown.
+    """
 
     camera: str
     markers: int

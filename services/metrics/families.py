@@ -115,7 +115,7 @@ def _streams(beats: Sequence[Health]) -> Iterator[Metric]:
 def _cameras(state: RigState) -> Iterator[Metric]:
     yield gauge(
         "rhot_camera_markers",
-        "markers in the newest picture",
+        "the hands' markers in the newest picture",
         ("camera",),
         [((one.camera,), float(one.markers)) for one in state.cameras if one.markers >= 0],
     )

@@ -70,6 +70,8 @@ class CameraService:
         self._exposure = ExposureEndpoint(service)
         self._monitor = CameraMonitor(camera.name, camera.fps, live=live)
         self._faults = CameraFaults(service, self._tracker, self._monitor, gate, self.offset)
+        # Markers of any kind in the last picture.
+        self._seen = 0
         self._markers = service.bus.publisher(topics.MARKERS, camera=camera.name)
         self._pictures = PictureCache(service.bus, camera.name, service.tasks)
         ColorFitting(service, self._pictures, self._tracker)
@@ -96,11 +98,12 @@ class CameraService:
         now_ns = time.monotonic_ns()
         if self._monitor.is_new(frame, now_ns) and running:
             found = self._track(frame)
-            self._faults.markers = len(found.markers)
+            self._seen = len(found.markers)
+            self._faults.markers = int(self._service.values["markers"])
             self._service.values["skipped_frames"] = source.dropped
             self._service.values["rejected_frames"] = source.rejected
             self._watch_drift(frame, found)
-        self._monitor.watch(frame, self._faults.markers if running else 0, now_ns)
+        self._monitor.watch(frame, self._seen if running else 0, now_ns)
         self._pictures.show(frame, now_ns)
 
     def _track(self, frame: Frame) -> MarkerFrame:
@@ -108,7 +111,8 @@ class CameraService:
         found = self._tracker.step(frame, offset)
         self._markers.put(found)
         values = self._service.values
-        values["markers"] = len(found.markers)
+        of_hands = self._service.config.counted(one.color for one in found.markers)
+        values["markers"] = len(of_hands)
         values["clock_offset_ms"] = offset.offset_ns * 1e-6
         values["clock_sigma_ms"] = offset.sigma_ns * 1e-6 if offset.sigma_ns >= 0 else -1.0
         for stage, took_ms in self._tracker.times_ms.items():

@@ -26,7 +26,7 @@ _MAX_CLOCK_SIGMA_NS = 20_000_000
 class CameraFaults:
     """Keeps the faults of one camera in step with what is so; attach() its source once it is open.
 
-    markers is how many were found in the last frame.
+    markers is how many of the hands' were found in the last frame.
     """
 
     def __init__(
@@ -112,5 +112,6 @@ class CameraFaults:
             return "waiting: session stopped" if self._gate.known else "waiting for fusion"
         if self._source is None or self._monitor.rate_hz is None:
             return "waiting for pictures"
-        wanted = len(self._tracker.wanted(self._tracker.colors))
+        colors = self._tracker.wanted(self._tracker.colors)
+        wanted = len(self._service.config.counted(colors))
         return f"{self._monitor.rate_hz:.0f} Hz, {self.markers} of {wanted} markers"

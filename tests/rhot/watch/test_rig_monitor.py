@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 from rhot.faults import FAULTS
@@ -183,3 +184,13 @@ def test_steamvrs_bridge_is_expected_under_its_name(host, sources, expected):
     assert (host or "the master") in bridge.action
     others = RigConfig(object=config.object, objects=Objects(source="libsurvive"))
     assert "openvr_bridge" not in dict(expected_services(others))
+
+
+def test_the_paint_on_an_objects_tracker_is_no_marker_of_a_hand():
+    """It turns away with the object, and nothing is wrong then."""
+    cup = ObjectTable(name="cup", serial="LHR-1", marker="cyan")
+    monitor = RigMonitor(msgspec.structs.replace(CONFIG, object=[cup]), NOW_NS)
+    assert {row.expected_markers for row in monitor.state(NOW_NS).cameras} == {2}
+    alone = msgspec.structs.replace(CONFIG, object=[cup], hand={})
+    monitor = RigMonitor(alone, NOW_NS)
+    assert {row.expected_markers for row in monitor.state(NOW_NS).cameras} == {1}
