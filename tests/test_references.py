@@ -6,6 +6,7 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ def strings(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.value
 
 
-def commands() -> Iterator[tuple[str, str]]:
+def _commands() -> Iterator[tuple[str, str]]:
     """(where, command line) of every `rhot ...` that users may read."""
     for path in PAGES:
         text = path.read_text(encoding="utf-8")
@@ -69,6 +70,12 @@ def commands() -> Iterator[tuple[str, str]]:
             # A string that is a command line as a whole; `rhot demo: ...` is a message.
             if re.match(r"rhot [a-z]+(?: [^:\n]+)?$", text) and "  " not in text:
                 yield f"{relative(path)}:{number}", text
+
+
+@cache
+def commands() -> tuple[tuple[str, str], ...]:
+    """The same, read once."""
+    return tuple(_commands())
 
 
 ROOT_COMMAND: Any = typer.main.get_command(application())
