@@ -84,6 +84,7 @@ def _unpack(path: Path, capture: Capture, result: Path) -> None:
                 complete=True,
                 warnings=[],
                 notes=[],
+                clocks=msgspec.UNSET,
             )
         )
     if capture.truth.stat().st_size == 0:

@@ -1,5 +1,7 @@
 """The whole rig without its processes: frames of all cameras in, markers, points and poses out.
 
+First the markers of every frame, then, in the order of time, what follows from them.
+
 Frames come in the order of time. The step objects are the services' own; their messages pass from
 one to the next without a bus. Pure: the same frames give the same messages. With one camera,
 without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame
@@ -68,8 +70,8 @@ class Pipeline:
         counts = self._fusion.refusals if self._fusion is not None else {}
         return {reason: count for reason, count in sorted(counts.items()) if count}
 
-    def step(self, frame: Frame) -> Output:
-        """One frame through every stage."""
+    def find(self, frame: Frame) -> MarkerFrame:
+        """The markers of one frame."""
         camera = self._cameras.get(frame.camera)
         if camera is not None and camera.size_px != frame.size_px:
             raise CalibrationError(
@@ -77,10 +79,14 @@ class Pipeline:
                 f"its lens was calibrated at {camera.size_px[0]} x {camera.size_px[1]}; "
                 f"use images of that size, or run `rhot calibrate lens {frame.camera}`"
             )
-        markers = self._trackers[frame.camera].step(
+        return self._trackers[frame.camera].step(
             frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera]
         )
-        return self.fuse(markers)
+
+    def believe_clocks(self) -> None:
+        """Align no clock as frames come: somebody said how far they are apart."""
+        if self._fusion is not None:
+            self._fusion.alignment.enabled = False
 
     def fuse(self, markers: MarkerFrame) -> Output:
         """One frame of markers through fusion and solver."""

@@ -1,4 +1,5 @@
-"""The folder `rhot track` writes: .jsonl files in wire format, and summary.json last of all.
+"""The folder `rhot track` writes: .jsonl files in wire format, clocks.json of two cameras or more,
+and summary.json last of all.
 
 Each file is written as NAME.partial and gets its name when all are complete. A run that fails
 removes its .partial files and leaves what was there before; one that is interrupted leaves them,
@@ -8,22 +9,23 @@ files are lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self, TypeVar
+from typing import Any, BinaryIO, Self, TypeVar
 
 import msgspec
 
 from rhot.errors import CaptureError, RhotError, disk_full, writing
 from rhot.files.capture import read_lines
+from services.cli.offline.clocks.camera_clock import CameraClock
 from services.cli.offline.track_summary import Summary
 
 M = TypeVar("M", bound=msgspec.Struct)
 
 STREAMS = ("markers", "points", "poses", "objects", "contacts")
-SUMMARY = "summary.json"
+SUMMARY, CLOCKS = "summary.json", "clocks.json"
 PARTIAL = ".partial"
 # What `rhot plot` and `rhot export` write beside them: a second run may overwrite a folder that
 # holds pictures and tables of the first.
@@ -82,17 +84,25 @@ class ResultWriter:
             self._files[stream].flush()
         return read_lines(self.folder / f"{stream}.jsonl{PARTIAL}", kind)
 
-    def finish(self, summary: Summary) -> None:
-        """Give the files their names and write summary.json."""
+    def finish(self, summary: Summary, clocks: Sequence[CameraClock] = ()) -> None:
+        """Give the files their names, write clocks.json if there is one, and summary.json."""
         self._stack.close()
         # Without its summary a result counts as incomplete, so that old and new files are never
         # taken for one.
         (self.folder / SUMMARY).unlink(missing_ok=True)
         for name in STREAMS:
             (self.folder / f"{name}.jsonl{PARTIAL}").replace(self.folder / f"{name}.jsonl")
-        partial = self.folder / f"{SUMMARY}{PARTIAL}"
-        partial.write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
-        partial.replace(self.folder / SUMMARY)
+        if clocks:
+            self._write_json(CLOCKS, clocks)
+        else:
+            (self.folder / CLOCKS).unlink(missing_ok=True)
+        self._write_json(SUMMARY, summary)
+
+    def _write_json(self, name: str, content: Any) -> None:
+        partial = self.folder / f"{name}{PARTIAL}"
+        with writing(self.folder):
+            partial.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n")
+        partial.replace(self.folder / name)
 
 
 def _no_space(error: BaseException | None, folder: Path) -> RhotError | None:
@@ -119,7 +129,7 @@ def check_result(folder: Path, *streams: str) -> None:
 
 
 def _prepare(folder: Path) -> None:
-    own = {f"{name}.jsonl" for name in STREAMS} | {SUMMARY}
+    own = {f"{name}.jsonl" for name in STREAMS} | {SUMMARY, CLOCKS}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         present = sorted(path.name for path in folder.iterdir())

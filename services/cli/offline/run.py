@@ -1,19 +1,28 @@
 """One run of `rhot track`: recordings through the pipeline, frame by frame, into a result folder.
 
-An error leaves no result, an interruption .partial files (results.py).
+The markers of all frames come first, as the cameras' clocks are found from the whole recording
+(clocks/); then what follows from them, by clocks put right. An error leaves no result, an
+interruption .partial files (results.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import closing, suppress
 from pathlib import Path
 
+import msgspec
+
 from rhot.errors import CalibrationError, CaptureError
-from rhot.files.calibration import load_colors, load_lens, load_objects
+from rhot.files.calibration import load_colors, load_lens, load_objects, load_rig_cameras
 from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
+from rhot.geometry.camera import Camera
 from rhot.messages import MarkerFrame
 from rhot.messages.objects import ObjectPose, OpenVrPose
+from services.cli.offline.clocks.alignment import Clocks
+from services.cli.offline.clocks.by_hand import offsets_of
+from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
@@ -24,21 +33,27 @@ from services.object_tracker.step import ObjectStep
 from services.pi_tracker.step import TrackerStep
 
 
-def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
+def run(job: Job, out: Path, progress: bool | None = False, offsets: Sequence[str] = ()) -> Summary:
     """Track one job into the folder `out`. progress None shows it on a terminal only.
 
-    Raises RhotError if anything needed is missing, or if no frame could be read.
+    offsets: CAM=SECONDS by hand. Raises RhotError if anything needed is missing, or if no frame
+    could be read.
     """
+    by_hand = offsets_of(offsets, job.cameras)
     cameras, markers_only = geometry(job.config, job.cameras)
     trackers = {one.camera: tracker_step(job.config, one.camera) for one in job.inputs}
     clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
-    with ResultWriter(out) as writer:
+    with ResultWriter(out) as writer, closing(RecordedMarkers(out)) as recorded:
         # First, as it takes no time and a broken line should not come up after an hour of video.
         object_notes = _track_objects(job, writer)
         contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
-        counters = _track_frames(job, pipeline, contacts, writer, progress)
-        warnings = [warning for one in job.inputs for warning in one.warnings]
+        counters = _find_markers(job, pipeline, recorded, progress)
+        clocks = _find_clocks(job, recorded, cameras, by_hand)
+        if by_hand:
+            pipeline.believe_clocks()
+        _fuse(clocks, len(recorded), pipeline, contacts, writer, progress)
+        unread = [warning for one in job.inputs for warning in one.warnings]
         notes = [markers_only] if markers_only else []
         notes += [note for one in job.inputs for note in one.notes]
         summary = Summary(
@@ -46,40 +61,35 @@ def run(job: Job, out: Path, progress: bool | None = False) -> Summary:
             cameras={name: counter.summary() for name, counter in counters.items()},
             **writer.counts,
             refusals=pipeline.refusals,
-            complete=not warnings,
-            warnings=warnings,
+            complete=not unread,
+            warnings=[*unread, *clocks.warnings],
             notes=[*notes, *object_notes, *_pose_notes(pipeline, writer.counts)],
+            clocks=clocks.told if clocks.worth_telling else msgspec.UNSET,
         )
-        writer.finish(summary)
+        writer.finish(summary, clocks.told)
     return summary
 
 
-def _track_frames(
-    job: Job,
-    pipeline: Pipeline,
-    contacts: ContactTrack,
-    writer: ResultWriter,
-    progress: bool | None,
+def _find_markers(
+    job: Job, pipeline: Pipeline, recorded: RecordedMarkers, progress: bool | None
 ) -> dict[str, CameraCounter]:
-    """All frames through the pipeline into the result; the counts by camera."""
+    """The markers of all frames; the counts by camera."""
     counters = {name: CameraCounter() for name in job.cameras}
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
     try:
-        for output in _outputs(job, pipeline):
-            for markers in output.markers:
-                counters[markers.camera].add(markers)
-            _write(writer, output, contacts)
+        for markers in _marker_frames(job, pipeline):
+            counters[markers.camera].add(markers)
+            recorded.add(markers)
             shown.advance()
-        _write(writer, pipeline.flush(), contacts)
     finally:
         shown.end()
     return counters
 
 
-def _outputs(job: Job, pipeline: Pipeline) -> Iterator[Output]:
-    """What each frame leads to: of pictures, or of markers that somebody found already."""
+def _marker_frames(job: Job, pipeline: Pipeline) -> Iterator[MarkerFrame]:
+    """The markers of each frame: of pictures, or those that somebody found already."""
     if job.markers is None:
-        yield from map(pipeline.step, merged([one.frames() for one in job.inputs]))
+        yield from map(pipeline.find, merged([one.frames() for one in job.inputs]))
         return
     for number, frame in enumerate(read_lines(job.markers, MarkerFrame), start=1):
         if frame.camera not in job.cameras:
@@ -87,7 +97,44 @@ def _outputs(job: Job, pipeline: Pipeline) -> Iterator[Output]:
                 f"{job.markers}: line {number}: camera {frame.camera!r} is not in rig.toml; it has"
                 f" {', '.join(job.cameras)}"
             )
-        yield pipeline.fuse(frame)
+        yield frame
+
+
+def _find_clocks(
+    job: Job,
+    recorded: RecordedMarkers,
+    cameras: dict[str, Camera] | None,
+    by_hand: dict[str, float],
+) -> Clocks:
+    """The cameras' clocks, by their markers or by hand."""
+    clocks = Clocks(recorded, job.cameras)
+    unknown = any(recorded.unknown(name) for name in job.cameras)
+    if len(job.cameras) > 1 and (cameras is not None or unknown or by_hand):
+        if cameras is None:
+            # Without a hand nothing asked for them yet.
+            with suppress(CalibrationError):
+                cameras = load_rig_cameras(job.config, job.cameras)
+        clocks.find(cameras, job.cameras, by_hand, tune=job.config.fusion.tune_clocks)
+    return clocks
+
+
+def _fuse(
+    clocks: Clocks,
+    total: int,
+    pipeline: Pipeline,
+    contacts: ContactTrack,
+    writer: ResultWriter,
+    progress: bool | None,
+) -> None:
+    """All markers through fusion and solver into the result."""
+    shown = Progress("rhot track: points and poses of", total, progress)
+    try:
+        for markers in clocks.frames():
+            _write(writer, pipeline.fuse(markers), contacts)
+            shown.advance()
+        _write(writer, pipeline.flush(), contacts)
+    finally:
+        shown.end()
 
 
 def tracker_step(config: RigConfig, name: str) -> TrackerStep:

@@ -12,6 +12,7 @@ from typing import Annotated
 import msgspec
 import typer
 
+from services.cli.offline.clocks.by_hand import OffsetOption
 from services.cli.options import ProgressOption
 
 
@@ -36,6 +37,7 @@ def track(
             help="frames a second of videos whose own times are wrong, of all or of one",
         ),
     ] = None,
+    offset: OffsetOption = None,
     progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:
@@ -45,7 +47,7 @@ def track(
     from services.cli.offline.run import run
     from services.cli.offline.track_summary import summary_text
 
-    summary = run(job_of(sources, config, fps or ()), out, progress)
+    summary = run(job_of(sources, config, fps or ()), out, progress, offset or ())
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
         return

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from rhot.messages import MarkerFrame
+from services.cli.offline.clocks.camera_clock import CameraClock, clock_text
 
 
 class CameraSummary(msgspec.Struct, frozen=True, kw_only=True):
@@ -23,7 +24,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """summary.json. No times of day and no durations: the same input writes the same bytes.
 
     refusals counts what fusion could not use, by reason; complete is false if a recording could not
-    be read to its end, and warnings say which; notes say what was left out or looks wrong.
+    be read to its end, and warnings say which; notes say what was left out or looks wrong. clocks:
+    of all cameras but the first, where one was not simply believed.
     """
 
     rig: str
@@ -37,6 +39,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     complete: bool
     warnings: list[str]
     notes: list[str]
+    clocks: list[CameraClock] | msgspec.UnsetType = msgspec.UNSET
 
 
 class CameraCounter:
@@ -76,4 +79,5 @@ def summary_text(summary: Summary, out: Path) -> str:
         f"{summary.objects} object poses"
         + (f", {summary.contacts} sets of contacts" if summary.contacts else "")
     )
+    lines += [] if summary.clocks is msgspec.UNSET else map(clock_text, summary.clocks)
     return "\n".join(lines)

@@ -54,7 +54,7 @@ class ClockAlignment:
         """Not enabled, nothing is put right."""
         self._names = [camera.name for camera in cameras]
         self._pairs = rectified_pairs(cameras)
-        self._enabled = enabled
+        self.enabled = enabled
         self._memory = HeightMemory(len(cameras))
         self._corrections: dict[int, Correction] = {}
         # By camera: an offset that was found once and differs from the one in use.
@@ -73,7 +73,7 @@ class ClockAlignment:
 
     def observe(self, view: View) -> bool:
         """Take in a frame as announced; whether clocks are put right otherwise than before."""
-        if not self._enabled:
+        if not self.enabled:
             return False
         changed = self._note_announced(view)
         self._memory.add(view)

@@ -87,11 +87,7 @@ def find_offset(
     together: both tracks are of the same seconds, as frames that arrived together are. That so much
     overlaps then speaks for an offset, even of motion that repeats itself.
     """
-    pairs = [
-        (one, other)
-        for one, other in zip(first, second, strict=True)
-        if len(one.times_s) >= 4 and len(other.times_s) >= 4
-    ]
+    pairs = usable_pairs(first, second)
     if not pairs:
         return undecided("no marker is seen by both cameras")
     offsets_s, score, explained, weight = _scores(pairs, range_s, near_s)
@@ -111,6 +107,17 @@ def find_offset(
     return _refined(pairs, coarse_s, better)
 
 
+def usable_pairs(
+    first: Sequence[HeightTrack], second: Sequence[HeightTrack]
+) -> list[tuple[HeightTrack, HeightTrack]]:
+    """The tracks of each landmark that both cameras see for some samples."""
+    return [
+        (one, other)
+        for one, other in zip(first, second, strict=True)
+        if len(one.times_s) >= 4 and len(other.times_s) >= 4
+    ]
+
+
 def _scores(
     pairs: list[tuple[HeightTrack, HeightTrack]], range_s: float, near_s: float
 ) -> tuple[Array, Array, Array, Array]:
@@ -123,25 +130,13 @@ def _scores(
         for own in zip(*pairs, strict=True)
     ]
     grids = [np.arange(begin, end, STEP_S) for begin, end in ends]
-    a, ma = _resampled([pair[0] for pair in pairs], grids[0])  # (L, N)
-    b, mb = _resampled([pair[1] for pair in pairs], grids[1])
+    a, ma = resampled([pair[0] for pair in pairs], grids[0])  # (L, N)
+    b, mb = resampled([pair[1] for pair in pairs], grids[1])
     length = a.shape[1] + b.shape[1]
-    fa, fma, faa = (np.fft.rfft(x, length).conj() for x in (a, ma, a * a))
-    fb, fmb, fbb = (np.fft.rfft(x, length) for x in (b, mb, b * b))
-    # Sums over the overlap at each lag: of samples, heights, squares and products.
-    n, sa, sb, saa, sbb, sab = np.fft.irfft(
-        np.stack([fma * fmb, fa * fmb, fma * fb, faa * fmb, fma * fbb, fa * fb]), length
-    )  # (L, length) each
     lags = np.arange(length)
     lags[lags >= b.shape[1]] -= length
     offsets_s = lags * STEP_S + (ends[1][0] - ends[0][0])
-    n = np.round(n)
-    enough = np.maximum(n, 1.0)
-    mean_a, mean_b = sa / enough, sb / enough
-    own = saa / enough - mean_a**2 + sbb / enough - mean_b**2  # (L, length)
-    left = (saa + sbb - 2.0 * sab) / enough - (mean_a - mean_b) ** 2
-    own, left = np.maximum(own, 0.0) + _NOISE**2, np.maximum(left, 0.0) + _NOISE**2
-    weight = np.where(n * STEP_S >= _OVERLAP_S, n * STEP_S * _RATE_HZ, 0.0)
+    own, left, weight = lag_variances(a, ma, b, mb, length)
     score = 0.5 * np.sum(weight * np.log(own / left), axis=0)
     explained = 1.0 - np.sum(weight * left, axis=0) / np.maximum(
         np.sum(weight * own, axis=0), 1e-12
@@ -149,6 +144,29 @@ def _scores(
     taken = np.flatnonzero((np.abs(offsets_s - near_s) <= range_s) & (weight.sum(axis=0) > 0.0))
     taken = taken[np.argsort(offsets_s[taken])]
     return offsets_s[taken], score[taken], explained[taken], weight.sum(axis=0)[taken]
+
+
+def lag_variances(
+    a: Array, ma: Array, b: Array, mb: Array, length: int
+) -> tuple[Array, Array, Array]:
+    """Variances of heights and of what is left at each lag (L, length), and numbers of values.
+
+    a, b heights of L landmarks, ma, mb where they are known; lags beyond half of length are those
+    below 0.
+    """
+    fa, fma, faa = (np.fft.rfft(x, length).conj() for x in (a, ma, a * a))
+    fb, fmb, fbb = (np.fft.rfft(x, length) for x in (b, mb, b * b))
+    # Sums over the overlap at each lag: of samples, heights, squares and products.
+    n, sa, sb, saa, sbb, sab = np.fft.irfft(
+        np.stack([fma * fmb, fa * fmb, fma * fb, faa * fmb, fma * fbb, fa * fb]), length
+    )  # (L, length) each
+    n = np.round(n)
+    enough = np.maximum(n, 1.0)
+    mean_a, mean_b = sa / enough, sb / enough
+    own = saa / enough - mean_a**2 + sbb / enough - mean_b**2
+    left = (saa + sbb - 2.0 * sab) / enough - (mean_a - mean_b) ** 2
+    own, left = np.maximum(own, 0.0) + _NOISE**2, np.maximum(left, 0.0) + _NOISE**2
+    return own, left, np.where(n * STEP_S >= _OVERLAP_S, n * STEP_S * _RATE_HZ, 0.0)
 
 
 def _better(score: Array, weight: Array, best: int) -> float:
@@ -169,7 +187,7 @@ def _better(score: Array, weight: Array, best: int) -> float:
     return float(min([score[best], *above[elsewhere].tolist()]))
 
 
-def _resampled(tracks: Sequence[HeightTrack], grid_s: Array) -> tuple[Array, Array]:
+def resampled(tracks: Sequence[HeightTrack], grid_s: Array) -> tuple[Array, Array]:
     """Heights (L, N) about their means at a grid's instants, 0 without; where."""
     heights, known = np.zeros((len(tracks), len(grid_s))), np.zeros((len(tracks), len(grid_s)))
     for row, track in enumerate(tracks):
@@ -180,21 +198,27 @@ def _resampled(tracks: Sequence[HeightTrack], grid_s: Array) -> tuple[Array, Arr
     return heights, known
 
 
-def interpolated(track: HeightTrack, at_s: Array) -> tuple[Array, Bools]:
-    """A track's heights (m,) at instants (m,), by cubics through four samples; where that holds."""
-    times, heights = track.times_s, track.heights
+def interpolated(track: HeightTrack, at_s: Array, samples: int = 4) -> tuple[Array, Bools]:
+    """A track's heights (m,) at instants (m,), and where that holds.
+
+    By cubics through four samples, or by polynomials through another even number.
+    """
+    times, heights, half = track.times_s, track.heights, samples // 2
+    if len(times) < samples:
+        return np.zeros(len(at_s)), np.zeros(len(at_s), dtype=bool)
     gap_s = _GAP_FRAMES * float(np.median(np.diff(times)))
-    after = np.clip(np.searchsorted(times, at_s, side="right"), 2, len(times) - 2)
-    inside = (at_s >= times[1]) & (at_s <= times[-2])
-    inside &= times[after + 1] - times[after - 2] <= gap_s + 2.0 * gap_s / _GAP_FRAMES
-    four = np.stack([after - 2, after - 1, after, after + 1])  # (4, m)
-    t, found = times[four], np.zeros(len(at_s))
-    for i in range(4):
+    after = np.clip(np.searchsorted(times, at_s, side="right"), half, len(times) - half)
+    inside = (at_s >= times[half - 1]) & (at_s <= times[-half])
+    widest_s = gap_s + (samples - 2) * gap_s / _GAP_FRAMES
+    inside &= times[after + half - 1] - times[after - half] <= widest_s
+    near = np.stack([after + k for k in range(-half, half)])  # (samples, m)
+    t, found = times[near], np.zeros(len(at_s))
+    for i in range(samples):
         weight = np.ones(len(at_s))
-        for j in range(4):
+        for j in range(samples):
             if i != j:
                 weight *= (at_s - t[j]) / (t[i] - t[j])
-        found += weight * heights[four[i]]
+        found += weight * heights[near[i]]
     return found, inside
 
 
