@@ -82,7 +82,7 @@ def check_seeds(seeds: Seeds, size_px: tuple[int, int], method: Method) -> None:
     if not seeds:
         raise CaptureError(
             "no seeds: say where each joint is in the first picture, as in "
-            f"{_EXAMPLE}, with --seeds FILE.json, or with --click"
+            f"{_EXAMPLE}, or with --seeds FILE.json"
         )
     width, height = size_px
     for place, (x, y) in seeds.items():

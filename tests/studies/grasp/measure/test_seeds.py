@@ -84,7 +84,7 @@ def test_metres_for_millimetres():
         parse_lengths(["index_proximal_mm=0.0436"])
     with pytest.raises(CaptureError, match="metres were given"):
         known_scale(0.00045, {"proximal": 90.0})
-    with pytest.raises(CaptureError, match="4360 mm; they are 5 to 95 mm long$"):
+    with pytest.raises(CaptureError, match=r"4360 mm; they are 5 to 95 mm long$"):
         parse_lengths(["index_proximal_mm=4360"])
 
 
