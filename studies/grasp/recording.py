@@ -19,6 +19,7 @@ JOINTS = ("mcp", "pip", "dip", "tip")
 ANGLES = ("mcp", "pip", "dip")
 Joint = Literal["mcp", "pip", "dip", "tip"]
 Angle = Literal["mcp", "pip", "dip"]
+Finger = Literal["index", "middle", "ring", "little", "thumb"]
 Finite = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 Sigma = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
 
@@ -51,7 +52,7 @@ class GraspRecording(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
 
     version: Literal[1] = 1
     subject: str
-    finger: Literal["index", "middle", "ring", "little", "thumb"] = "index"
+    finger: Finger = "index"
     source: str = ""
     method: Literal["dots", "edges", "recording", "truth"]
     unit: Literal["mm", "px"]

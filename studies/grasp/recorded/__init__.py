@@ -1,0 +1,1 @@
+"""Recordings of whole hands as recordings of one finger in its plane of flexion."""
