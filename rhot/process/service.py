@@ -28,6 +28,8 @@ from rhot.process.health.slow_streams import SlowStreams
 
 log = logging.getLogger("rhot.service")
 
+# Health is told this often.
+_BEAT_S = 1.0
 # The first two beats after the start hold parts of a second; what they would say of rates is not
 # true.
 _SETTLE_S = 2.0
@@ -112,7 +114,7 @@ class Service:
         publisher = self.bus.publisher(topics.HEALTH, service=self.name, instance=self.instance)
         last_s, last_cpu_s = time.monotonic(), time.process_time()
         while True:
-            await asyncio.sleep(1.0)
+            await asyncio.sleep(_BEAT_S)
             now_s, cpu_s = time.monotonic(), time.process_time()
             elapsed_s = now_s - last_s
             told = [stats for stats in self.bus.streams if stats.topic is not topics.HEALTH]

@@ -29,7 +29,7 @@ from rhot.messages.simulator import SimFrame
 from testing.synthetic_images import PAINTS, Tip, clean, frame_of, noisy
 
 pytestmark = pytest.mark.browser
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 SIZE = (320, 240)
 WAIT = {"timeout": DEADLINE_S * 1e3}
 InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]

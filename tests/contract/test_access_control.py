@@ -17,10 +17,13 @@ from services.cli.live.router import running_router
 from testing.secured_rig import SecuredRig
 
 HOSTS = ("left", "right", "laptop", "steamvr", "master")
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 _MARKS = itertools.count()
 # Long enough for an answer on a busy machine; none comes to what is forbidden.
 QUIET_S = 0.4
+# Messages sent, a tenth of a second apart, until one is heard: to what may hear them, and to what
+# may not.
+PATIENT, FEW = 600, 20
 
 
 class Everybody:
@@ -29,14 +32,14 @@ class Everybody:
     def __init__(self, buses: dict[str, Bus]) -> None:
         self.buses = buses
 
-    async def arrives(self, sender, topic, receiver, **names) -> bool:
-        """Whether what sender publishes reaches receiver: at the first message, or not at twenty
-        over two seconds.
-        """
-        return await _arrives(self.buses[sender], topic, self.buses[receiver], names)
+    async def arrives(self, sender, topic, receiver, sent: int = FEW, **names) -> bool:
+        """Whether one of so many messages of a sender reaches the receiver."""
+        return await _arrives(self.buses[sender], topic, self.buses[receiver], names, sent)
 
 
-async def _arrives(sender: Bus, topic, receiver: Bus, names: dict[str, str]) -> bool:
+async def _arrives(
+    sender: Bus, topic, receiver: Bus, names: dict[str, str], sent: int = FEW
+) -> bool:
     subscription = receiver.raw(topic, 64, **names)
     publisher = sender.publisher(topic, **names)
     mark = f'"{next(_MARKS)}"'.encode()
@@ -48,7 +51,7 @@ async def _arrives(sender: Bus, topic, receiver: Bus, names: dict[str, str]) -> 
 
     waiting = asyncio.create_task(heard())
     try:
-        for _ in range(20):
+        for _ in range(sent):
             publisher.put_bytes(mark)
             if (await asyncio.wait([waiting], timeout=0.1))[0]:
                 return True
@@ -124,25 +127,30 @@ FORBIDDEN = [
 ]
 
 
-async def arrived(everybody, cases) -> list[bool]:
+async def arrived(everybody, cases, sent: int) -> list[bool]:
     return await asyncio.gather(
-        *(everybody.arrives(sender, topic, to, **names) for sender, topic, names, to in cases)
+        *(everybody.arrives(sender, topic, to, sent, **names) for sender, topic, names, to in cases)
     )
 
 
 async def test_what_a_role_needs_passes_and_nothing_else_does(everybody):
-    passed = await arrived(everybody, ALLOWED + FORBIDDEN)
-    for case, got_through in zip(ALLOWED + FORBIDDEN, passed, strict=True):
-        assert got_through == (case in ALLOWED), case
+    for case, got_through in zip(ALLOWED, await arrived(everybody, ALLOWED, PATIENT), strict=True):
+        assert got_through, case
+    # All links are up and carry messages by now.
+    for case, got_through in zip(FORBIDDEN, await arrived(everybody, FORBIDDEN, FEW), strict=True):
+        assert not got_through, case
 
 
 async def test_another_rigs_pictures_and_poses_are_not_for_this_rigs_hosts(everybody, rig):
     async with contextlib.AsyncExitStack() as stack:
         lab = await stack.enter_async_context(open_bus("lab", rig.open))
-        for name in ("left", "laptop"):
-            ours = await stack.enter_async_context(open_bus("lab", rig.as_host(name)))
-            assert not await _arrives(lab, topics.PREVIEW, ours, RIGHT)
-            assert not await _arrives(lab, topics.POSE, ours, HAND)
+        ours = [
+            await stack.enter_async_context(open_bus("lab", rig.as_host(name)))
+            for name in ("left", "laptop")
+        ]
+        what = ((topics.PREVIEW, RIGHT), (topics.POSE, HAND))
+        asked = [_arrives(lab, topic, bus, names) for bus in ours for topic, names in what]
+        assert not any(await asyncio.gather(*asked))
 
 
 async def test_questions_are_for_those_who_may_ask_them(everybody):
@@ -157,8 +165,8 @@ async def test_questions_are_for_those_who_may_ask_them(everybody):
         while not await buses["here"].get(topics.FRAME, QUIET_S, **LEFT):
             pass
     for asker in ("left", "right", "laptop", "steamvr", "master"):
-        assert await buses[asker].get(topics.CLOCK, 5.0), asker
-    assert await buses["master"].get(topics.FRAME, 5.0, **LEFT)
+        assert await buses[asker].get(topics.CLOCK, DEADLINE_S), asker
+    assert await buses["master"].get(topics.FRAME, DEADLINE_S, **LEFT)
     for asker in ("right", "laptop", "steamvr"):
         assert not await buses[asker].get(topics.FRAME, QUIET_S, **LEFT), asker
     # Left would answer for the right camera's colours, and is not asked.
@@ -199,6 +207,6 @@ async def test_a_certificate_that_rig_toml_does_not_name_may_do_nothing(everybod
     rig.make("thief", "viewer")
     async with open_bus("desk", rig.as_host("thief")) as thief:
         everybody.buses["thief"] = thief
-        assert not await everybody.arrives("here", topics.POSE, "thief", **HAND)
-        assert not await everybody.arrives("thief", topics.POSE, "here", **HAND)
+        cases = [("here", topics.POSE, HAND, "thief"), ("thief", topics.POSE, HAND, "here")]
+        assert not any(await arrived(everybody, cases, FEW))
         assert not await thief.get(topics.CLOCK, QUIET_S)

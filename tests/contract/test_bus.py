@@ -15,7 +15,7 @@ from rhot.bus.subscription import RawSubscription, Sample
 from rhot.errors import BusError
 from rhot.messages import ClockEcho, HandPoint, HandPoints, Session
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 
 
 def points(seq: int, hand: str = "right") -> HandPoints:

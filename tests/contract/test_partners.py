@@ -14,7 +14,7 @@ from rhot.messages import ClockEcho
 from services.cli.live.router import running_router
 from testing.secured_rig import SecuredRig
 
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 HAND = {"hand": "right"}
 
 

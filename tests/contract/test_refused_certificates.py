@@ -17,7 +17,7 @@ from services.cli.pki.certificates import make_authority
 from services.cli.router_session import router_session
 from testing.secured_rig import LONG_AGO, NOW, SecuredRig
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from rhot.bus.master_clock import follow_master
 from rhot.clock import OffsetEstimator
 from rhot.messages import ClockEcho
 
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 
 
 async def until(condition) -> None:

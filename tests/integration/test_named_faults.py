@@ -87,7 +87,7 @@ async def second_fusion(rig) -> AsyncIterator[None]:
         yield
     finally:
         process.terminate()
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             await process.wait()
 
 

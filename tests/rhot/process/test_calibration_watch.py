@@ -17,7 +17,7 @@ from rhot.files.calibration import save
 from rhot.messages.camera import Exposure
 from rhot.process.lifecycle import EXIT_AGAIN
 
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 SCRIPT = textwrap.dedent("""
     import asyncio
     from rhot.files.calibration import load_exposure

@@ -11,7 +11,7 @@ import pytest
 from rhot.errors import CalibrationError, SourceError
 from rhot.process.restart_hold import hold_back, hold_s
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 @pytest.fixture
@@ -50,8 +50,8 @@ def test_a_changed_file_ends_the_wait(held, tmp_path, change):
             (folder / "left.lens.json").chmod(0o600)
 
     mender = threading.Thread(target=mend)
-    mender.start()
     started_s = time.monotonic()
+    mender.start()
     hold_back(error, 0.1, [tmp_path / "rig.toml", folder])
     mender.join()
     assert 0.9 < time.monotonic() - started_s < DEADLINE_S
@@ -60,7 +60,7 @@ def test_a_changed_file_ends_the_wait(held, tmp_path, change):
 def test_systemd_sees_the_error_and_that_we_live(held, tmp_path, monkeypatch):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
         server.bind(str(tmp_path / "notify"))
-        server.settimeout(5.0)
+        server.settimeout(60.0)
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         monkeypatch.setenv("RHOT_HOLD_S", "1")
         hold_back(SourceError("no camera\nat all"), 0.1, [])

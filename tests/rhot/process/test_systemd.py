@@ -11,7 +11,7 @@ def test_notify_reaches_the_socket(tmp_path, monkeypatch, abstract):
     path = f"@rhot-test-{os.getpid()}" if abstract else str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
         server.bind("\0" + path[1:] if abstract else path)
-        server.settimeout(5.0)
+        server.settimeout(60.0)
         monkeypatch.setenv("NOTIFY_SOCKET", path)
         assert systemd.notify("READY=1")
         assert server.recv(100) == b"READY=1"
@@ -38,7 +38,7 @@ def test_more_time_is_asked_for_until_ready_and_never_after(tmp_path, monkeypatc
     monkeypatch.setattr(systemd, "_Start", type("Fresh", (), {"over": False}))
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as server:
         server.bind(str(tmp_path / "notify"))
-        server.settimeout(5.0)
+        server.settimeout(60.0)
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         systemd.ask_for_time()
         systemd.notify("READY=1\nSTATUS=running")

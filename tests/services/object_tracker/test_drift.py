@@ -41,6 +41,15 @@ def config(tmp_path: Path) -> RigConfig:
     )
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A window of three seconds, looked at three times a second, so that tests are short; what the
+    real one tells apart is for tests/services/object_tracker/monitors/.
+    """
+    monkeypatch.setattr("services.object_tracker.drift._LOOK_S", 0.3)
+    monkeypatch.setattr("services.object_tracker.monitors.drift_watch._WINDOW_S", 3.0)
+
+
 async def test_a_moved_base_station_is_named_and_its_return_too(
     running: Callable, config: RigConfig
 ) -> None:
@@ -50,7 +59,7 @@ async def test_a_moved_base_station_is_named_and_its_return_too(
         truth = asyncio.create_task(play(bus, scene, None))
         while "drift_mm" not in service.values:
             await asyncio.sleep(0.1)
-        await asyncio.sleep(3.0)
+        await asyncio.sleep(1.0)
         assert not _drift(service)
         truth.cancel()
         bumped = asyncio.create_task(play(bus, scene, moved))

@@ -221,7 +221,7 @@ async def test_colours_two_hundred_times_a_second(tracker, router, colors):
 
 async def test_every_one_of_many_who_ask_at_once_is_answered(tracker, colors):
     changes = [msgspec.structs.replace(colors, date=str(n), tool="test") for n in range(20)]
-    async with asyncio.timeout(20.0), asyncio.TaskGroup() as tasks:
+    async with asyncio.timeout(60.0), asyncio.TaskGroup() as tasks:
         for change in changes:
             tasks.create_task(
                 tracker.bus.request(topics.COLORS, change, timeout_s=10.0, camera="left")

@@ -23,7 +23,7 @@ from rhot.process.service import Service
 from services.pi_tracker.endpoints import preview
 from services.pi_tracker.service import serve
 
-DEADLINE_S = 15.0
+DEADLINE_S = 60.0
 SIZE = (160, 120)
 FOLDER = CameraTable(name="left", source="folder:shots")
 

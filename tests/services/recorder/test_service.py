@@ -105,7 +105,7 @@ async def heard(
     async with (
         open_bus(rig, [router]) as ours,
         open_bus(rig, [router]) as theirs,
-        asyncio.timeout(15.0),
+        asyncio.timeout(60.0),
     ):
         queue: asyncio.Queue[tuple[str, bytes]] = asyncio.Queue()
 

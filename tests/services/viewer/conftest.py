@@ -213,7 +213,7 @@ class Browser:
         """Ask for the public tunnel that must not be."""
         self._send(_messages.ShareUrlRequest())
 
-    def wait_for(self, type_: str, timeout_s: float = 10.0, **fields: Any) -> dict[str, Any]:
+    def wait_for(self, type_: str, timeout_s: float = 60.0, **fields: Any) -> dict[str, Any]:
         """A message of a type with the given fields, among those since `forget` or to come.
 
         A callable value is asked.

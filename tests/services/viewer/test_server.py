@@ -89,7 +89,7 @@ def test_browsers_are_counted(browse: Callable[..., object]) -> None:
 
     def seen(count: int) -> bool:
         with changed:
-            return changed.wait_for(lambda: bool(counts) and counts[-1] == count, timeout=5.0)
+            return changed.wait_for(lambda: bool(counts) and counts[-1] == count, timeout=60.0)
 
     with open_server("127.0.0.1", 0) as server:
         BrowserCount(server, note)

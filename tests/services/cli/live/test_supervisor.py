@@ -12,7 +12,7 @@ import pytest
 
 from services.cli.live.supervisor import Child, Supervisor
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 @pytest.fixture

@@ -7,15 +7,29 @@ import contextlib
 import os
 import socket
 
+import msgspec
 import numpy as np
 import pytest
 
 from rhot import topics
+from rhot.files.rig_tables import CameraTable
 from rhot.messages import ClockEcho, Session
 from rhot.messages.simulator import SimFrame
 from services.pi_tracker.service import serve
 
 SIZE = (240, 160)
+# What rig.toml says; the camera is three times as fast, and well on a busy machine, too.
+FPS = 10.0
+# Faults begin and end in tenths of seconds instead of seconds; how long they take in use is for
+# tests/services/pi_tracker/monitors/.
+QUICK = {
+    "services.pi_tracker.endpoints.camera_faults._PATIENCE_S": 0.5,
+    "services.pi_tracker.endpoints.camera_faults._PERIOD_S": 0.1,
+    "services.pi_tracker.monitors.frame_rate.WINDOW_S": 1.0,
+    "services.pi_tracker.monitors.picture_content._PERIOD_NS": 200_000_000,
+    "services.pi_tracker.monitors.repeated_picture._FROZEN_NS": 400_000_000,
+    "rhot.process.service._BEAT_S": 0.1,
+}
 
 
 class Camera:
@@ -68,7 +82,10 @@ async def watched(running, config, picture, monkeypatch, tmp_path):
 
     until(*codes) waits until exactly these faults stand; what health says then.
     """
-    monkeypatch.setattr("services.pi_tracker.endpoints.camera_faults._PATIENCE_S", 1.0)
+    for name, value in QUICK.items():
+        monkeypatch.setattr(name, value)
+    camera = CameraTable(name="left", source="simulator", size_px=SIZE, fps=FPS)
+    config = msgspec.structs.replace(config, camera=[camera])
 
     @contextlib.asynccontextmanager
     async def run():
@@ -82,7 +99,8 @@ async def watched(running, config, picture, monkeypatch, tmp_path):
                     health = await anext(healths)
                     # What the machine is too slow for, or short of, is none of this.
                     told = {fault.code: fault for fault in health.faults}
-                    if set(told) - {"stream_slow", "disk_low", "computer_hot"} == set(codes):
+                    other = {"stream_slow", "disk_low", "computer_hot", "camera_slow"} - set(codes)
+                    if set(told) - other == set(codes):
                         return health, told
 
             try:
@@ -117,7 +135,7 @@ async def test_frozen_pictures_are_told_and_never_measured(watched):
         camera.frozen = True
         health, told = await until("camera_frozen")
         assert "the same picture for" in told["camera_frozen"].text
-        assert health.values["repeated_frames"] > 20
+        assert health.values["repeated_frames"] > 3
         # What was on its way is over by now; from here on no frame is measured.
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(0.5):
@@ -125,7 +143,7 @@ async def test_frozen_pictures_are_told_and_never_measured(watched):
                     await anext(markers)
         # (A timeout ends the iteration's wait, not the subscription.)
         with pytest.raises(TimeoutError):
-            async with asyncio.timeout(1.5):
+            async with asyncio.timeout(0.5):
                 await anext(markers)
         camera.frozen = False
         assert (await anext(markers)).markers
@@ -147,11 +165,12 @@ async def test_a_slow_camera(watched):
     async with watched() as (camera, until, bus):
         Master(bus)
         await until()
-        camera.hz = 12.0
+        camera.hz = 4.0
         _, told = await until("camera_slow")
-        assert "pictures a second of 30" in told["camera_slow"].text
+        assert "pictures a second of 10" in told["camera_slow"].text
         camera.hz = 60.0
-        await until()
+        while "camera_slow" in told:
+            _, told = await until()
 
 
 async def test_a_master_that_answers_no_clock(watched, monkeypatch):
@@ -179,6 +198,6 @@ async def test_systemd_is_told_what_it_does_in_words(watched, monkeypatch, tmp_p
 
             await told("STATUS=waiting for fusion")
             master = Master(bus)
-            assert "Hz, 2 of 2 markers" in await told("Hz")
+            await told("Hz, 2 of 2 markers")
             master.say(running=False)
             await told("STATUS=waiting: session stopped")

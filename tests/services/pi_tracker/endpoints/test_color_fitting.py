@@ -8,7 +8,7 @@ from rhot import topics
 from rhot.messages.camera import FitRequest, FitResult, PointedAt, picture_name
 from services.pi_tracker.endpoints import picture_cache
 
-FIT_S = 10.0
+FIT_S = 60.0
 
 
 async def ask(client, request) -> FitResult:

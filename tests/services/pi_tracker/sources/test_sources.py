@@ -21,7 +21,7 @@ from services.pi_tracker.sources import ThreadedSource, is_file, open_reader
 from services.pi_tracker.sources.notes import Notes
 from services.pi_tracker.sources.simulator import SimulatorSource
 
-DEADLINE_S = 10.0
+DEADLINE_S = 60.0
 
 
 @pytest.mark.parametrize(
