@@ -53,10 +53,15 @@ class Bench:
             for key in self.poses:
                 pixels = self.corners(camera, key)
                 noisy = pixels + generator.normal(0.0, noise_px, pixels.shape)
-                if is_inside(pixels, camera.size_px):
+                if is_inside(pixels, camera.size_px) and self._is_seen(camera, key, pixels):
                     ids = np.arange(self.board.size)
                     found[camera.name][key] = Detection(ids, noisy, camera.size_px)
         return found
+
+    def _is_seen(self, camera: Camera, key: str, pixels: Array) -> bool:
+        """Whether the pixels' rays are the corners': not where the lens model folds over."""
+        p_camera = apply(inverse(camera.T_rig_from_camera) @ self.poses[key], self.board.points)
+        return np.allclose(camera.rays_from_pixels(pixels), p_camera[:, :2] / p_camera[:, 2:])
 
     def picture(
         self,

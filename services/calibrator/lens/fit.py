@@ -12,7 +12,7 @@ from services.calibrator.board.board_views import LeftOut, board_view, same_size
 from services.calibrator.board.detect import Detection
 from services.calibrator.bundle.adjust import Adjustment, FreeUnknowns, adjust
 from services.calibrator.bundle.initial_guess import guess_board_pose, guess_lens
-from services.calibrator.bundle.lens_model import CX, CY, FX, FY, K1, K2
+from services.calibrator.bundle.lens_model import CX, CY, FX, FY, K1, K2, P1, P2
 from services.calibrator.bundle.outliers import OUTLIER_ROUNDS, outliers
 from services.calibrator.bundle.residuals import State, View, rms
 from services.calibrator.lens.checks import check_count
@@ -25,6 +25,7 @@ _STAGES = (
     only_free(FX, FY),
     only_free(FX, FY, K1),
     only_free(FX, FY, CX, CY, K1, K2),
+    only_free(FX, FY, CX, CY, K1, K2, P1, P2),
 )
 
 
@@ -69,14 +70,14 @@ def fit_lens(size_px: tuple[int, int], views: list[View], free: np.ndarray) -> A
     The boards are numbered 0..n-1. free (9,) bool says which numbers of the lens may move; the
     others are those of an ideal lens.
     """
-    lens = guess_lens(size_px, views)
-    for stage in (*_STAGES, np.ones_like(free)):
-        found = fit_poses(lens, views, stage & free)
-        lens = found.state.lenses[0]
-    # A pose of the wrong branch (a near-frontal board turned the other way) is found again with the
-    # lens now known.
-    again = fit_poses(lens, views, free)
-    return again if again.rms_px <= found.rms_px else found
+    found = fit_poses(guess_lens(size_px, views), views, _STAGES[0] & free)
+    # Last all again: a pose of the wrong branch (a near-frontal board turned the other way) is found
+    # with the lens then known. And a stage that ends in a worse minimum than the one before, as k3
+    # does with boards that were never tilted, is forgotten.
+    for stage in (*_STAGES[1:], np.ones_like(free), np.ones_like(free)):
+        again = fit_poses(found.state.lenses[0], views, stage & free)
+        found = again if again.rms_px <= found.rms_px else found
+    return found
 
 
 def fit_poses(lens: Array, views: list[View], free: np.ndarray) -> Adjustment:
