@@ -71,7 +71,7 @@ def fit_lens(size_px: tuple[int, int], views: list[View], free: np.ndarray) -> A
     others are those of an ideal lens.
     """
     found = fit_poses(guess_lens(size_px, views), views, _STAGES[0] & free)
-    # Last all again: a pose of the wrong branch (a near-frontal board turned the other way) is found
+    # Last all again: a pose of the wrong branch (a near-frontal board turned around) is found
     # with the lens then known. And a stage that ends in a worse minimum than the one before, as k3
     # does with boards that were never tilted, is forgotten.
     for stage in (*_STAGES[1:], np.ones_like(free), np.ones_like(free)):
