@@ -1,0 +1,81 @@
+"""Which dot is which at the start, from given points. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from services.pi_tracker.dots.assignment import assign
+from services.pi_tracker.dots.chains import Chains, chains_of
+from services.pi_tracker.dots.dot import Patch
+
+Array = npt.NDArray[np.float64]
+
+# A seed means the patch that is within so many of its diameters, or else none.
+_SEED_DIAMETERS = 2.0
+# Of px per m where there is no bone to measure it on: a hand of 0.2 m fills a third of the picture.
+_HAND_M = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Dots as tracking starts: their patches (-1 for none), places (n, 2) and sigmas (n,)."""
+
+    chains: Chains
+    patch: tuple[int, ...]
+    places: Array
+    sigmas: Array
+    px_per_m: float
+    notes: list[str] = field(default_factory=list)
+
+    def lengths(self) -> Array:
+        """(s,) px, of spans whose ends both have a patch; else 0."""
+        near, far = self.chains.spans[:, 0], self.chains.spans[:, 1]
+        bones = self.places[far] - self.places[near]
+        known = np.array(self.patch) >= 0
+        return np.where(known[near] & known[far], np.hypot(bones[:, 0], bones[:, 1]), 0.0)
+
+
+def from_seeds(
+    chains: Chains, seeds: Mapping[str, tuple[float, float]], patches: Sequence[Patch]
+) -> Start | None:
+    """Each seeded dot has the patch at its seed, all seeds at once; None without a patch.
+
+    A seed without a patch starts there all the same, unsure. Landmarks without a seed have no dot.
+    """
+    if not patches:
+        return None
+    names = [name for name in chains.landmarks if name in seeds]
+    own = chains_of(names)
+    points = np.array([seeds[name] for name in names])
+    places = np.array([(p.x_px, p.y_px) for p in patches])
+    diameters = np.sqrt(4.0 / np.pi * np.array([p.area_px for p in patches]))
+    apart = np.linalg.norm(places[None] - points[:, None], axis=2)
+    reach = _SEED_DIAMETERS * np.maximum(diameters, 4.0)[None]
+    # The sum of distances is least where the sum of what is left of a reach is largest.
+    patch = assign(np.where(apart < reach, 1e3 + reach - apart, -np.inf))
+    found = patch >= 0
+    starts = np.where(found[:, None], places[patch], points)
+    typical = float(np.median(diameters))
+    sigmas = np.where(found, 0.1 * typical, typical)
+    notes = [
+        f"there is no dot at the seed of {name.replace('_', ' ')} "
+        f"({points[k][0]:g}, {points[k][1]:g}): it is searched from there on"
+        for k, name in enumerate(names)
+        if not found[k]
+    ]
+    scale = px_per_m(own, starts)
+    return Start(own, tuple(patch.tolist()), starts, sigmas, scale, notes)
+
+
+def px_per_m(chains: Chains, places: Array) -> float:
+    """How large the hand is in the picture: that of the bones least foreshortened."""
+    if not len(chains.bones):
+        spread = float(np.ptp(places, axis=0).max()) if len(places) > 1 else 200.0
+        return max(spread, 50.0) / _HAND_M
+    bones = places[chains.bones[:, 1]] - places[chains.bones[:, 0]]
+    ratios = np.hypot(bones[:, 0], bones[:, 1]) / chains.lengths_m
+    return max(float(np.quantile(ratios, 0.75)), 1.0)

@@ -1,0 +1,78 @@
+"""Dots of one colour in the pictures of one camera: search, sub-pixel centres, identity.
+
+Pure. The search and the centres are those of single markers (detect/, measure/); all blobs of the
+colour go into the tracker of dots, which tells them apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rhot.files.rig_tables import Tracker
+from services.pi_tracker.detect import search_region
+from services.pi_tracker.detect.blob_search import BlobDetector
+from services.pi_tracker.detect.color_table import ColorTable
+from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.parts import parts_of
+from services.pi_tracker.dots.tracker import DotTracker
+from services.pi_tracker.identify.blob_shape import is_paint_shaped
+from services.pi_tracker.image.blob import Blob
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.noise import Noise
+from services.pi_tracker.image.yuv_planes import Picture, picture
+from services.pi_tracker.measure.centroid import centroids
+
+# The centre of a part of a blob is known to this share of its diameter, and so much less of its
+# quality is left.
+_PART_SIGMA, _PART_QUALITY = 0.15, 0.5
+
+
+class DotFinder:
+    """Follows the dots of one colour through the frames of one camera."""
+
+    def __init__(
+        self,
+        table: ColorTable,
+        color: str,
+        settings: Tracker,
+        landmarks: Sequence[str],
+        size_px: tuple[int, int],
+        seeds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        """table has the colour, and others that are not to be taken for it.
+
+        landmarks and seeds are DotTracker's; size_px is the picture's.
+        """
+        self._class = table.names.index(color)
+        self._settings = settings
+        self._detector = BlobDetector(table, settings)
+        self._noise = Noise()
+        self.tracker = DotTracker(landmarks, size_px, seeds)
+
+    def find(self, frame: Frame) -> dict[str, Dot]:
+        """The dots of one picture by landmark; empty until tracking has started."""
+        image = picture(frame)
+        self._noise.update(image)
+        blobs = [
+            blob
+            for blob in self._detector.detect(image, search_region.whole(image.size))
+            if blob.color == self._class and is_paint_shaped(blob, self._settings.max_area_px)
+        ]
+        return self.tracker.step(self._patches(image, blobs), frame.stamp_ns * 1e-9)
+
+    def _patches(self, image: Picture, blobs: list[Blob]) -> list[Patch]:
+        found: list[Patch] = []
+        if not blobs:
+            return found
+        measured = centroids(image, blobs, self._noise)
+        for number, (blob, one) in enumerate(zip(blobs, measured, strict=True)):
+            parts = parts_of(blob, self.tracker.dot_area_px2)
+            if len(parts) == 1:
+                found.append(Patch(one.x_px, one.y_px, blob.area_px, one.sigma_px, one.quality))
+                continue
+            for x, y, area in parts:
+                sigma = _PART_SIGMA * math.sqrt(4.0 / math.pi * area)
+                whole = (one.x_px, one.y_px)
+                found.append(Patch(x, y, area, sigma, _PART_QUALITY * one.quality, number, whole))
+        return found

@@ -1,0 +1,56 @@
+"""Patches of blobs: a blob that several dots have run together into is cut into as many parts.
+
+Pure. A blob is cut where it is both larger and longer than one dot can be; where each part is one
+dot's, each has a centre of its own, if a rough one. Dots that hide behind each other entirely are
+not seen here: they share a patch later (hypothesis.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from services.pi_tracker.image.blob import Blob
+
+Array = npt.NDArray[np.float64]
+
+# A blob of more than so many times a dot's area may be two. (Dots of one hand differ by a third.)
+_LARGE = 1.35
+# And it is where its variance along its longer axis is so many times that of a disc of one dot's
+# area: of two discs side by side it is 5 times, of two that overlap by half 2.4 times.
+_LONG = 2.2
+_MAX_PARTS, _ROUNDS = 4, 8
+
+
+def parts_of(blob: Blob, dot_area_px2: float) -> list[tuple[float, float, float]]:
+    """Centres (x, y) px and areas px^2 of the dots that a blob may be; one is not cut."""
+    whole = [(blob.x_px, blob.y_px, blob.area_px)]
+    if dot_area_px2 <= 0.0 or blob.area_px < _LARGE * dot_area_px2:
+        return whole
+    rows, columns = np.nonzero(blob.mask)
+    cells = np.stack([columns, rows], axis=1) + 0.0  # (c, 2)
+    values, vectors = np.linalg.eigh(np.asarray(np.cov(cells.T), np.float64))
+    # A disc of area A has variance A / (4 pi) along any axis; a cell is 4 px^2.
+    if values[1] < _LONG * dot_area_px2 / 4.0 / (4.0 * np.pi):
+        return whole
+    count = int(np.clip(round(blob.area_px / dot_area_px2 + 0.2), 2, _MAX_PARTS))
+    along = (cells - cells.mean(axis=0)) @ vectors[:, 1]
+    centres = cells.mean(axis=0) + np.outer(
+        np.quantile(along, (np.arange(count) + 0.5) / count), vectors[:, 1]
+    )
+    centres, own = _k_means(cells, np.asarray(centres, np.float64))
+    left, top = blob.rect[0], blob.rect[1]
+    x, y = 2.0 * (centres[:, 0] + left) + 0.5, 2.0 * (centres[:, 1] + top) + 0.5
+    areas = 4.0 * np.bincount(own, minlength=count)
+    return [(float(x[k]), float(y[k]), float(areas[k])) for k in range(count) if areas[k] > 0.0]
+
+
+def _k_means(points: Array, centres: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Lloyd's algorithm: centres (k, 2), and the centre of each point (c,)."""
+    own = np.zeros(len(points), np.int64)
+    for _ in range(_ROUNDS):
+        own = np.argmin(np.sum((points[:, None] - centres[None]) ** 2, axis=2), axis=1)
+        counts = np.maximum(np.bincount(own, minlength=len(centres)), 1)[:, None]
+        sums = np.stack([np.bincount(own, points[:, k], len(centres)) for k in (0, 1)], axis=1)
+        centres = sums / counts
+    return centres, own

@@ -1,0 +1,209 @@
+"""Dots of one colour on a hand, told apart: patches of a picture in, named dots out.
+
+Identity at the start comes from seeds, which are given points (constellation.py), afterwards from
+motion and from bones that do not grow (hypothesis.py). Several accounts are kept side by side; what
+is told is the likeliest one's, so that a mix-up is undone as soon as the next pictures speak
+against it. Pure: time is an argument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.chains import Chains, chains_of
+from services.pi_tracker.dots.constellation import Start, from_seeds
+from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.extend import extend
+from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, normalised
+
+Array = npt.NDArray[np.float64]
+
+# So many accounts are kept, and none that is so much (nats) less likely than the best.
+_KEPT, _WORSE_NATS = 12, 12.0
+# The hand's acceleration, m/s^2: at the start, least and most. (Real hands: 8..20 within a frame.)
+_ACCELERATION, _LEAST, _MOST = 6.0, 0.5, 60.0
+# Sharper ones, m/s^2, and the log probability that one begins: a finger that sets off, a jerk.
+_SHARPER = ((8.0, -3.0), (50.0, -6.0))
+# It grows fast where dots surprise and falls slowly where they do not: powers of the innovations'
+# mean square.
+_GROWTH, _DECAY = 0.3, 0.15
+# A hand's speed when tracking starts, m/s.
+_START_SPEED = 0.5
+# Of the number of false patches: weight of a new picture, and what it never falls below.
+_FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
+# A gap longer than this tells nothing of where dots have gone meanwhile.
+_LONGEST_GAP_S = 0.5
+
+
+@dataclass
+class _Scale:
+    """What is learnt of the picture: px per m of the hand, its acceleration, false patches."""
+
+    px_per_m: float
+    acceleration: float
+    false_patches: float = 0.0
+
+
+class DotTracker:
+    """Follows the dots of one colour.
+
+    landmarks name them (rhot.hand.JOINTS); seeds are points of the first picture by landmark, px.
+    A landmark without a seed has no dot.
+    """
+
+    def __init__(
+        self,
+        landmarks: Sequence[str],
+        size_px: tuple[int, int],
+        seeds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        """size_px is the picture's. Raises ValueError on a landmark that no hand has."""
+        self.landmarks = tuple(landmarks)
+        self._size_px = size_px
+        self._seeds = dict(seeds)
+        unknown = sorted(set(self._seeds) - set(self.landmarks))
+        if unknown:
+            raise ValueError(
+                f"seed {unknown[0]!r} is none of the dots; they are {', '.join(self.landmarks)}"
+            )
+        # Of the dots that there are, once tracking has started.
+        self._chains: Chains = chains_of(self.landmarks)
+        self._scale = _Scale(1.0, 1.0)
+        self._hypotheses: list[Hypothesis] = []
+        self._time_s = 0.0
+        # What a person should know of the start; empty if all is well.
+        self.notes: list[str] = []
+
+    def step(self, patches: Sequence[Patch], time_s: float) -> dict[str, Dot]:
+        """The dots of the next picture, by landmark; empty until tracking has started."""
+        if not self._hypotheses:
+            self._start(patches, time_s)
+            return self._dots(patches) if self._hypotheses else {}
+        elapsed_s = min(max(time_s - self._time_s, 1e-3), _LONGEST_GAP_S)
+        self._time_s = time_s
+        arrays = _arrays(patches)
+        around = self._around()
+        children: list[Hypothesis] = []
+        best = -np.inf
+        for one in self._hypotheses:
+            children += extend(one, arrays, around, elapsed_s, best - _WORSE_NATS)
+            best = max(child.score for child in children)
+        self._hypotheses = _pruned(children)
+        self._learn(len(patches))
+        return self._dots(patches)
+
+    @property
+    def dot_area_px2(self) -> float:
+        """How large a dot is as a rule, 0 while it is unknown."""
+        return float(np.median(self._hypotheses[0].areas)) if self._hypotheses else 0.0
+
+    def _start(self, patches: Sequence[Patch], time_s: float) -> None:
+        found = from_seeds(self._chains, self._seeds, patches)
+        if found is not None:
+            self._begin(found, patches, time_s)
+
+    def _begin(self, found: Start, patches: Sequence[Patch], time_s: float) -> None:
+        chains, self.notes, self._time_s = found.chains, found.notes, time_s
+        self._chains = chains
+        scale = found.px_per_m
+        self._scale = _Scale(scale, _ACCELERATION * scale)
+        areas = np.array([p.area_px for p in patches]) if patches else np.array([100.0])
+        typical = float(np.median(areas))
+        own = [typical if p < 0 else patches[p].area_px for p in found.patch]
+        state = motion.start(found.places, found.sigmas, _START_SPEED * scale)
+        lengths = np.maximum(found.lengths(), 0.9 * scale * chains.spans_m)
+        missing = np.array([p < 0 for p in found.patch], np.int64)
+        places = _arrays(patches).places
+        false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
+        self._hypotheses = [
+            Hypothesis(0.0, state, lengths, np.array(own), missing, found.patch, found.patch, false)
+        ]
+
+    def _around(self) -> Surroundings:
+        width, height = self._size_px
+        density = (self._scale.false_patches + _FEWEST_FALSE) / (width * height)
+        usual, scale = self._scale.acceleration, self._scale.px_per_m
+        sharper = [(level * scale, prior) for level, prior in _SHARPER if level * scale > usual]
+        return Surroundings(self._chains, ((usual, 0.0), *sharper), density)
+
+    def _learn(self, count: int) -> None:
+        """Take the likeliest account for the truth."""
+        best, scale = self._hypotheses[0], self._scale
+        power = _GROWTH if best.squared > 1.0 else _DECAY
+        grown = scale.acceleration * max(best.squared, 0.05) ** power
+        scale.acceleration = float(np.clip(grown, _LEAST * scale.px_per_m, _MOST * scale.px_per_m))
+        false = count - len({p for p in best.patch if p >= 0})
+        scale.false_patches += _FALSE_WEIGHT * (false - scale.false_patches)
+
+    def _dots(self, patches: Sequence[Patch]) -> dict[str, Dot]:
+        best = self._hypotheses[0]
+        weights = np.exp([one.score for one in self._hypotheses])
+        weights /= weights.sum()
+        sigmas = np.sqrt(np.diag(best.state.cov))
+        dots: dict[str, Dot] = {}
+        for number, name in enumerate(self._chains.landmarks):
+            index = best.patch[number]
+            x, y = best.state.mean[number].tolist()
+            if index < 0:
+                area = float(best.areas[number])
+                dots[name] = Dot(x, y, float(sigmas[number]), 0.0, "carried", area, -1)
+                continue
+            agree = sum(
+                float(weight)
+                for weight, one in zip(weights, self._hypotheses, strict=True)
+                if one.patch[number] == index
+            )
+            dots[name] = _seen(best, number, patches, agree, float(sigmas[number]))
+        return dots
+
+
+def _seen(
+    best: Hypothesis, number: int, patches: Sequence[Patch], agree: float, sigma_px: float
+) -> Dot:
+    index = best.patch[number]
+    patch = patches[index]
+    if best.patch.count(index) > 1:
+        x, y = best.state.mean[number].tolist()
+        return Dot(x, y, sigma_px, 0.3 * agree * patch.quality, "merged", patch.area_px, index)
+    parts = {k for k, one in enumerate(patches) if one.whole == patch.whole and patch.whole >= 0}
+    alone = len(parts & set(best.patch)) == 1
+    x, y = patch.whole_px if alone else (patch.x_px, patch.y_px)
+    # Hidden in part, its centre has moved, where to nobody knows.
+    hidden = max(0.0, 1.0 - patch.area_px / max(float(best.areas[number]), 1.0))
+    offset = 0.34 * hidden * float(np.sqrt(best.areas[number])) if hidden > 0.25 else 0.0
+    return Dot(
+        x,
+        y,
+        float(np.hypot(patch.sigma_px, offset)),
+        patch.quality * agree,
+        "seen",
+        patch.area_px,
+        index,
+    )
+
+
+def _arrays(patches: Sequence[Patch]) -> Patches:
+    count = len(patches)
+    return Patches(
+        np.array([(p.x_px, p.y_px) for p in patches]).reshape(count, 2),
+        np.maximum(np.array([p.area_px for p in patches]), 1.0),
+        np.array([p.sigma_px for p in patches]),
+        np.array([p.whole for p in patches], np.int64),
+        np.array([p.whole_px for p in patches]).reshape(count, 2),
+    )
+
+
+def _pruned(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """The best, best first; of those that agree in the last two pictures only one."""
+    kept: dict[tuple[tuple[int, ...], tuple[int, ...]], Hypothesis] = {}
+    for one in sorted(hypotheses, key=lambda one: -one.score):
+        kept.setdefault((one.patch, one.before), one)
+        if len(kept) >= _KEPT:
+            break
+    best = normalised(list(kept.values()))
+    return [one for one in best if one.score > -_WORSE_NATS]

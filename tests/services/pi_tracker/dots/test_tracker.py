@@ -1,0 +1,114 @@
+"""Dots keep their names: through crossings, gaps, false patches and jerks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.pi_tracker.dots.chains import finger_landmarks
+from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.tracker import DotTracker
+
+SIZE = (1280, 720)
+NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
+THUMB = np.array([[400.0, 500.0], [490.0, 470.0], [550.0, 440.0], [600.0, 415.0]])
+INDEX = np.array([[480.0, 300.0], [590.0, 260.0], [650.0, 250.0], [700.0, 245.0]])
+REST = np.concatenate([THUMB, INDEX])
+
+
+def _patches(places: np.ndarray) -> list[Patch]:
+    return [Patch(float(x), float(y), 300.0) for x, y in places]
+
+
+def _tracker(names: tuple[str, ...] = NAMES, rest: np.ndarray = REST) -> DotTracker:
+    tracker = DotTracker(names, SIZE, {n: (x, y) for n, (x, y) in zip(names, rest, strict=True)})
+    tracker.step(_patches(rest), 0.0)
+    return tracker
+
+
+def _errors(dots: dict[str, Dot], truth: np.ndarray) -> np.ndarray:
+    return np.array(
+        [
+            np.hypot(dots[n].x_px - x, dots[n].y_px - y)
+            for n, (x, y) in zip(NAMES, truth, strict=True)
+        ]
+    )
+
+
+def test_seeds_name_the_patches_beside_them_whatever_their_order() -> None:
+    seeds = {n: (x + 4.0, y - 3.0) for n, (x, y) in zip(NAMES, REST, strict=True)}
+    tracker = DotTracker(NAMES, SIZE, seeds)
+    order = np.random.default_rng(1).permutation(8)
+    dots = tracker.step(_patches(REST[order]), 0.0)
+    assert list(dots) == list(NAMES)
+    assert _errors(dots, REST).max() == 0.0
+    assert [order[dots[name].patch] for name in NAMES] == list(range(8))
+    assert not tracker.notes
+
+
+def test_a_seed_without_a_dot_is_told_and_waits() -> None:
+    seeds = {n: (x, y) for n, (x, y) in zip(NAMES, REST, strict=True)}
+    tracker = DotTracker(NAMES, SIZE, seeds)
+    dots = tracker.step(_patches(REST[:7]), 0.0)
+    assert dots["index_tip"].state == "carried"
+    assert "no dot at the seed of index tip" in tracker.notes[0]
+    dots = tracker.step(_patches(REST), 1 / 30)
+    assert dots["index_tip"].state == "seen"
+
+
+def test_wrong_names_are_refused() -> None:
+    with pytest.raises(ValueError, match="no landmark"):
+        DotTracker(("index_knuckle",), SIZE, {})
+    with pytest.raises(ValueError, match="none of the dots"):
+        DotTracker(NAMES, SIZE, {"little_tip": (1.0, 2.0)})
+
+
+def test_tips_that_cross_keep_their_names() -> None:
+    tracker = _tracker()
+    for frame in range(1, 41):
+        truth = REST.copy()
+        # The thumb's tip goes up past the index finger's, which goes down: 6 px a frame each.
+        share = frame / 40.0
+        truth[3] += share * np.array([110.0, -170.0])
+        truth[2] += share * np.array([40.0, -70.0])
+        truth[7] += share * np.array([-90.0, 150.0])
+        truth[6] += share * np.array([-30.0, 60.0])
+        apart = np.linalg.norm(truth[3] - truth[7])
+        patches = _patches(truth)
+        if apart < 16.0:
+            patches = _patches(np.delete(truth, [3, 7], axis=0)) + _patches(
+                0.5 * (truth[3:4] + truth[7:8])
+            )
+        dots = tracker.step(patches, frame / 30)
+        assert _errors(dots, truth).max() < 12.0
+
+
+def test_a_hand_that_jerks_by_more_than_its_dots_are_apart_keeps_them() -> None:
+    tracker = _tracker()
+    truth = REST
+    for frame in range(1, 12):
+        if frame == 6:
+            truth = REST + np.array([70.0, -20.0])
+        dots = tracker.step(_patches(truth), frame / 30)
+        assert _errors(dots, truth).max() < 1.0
+
+
+def test_a_lost_dot_is_found_again_and_no_false_patch_is_taken_for_it() -> None:
+    tracker = _tracker()
+    for frame in range(1, 60):
+        truth = REST + np.array([3.0, 1.0]) * min(frame, 40)
+        seen = truth if not 20 <= frame < 35 else np.delete(truth, 5, axis=0)
+        patches = _patches(seen)
+        if 10 <= frame < 50:
+            patches.append(Patch(300.0, 300.0, 280.0))
+        dots = tracker.step(patches, frame / 30)
+        assert _errors(dots, truth).max() < 12.0
+        assert dots["index_intermediate"].state == ("carried" if 20 <= frame < 35 else "seen")
+
+
+def test_no_patches_at_all_is_no_error_and_time_may_stand_still() -> None:
+    tracker = _tracker()
+    dots = tracker.step([], 1 / 30)
+    assert {dot.state for dot in dots.values()} == {"carried"}
+    assert {dot.state for dot in tracker.step(_patches(REST), 1 / 30).values()} == {"seen"}
+    assert DotTracker(NAMES, SIZE, {}).step([], 0.0) == {}
