@@ -35,6 +35,11 @@ _MIN_CORNERS, _MAX_CORNERS = 3, 40
 # Squares of 1 mm are beyond a printer, squares of 2 m beyond a desk: such a number is in
 # millimetres, or a slip.
 _MIN_SQUARE_M, _MAX_SQUARE_M = 0.001, 2.0
+# Squares of boards that are held in a hand. Others are a slip more often than not: a zero more or
+# less, centimetres or millimetres for metres, metres for centimetres.
+_HELD_M, _SLIPS = (0.005, 0.1), (0.1, 10.0, 0.01, 0.001, 100.0)
+# What a held board's squares usually measure.
+_USUAL_M = 0.025
 # Sides of a marker in squares: a smaller one has too few pixels to be decoded, a larger one comes
 # too near the corners.
 _MIN_MARKER, _MAX_MARKER = 0.3, 0.9
@@ -67,7 +72,8 @@ class Board:
         if not _MIN_SQUARE_M <= self.square_m <= _MAX_SQUARE_M:
             raise CalibrationError(
                 f"squares of {self.square_m:g} m cannot be right; give the side of one square in "
-                f"metres, {_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}, e.g. --square 0.025"
+                f"metres, {_MIN_SQUARE_M:g}..{_MAX_SQUARE_M:g}"
+                f"{_meant_text(self.square_m) or ', e.g. --square 0.025'}"
             )
         if not _MIN_MARKER <= self.marker <= _MAX_MARKER:
             raise CalibrationError(
@@ -130,3 +136,43 @@ def parse_corners(text: str) -> tuple[int, int]:
             "e.g. --board 9x6"
         )
     return int(match[1]), int(match[2])
+
+
+def square_doubt(square_m: float) -> str:
+    """What is unusual about squares of that side, as a sentence; empty if nothing is.
+
+    A calibration cannot tell its own scale: with squares ten times too large all figures are as
+    good, and every distance is ten times too long.
+    """
+    if square_m == 1.0 or _HELD_M[0] <= square_m <= _HELD_M[1]:
+        return ""
+    return (
+        f"squares of {length_text(square_m)} are not those of a board that is held in the hand "
+        f"({range_text(_HELD_M)}); --square is in metres{_meant_text(square_m)}"
+    )
+
+
+def square_note(square_m: float) -> str:
+    """What to say of squares of 1: lengths without a unit."""
+    if square_m != 1.0:
+        return ""
+    return "--square 1: every length of the result is in squares, not in metres"
+
+
+def length_text(metres: float) -> str:
+    """A length in the unit in which it is easily read: `2.5 mm`, `250 mm`, `3.3 m`."""
+    return f"{1e3 * metres:.3g} mm" if metres < 1.0 else f"{metres:.3g} m"
+
+
+def range_text(limits_m: tuple[float, float]) -> str:
+    """Two lengths: `5 mm to 100 mm`."""
+    return f"{length_text(limits_m[0])} to {length_text(limits_m[1])}"
+
+
+def _meant_text(square_m: float) -> str:
+    """The side nearest to the usual one of those that slips of units and of a zero make of this."""
+    held = [square_m * factor for factor in _SLIPS if _HELD_M[0] <= square_m * factor <= _HELD_M[1]]
+    if not held:
+        return ""
+    best = min(held, key=lambda side: max(side / _USUAL_M, _USUAL_M / side))
+    return f", so {length_text(best)} would be --square {best:g}"

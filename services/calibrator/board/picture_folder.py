@@ -97,6 +97,27 @@ def one_camera(folder: Path, camera: str) -> PictureSet:
     return PictureSet({camera: {str(path.relative_to(folder)): path for path in own or paths}})
 
 
+def mixed_cameras(folder: Path, camera: str) -> str:
+    """A sentence if a folder's names are those of several cameras, none of them this one; or empty.
+
+    Raises CalibrationError if there are no pictures.
+    """
+    paths = _pictures(folder)
+    reading = read_names(paths, folder)
+    if reading is None or any(camera in name_parts(path.relative_to(folder)) for path in paths):
+        return ""
+    # Numbers alone are a date, or those of a series, unless they are a camera's.
+    if reading.numbered and not all(name.lower().startswith("cam") for name in reading.files):
+        return ""
+    counts = [f"{len(pictures)} of {name!r}" for name, pictures in reading.files.items()]
+    return (
+        f"{folder}: by their names these are pictures of {len(counts)} cameras "
+        f"({', '.join(counts)}), and none is named after {camera!r}; a lens is calibrated from "
+        f"the pictures of one camera: give its name ({', '.join(reading.files)}), or a folder of "
+        "its own"
+    )
+
+
 def picture_of(folder: Path, camera: str) -> Path | None:
     """The first picture that is named after the camera (`left.png`, `desk_left.jpg`), or None.
 

@@ -27,9 +27,10 @@ from services.calibrator.bundle.lens_model import rays_from_pixels
 from services.calibrator.bundle.residuals import View, rms, rms_by_board
 from services.calibrator.bundle.views import single_view
 from services.calibrator.lens.checks import check_fit, check_lens
-from services.calibrator.lens.fit import fit_pictures, fit_poses
+from services.calibrator.lens.fit import fit_poses
 from services.calibrator.lens.model_selection import LensModel, choose_model, only_free
 from services.calibrator.lens.result import LensFit, LensResult, PictureError
+from services.calibrator.lens.screening import fit_pictures
 
 
 def calibrate_lens(camera: str, detections: dict[str, Detection], board: Board) -> LensResult:

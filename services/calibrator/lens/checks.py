@@ -46,10 +46,14 @@ def check_count(camera: str, count: int, left_out: list[LeftOut] | None = None) 
     """Raise CalibrationError if a camera has too few pictures of the board."""
     if count >= MIN_VIEWS:
         return
+    usable = f"only {count} usable picture{'s' if count > 1 else ''} of the board"
     reason = (
-        f"camera {camera!r}: only {count} usable pictures of the board, at least {MIN_VIEWS} are "
-        "needed (12 to 20 are good)"
+        f"camera {camera!r}: {usable if count else 'no picture shows the board as a whole'}, at "
+        f"least {MIN_VIEWS} are needed (12 to 20 are good)"
     )
+    if not count:
+        reason += ". Is --board its number of inner corners (one less than the squares each way)?"
+        raise CalibrationError(f"{reason} {_HOW_TO}")
     if left_out:
         named = (f"{item.key} ({item.reason})" for item in left_out[:_NAMED])
         reason += "; left out: " + "; ".join(named)

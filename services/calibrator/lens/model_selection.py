@@ -44,9 +44,9 @@ LENS_MODELS = (
     _model("k1 k2 p1 p2", K1, K2, P1, P2),
     _model("k1 k2 p1 p2 k3", K1, K2, P1, P2, K3),
 )
-# The model to begin with, before any choice, and to screen pictures with: the richest there is. A
-# poorer one takes good pictures at the edge of the image for bad ones. Of 50 synthetic pictures of
-# each of five lenses with strong k3, k1 k2 p1 p2 left out 2 to 11, this one none.
+# The model to begin with, before any choice, and to screen pictures with: the richest there is, as
+# a poorer one takes good pictures at the edge of the image for bad ones. Of 50 synthetic pictures
+# of each of two lenses with k3, k1 k2 p1 p2 left out 2 to 11, this one none (of five lenses).
 USUAL_MODEL = LENS_MODELS[4]
 
 

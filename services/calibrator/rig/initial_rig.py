@@ -16,7 +16,7 @@ from services.calibrator.bundle.initial_guess import guess_board_pose
 from services.calibrator.bundle.residuals import POSE_SIZE, State, View, rms, view_residuals
 from services.calibrator.bundle.views import views_of_board
 from services.calibrator.lens.checks import check_fit
-from services.calibrator.lens.fit import fit_pictures
+from services.calibrator.lens.screening import fit_pictures
 from services.calibrator.rig.extrinsics import Cameras, find_extrinsics
 from services.calibrator.rig.result import RigFit
 

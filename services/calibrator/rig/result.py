@@ -13,8 +13,10 @@ from services.calibrator.board.board_views import LeftOut
 from services.calibrator.board.coverage import Coverage, coverage
 from services.calibrator.bundle.adjust import Adjustment
 from services.calibrator.bundle.cross_validation import held_out_rms
+from services.calibrator.bundle.lens_model import FX
 from services.calibrator.bundle.residuals import State, View, rms, rms_by_board
 from services.calibrator.lens.result import LensEstimate
+from services.calibrator.rig.doubts import rig_doubts
 from services.calibrator.rig.held_out_error import HeldOutError
 
 
@@ -87,6 +89,16 @@ class RigResult:
             self.lens_sigma[camera],
             self.coverage[camera],
         )
+
+    def doubts(self) -> list[str]:
+        """What is so unusual about the places of cameras and boards that somebody must be asked."""
+        distances = [each.held_out.distance_m for each in self.positions if each.held_out]
+        baselines = {
+            name: float(np.linalg.norm(T[:3, 3]))
+            for name, T in zip(self.cameras[1:], self.state.T_camera_from_rig[1:], strict=True)
+        }
+        focal_px = float(self.state.lenses[0, FX])
+        return rig_doubts(self.board.square_m, baselines, float(np.median(distances)), focal_px)
 
 
 class _SquareRatios(NamedTuple):

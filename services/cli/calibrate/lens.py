@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from services.cli.calibrate import options
+from services.cli.calibrate.doubts import settle
 from services.cli.option_groups import grouped
 
 
@@ -27,7 +28,8 @@ def lens(
     """Find a camera's focal length, centre and distortion from pictures of a board."""
     # Not above: OpenCV takes longer to import than other commands take to run.
     from rhot.files.calibration import save
-    from services.calibrator.board.picture_folder import one_camera
+    from services.calibrator.board.board_views import size_doubt
+    from services.calibrator.board.picture_folder import mixed_cameras, one_camera
     from services.calibrator.lens.calibrate import calibrate_lens
     from services.calibrator.output.calibration_files import lens_file
     from services.calibrator.output.report import lens_text
@@ -39,8 +41,10 @@ def lens(
 
         cameras = LiveCameras(rig, [name], folder, source.connect)
         known = collect(cameras, known, shown.square_m, source.count)
+    settle([mixed_cameras(folder, name)], yes=shown.yes)
     pictures = one_camera(folder, name)
     known, found, blind = options.detect_all(pictures, known, shown.square_m, source.progress)
+    settle([size_doubt(name, found[name])], yes=shown.yes)
     result = calibrate_lens(name, found[name], known)
     result = replace(result, left_out=(*blind, *result.left_out))
     made = lens_file(result, known, options.now_text(), str(folder))

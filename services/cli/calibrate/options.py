@@ -13,6 +13,7 @@ import typer
 
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig, load_rig
+from services.cli.calibrate.doubts import settle
 from services.cli.options import ConnectOption, ProgressOption
 from services.cli.progress import Progress
 
@@ -67,6 +68,10 @@ CountOption = Annotated[
         "--count", min=5, max=200, help="with --live: how many positions of the board to collect"
     ),
 ]
+YesOption = Annotated[
+    bool,
+    typer.Option("--yes", help="what looks like a slip (sizes, folders) is really so"),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 
@@ -79,6 +84,7 @@ class BoardOptions:
     kind: KindOption = Kind.CHESSBOARD
     marker: MarkerOption = 0.7
     dictionary: DictionaryOption = "DICT_4X4_50"
+    yes: YesOption = False
 
     @property
     def square_m(self) -> float:
@@ -87,9 +93,12 @@ class BoardOptions:
 
     @property
     def note(self) -> str:
-        """What to say if the size of the squares was assumed; empty if it was given."""
+        """What to say if the size of the squares was assumed, or has no unit; else empty."""
+        from services.calibrator.board.board import square_note
+
         if self.square is not None:
-            return ""
+            text = square_note(self.square)
+            return f"note: {text}" if text else ""
         return (
             f"note: squares of {1e3 * _SQUARE_M:g} mm were assumed; measure yours and give "
             "--square: every distance scales with it"
@@ -99,9 +108,9 @@ class BoardOptions:
         """The board that the options describe; None if its corners are to be counted in the
         pictures.
 
-        Raises CalibrationError for an impossible one.
+        Raises CalibrationError for an impossible one, and for one that looks like a slip.
         """
-        from services.calibrator.board.board import Board, parse_corners
+        from services.calibrator.board.board import Board, parse_corners, square_doubt
 
         if self.board is None:
             if self.kind is Kind.CHARUCO:
@@ -111,10 +120,13 @@ class BoardOptions:
                 )
             # Checks the square before minutes of detection.
             Board(9, 6, self.square_m)
+            settle([square_doubt(self.square_m)], yes=self.yes)
             return None
         cols, rows = parse_corners(self.board)
         square_m = _SQUARE_M if self.square is None else self.square
-        return Board(cols, rows, square_m, self.kind.value, self.dictionary, self.marker)
+        board = Board(cols, rows, square_m, self.kind.value, self.dictionary, self.marker)
+        settle([square_doubt(square_m)], yes=self.yes)
+        return board
 
 
 @dataclass(frozen=True)

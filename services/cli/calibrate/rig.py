@@ -15,6 +15,7 @@ from rhot.errors import CalibrationError
 from rhot.files.calibration import load_cameras, load_lens, save
 from rhot.files.config import RigConfig, load_rig
 from services.cli.calibrate import options
+from services.cli.calibrate.doubts import settle
 from services.cli.option_groups import grouped
 from services.cli.options import ConnectOption
 
@@ -69,6 +70,7 @@ def stereo(
     known, found, blind = options.detect_all(pictures, known, shown.square_m, source.progress)
     result = calibrate_rig(found, known, lens_vectors(kept, found) if kept else None)
     result = replace(result, left_out=(*blind, *result.left_out))
+    settle(result.doubts(), yes=shown.yes)
     _write(result, target, folder, as_json=source.as_json)
     if shown.note:
         typer.echo(shown.note, err=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
-from services.calibrator.board.board import Board, parse_corners
+from services.calibrator.board.board import Board, parse_corners, square_doubt, square_note
 
 
 def test_points_run_along_rows_in_metres():
@@ -52,3 +52,22 @@ def test_other_texts_are_refused_with_an_example(text):
 def test_impossible_boards_are_refused_with_what_is_possible(arguments, reason):
     with pytest.raises(CalibrationError, match=reason):
         Board(**arguments)
+
+
+@pytest.mark.parametrize("square_m", [0.005, 0.02501, 0.1])
+def test_squares_that_people_hold_are_no_doubt(square_m):
+    assert square_doubt(square_m) == ""
+    assert square_note(square_m) == ""
+
+
+@pytest.mark.parametrize(
+    ("square_m", "meant"),
+    [(0.25, "0.025"), (0.0025, "0.025"), (2.4, "0.024"), (25.0, "0.025"), (0.3, "0.03")],
+)
+def test_a_slip_of_the_square_is_told_with_what_may_be_meant(square_m, meant):
+    assert f"would be --square {meant}" in square_doubt(square_m)
+
+
+def test_squares_of_one_have_no_unit():
+    assert square_doubt(1.0) == ""
+    assert "in squares" in square_note(1.0)
