@@ -1,0 +1,250 @@
+"""`rhot grasp measure VIDEO|FRAMES --out DIR`: a finger's joint angles, lengths and path, picture
+by picture, from dots on its joints.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from rhot.errors import CaptureError, writing
+from services.cli.option_groups import grouped
+from services.cli.options import ProgressOption
+
+if TYPE_CHECKING:
+    from rhot.files.calibration import ColorRange
+    from studies.grasp.measure.joints import Finger, Seen
+    from studies.grasp.measure.pictures import Pictures
+    from studies.grasp.measure.recordings import Finding, Line, Wanted
+    from studies.grasp.measure.seeds import Seeds
+
+_GRID = "first-frame.png"
+
+
+@dataclass(frozen=True)
+class SeedOptions:
+    """Where the joints are in the first picture."""
+
+    seed: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=X,Y",
+            help="a joint's pixel in the first picture, as index_pip=512,300; once for each joint "
+            "(index_mcp, index_pip, index_dip, index_tip, thumb_cmc, thumb_mp, thumb_ip, "
+            "thumb_tip; of the base line index_wrist)",
+        ),
+    ] = None
+    seeds: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help='{"index_tip": [512, 300], ...}')
+    ] = None
+    base: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X1,Y1,X2,Y2",
+            help="base line of the MCP angle, two pixels towards the finger, at rest in the "
+            "picture; default: b1 to b2, else wrist to knuckle, else thumb_cmc to index_mcp",
+        ),
+    ] = None
+    flexion: Annotated[
+        Literal["auto", "clockwise", "counterclockwise"],
+        typer.Option(help="which way the finger closes on the screen; auto: as it bends most"),
+    ] = "auto"
+
+
+@dataclass(frozen=True)
+class LookOptions:
+    """How joints are found."""
+
+    hsv: Annotated[
+        str | None,
+        typer.Option(
+            metavar="H,S,V-H,S,V", help="range of the dots' colour; default: found at the seeds"
+        ),
+    ] = None
+    color: Annotated[
+        str | None, typer.Option(help="the dots' colour by its name in the file of --colors")
+    ] = None
+    colors: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.colors.json", help="written by `rhot calibrate colors`"),
+    ] = None
+
+
+@dataclass(frozen=True)
+class ScaleOptions:
+    """What makes pixels millimetres, and seconds."""
+
+    lens: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.lens.json", help="lens calibration: pictures are corrected"),
+    ] = None
+    length: Annotated[
+        list[str] | None,
+        typer.Option(metavar="BONE_mm=MM", help="a known length, as index_proximal_mm=43.6"),
+    ] = None
+    scale_mm_per_px: Annotated[
+        float | None, typer.Option("--scale-mm-per-px", help="millimetres a pixel")
+    ] = None
+    fps: Annotated[
+        float | None,
+        typer.Option(min=0.1, max=10_000, help="frame rate, instead of the video's own times"),
+    ] = None
+
+
+@grouped
+def measure(
+    video: Annotated[Path, typer.Argument(metavar="VIDEO | FRAMES", help="file, or folder")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder for the results")],
+    at: SeedOptions,
+    look: LookOptions,
+    scaled: ScaleOptions,
+    subject: Annotated[str | None, typer.Option(help="who; default: the video's name")] = None,
+    overlay: Annotated[
+        bool, typer.Option("--overlay/--no-overlay", help="a video of what was measured")
+    ] = True,
+    progress: ProgressOption = None,
+) -> None:
+    """Measure a finger's joint angles in a video: one JSON and one CSV for each finger."""
+    # Not above: OpenCV takes longer to import than other commands take to run.
+    from rhot.files.calibration import Lens, load
+    from services.cli.progress import Progress
+    from studies.grasp.measure.pictures import Pictures
+    from studies.grasp.measure.recordings import recordings
+    from studies.grasp.measure.run import see
+    from studies.grasp.measure.seeds import missing_notes
+
+    lens = load(scaled.lens, Lens, "rhot calibrate lens") if scaled.lens else None
+    pictures = Pictures(video, scaled.fps, lens)
+    color = _color(look)
+    wanted = _wanted(video, subject, at, scaled, pictures)
+    seeds = _seeds(at)
+    if not seeds:
+        raise _seeds_wanted(pictures, out)
+    line = Progress("measuring", 0, progress)
+    seen = see(pictures, seeds, "dots", color, line.advance)
+    line.end()
+    notes = missing_notes(seeds, has_base=wanted.base is not None)
+    notes[""] = pictures.notes()
+    findings = recordings(seen, list(seeds), wanted, "dots", notes)
+    _write(out, findings, seen)
+    if overlay:
+        drawing = Progress("drawing", len(seen), progress)
+        _draw(out, pictures, seen, findings, wanted, drawing)
+        drawing.end()
+    for finger, finding in findings.items():
+        typer.echo(_summary(finger, finding))
+    typer.echo(f"written: {out}")
+
+
+def _color(look: LookOptions) -> ColorRange | None:
+    from rhot.files.calibration import Colors, load
+    from studies.grasp.measure.dots.color import parse_range
+
+    if look.hsv is not None:
+        return parse_range(look.hsv)
+    if (look.color is None) != (look.colors is None):
+        raise CaptureError("--color NAME and --colors FILE.colors.json belong together")
+    if look.color is None or look.colors is None:
+        return None
+    known = load(look.colors, Colors, "rhot calibrate colors").colors
+    if look.color not in known:
+        valid = ", ".join(sorted(known)) or "none"
+        raise CaptureError(f"--color {look.color}: not in {look.colors}, which has {valid}")
+    return known[look.color]
+
+
+def _seeds(at: SeedOptions) -> Seeds:
+    from studies.grasp.measure.seeds import decode_seeds, parse_seeds
+
+    seeds: Seeds = {}
+    if at.seeds is not None:
+        try:
+            seeds = decode_seeds(at.seeds.read_bytes(), str(at.seeds))
+        except OSError as error:
+            raise CaptureError(f"{at.seeds}: cannot be read: {error.strerror}") from None
+    return {**seeds, **parse_seeds(at.seed or [])}
+
+
+def _seeds_wanted(pictures: Pictures, out: Path) -> CaptureError:
+    """The error of a command without seeds, after showing the first picture with a grid."""
+    import cv2
+
+    from services.pi_tracker.image.yuv_planes import bgr_image
+    from studies.grasp.measure.draw import with_grid
+
+    camera = type(pictures)(pictures.path, pictures.fps)
+    image = with_grid(bgr_image(camera.first()))
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / _GRID
+    if not cv2.imwrite(str(path), image):
+        return CaptureError(f"no seeds, and {path} cannot be written")
+    return CaptureError(
+        f"no seeds: say where each joint is in the first picture. {path} shows it with a grid of "
+        "pixels; then --seed index_mcp=410,352 --seed index_pip=512,300 ..."
+    )
+
+
+def _wanted(
+    video: Path, subject: str | None, at: SeedOptions, scaled: ScaleOptions, pictures: Pictures
+) -> Wanted:
+    from studies.grasp.measure.pictures import corrected_seeds
+    from studies.grasp.measure.recordings import Wanted
+    from studies.grasp.measure.scale import parse_lengths
+    from studies.grasp.measure.seeds import parse_line
+
+    base: Line | None = None
+    if at.base is not None:
+        ends = parse_line(at.base)
+        start, end = corrected_seeds(ends, pictures.lens).values()
+        base = (*start, *end)
+    return Wanted(
+        subject=subject or video.stem,
+        source=video.name,
+        base=base,
+        flexion=at.flexion,
+        mm_per_px=scaled.scale_mm_per_px,
+        lengths_mm=parse_lengths(scaled.length or []),
+    )
+
+
+def _write(out: Path, findings: dict[Finger, Finding], seen: list[Seen]) -> None:
+    from studies.grasp.measure.table import table
+    from studies.grasp.recording import save_recording
+
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+        for finger, finding in findings.items():
+            save_recording(out / f"{finger}.json", finding.recording)
+            (out / f"{finger}.csv").write_text(table(finding, seen))
+
+
+def _draw(
+    out: Path,
+    pictures: Pictures,
+    seen: list[Seen],
+    findings: dict[Finger, Finding],
+    wanted: Wanted,
+    line: object,
+) -> None:
+    from services.cli.video_writer import SUFFIX, VideoWriter, rate_of
+    from services.pi_tracker.image.yuv_planes import bgr_image
+    from studies.grasp.measure.draw import drawn
+    from studies.grasp.measure.recordings import with_base
+
+    size_px = pictures.first().size_px
+    fps = rate_of([one.time_s for one in seen])
+    with closing(VideoWriter(out / f"overlay{SUFFIX}", fps, size_px)) as video:
+        for number, frame in enumerate(pictures.frames()):
+            place = with_base(seen[number], wanted.base)
+            video.write(drawn(bgr_image(frame), place, findings, number))
+            line.advance()  # type: ignore[attr-defined]
+
+
+def _summary(finger: Finger, finding: Finding) -> str:
+    from studies.grasp.measure.summary import summary
+
+    return f"{finger}:\n{summary(finding)}"
