@@ -1,0 +1,1 @@
+"""Figures, tables and pages of a grasp study. Needs the extra `study` (matplotlib)."""
