@@ -1,12 +1,16 @@
 """`rhot warm`: compile every numba kernel into its cache, before the first start of a service.
 
 Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or
-~/.cache/rhot (rhot.process.numba_cache); running it again costs a second.
+~/.cache/rhot (rhot.process.numba_cache); running it again costs seconds. A compiler uses one core:
+services share no kernels, and each has a process of its own.
 """
 
 from __future__ import annotations
 
+import os
 import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +18,8 @@ import typer
 
 import services
 from rhot.files.calibration import load_hand, load_rig_cameras
-from rhot.files.config import load_rig
+from rhot.files.config import RigConfig, load_rig
+from rhot.hand import HandModel, HandName
 from rhot.process.numba_cache import adopt, clear_old
 from services.cli.defaults import sim_toml
 
@@ -27,23 +32,47 @@ def warm(
     """Compile all kernels once, ahead of the first start."""
     package = Path(services.__file__).parent
     adopt(package)
-    # Only here: `rhot --help` must not wait for numba.
-    from services.fusion.warm import warm_up as warm_fusion
-    from services.simulator.camera.frame_source import FrameSource
-    from services.simulator.scene.scene import load_scene
-    from services.solver.warm import warm_up as warm_solver
-
     started_s = time.monotonic()
-    rig = load_rig(config or sim_toml())
-    hands = {
-        name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()
-    }
-    names = [camera.name for camera in rig.camera]
-    warm_solver(rig, hands)
-    warm_fusion(rig, load_rig_cameras(rig), hands)
+    path = config or sim_toml()
+    rig = load_rig(path)
+    # Those that take longest begin.
+    parts = ["fusion", "solver"]
     if any(camera.source == "simulator" for camera in rig.camera):
-        scene = load_scene(rig)
-        for name in names:
-            FrameSource(scene, name).take(0)
+        parts.insert(1, "simulator")
+    # Processes, as numba compiles in one thread at a time; spawned, as its locks do not survive a
+    # fork.
+    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        jobs = {pool.submit(_warm, part, path): part for part in parts}
+        for job in as_completed(jobs):
+            typer.echo(f"{jobs[job]}: ready after {job.result():.1f} s")
     clear_old(package)
     typer.echo(f"kernels compiled in {time.monotonic() - started_s:.1f} s")
+
+
+def _warm(part: str, config: Path) -> float:
+    """Compile the kernels of a service, in a process of its own; the seconds it took."""
+    started_s = time.monotonic()
+    rig = load_rig(config)
+    # Only here: `rhot --help` must not wait for numba.
+    if part == "simulator":
+        from services.simulator.camera.frame_source import FrameSource
+        from services.simulator.scene.scene import load_scene
+
+        scene = load_scene(rig)
+        for camera in rig.camera:
+            FrameSource(scene, camera.name).take(0)
+    elif part == "solver":
+        from services.solver.warm import warm_up as warm_solver
+
+        warm_solver(rig, _hands(rig))
+    else:
+        from services.fusion.warm import warm_up as warm_fusion
+
+        warm_fusion(rig, load_rig_cameras(rig), _hands(rig))
+    return time.monotonic() - started_s
+
+
+def _hands(rig: RigConfig) -> dict[HandName, HandModel]:
+    return {
+        name: load_hand(rig.calibration_dir, name, table.scale) for name, table in rig.hand.items()
+    }
