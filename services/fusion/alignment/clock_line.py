@@ -16,11 +16,12 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from services.fusion.alignment.offset_search import HeightTrack
-from services.fusion.alignment.recorded_rows import INSTANTS_HZ, Rows, rows_of, take
+from services.fusion.alignment.recorded_rows import INSTANTS_HZ, ROWS_HZ, Rows, rows_of, take
 from services.fusion.monitors.shift_regression import Heights, Shift, fit_shift
 
-# Rounds of looking again from where the last one led: the regression is linear in the shift.
-_ROUNDS = 4
+# Rounds of looking again from where the last one led (the regression is linear in the shift), and
+# the share of its sigma by which a settled one moves.
+_ROUNDS, _SETTLED = 4, 0.02
 # A window, s, and how many at most.
 _WINDOW_S, _WINDOWS = 5.0, 120
 # Clocks of cameras differ by so much (one sigma): what little a short recording tells of a drift is
@@ -32,8 +33,9 @@ _STRAY_S = 0.04
 _CONSTANT = 4e-3
 # Windows beyond so many sigmas of the line have no weight.
 _TUKEY = 4.7
-# What a centre's own errors and stamps of a microsecond or so leave, s.
-_SIGMA_FLOOR_S = 2e-5
+# What a centre's own errors and stamps of a microsecond or so leave, s; and what errors that last
+# for longer than a regression looks back add to its sigmas (1 px of them, tuning motions: 1.46).
+_SIGMA_FLOOR_S, _LASTING = 2e-5, 1.4
 
 
 T = TypeVar("T", float, Array)
@@ -72,10 +74,13 @@ class LineFit(NamedTuple):
         return math.hypot(self.offset_sigma_s, self.drift_sigma * (first_s - self.line.at_s))
 
 
-def rows_along(pairs: list[tuple[HeightTrack, HeightTrack]], line: ClockLine) -> Rows | None:
+def rows_along(
+    pairs: list[tuple[HeightTrack, HeightTrack]], line: ClockLine, rows_hz: float = ROWS_HZ
+) -> Rows | None:
     """Height differences with the second clock put right by a line."""
     return rows_of(
-        [(one, other._replace(times_s=line.first_s(other.times_s))) for one, other in pairs]
+        [(one, other._replace(times_s=line.first_s(other.times_s))) for one, other in pairs],
+        rows_hz,
     )
 
 
@@ -94,7 +99,10 @@ def fit_line(pairs: list[tuple[HeightTrack, HeightTrack]], near: ClockLine) -> L
         if not shifts:
             return None
         fit = _through(shifts, np.array(at_s), line)
+        moved_s = abs(fit.line.late_s(fit.line.at_s) - line.late_s(fit.line.at_s))
         line = fit.line
+        if moved_s < _SETTLED * fit.offset_sigma_s:
+            break
         if abs(line.late_s(near.at_s) - near.offset_s) > _STRAY_S:
             return None
     return fit
@@ -121,7 +129,7 @@ def _window_shifts(rows: Heights, begin_s: float) -> tuple[list[Shift], list[flo
 def _through(shifts: list[Shift], at_s: Array, line: ClockLine) -> LineFit:
     """The line with the shifts that are left about it."""
     values = np.array([shift.shift_s for shift in shifts])
-    sigmas = np.sqrt([shift.variance for shift in shifts])
+    sigmas = _LASTING * np.sqrt([shift.variance for shift in shifts])
     robust, scale = np.ones(len(values)), 1.0
     middle = offset = drift = information = spread = 0.0
     for _ in range(_ROUNDS):

@@ -17,30 +17,38 @@ from services.fusion.arrays import Ints
 from services.fusion.monitors.shift_regression import Heights
 
 # Samples a second of each camera that become rows, and instants a second that they are counted in.
-_ROWS_HZ, INSTANTS_HZ = 30.0, 10.0
+ROWS_HZ, INSTANTS_HZ = 30.0, 10.0
 # What a cubic misses, as a multiple of its distance from a quintic.
 _MISSED = 8.0
 # Least noise of a height (.05 px at 500 px of focal length).
 _NOISE = 1e-4
 # Neighbours of a sample whose distances differ by more than this share do not give its speed.
 _UNEVEN = 0.1
+# A spike differs by so many median deviations of its neighbours and so much more (6 px at 500 px
+# of focal length): sharp turns of fast hands at 30 fps stay below half of that.
+_SPIKE_SPREADS, _SPIKE = 4.0, 0.012
 
 
 class Rows(NamedTuple):
-    """n height differences; own: the height itself (n,), about its landmark's median."""
+    """n height differences; own: the height itself (n,), about its landmark's median.
+
+    missed: what interpolation misses in the middle between two samples (n,), wherever the row lies.
+    """
 
     heights: Heights
     own: Array
+    missed: Array
 
 
-def rows_of(pairs: list[tuple[HeightTrack, HeightTrack]]) -> Rows | None:
+def rows_of(pairs: list[tuple[HeightTrack, HeightTrack]], rows_hz: float = ROWS_HZ) -> Rows | None:
     """The rows of each landmark's two tracks, by one clock; None without any."""
     begin_s = min(float(track.times_s[0]) for pair in pairs for track in pair)
     tables = []
     for row, (one, other) in enumerate(pairs):
         for sampled, there, sign in ((one, other, 1.0), (other, one, -1.0)):
-            tables.append(_table(sampled, there, sign, begin_s, row))
-    instants, landmarks, heights, speeds, spans, missed, own = np.concatenate(tables, axis=1)
+            tables.append(_table(sampled, there, sign, begin_s, row, rows_hz))
+    table = np.concatenate(tables, axis=1)
+    instants, landmarks, heights, speeds, spans, missed, own, between = table
     if not len(instants):
         return None
     rows = landmarks.astype(np.int64)
@@ -48,7 +56,23 @@ def rows_of(pairs: list[tuple[HeightTrack, HeightTrack]]) -> Rows | None:
     order = np.argsort(instants, kind="stable")
     zeros, ones = np.zeros(len(order)), np.ones(len(order))
     found = Heights(instants.astype(np.int64), rows, heights, zeros, speeds, spans, variances, ones)
-    return Rows(take(found, order), own[order])
+    return Rows(take(found, order), own[order], _MISSED * between[order])
+
+
+def without_spikes(track: HeightTrack) -> HeightTrack:
+    """A track without the samples that are something else for a frame or two.
+
+    They differ from the median of five by far more than the others do: a marker that turns sharply
+    takes its neighbours along.
+    """
+    heights = track.heights
+    if len(heights) < 5:
+        return track
+    five = np.lib.stride_tricks.sliding_window_view(np.pad(heights, 2, mode="edge"), 5)
+    middle = np.median(five, axis=1)
+    spread = np.median(np.abs(five - middle[:, None]), axis=1)
+    kept = np.abs(heights - middle) <= _SPIKE_SPREADS * spread + _SPIKE
+    return HeightTrack(track.times_s[kept], heights[kept])
 
 
 def take(rows: Heights, which: slice | Ints) -> Heights:
@@ -57,17 +81,22 @@ def take(rows: Heights, which: slice | Ints) -> Heights:
 
 
 def _table(
-    sampled: HeightTrack, there: HeightTrack, sign: float, begin_s: float, row: int
+    sampled: HeightTrack, there: HeightTrack, sign: float, begin_s: float, row: int, rows_hz: float
 ) -> Array:
-    """Columns of rows_of (7, n) at one camera's samples."""
+    """Columns of rows_of (8, n) at one camera's samples."""
     times, heights = sampled.times_s, sampled.heights
-    every = max(1, round(1.0 / (_ROWS_HZ * float(np.median(np.diff(times))))))
+    every = max(1, round(1.0 / (rows_hz * float(np.median(np.diff(times))))))
     k = np.arange(1, len(times) - 1, every)
     span = times[k + 1] - times[k - 1]
     even = np.abs(times[k + 1] + times[k - 1] - 2.0 * times[k]) <= _UNEVEN * span
     cubic, inside = interpolated(there, times[k])
     quintic, further = interpolated(there, times[k], 6)
     kept = even & inside & further
+    after = np.clip(
+        np.searchsorted(there.times_s, times[k], side="right"), 1, len(there.times_s) - 1
+    )
+    middle_s = 0.5 * (there.times_s[after - 1] + there.times_s[after])
+    between = interpolated(there, middle_s, 6)[0] - interpolated(there, middle_s)[0]
     columns = [
         np.round((times[k] - begin_s) * INSTANTS_HZ),
         np.full(len(k), row),
@@ -76,6 +105,7 @@ def _table(
         span,
         quintic - cubic,
         heights[k] - np.median(heights),
+        np.abs(between),
     ]
     return np.stack(columns)[:, kept]
 

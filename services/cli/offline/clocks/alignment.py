@@ -158,7 +158,7 @@ class Clocks:
             verdict, used = "by hand", ClockLine(by_hand, 0.0, 0.0)
             self._lines[name] = (used, None)
         elif found.decided and (unknown or (beyond and tune)):
-            verdict, used = "aligned", line
+            verdict, used = "aligned" if unknown else "corrected", line
             self._lines[name] = self._through(against, found.fit)
         elif found.decided and beyond:
             verdict = "contradicted"

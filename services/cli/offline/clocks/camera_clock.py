@@ -6,10 +6,11 @@ from typing import Literal
 
 import msgspec
 
-# aligned: put right by the markers' motion. by hand: by --offset. as stamped: the markers agree
-# with the stamps, or cannot tell and the stamps are on one clock. contradicted: the markers say
-# otherwise than stamps which are kept all the same. unknown: nothing tells.
-Verdict = Literal["aligned", "by hand", "as stamped", "contradicted", "unknown"]
+# aligned: without a common clock, put right by the markers' motion. by hand: by --offset. as
+# stamped: the markers agree with the stamps, or cannot tell and the stamps are on one clock.
+# corrected: the markers contradict stamps of one clock, and put them right; contradicted: the
+# stamps are kept all the same. unknown: nothing tells.
+Verdict = Literal["aligned", "by hand", "as stamped", "corrected", "contradicted", "unknown"]
 
 
 class CameraClock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -75,6 +76,11 @@ def warnings_of(one: CameraClock) -> list[str]:
             f"offset ({one.why_not}): the recordings are taken to begin together, and points are "
             "off by as much as the hand moves meanwhile; film some seconds of irregular motion "
             f"that both see, or give it by hand: --offset {one.camera}=SECONDS"
+        )
+    if one.verdict == "corrected":
+        told.append(
+            f"{one.camera}: its stamps contradict the markers' motion and are put right: "
+            f"{found_text(one)}; if they are right all the same: --offset {one.camera}=0"
         )
     if one.verdict == "contradicted":
         told.append(
