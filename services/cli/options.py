@@ -16,6 +16,12 @@ ConnectOption = Annotated[
 ProgressOption = Annotated[
     bool | None, typer.Option("--progress/--no-progress", help="default: on a terminal only")
 ]
+ResultArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="DIR | FILE.mcap", help="folder written by `rhot track`, or a recording"
+    ),
+]
 VerboseOption = Annotated[
     bool, typer.Option("--verbose", "-v", help="show everything the services log")
 ]

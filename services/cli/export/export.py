@@ -15,16 +15,13 @@ from services.cli.export.motion_options import (
     TrcOption,
     UpOption,
 )
-from services.cli.options import ProgressOption
+from services.cli.interruption import interruptible
+from services.cli.options import ProgressOption, ResultArgument
+from services.cli.unpacked_capture import folder_beside
 
 
 def export(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            metavar="DIR | FILE.mcap", help="folder written by `rhot track`, or a recording"
-        ),
-    ],
+    recording: ResultArgument,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="folder for the tables; default: DIR, or FILE's name"),
@@ -60,15 +57,16 @@ def export(
         raise CaptureError(f"{recording}: no such folder or file")
     if up not in UPS:
         raise ConfigError(f"--up {up}: valid: {', '.join(UPS)}")
-    folder = out or (recording if recording.is_dir() else recording.with_suffix(""))
+    folder = folder_beside(recording, out)
     motions = [name for name, wanted in zip(FORMATS, (bvh, trc, mot, gltf), strict=True) if wanted]
-    if motions:
-        for path, clip in export_motion(recording, folder, motions, up).items():
-            bridged = f"; {clip.gaps} gaps bridged" if clip.gaps else ""
-            typer.echo(f"{path}: {len(clip.wrist_m)} frames at {clip.rate_hz:g} Hz{bridged}")
     formats = [name for name, wanted in (("csv", csv), ("parquet", parquet)) if wanted]
-    if motions and not formats:
-        return
-    tables = export_tables(recording, folder, formats or ["csv"], only or (), progress)
+    with interruptible("rhot export", folder):
+        if motions:
+            for path, clip in export_motion(recording, folder, motions, up).items():
+                bridged = f"; {clip.gaps} gaps bridged" if clip.gaps else ""
+                typer.echo(f"{path}: {len(clip.wrist_m)} frames at {clip.rate_hz:g} Hz{bridged}")
+        if motions and not formats:
+            return
+        tables = export_tables(recording, folder, formats or ["csv"], only or (), progress)
     for path, rows in tables.items():
         typer.echo(f"{path}: {rows} rows")

@@ -1,4 +1,5 @@
-"""What `rhot track` reads: a capture folder, or CAM=VIDEO pairs with a rig.toml.
+"""What `rhot track` reads: a capture folder, or CAM=VIDEO pairs with a rig.toml; one video alone
+needs the ranges of its colours only.
 
 Stamps come from the capture's csv, from VIDEO's own csv beside it (left.mp4, left.csv), from the
 times in the video's container, or from a frame rate given by hand.
@@ -7,16 +8,18 @@ times in the video's container, or from a frame rate given by hand.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 
-from rhot.errors import CaptureError, ConfigError, RhotError
+from rhot.errors import CalibrationError, CaptureError, ConfigError, RhotError
+from rhot.files.calibration import load_colors
 from rhot.files.capture import CSV_HEADER, Capture, read_stamps
 from rhot.files.config import RigConfig, load_rig
-from rhot.files.rig_tables import CameraTable
+from rhot.files.rig_tables import CameraTable, RigTable
 from services.cli.offline.camera_input import CameraInput, StampedReader
+from services.cli.offline.track_summary import Origin
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader
 from services.pi_tracker.sources.video import VideoReader
@@ -30,13 +33,16 @@ _CSV_SIGMA_NS, _UNKNOWN_SIGMA_NS = 500_000, -1
 class Job:
     """All that one run reads; objects is the capture's objects.jsonl or None.
 
-    markers is the markers.jsonl of a capture without pictures: there are no inputs then.
+    markers is the markers.jsonl of a capture without pictures: there are no inputs then. colors are
+    those to track, if not all. origin is what was asked for.
     """
 
     config: RigConfig
     inputs: list[CameraInput]
     objects: Path | None
     markers: Path | None = None
+    colors: tuple[str, ...] = ()
+    origin: Origin | None = None
 
     @property
     def cameras(self) -> list[str]:
@@ -46,12 +52,56 @@ class Job:
         return [one.camera for one in self.inputs]
 
 
-def job_of(sources: Sequence[str], config: Path | None, rates: Sequence[str] = ()) -> Job:
+def job_of(
+    sources: Sequence[str],
+    config: Path | None,
+    rates: Sequence[str] = (),
+    colors: Sequence[str] = (),
+) -> Job:
     """From the command line's arguments: one CAPTURE, or CAM=VIDEO pairs.
 
-    rates: frame rates of videos by hand, `30` of all or `left=29.97` of one. Raises ConfigError or
-    CaptureError saying what was expected.
+    rates: frame rates of videos by hand, `30` of all or `left=29.97` of one. colors: those to track
+    where no rig.toml says which. Raises RhotError saying what was expected.
     """
+    job = replace(_job(sources, config, rates), origin=origin_of(sources, config, rates))
+    if not colors:
+        return job
+    if job.config.hand or job.markers is not None:
+        raise ConfigError(
+            "--color is for a video without rig.toml; here [hand.right.markers] says which colours"
+            " are tracked"
+        )
+    for camera in job.cameras:
+        _check_colors(job.config, camera, colors)
+    return replace(job, colors=tuple(dict.fromkeys(colors)))
+
+
+def origin_of(sources: Sequence[str], config: Path | None, rates: Sequence[str]) -> Origin:
+    """What was asked for, so that another command in another folder finds it again."""
+    named = [source.partition("=") for source in sources]
+    paths = [
+        f"{name}={Path(path).resolve()}" if path and not Path(source).is_dir() else source
+        for source, (name, _, path) in zip(sources, named, strict=True)
+    ]
+    return Origin(
+        sources=[path if "=" in path else str(Path(path).resolve()) for path in paths],
+        config=str(config.resolve()) if config is not None else "",
+        rates=list(rates),
+    )
+
+
+def _check_colors(config: RigConfig, camera: str, wanted: Sequence[str]) -> None:
+    known = load_colors(config.calibration_dir, camera).colors
+    for name in wanted:
+        if name not in known:
+            raise CalibrationError(
+                f"--color {name}: is not in {config.calibration_dir / camera}.colors.json, which "
+                f"has {', '.join(sorted(known)) or 'none'}; add it with `rhot calibrate colors "
+                f"{camera} --video VIDEO`"
+            )
+
+
+def _job(sources: Sequence[str], config: Path | None, rates: Sequence[str]) -> Job:
     if any("=" in source and not Path(source).is_dir() for source in sources):
         return _videos(sources, config, rates)
     if rates:
@@ -96,12 +146,8 @@ def _capture(capture: Capture, config: Path | None) -> Job:
 
 
 def _videos(sources: Sequence[str], path: Path | None, rates: Sequence[str]) -> Job:
-    if path is None:
-        raise ConfigError(
-            "CAM=VIDEO needs --config rig.toml, whose calibration/CAM.colors.json has the colours"
-        )
-    config = load_rig(path)
     pairs = [_pair(source) for source in sources]
+    config = _rig_of_one_video(pairs) if path is None else load_rig(path)
     names = [name for name, _ in pairs]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -115,6 +161,24 @@ def _videos(sources: Sequence[str], path: Path | None, rates: Sequence[str]) -> 
     by_hand = _rates(rates, order)
     inputs = [_video_input(tables[name], videos[name], by_hand.get(name)) for name in order]
     return Job(config, inputs, None)
+
+
+def _rig_of_one_video(pairs: Sequence[tuple[str, Path]]) -> RigConfig:
+    """What stands for a rig.toml: its calibration is that of the current folder."""
+    name, video = pairs[0]
+    if len(pairs) > 1:
+        raise ConfigError(
+            f"{len(pairs)} videos need --config rig.toml, which says which colour is on which "
+            "landmark; one video alone needs its colours only"
+        )
+    config = RigConfig(rig=RigTable(name="video"))
+    colors = config.calibration_dir / f"{name}.colors.json"
+    if not colors.is_file():
+        raise CalibrationError(
+            f"{colors}: no such file, and no --config rig.toml; make it with `rhot calibrate colors"
+            f" {name} --video {video} --auto --out {config.calibration_dir}`"
+        )
+    return config
 
 
 def _rates(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, float]:

@@ -113,11 +113,12 @@ def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | N
     Raises CalibrationError, naming the command that helps, if hands are configured, two cameras are
     there and one is uncalibrated.
     """
+    if len(names) < 2:
+        note = f"3D needs two cameras, this is {names[0]!r} alone; `rhot export` writes the markers"
+        return None, f"markers only: {note}"
     if not config.hand:
         note = "rig.toml has no [hand.right.markers] table that says which colour is which landmark"
         return None, f"markers only: {note}"
-    if len(names) < 2:
-        return None, f"markers only: 3D needs two cameras, this is {names[0]!r} alone"
     return load_rig_cameras(config, names), ""
 
 

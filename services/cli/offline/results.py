@@ -1,10 +1,10 @@
 """The folder `rhot track` writes: .jsonl files in wire format, clocks.json of two cameras or more,
 and summary.json last of all.
 
-Each file is written as NAME.partial and gets its name when all are complete. A run that fails
-removes its .partial files and leaves what was there before; one that is interrupted leaves them,
-and readers refuse such a folder. A folder that holds anything else is refused too, so that nobody's
-files are lost.
+Each file is written as NAME.partial and gets its name when all are complete. A run that fails or
+is interrupted removes its .partial files and leaves what was there before; one that is killed, or a
+bug, leaves them, and readers refuse such a folder until the next run replaces it. A folder that
+holds anything else is refused too, so that nobody's files are lost.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ M = TypeVar("M", bound=msgspec.Struct)
 STREAMS = ("markers", "points", "poses", "objects", "contacts")
 SUMMARY, CLOCKS = "summary.json", "clocks.json"
 PARTIAL = ".partial"
+_OWN = {f"{name}.jsonl" for name in STREAMS} | {SUMMARY, CLOCKS}
 # What `rhot plot` and `rhot export` write beside them: a second run may overwrite a folder that
 # holds pictures and tables of the first.
-ADDED = (".png", ".csv", ".parquet")
+ADDED = (".png", ".csv", ".parquet", ".bvh", ".trc", ".mot", ".glb", ".webm")
 
 
 class ResultWriter:
@@ -44,9 +45,14 @@ class ResultWriter:
         _prepare(folder)
 
     def __enter__(self) -> Self:
-        for name in STREAMS:
-            path = self.folder / f"{name}.jsonl{PARTIAL}"
-            self._files[name] = self._stack.enter_context(path.open("wb"))
+        try:
+            for name in STREAMS:
+                path = self.folder / f"{name}.jsonl{PARTIAL}"
+                self._files[name] = self._stack.enter_context(path.open("wb"))
+        except BaseException as error:
+            # Whoever is not let in is not shown out.
+            self.__exit__(type(error), error, error.__traceback__)
+            raise
         return self
 
     def __exit__(
@@ -63,7 +69,7 @@ class ResultWriter:
             failed = failed or _no_space(unwritten, self.folder)
             if failed is None and error is None:
                 raise
-        if failed is not None:
+        if failed is not None or isinstance(error, KeyboardInterrupt):
             for path in self.folder.glob(f"*{PARTIAL}"):
                 path.unlink()
             if not any(self.folder.iterdir()):
@@ -114,7 +120,8 @@ def check_result(folder: Path, *streams: str) -> None:
     make_it = f"`rhot track CAPTURE --out {folder}`"
     if not folder.is_dir():
         raise CaptureError(f"{folder}: no such folder; make it with {make_it}")
-    if any(folder.glob(f"*{PARTIAL}")):
+    # Those of tables and videos that were not finished do not matter.
+    if any(path.removesuffix(PARTIAL) in _OWN for path in _partials(folder)):
         raise CaptureError(
             f"{folder}: holds {PARTIAL} files of a run that was interrupted; "
             "run `rhot track` into it again"
@@ -128,15 +135,18 @@ def check_result(folder: Path, *streams: str) -> None:
             raise CaptureError(f"{folder}: has no {stream}.jsonl; make it with {make_it}")
 
 
+def _partials(folder: Path) -> list[str]:
+    return [path.name for path in folder.glob(f"*{PARTIAL}")]
+
+
 def _prepare(folder: Path) -> None:
-    own = {f"{name}.jsonl" for name in STREAMS} | {SUMMARY, CLOCKS}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         present = sorted(path.name for path in folder.iterdir())
         foreign = [
             name
             for name in present
-            if name.removesuffix(PARTIAL) not in own
+            if name.removesuffix(PARTIAL) not in _OWN
             and not name.removesuffix(PARTIAL).endswith(ADDED)
         ]
         if foreign:

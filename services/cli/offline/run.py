@@ -41,7 +41,7 @@ def run(job: Job, out: Path, progress: bool | None = False, offsets: Sequence[st
     """
     by_hand = offsets_of(offsets, job.cameras)
     cameras, markers_only = geometry(job.config, job.cameras)
-    trackers = {one.camera: tracker_step(job.config, one.camera) for one in job.inputs}
+    trackers = {one.camera: tracker_step(job.config, one.camera, job.colors) for one in job.inputs}
     clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
     with ResultWriter(out) as writer, closing(RecordedMarkers(out)) as recorded:
@@ -65,6 +65,7 @@ def run(job: Job, out: Path, progress: bool | None = False, offsets: Sequence[st
             warnings=[*unread, *clocks.warnings],
             notes=[*notes, *object_notes, *_pose_notes(pipeline, writer.counts)],
             clocks=clocks.told if clocks.worth_telling else msgspec.UNSET,
+            origin=job.origin,
         )
         writer.finish(summary, clocks.told)
     return summary
@@ -137,15 +138,15 @@ def _fuse(
         shown.end()
 
 
-def tracker_step(config: RigConfig, name: str) -> TrackerStep:
-    """The tracker of one camera with its calibration.
+def tracker_step(config: RigConfig, name: str, only: Sequence[str] = ()) -> TrackerStep:
+    """The tracker of one camera with its calibration, for `only` these colours if any are named.
 
     Raises CalibrationError naming the command that helps.
     """
     colors = load_colors(config.calibration_dir, name)
     path = config.calibration_dir / f"{name}.colors.json"
     # Without a hand in rig.toml no landmark chooses the colours: all are tracked.
-    wanted = config.tracked_colors(colors.colors)
+    wanted = list(only) or config.tracked_colors(colors.colors)
     if not wanted:
         raise CalibrationError(
             f"{path}: has no colour; add one with `rhot calibrate colors {name}`"

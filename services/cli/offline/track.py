@@ -1,26 +1,40 @@
-"""`rhot track CAPTURE --out DIR`, or CAM=VIDEO pairs instead of CAPTURE: the whole rig, offline.
+"""`rhot track CAPTURE --out DIR`, or CAM=VIDEO pairs or a recording's FILE.mcap instead of CAPTURE:
+the whole rig, offline.
 
 As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off
 is tracked up to there, and the summary says so; if no frame at all can be read, the command fails.
+Of a recording the markers are taken, and points and poses are computed anew.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
 
+from services.cli.interruption import interruptible
 from services.cli.offline.clocks.by_hand import OffsetOption
 from services.cli.options import ProgressOption
+from services.cli.unpacked_capture import readable
+
+ColorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="a colour to track in a video without rig.toml; default: all calibrated ones",
+    ),
+]
 
 
 def track(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="CAPTURE | CAM=VIDEO...", help="a capture folder, or a video per camera"
+            metavar="CAPTURE | CAM=VIDEO... | FILE.mcap",
+            help="a capture folder, a video per camera, or a recording",
         ),
     ],
     out: Annotated[
@@ -28,8 +42,10 @@ def track(
         typer.Option("--out", "-o", help="folder for markers, points, poses and objects as .jsonl"),
     ],
     config: Annotated[
-        Path | None, typer.Option(help="rig.toml; default: the capture's own")
+        Path | None,
+        typer.Option(help="rig.toml; default: the capture's own; one video needs none"),
     ] = None,
+    color: ColorOption = None,
     fps: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,11 +59,15 @@ def track(
 ) -> None:
     """Track recordings offline: markers, 3D points, hand poses and objects."""
     # Not above: OpenCV and numba take longer to import than other commands take to run.
-    from services.cli.offline.inputs import job_of
+    from services.cli.offline.inputs import job_of, origin_of
     from services.cli.offline.run import run
     from services.cli.offline.track_summary import summary_text
 
-    summary = run(job_of(sources, config, fps or ()), out, progress, offset or ())
+    with interruptible("rhot track", out), readable(sources) as found:
+        job = job_of(found, config, fps or (), color or ())
+        # What was asked for, not what a recording was unpacked to.
+        job = replace(job, origin=origin_of(sources, config, fps or ()))
+        summary = run(job, out, progress, offset or ())
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
         return

@@ -20,12 +20,24 @@ class CameraSummary(msgspec.Struct, frozen=True, kw_only=True):
     colors: dict[str, int]
 
 
+class Origin(msgspec.Struct, frozen=True, kw_only=True):
+    """What was tracked, for who needs its pictures again: as `rhot track` takes it, paths absolute.
+
+    config is the rig.toml that was named, "" if none was.
+    """
+
+    sources: list[str]
+    config: str = ""
+    rates: list[str] = []
+
+
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """summary.json. No times of day and no durations: the same input writes the same bytes.
 
     refusals counts what fusion could not use, by reason; complete is false if a recording could not
     be read to its end, and warnings say which; notes say what was left out or looks wrong. clocks:
-    of all cameras but the first, where one was not simply believed.
+    of all cameras but the first, where one was not simply believed. origin is None where nobody
+    tracked: in what a recording's messages are unpacked to.
     """
 
     rig: str
@@ -40,6 +52,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     warnings: list[str]
     notes: list[str]
     clocks: list[CameraClock] | msgspec.UnsetType = msgspec.UNSET
+    origin: Origin | None = None
 
 
 class CameraCounter:

@@ -21,10 +21,11 @@ _GAP_STEPS = 2.5
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A sampled signal."""
+    """A sampled signal; sigma is one standard deviation of its values, None where unknown."""
 
     times_s: Array  # (n,)
     values: Array  # (n, k)
+    sigma: Array | None = None  # (n, k)
 
 
 def with_gaps(track: Track) -> Track:
@@ -36,7 +37,17 @@ def with_gaps(track: Track) -> Track:
     return Track(
         np.insert(track.times_s, gaps, track.times_s[gaps - 1]),
         np.insert(track.values, gaps, np.nan, axis=0),
+        None if track.sigma is None else np.insert(track.sigma, gaps, np.nan, axis=0),
     )
+
+
+def draw_sigma(axes: Axes, track: Track, column: int, color: str, scale: float = 1.0) -> None:
+    """A band of one standard deviation about a signal, where it is known; scale of both."""
+    if track.sigma is not None:
+        middle, sigma = scale * track.values[:, column], scale * track.sigma[:, column]
+        axes.fill_between(
+            track.times_s, middle - sigma, middle + sigma, color=color, alpha=0.18, linewidth=0.0
+        )
 
 
 def color_of(number: int) -> str:

@@ -16,7 +16,15 @@ from matplotlib.figure import Figure
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS
-from services.cli.plot.axes import Track, color_of, label, label_xyz, new_figure, style
+from services.cli.plot.axes import (
+    Track,
+    color_of,
+    draw_sigma,
+    label,
+    label_xyz,
+    new_figure,
+    style,
+)
 
 
 def markers_figure(
@@ -57,7 +65,8 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
 
     Each track comes with which of its rows are only predicted (n,): those are drawn as circles.
     """
-    figure = new_figure(f"3D points, {hand} hand, rig frame", (13.0, 8.0))
+    title = f"3D points, {hand} hand, rig frame (band: one sigma; circles: predicted)"
+    figure = new_figure(title, (13.0, 8.0))
     grid = figure.add_gridspec(1, 2, width_ratios=(3, 2))
     left, right = (figure.add_subfigure(grid[0, column]) for column in range(2))
     over_time = left.subplots(3, 1, sharex=True)
@@ -72,6 +81,7 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
         color, mm = color_of(number), 1e3 * track.values
         for row, axes in enumerate(over_time):
             axes.plot(track.times_s, mm[:, row], color=color, linewidth=1.0, label=name)
+            draw_sigma(axes, track, row, color, 1e3)
             axes.plot(track.times_s[predicted], mm[predicted, row], color=color, **circles)
         front.plot(mm[:, 0], mm[:, 1], color=color, linewidth=0.8)
         above.plot(mm[:, 0], mm[:, 2], color=color, linewidth=0.8)
@@ -88,10 +98,17 @@ def points_figure(hand: str, tracks: Mapping[str, tuple[Track, npt.NDArray[np.bo
     return figure
 
 
-def angles_figure(hand: str, estimate: Track, truth: Track | None) -> Figure:
-    """One hand: the four angles of each digit in deg, values (n, 20); truth dashed."""
-    dashed = ", dashed: truth" if truth is not None else ""
-    figure = new_figure(f"joint angles, {hand} hand{dashed}", (12.0, 11.0))
+def angles_figure(
+    hand: str, estimate: Track, truth: Track | None, limits_deg: Array, *, measured: bool
+) -> Figure:
+    """One hand: the four angles of each digit in deg, values (n, 20), with sigma; truth dashed.
+
+    limits_deg (20, 2): low and high of each angle, dotted; measured: of this person's hand.
+    """
+    dashed = "; dashed: truth" if truth is not None else ""
+    limits = "limits" if measured else "limits of the tables"
+    title = f"joint angles, {hand} hand (band: one sigma; dotted: {limits}{dashed})"
+    figure = new_figure(title, (12.0, 11.0))
     rows = figure.subplots(5, 1, sharex=True)
     dashes: dict[str, Any] = {"linewidth": 0.9, "linestyle": "--", "alpha": 0.8}
     for row, (digit, names) in enumerate(zip(DIGITS, DIGIT_ANGLES, strict=True)):
@@ -100,6 +117,12 @@ def angles_figure(hand: str, estimate: Track, truth: Track | None) -> Figure:
             color, index = color_of(column), 4 * row + column
             values = estimate.values[:, index]
             axes.plot(estimate.times_s, values, color=color, linewidth=1.2, label=name)
+            low, high = limits_deg[index]
+            # An angle that cannot move has neither.
+            if high > low:
+                draw_sigma(axes, estimate, index, color)
+                for limit in (low, high):
+                    axes.axhline(limit, color=color, linewidth=0.8, linestyle=":", alpha=0.7)
             if truth is not None:
                 axes.plot(truth.times_s, truth.values[:, index], color=color, **dashes)
         label(axes, f"{digit} / deg", last=row == 4)

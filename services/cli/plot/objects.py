@@ -16,7 +16,15 @@ from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import Truth
 from services.cli.evaluate.score_statistics import turns_deg
 from services.cli.evaluate.truth_track import ObjectTrack, inside, object_track
-from services.cli.plot.axes import Track, color_of, label, label_xyz, new_figure, with_gaps
+from services.cli.plot.axes import (
+    Track,
+    color_of,
+    draw_sigma,
+    label,
+    label_xyz,
+    new_figure,
+    with_gaps,
+)
 
 _DASHES: dict[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": "--"}
 
@@ -53,7 +61,9 @@ def _drawing(poses: Sequence[ObjectPose], truth: ObjectTrack | None, origin_ns: 
     times_s = np.asarray((stamps - origin_ns) * 1e-9, dtype=np.float64)
     position_mm: Array = 1e3 * np.array([pose.position_m for pose in poses])
     good = np.array([pose.registered and pose.tracking == "ok" for pose in poses])
-    position = with_gaps(Track(times_s, position_mm))
+    sigma_mm = [np.nan if pose.sigma_m is None else 1e3 * pose.sigma_m for pose in poses]
+    sigma = np.repeat(np.array(sigma_mm)[:, None], 3, axis=1)  # (n, 3)
+    position = with_gaps(Track(times_s, position_mm, sigma))
     unsure = Track(times_s[~good], position_mm[~good])
     if truth is None:
         return Drawing(position, unsure)
@@ -72,7 +82,7 @@ def _drawing(poses: Sequence[ObjectPose], truth: ObjectTrack | None, origin_ns: 
 def objects_figure(objects: Mapping[str, Drawing]) -> Figure:
     """Position over time, truth dashed, poses that are not ok as circles; errors below."""
     compared = any(one.off is not None for one in objects.values())
-    title = "objects, rig frame (circles: not ok, or not registered"
+    title = "objects, rig frame (band: one sigma; circles: not ok, or not registered"
     title += "; dashed: truth)" if any(one.truth for one in objects.values()) else ")"
     figure = new_figure(title, (12.0, 10.0 if compared else 7.0))
     rows = figure.subplots(5 if compared else 3, 1, sharex=True)
@@ -94,6 +104,7 @@ def _positions(rows: npt.NDArray[np.object_], name: str, one: Drawing, color: st
     for row, axes in enumerate(rows):
         line = one.position
         axes.plot(line.times_s, line.values[:, row], color=color, linewidth=1.0, label=name)
+        draw_sigma(axes, line, row, color)
         circles = one.unsure.values[:, row]
         axes.plot(
             one.unsure.times_s, circles, "o", color=color, markersize=3.5, markerfacecolor="none"

@@ -15,9 +15,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rhot.errors import CaptureError
+from rhot.files.calibration import load_hand
 from rhot.files.capture import Capture, read_lines
+from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
-from rhot.hand import HANDS
+from rhot.hand import HANDS, HandModel, HandName, default_hand
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from rhot.messages.objects import ObjectPose
 from rhot.messages.simulator import Truth
@@ -33,6 +35,7 @@ from services.cli.plot.figures import (
     residuals_figure,
 )
 from services.cli.plot.objects import drawings, objects_figure
+from services.cli.plot.rig_of_result import rig_of_result
 
 Flags = npt.NDArray[np.bool_]
 
@@ -45,17 +48,20 @@ class _Stamped(Protocol):
 M = TypeVar("M", bound=_Stamped)
 
 
-def plot_result(result: Path, out: Path, capture: Path | None) -> list[Path]:
+def plot_result(
+    result: Path, out: Path, capture: Path | None, rig_toml: Path | None = None
+) -> list[Path]:
     """Draw a result into the folder `out`; the pictures written.
 
-    Raises CaptureError if the result is incomplete or empty, or if `capture` has no truth.
+    capture: whose truth is drawn beside; rig_toml: of a recording, whose hand has limits. Raises
+    CaptureError if the result is incomplete or empty, or if `capture` has no truth.
     """
     check_result(result, "markers", "points", "poses", "objects")
     truth = _truth(Capture(capture)) if capture is not None else []
     written = []
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for name, figure in _figures(result, truth):
+        for name, figure in _figures(result, truth, rig_of_result(result, rig_toml)):
             path = out / f"{name}.png"
             FigureCanvasAgg(figure).print_png(str(path))
             written.append(path)
@@ -74,7 +80,9 @@ def _truth(capture: Capture) -> list[Truth]:
     return list(read_lines(capture.truth, Truth))
 
 
-def _figures(result: Path, truth: list[Truth]) -> Iterator[tuple[str, Figure]]:
+def _figures(
+    result: Path, truth: list[Truth], rig: RigConfig | None
+) -> Iterator[tuple[str, Figure]]:
     """(name, figure) of everything the result holds."""
     frames = list(read_lines(result / "markers.jsonl", MarkerFrame))
     if not frames:
@@ -92,21 +100,36 @@ def _figures(result: Path, truth: list[Truth]) -> Iterator[tuple[str, Figure]]:
             yield f"points_{hand}", points_figure(hand, _point_tracks(lines, origin_ns))
         solved = _by_stamp(pose for pose in poses if pose.hand == hand)
         if solved:
-            yield from _pose_figures(hand, solved, truth, origin_ns)
+            yield from _pose_figures(_model(rig, hand), solved, truth, origin_ns)
     objects = drawings(list(read_lines(result / "objects.jsonl", ObjectPose)), truth, origin_ns)
     if objects:
         yield "objects", objects_figure(objects)
 
 
+def _model(rig: RigConfig | None, hand: HandName) -> HandModel:
+    """The hand that was tracked, for its limits; the tables' where its rig is not known."""
+    if rig is None or hand not in rig.hand:
+        return default_hand(hand)
+    return load_hand(rig.calibration_dir, hand, rig.hand[hand].scale)
+
+
 def _pose_figures(
-    hand: str, poses: list[HandPose], truth: list[Truth], origin_ns: int
+    model: HandModel, poses: list[HandPose], truth: list[Truth], origin_ns: int
 ) -> Iterator[tuple[str, Figure]]:
+    hand = model.hand
     estimate = estimate_track(poses)
-    angles = with_gaps(_angles_track(estimate, origin_ns))
+    found = _angles_track(estimate, origin_ns)
+    # One sigma a digit, of those of its angles that can move.
+    sigma_rad = [[finger.sigma_rad for finger in pose.fingers] for pose in poses]
+    sigma_deg = np.rad2deg(np.array(sigma_rad, dtype=np.float64)).repeat(4, axis=1)  # (n, 20)
+    angles = with_gaps(Track(found.times_s, found.values, sigma_deg))
     true_angles = None
     if any(hand in line.hands for line in truth):
         true_angles = _angles_track(hand_track(truth, hand), origin_ns)
-    yield f"angles_{hand}", angles_figure(hand, angles, true_angles)
+    limits_deg = np.rad2deg(model.limits_rad).reshape(20, 2)
+    measured = model.origin != "tables"
+    figure = angles_figure(hand, angles, true_angles, limits_deg, measured=measured)
+    yield f"angles_{hand}", figure
     fingers = [pose.fingers for pose in poses]
     residuals_mm = 1e3 * np.array([[finger.residual_m for finger in row] for row in fingers])
     iterations = np.array([[float(finger.iterations) for finger in row] for row in fingers])
@@ -143,11 +166,13 @@ def _point_tracks(lines: list[HandPoints], origin_ns: int) -> dict[str, tuple[Tr
     for row, line in enumerate(lines):
         for point in line.points:
             empty = (
-                Track(times_s, np.full((len(lines), 3), np.nan)),
+                Track(times_s, *np.full((2, len(lines), 3), np.nan)),
                 np.zeros(len(lines), dtype=bool),
             )
             track, predicted = tracks.setdefault(point.name, empty)
             track.values[row] = point.position_m
+            if track.sigma is not None:
+                track.sigma[row] = point.sigma_m
             predicted[row] = point.source == "predicted"
     return dict(sorted(tracks.items()))
 

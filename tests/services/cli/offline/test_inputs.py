@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
-from rhot.errors import CaptureError, ConfigError
+from rhot.errors import CalibrationError, CaptureError, ConfigError
 from rhot.files.capture import FrameStamp, write_stamps
 from services.cli.offline.inputs import job_of
+from services.cli.offline.track_summary import Origin
 
 RIG = '[rig]\nname = "r"\n[[camera]]\nname = "left"\n[[camera]]\nname = "right"\n'
 
@@ -104,12 +107,40 @@ def test_arguments_that_make_no_sense(rig, sources, error, text):
 
 
 def test_a_video_needs_a_configuration_and_a_capture_brings_its_own(tmp_path):
-    with pytest.raises(ConfigError, match="--config"):
-        job_of(["left=a.mkv"], None)
+    with pytest.raises(ConfigError, match="2 videos need --config"):
+        job_of(["left=a.mkv", "right=b.mkv"], None)
     with pytest.raises(CaptureError, match=r"no rig\.toml"):
         job_of([str(tmp_path)], None)
     with pytest.raises(CaptureError, match=r"is a file; .*CAM="):
         job_of([str(video(tmp_path / "v.mkv"))], None)
+
+
+def test_one_video_needs_no_rig_but_the_ranges_of_its_colours(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    source = f"cam={video(tmp_path / 'v.mkv')}"
+    with pytest.raises(CalibrationError, match=r"rhot calibrate colors cam --video .*v\.mkv"):
+        job_of([source], None)
+    colors = '{"colors": {"green": {"hsv_low": [35, 60, 40], "hsv_high": [85, 255, 255]}}}'
+    (tmp_path / "calibration").mkdir()
+    (tmp_path / "calibration" / "cam.colors.json").write_text(colors)
+    job = job_of([source], None, colors=["green"])
+    assert (job.cameras, job.colors, job.config.hand) == (["cam"], ("green",), {})
+    with pytest.raises(CalibrationError, match=r"--color red: is not in .* which has green"):
+        job_of([source], None, colors=["red"])
+
+
+def test_colours_are_not_named_where_a_hand_wears_them(short_capture):
+    with pytest.raises(ConfigError, match=r"--color is for a video without rig\.toml"):
+        job_of([str(short_capture)], None, colors=["blue"])
+
+
+def test_what_was_asked_for_is_remembered_with_whole_paths(tmp_path, rig, monkeypatch):
+    video(tmp_path / "v.mkv")
+    monkeypatch.chdir(tmp_path)
+    origin = job_of(["left=v.mkv"], Path("rig.toml"), ["left=20"]).origin
+    assert origin == Origin(
+        sources=[f"left={tmp_path / 'v.mkv'}"], config=str(rig), rates=["left=20"]
+    )
 
 
 def test_a_missing_video_is_an_error_with_its_name(tmp_path, rig):

@@ -59,14 +59,36 @@ def test_a_file_in_the_way_is_an_error(tmp_path):
         ResultWriter(tmp_path / "out")
 
 
-def test_an_interrupted_run_is_recognised_and_can_be_repeated(tmp_path):
-    with pytest.raises(KeyboardInterrupt), ResultWriter(tmp_path) as writer:
+@pytest.mark.parametrize("before", [0, 2])
+def test_an_interrupted_run_leaves_what_was_there(tmp_path, before):
+    folder = tmp_path / "out"
+    if before:
+        write(folder, lines=before)
+    with pytest.raises(KeyboardInterrupt), ResultWriter(folder) as writer:
         writer.write("poses", [LINE])
         raise KeyboardInterrupt
+    assert folder.exists() == bool(before)
+    if before:
+        check_result(folder, "poses")
+        assert (folder / "poses.jsonl").read_bytes().count(b"\n") == before
+
+
+def test_a_run_that_was_killed_is_recognised_and_can_be_repeated(tmp_path):
+    """Nothing is tidied up then; a bug leaves the same."""
+    with pytest.raises(ZeroDivisionError), ResultWriter(tmp_path) as writer:
+        writer.write("poses", [LINE] * (1 // 0))
     with pytest.raises(CaptureError, match="interrupted"):
         check_result(tmp_path, "poses")
     write(tmp_path)
     check_result(tmp_path, "poses")
+
+
+def test_a_table_or_video_that_was_not_finished_does_not_spoil_the_result(tmp_path):
+    write(tmp_path)
+    (tmp_path / "angles.csv.partial").write_text("time_s")
+    (tmp_path / "overlay_left.webm.partial").write_bytes(b"")
+    check_result(tmp_path, "poses")
+    write(tmp_path)
 
 
 def test_a_failed_run_keeps_the_result_before_it(tmp_path):

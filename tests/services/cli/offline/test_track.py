@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
 from typer.testing import CliRunner
@@ -16,6 +17,9 @@ from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS
 from services.cli.offline.run import run
+from services.cli.unpacked_capture import readable
+from services.recorder.recorder import attachments
+from services.recorder.writer import RecordingWriter
 
 FILES = (*(f"{name}.jsonl" for name in STREAMS), "summary.json")
 
@@ -205,6 +209,52 @@ def test_the_command_prints_a_summary_and_notes_and_nothing_else_on_a_pipe(short
         application(), ["track", *sources, "--out", str(tmp_path / "b"), "--json"]
     )
     assert json.loads(found.stdout)["cameras"]["left"]["frames"] > 10
+
+
+def test_a_recording_is_tracked_anew_from_its_markers(capture, result, recording, tmp_path):
+    """Its markers are the result's, and so are the points and poses that come of them."""
+    ran = CliRunner().invoke(
+        application(), ["track", str(recording), "--out", str(tmp_path / "again")]
+    )
+    assert ran.exit_code == 0, ran.stderr
+    for name in ("markers", "points", "poses"):
+        again = (tmp_path / "again" / f"{name}.jsonl").read_bytes()
+        assert again == (result / f"{name}.jsonl").read_bytes(), name
+    summary = json.loads((tmp_path / "again" / "summary.json").read_text())
+    assert summary["origin"]["sources"] == [str(recording)]
+
+
+def test_a_recording_without_markers_or_with_a_broken_rig_is_named(tmp_path, capture):
+    kept = attachments(load_rig(capture / "rig.toml"))
+    for name, own, message in (
+        ("empty", kept, "empty.mcap: holds no markers"),
+        ("no_rig", {}, "no_rig.mcap: holds no config.json"),
+        ("no_lens", {"config.json": kept["config.json"]}, "no_lens.mcap: holds no markers"),
+    ):
+        path = tmp_path / f"{name}.mcap"
+        with RecordingWriter(path, "desk", "1", own):
+            pass
+        with pytest.raises(CaptureError, match=message), readable([str(path)]):
+            pass
+
+
+def test_one_video_without_a_rig_gives_markers_of_the_colour_asked_for(
+    short_capture, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "calibration").mkdir()
+    shutil.copy(short_capture / "calibration" / "right.colors.json", tmp_path / "calibration")
+    source = f"right={short_capture / 'right.mkv'}"
+    ran = CliRunner().invoke(
+        application(), ["track", source, "--color", "blue", "--color", "lime", "--out", "out"]
+    )
+    assert ran.exit_code == 0, ran.stderr
+    assert "note: markers only: 3D needs two cameras, this is 'right' alone" in ran.stderr
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert set(summary["cameras"]["right"]["colors"]) == {"blue", "lime"}
+    ran = CliRunner().invoke(application(), ["export", "out"])
+    assert ran.exit_code == 0, ran.stderr
+    assert [path.name for path in (tmp_path / "out").glob("*.csv")] == ["markers.csv"]
 
 
 def test_poses_of_objects_that_are_left_out_are_a_note(copy, tmp_path):

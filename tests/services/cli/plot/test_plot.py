@@ -8,13 +8,18 @@ from __future__ import annotations
 import shutil
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from rhot.errors import CaptureError
+from rhot.files.calibration import load_hand
+from rhot.files.capture import read_lines
+from rhot.messages import HandPoints, HandPose
 from services.cli.application import application
-from services.cli.plot.result import plot_result
+from services.cli.plot.result import _figures, plot_result
+from services.cli.plot.rig_of_result import rig_of_result
 
 pytest.importorskip("matplotlib", reason="matplotlib is of the extra `study`")
 
@@ -43,6 +48,36 @@ def test_the_truth_changes_the_angles_picture(capture, result, tmp_path):
         (tmp_path / folder / "angles_right.png").read_bytes() for folder in ("without", "with")
     ]
     assert pictures[0] != pictures[1]
+
+
+def test_angles_have_bands_of_sigma_and_the_limits_of_the_hand(capture, result):
+    rig = rig_of_result(result)
+    assert rig is not None
+    figures = dict(_figures(result, [], rig))
+    thumb, _, middle, *_ = figures["angles_right"].axes
+    dotted = [line.get_ydata()[0] for line in thumb.lines if line.get_linestyle() == ":"]
+    limits = load_hand(rig.calibration_dir, "right").limits_rad
+    assert dotted == pytest.approx(np.rad2deg(limits[0]).ravel())
+    # The middle finger's abduction cannot move.
+    assert (len(thumb.collections), len(middle.collections)) == (4, 3)
+    poses = list(read_lines(result / "poses.jsonl", HandPose))
+    width = np.rad2deg(2.0 * poses[0].fingers[0].sigma_rad)
+    first = thumb.collections[0].get_paths()[0].vertices
+    at_start = first[first[:, 0] == first[:, 0].min()][:, 1]
+    assert np.ptp(at_start) == pytest.approx(width)
+    points = list(read_lines(result / "points.jsonl", HandPoints))
+    x = figures["points_right"].subfigs[0].axes[0]
+    assert len(x.collections) == len({point.name for line in points for point in line.points})
+
+
+def test_limits_are_the_tables_where_the_rig_is_gone(result, tmp_path):
+    moved = tmp_path / "result"
+    shutil.copytree(result, moved)
+    summary = msgspec.json.decode((moved / "summary.json").read_bytes())
+    (moved / "summary.json").write_bytes(msgspec.json.encode({**summary, "origin": None}))
+    assert rig_of_result(moved) is None
+    title = dict(_figures(moved, [], None))["angles_right"].get_suptitle()
+    assert "limits of the tables" in title
 
 
 def test_pictures_go_beside_the_result_and_it_can_still_be_tracked_into(result, tmp_path):
