@@ -26,13 +26,7 @@ def film(experiment: Experiment, out: Path, kind: str, advance: Callable[[], Non
     code, suffix = _CODECS[kind]
     path = out / f"{name}{suffix}"
     size, fps = experiment.view.camera.size_px, experiment.options.cycles.fps
-    codec = cv2.VideoWriter_fourcc(*code)  # type: ignore[attr-defined]
-    video = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, codec, fps, size)
-    if not video.isOpened():
-        raise CaptureError(
-            f"{path}: OpenCV cannot write {code} here; choose --video frames, or install"
-            " opencv-python-headless, whose wheels bring FFmpeg along"
-        )
+    video = open_video(path, code, fps, size)
     try:
         for frame in range(len(experiment)):
             video.write(experiment.picture(frame))
@@ -40,6 +34,18 @@ def film(experiment: Experiment, out: Path, kind: str, advance: Callable[[], Non
     finally:
         video.release()
     return path
+
+
+def open_video(path: Path, code: str, fps: float, size_px: tuple[int, int]) -> cv2.VideoWriter:
+    """A writer of BGR pictures; CaptureError where OpenCV has no such codec."""
+    codec = cv2.VideoWriter_fourcc(*code)  # type: ignore[attr-defined]
+    video = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, codec, fps, size_px)
+    if not video.isOpened():
+        raise CaptureError(
+            f"{path}: OpenCV cannot write {code} here; is the folder writable, and was OpenCV built"
+            " with FFmpeg (pip's opencv-python-headless is)?"
+        )
+    return video
 
 
 def _frames(experiment: Experiment, folder: Path, advance: Callable[[], None]) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from services.cli.grasp.measure import measure
 from services.cli.grasp.recover import recover
+from services.cli.grasp.rectify import rectify
 from services.cli.grasp.render import render
 from services.cli.grasp.report import report
 from services.cli.options import menu
@@ -11,4 +12,5 @@ from services.cli.options import menu
 grasp = menu("grasp", "A filmed finger's joint angles, and the same from its tip's path alone.")
 
 for command in (render, measure, recover, report):
+for command in (render, rectify):
     grasp.command(name=command.__name__)(command)

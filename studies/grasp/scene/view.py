@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rhot.geometry.camera import Camera, pinhole
-from rhot.geometry.transforms import Array
+from rhot.geometry.transforms import Array, rotation_x, rotation_y, rotation_z
 
 # Of a phone or a webcam. Near enough that the hand fills the picture, and far enough that this
 # height is seen: reference rectangle, finger and thumb.
@@ -70,7 +70,7 @@ def place_camera(options: ViewOptions, seed: int) -> View:
     # A camera on a desk stands low or high and to a side: mostly about the vertical axis.
     side = rng.choice((-1.0, 1.0)) * rng.uniform(0.5, 1.0)
     tilt = np.radians(options.tilt_deg) * np.array([np.sqrt(1.0 - side * side), side])
-    R = _rotation(2, np.radians(options.roll_deg)) @ _rotation(1, tilt[1]) @ _rotation(0, tilt[0])
+    R = rotation_z(np.radians(options.roll_deg)) @ rotation_y(tilt[1]) @ rotation_x(tilt[0])
     matrix = pinhole(options.size_px, np.radians(_HFOV_DEG))
     distance = max(_NEAREST_MM, _HEIGHT_MM * matrix[1, 1] / options.size_px[1])
     T = np.eye(4)
@@ -87,12 +87,3 @@ def place_camera(options: ViewOptions, seed: int) -> View:
     flat = np.stack([back[:3, 0] / 1000.0, back[:3, 1] / 1000.0, back[:3, 3]], axis=1)
     homography = camera.matrix @ flat
     return View(camera, homography / homography[2, 2])
-
-
-def _rotation(axis: int, angle_rad: float) -> Array:
-    """About x, y or z; (3, 3)."""
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    R = np.eye(3)
-    a, b = [(1, 2), (2, 0), (0, 1)][axis]
-    R[a, a], R[b, b], R[a, b], R[b, a] = c, c, -s, s
-    return R
