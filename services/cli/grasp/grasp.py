@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from services.cli.grasp.measure import measure
+from services.cli.grasp.compare import compare
 from services.cli.grasp.recover import recover
 from services.cli.grasp.rectify import rectify
 from services.cli.grasp.render import render
@@ -13,4 +14,5 @@ grasp = menu("grasp", "A filmed finger's joint angles, and the same from its tip
 
 for command in (render, measure, recover, report):
 for command in (render, rectify):
+for command in (render, recover, report, compare):
     grasp.command(name=command.__name__)(command)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from rhot.errors import CaptureError
+from rhot.process.service import rhot_version
 from services.cli.progress import Progress
 from studies.grasp.recorded.hands import hand_recording
 from studies.grasp.recording import Finger, GraspRecording, load_recording
@@ -60,6 +62,11 @@ def load_all(
         why = "; ".join(left_out) or f"nothing to recover in {', '.join(map(str, paths))}"
         raise CaptureError(f"{why}. Valid: {_VALID}")
     return _named(kept), left_out
+
+
+def made_by() -> str:
+    """Which version made a page, and when."""
+    return f"Made by rhot {rhot_version()} on {datetime.datetime.now(datetime.UTC):%Y-%m-%d}"
 
 
 def _files(path: Path) -> list[Path]:

@@ -23,11 +23,10 @@ def report(
     """Draw and tabulate what was recovered: Markdown, PNG, CSV, JSON and one HTML file."""
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
-    import datetime
     from collections.abc import Callable
 
     from rhot.errors import writing
-    from rhot.process.service import rhot_version
+    from services.cli.grasp.inputs import made_by
     from services.cli.progress import Progress
     from studies.grasp.report.write import write_report
 
@@ -37,8 +36,7 @@ def report(
         line.total = figures
         return line.advance
 
-    today = datetime.datetime.now(datetime.UTC)
-    about = f"Made by rhot {rhot_version()} on {today:%Y-%m-%d} of {folder.resolve().name}."
+    about = f"{made_by()} of {folder.resolve().name}."
     where = out or folder / "report"
     with writing(where):
         files = write_report(folder, where, title, about, begun)

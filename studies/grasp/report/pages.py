@@ -1,13 +1,19 @@
-"""The report as Markdown, and as one HTML file that needs nothing else. Pure."""
+"""The report as Markdown, and as one HTML file that needs nothing else; with what is beside."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from studies.grasp.report.tables import Table
+
+# Folders beside the pages.
+FIGURES, TABLES = "figures", "tables"
 
 
 class Picture(NamedTuple):
@@ -97,6 +103,27 @@ def html(report: Report) -> str:
         parts.append("</ul>")
     parts.append("</body></html>\n")
     return "\n".join(parts)
+
+
+def written_report(
+    report: Report, out: Path, name: str, numbers: bytes, more: Sequence[Table]
+) -> list[Path]:
+    """Write pages `name`, figures, tables (and `more` tables, as files only); HTML first."""
+    (out / FIGURES).mkdir(parents=True, exist_ok=True)
+    (out / TABLES).mkdir(parents=True, exist_ok=True)
+    parts = [one for section in report.sections for one in section.parts]
+    files = [out / f"{name}.html", out / f"{name}.md", out / f"{name}.json"]
+    files[0].write_text(html(report), encoding="utf-8")
+    files[1].write_text(markdown(report, FIGURES), encoding="utf-8")
+    files[2].write_bytes(msgspec.json.format(numbers, indent=1) + b"\n")
+    for one in [*parts, *more]:
+        if isinstance(one, Table):
+            files.append(out / TABLES / f"{one.name}.csv")
+            files[-1].write_text(one.csv(), encoding="utf-8")
+        else:
+            files.append(out / FIGURES / f"{one.name}.png")
+            files[-1].write_bytes(one.png)
+    return list(dict.fromkeys(files))
 
 
 def _image(picture: Picture) -> str:

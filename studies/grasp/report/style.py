@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from studies.grasp.report.pages import Picture
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart too; each line has a dash of
 # its own besides, so that a print in grey can be read.
@@ -32,6 +36,12 @@ class Drawn(NamedTuple):
     title: str
     caption: str
     figure: Figure
+
+    def picture(self) -> Picture:
+        """As PNG."""
+        stream = io.BytesIO()
+        FigureCanvasAgg(self.figure).print_png(stream)
+        return Picture(self.name, self.title, self.caption, stream.getvalue())
 
 
 def method_line(name: str) -> dict[str, Any]:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import msgspec
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from studies.grasp.recover.errors import errors_of
 from studies.grasp.report import contents
 from studies.grasp.report.angle_figures import angles_figure, iterations_figure, people_figure
 from studies.grasp.report.law_figures import laws_figure
 from studies.grasp.report.motion_range import person_range
-from studies.grasp.report.pages import Picture, Report, Section, html, markdown
+from studies.grasp.report.pages import Picture, Report, Section, written_report
 from studies.grasp.report.path_figures import paths_figure
 from studies.grasp.report.study import Person, load_study, same_length
 from studies.grasp.report.style import Drawn
 from studies.grasp.report.tables import Table
 
-FIGURES, TABLES = "figures", "tables"
 # People in one figure with a panel each.
 _PANELS = 6
 _KINDS = ("angles", "paths", "laws", "people", "effort")
@@ -42,28 +39,14 @@ def write_report(
     pictures: dict[str, list[Picture]] = {
         kind: [] for kind in ("angles", "paths", "laws", "people", "effort")
     }
-    (out / FIGURES).mkdir(parents=True, exist_ok=True)
-    (out / TABLES).mkdir(parents=True, exist_ok=True)
-    written = []
     for kind, drawn in _figures(people, groups):
         if drawn is not None:
-            picture = _png(drawn)
-            pictures[kind].append(picture)
-            path = out / FIGURES / f"{picture.name}.png"
-            path.write_bytes(picture.png)
-            written.append(path)
+            pictures[kind].append(drawn.picture())
         advance()
     report = Report(title, about, _sections(people, pictures, missing), _notes(people))
-    tables = [one for s in report.sections for one in s.parts if isinstance(one, Table)]
-    for table in [*tables, contents.all_errors_table(people), contents.angles_table(people)]:
-        path = out / TABLES / f"{table.name}.csv"
-        path.write_text(table.csv(), encoding="utf-8")
-        written.append(path)
-    pages = [out / "report.html", out / "report.md", out / "report.json"]
-    pages[0].write_text(html(report), encoding="utf-8")
-    pages[1].write_text(markdown(report, FIGURES), encoding="utf-8")
-    pages[2].write_bytes(msgspec.json.format(msgspec.json.encode(_figures_of(people)), indent=1))
-    return [*pages, *written]
+    numbers = msgspec.json.encode(_figures_of(people))
+    files = [contents.all_errors_table(people), contents.angles_table(people)]
+    return written_report(report, out, "report", numbers, files)
 
 
 def _figures(
@@ -77,12 +60,6 @@ def _figures(
     alike = same_length(list(people))
     yield "people", people_figure(people) if alike else None
     yield "effort", iterations_figure(people) if alike else None
-
-
-def _png(drawn: Drawn) -> Picture:
-    stream = io.BytesIO()
-    FigureCanvasAgg(drawn.figure).print_png(stream)
-    return Picture(drawn.name, drawn.title, drawn.caption, stream.getvalue())
 
 
 def _sections(
