@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from services.cli.grasp.measure import measure
 from services.cli.grasp.compare import compare
+from services.cli.grasp.measure import measure
 from services.cli.grasp.recover import recover
 from services.cli.grasp.rectify import rectify
 from services.cli.grasp.render import render
@@ -12,7 +12,5 @@ from services.cli.options import menu
 
 grasp = menu("grasp", "A filmed finger's joint angles, and the same from its tip's path alone.")
 
-for command in (render, measure, recover, report):
-for command in (render, rectify):
-for command in (render, recover, report, compare):
+for command in (render, measure, rectify, recover, report, compare):
     grasp.command(name=command.__name__)(command)

@@ -28,7 +28,7 @@ def parts_of(blob: Blob, dot_area_px2: float) -> list[tuple[float, float, float]
     if dot_area_px2 <= 0.0 or blob.area_px < _LARGE * dot_area_px2:
         return whole
     rows, columns = np.nonzero(blob.mask)
-    cells = np.stack([columns, rows], axis=1) + 0.0  # (c, 2)
+    cells = np.stack([columns, rows], axis=1).astype(np.float64)  # (c, 2)
     values, vectors = np.linalg.eigh(np.asarray(np.cov(cells.T), np.float64))
     # A disc of area A has variance A / (4 pi) along any axis; a cell is 4 px^2.
     if values[1] < _LONG * dot_area_px2 / 4.0 / (4.0 * np.pi):
