@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rhot.errors import CaptureError, ConfigError, writing
 from services.cli.grasp.recover import FingerOption
 from services.cli.options import ProgressOption
 
@@ -46,12 +47,10 @@ def compare(
     """Compare tip paths across people, find where one leaves their band, and count markers."""
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
-    from rhot.errors import CaptureError, ConfigError, writing
     from services.cli.grasp.inputs import load_all, made_by
     from studies.grasp.compare.write import markers_answer, write_comparison
 
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ConfigError(f"{out}: is not an empty folder; name a new one")
+    _check_new(out)
     named, left_out = load_all(references, finger, progress)
     known = _paths(named, left_out)
     if not known:
@@ -59,21 +58,32 @@ def compare(
     others, more = load_all(judge, finger, progress) if judge else ([], [])
     new = _paths(others, more)
     found = _compared(known, new, dot, progress)
-    notes = {one.name: one.notes for one in [*known, *new] if one.notes}
     left_out += more
-    if left_out:
-        notes["left out"] = left_out
+    notes = {one.name: one.notes for one in [*known, *new] if one.notes}
+    notes |= {"left out": left_out} if left_out else {}
     with writing(out):
         about = f"{made_by()} of {len(found.people)} people, {found.references} of them references."
         files = write_comparison(found, out, title, about, accuracy, notes)
     for one in left_out:
         typer.echo(f"left out: {one}", err=True)
-    typer.echo(found.why_no_band or f"band of {found.references} references")
-    for person in found.judged:
-        outside = 100.0 * person.shape.outside_share
-        typer.echo(f"{person.someone.subject}: {outside:.0f} % of the path outside the band")
-    typer.echo(markers_answer(found, accuracy))
-    typer.echo(f"{files[0]}: {len(files)} files")
+    told = [*_told(found), markers_answer(found, accuracy), f"{files[0]}: {len(files)} files"]
+    typer.echo("\n".join(told))
+
+
+def _check_new(out: Path) -> None:
+    """Raises ConfigError where results would mix with what is there."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ConfigError(f"{out}: is not an empty folder; name a new one")
+
+
+def _told(found: Comparison) -> list[str]:
+    """The comparison in a few lines."""
+    judged = [
+        f"{person.someone.subject}: {100.0 * person.shape.outside_share:.0f} % of the path "
+        "outside the band"
+        for person in found.judged
+    ]
+    return [found.why_no_band or f"band of {found.references} references", *judged]
 
 
 def _compared(
