@@ -94,7 +94,7 @@ def _best_about(pairs: list[tuple[HeightTrack, HeightTrack]], line: ClockLine) -
     ]
     found = [_compare(rows_along(pairs, one, rows_hz)) for one in near]
     scale = min(_scale(one.left) for one in found)
-    return near[int(np.argmax([_gain(one, scale) for one in found]))]
+    return near[int(np.argmax([_mean_gain(one, scale) for one in found]))]
 
 
 class _Comparison(NamedTuple):
@@ -174,6 +174,11 @@ def _scale(left: Array) -> float:
 
 def _gain(one: _Comparison, scale: float) -> float:
     """A line's log-likelihood above that of no relation."""
+    return _RATE_HZ * one.seconds * math.sqrt(one.landmarks) * _mean_gain(one, scale)
+
+
+def _mean_gain(one: _Comparison, scale: float) -> float:
+    """The same for one value."""
     if not len(one.left):
         return -math.inf
     variances = _STUDENT * (scale**2 + one.missed)
@@ -181,5 +186,4 @@ def _gain(one: _Comparison, scale: float) -> float:
     gained = np.logaddexp(
         math.log(1.0 - _WRONG) + 0.5 * (_STUDENT + 1.0) * gained, math.log(_WRONG)
     )
-    values = _RATE_HZ * one.seconds * math.sqrt(one.landmarks)
-    return values * float(np.mean(gained))
+    return float(np.mean(gained))

@@ -59,8 +59,8 @@ def test_offset_and_drift_are_found(motion, offset_s, drift):
 
 def test_drift_is_told_by_a_longer_recording():
     motion = MOTIONS["sinusoids"]
-    first = seen(motion, 0.0, 60.0, 30.0, (0.0, 0.0), 1)
-    second = seen(motion, 25.0, 60.0, 30.0, (-30.0, 2e-4), 2)
+    first = seen(motion, 0.0, 150.0, 20.0, (0.0, 0.0), 1)
+    second = seen(motion, 25.0, 150.0, 20.0, (-30.0, 2e-4), 2)
     found = find_recorded_offset(first, second)
     assert found.decided, found.why_not
     assert found.fit.line.late_s(0.0) == pytest.approx(-30.0, abs=1e-3)
