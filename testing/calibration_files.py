@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, lens_kind, save
 from rhot.geometry.camera import Camera
 
 
@@ -15,6 +15,7 @@ def lens_of(camera: Camera) -> Lens:
         size_px=camera.size_px,
         matrix=tuple(tuple(row) for row in camera.matrix.tolist()),
         distortion=tuple(camera.distortion.tolist()),
+        model=lens_kind(camera.distortion),
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
-from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
+from rhot.files.calibration import CameraPlace, Lens, RigGeometry, lens_kind, save
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import (
     Array,
@@ -178,6 +178,7 @@ def write_cameras(scene: PaintedTracker, folder: Path) -> None:
             size_px=camera.size_px,
             matrix=rows_of(camera.matrix),
             distortion=tuple(camera.distortion.tolist()),
+            model=lens_kind(camera.distortion),
         )
         save(folder / f"{name}.lens.json", lens)
 

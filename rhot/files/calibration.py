@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 import numpy as np
 
 from rhot.errors import UNDECODABLE, CalibrationError, writing
 from rhot.files.config import RigConfig
-from rhot.geometry.camera import Camera
+from rhot.geometry.camera import FISHEYE_NUMBERS, Camera
 from rhot.hand import HandModel, HandName, default_hand
 from rhot.messages.camera import Calibration, ColorRange, Colors, Exposure
 
@@ -29,9 +30,11 @@ __all__ = [
     "Colors",
     "Exposure",
     "Lens",
+    "LensKind",
     "ObjectPlace",
     "Objects",
     "RigGeometry",
+    "lens_kind",
     "load",
     "load_cameras",
     "load_colors",
@@ -45,6 +48,8 @@ __all__ = [
 ]
 
 S = TypeVar("S", bound=msgspec.Struct)
+# The lens models: a pinhole with Brown-Conrady distortion, and Kannala & Brandt's of wide lenses.
+LensKind = Literal["brown-conrady", "fisheye"]
 Row3 = tuple[float, float, float]
 Row4 = tuple[float, float, float, float]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]
@@ -52,11 +57,28 @@ Size = Annotated[int, msgspec.Meta(ge=1, le=65536)]
 
 
 class Lens(Calibration, frozen=True, kw_only=True):
-    """<camera>.lens.json"""
+    """<camera>.lens.json
+
+    distortion is k1, k2, p1, p2, k3 of the model brown-conrady, or k1, k2, k3, k4 of fisheye.
+    """
 
     size_px: tuple[Size, Size]
     matrix: tuple[Row3, Row3, Row3]
-    distortion: tuple[float, float, float, float, float]
+    distortion: Annotated[tuple[float, ...], msgspec.Meta(min_length=4, max_length=5)]
+    model: LensKind = "brown-conrady"
+
+    def __post_init__(self) -> None:
+        wanted = FISHEYE_NUMBERS if self.model == "fisheye" else 5
+        if len(self.distortion) != wanted:
+            raise ValueError(
+                f"distortion of the model {self.model} has {wanted} numbers, not "
+                f"{len(self.distortion)}"
+            )
+
+
+def lens_kind(distortion: Sequence[float] | np.ndarray) -> LensKind:
+    """The model that so many numbers of distortion belong to."""
+    return "fisheye" if len(distortion) == FISHEYE_NUMBERS else "brown-conrady"
 
 
 class CameraPlace(msgspec.Struct, frozen=True, kw_only=True):

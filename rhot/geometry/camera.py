@@ -1,4 +1,5 @@
-"""The pinhole camera with Brown-Conrady distortion, and where each camera stands in the rig.
+"""The camera: a pinhole with Brown-Conrady distortion, or a wide lens (fisheye.py), and where it
+stands in the rig.
 
 Frames: `camera` is x right, y down, z forward (OpenCV); pixel (0, 0) is the centre of the top left
 pixel. A point behind the camera projects to NaN, and a pixel that no ray of the lens model reaches
@@ -13,21 +14,26 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rhot.geometry.fisheye import distort_fisheye, fisheye_derivatives, undistort_fisheye
 from rhot.geometry.transforms import Array, inverse
+
+# How many numbers of distortion a fisheye has; Brown-Conrady has five.
+FISHEYE_NUMBERS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
     """One calibrated camera.
 
-    matrix is the pinhole matrix (3, 3) in px, distortion is (k1, k2, p1, p2, k3) as OpenCV orders
-    it, and T_rig_from_camera (4, 4) in metres places the optical centre in the rig.
+    matrix is the pinhole matrix (3, 3) in px. distortion is (k1, k2, p1, p2, k3) of Brown-Conrady
+    or (k1, k2, k3, k4) of the fisheye model, as OpenCV orders them: how many there are says which
+    it is. T_rig_from_camera (4, 4) in metres places the optical centre in the rig.
     """
 
     name: str
     size_px: tuple[int, int]
     matrix: Array  # (3, 3)
-    distortion: Array  # (5,)
+    distortion: Array  # (5,) or (4,)
     T_rig_from_camera: Array  # (4, 4)
 
     @property
@@ -48,7 +54,7 @@ class Camera:
     def project(self, p_rig: npt.ArrayLike) -> Array:
         """Pixels (n, 2) of points (n, 3) in the rig frame; NaN behind the camera.
 
-        Brown-Conrady model, OpenCV documentation of `projectPoints`.
+        OpenCV documentation of `projectPoints`, and of `fisheye::projectPoints`.
         """
         T = self.T_camera_from_rig
         p_camera = (
@@ -88,11 +94,13 @@ class Camera:
 
 
 def undistort(target: Array, distortion: Array) -> Array:
-    """Image points (n, 2) that Brown-Conrady (k1, k2, p1, p2, k3) takes to `target` (n, 2); NaN
-    where it takes none there.
+    """Image points (n, 2) that a lens takes to `target` (n, 2); NaN where it takes none there.
 
-    Newton's method: the usual fixed-point iteration diverges at the corners of wide-angle lenses.
+    distortion is (5,) of Brown-Conrady or (4,) of a fisheye. Newton's method: the usual fixed-point
+    iteration diverges at the corners of wide-angle lenses.
     """
+    if len(distortion) == FISHEYE_NUMBERS:
+        return undistort_fisheye(target, distortion)
     if not np.any(distortion):
         return target.copy()
     xy = target.copy()
@@ -124,6 +132,8 @@ def distortion_derivatives(
     """The 2x2 derivative, (n,) each, of the distorted by the undistorted image point (n, 2), by
     rows; distortion as for `distort`.
     """
+    if len(distortion) == FISHEYE_NUMBERS:
+        return fisheye_derivatives(xy, distortion)
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y
@@ -137,10 +147,13 @@ def distortion_derivatives(
 
 
 def distort(xy: Array, distortion: Array) -> Array:
-    """Brown-Conrady distortion of normalised points; (n, 2) -> (n, 2).
+    """Distortion of normalised points; (n, 2) -> (n, 2).
 
-    distortion is (5,), or (5, n) for a lens of each point's own.
+    distortion is (5,) of Brown-Conrady or (4,) of a fisheye, or (5, n) or (4, n) for a lens of each
+    point's own.
     """
+    if len(distortion) == FISHEYE_NUMBERS:
+        return distort_fisheye(xy, distortion)
     k1, k2, p1, p2, k3 = distortion
     x, y = xy[:, 0], xy[:, 1]
     r2 = x * x + y * y

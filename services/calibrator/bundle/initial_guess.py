@@ -12,8 +12,10 @@ from rhot.geometry.transforms import Array, transform
 from services.calibrator.bundle.lens_model import (
     CX,
     CY,
+    FISHEYE,
     FX,
     FY,
+    K3,
     LENS_SIZE,
     project,
     rays_from_pixels,
@@ -27,15 +29,16 @@ _FOCALS = 0.25 * 1.2 ** np.arange(16)
 _FAR = 5.0
 
 
-def ideal_lens(size_px: tuple[int, int], focal_px: float) -> Array:
+def ideal_lens(size_px: tuple[int, int], focal_px: float, *, fisheye: bool = False) -> Array:
     """A lens (9,) without distortion, its principal point in the middle of the picture."""
     lens = np.zeros(LENS_SIZE)
+    lens[K3] = FISHEYE if fisheye else 0.0
     lens[[FX, FY]] = focal_px
     lens[[CX, CY]] = (size_px[0] - 1) / 2.0, (size_px[1] - 1) / 2.0
     return lens
 
 
-def guess_lens(size_px: tuple[int, int], views: list[View]) -> Array:
+def guess_lens(size_px: tuple[int, int], views: list[View], *, fisheye: bool = False) -> Array:
     """The ideal lens (9,) of that focal length with which the boards' views fit best.
 
     Scored by the median view: a strongly distorting lens bends some views more than a wrong focal
@@ -43,9 +46,10 @@ def guess_lens(size_px: tuple[int, int], views: list[View]) -> Array:
     """
     scores = []
     for factor in _FOCALS:
-        lens = ideal_lens(size_px, factor * size_px[0])
+        lens = ideal_lens(size_px, factor * size_px[0], fisheye=fisheye)
         scores.append(float(np.median([guess_board_pose(lens, view)[1] for view in views])))
-    return ideal_lens(size_px, _FOCALS[int(np.argmin(scores))] * size_px[0])
+    best = _FOCALS[int(np.argmin(scores))] * size_px[0]
+    return ideal_lens(size_px, best, fisheye=fisheye)
 
 
 def guess_board_pose(lens: Array, view: View) -> tuple[Array, float]:

@@ -12,36 +12,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from rhot.files.calibration import LensKind
 from rhot.geometry.transforms import Array
 from services.calibrator.board.board import Board
 from services.calibrator.board.detect import Detection
-from services.calibrator.bundle.adjust import Adjustment, FreeUnknowns, adjust
-from services.calibrator.bundle.cross_validation import (
-    adjust_without,
-    folds,
-    held_out_rms,
-    leave_one_out,
-    suspects,
-)
+from services.calibrator.bundle.cross_validation import held_out_rms, leave_one_out, suspects
 from services.calibrator.bundle.lens_model import rays_from_pixels
 from services.calibrator.bundle.residuals import View, rms, rms_by_board
-from services.calibrator.bundle.views import single_view
 from services.calibrator.lens.checks import check_fit, check_lens
-from services.calibrator.lens.fit import fit_poses
-from services.calibrator.lens.model_selection import LensModel, choose_model, only_free
+from services.calibrator.lens.held_out import best_pose, free_unknowns, held_out_px, refit
+from services.calibrator.lens.model_selection import LensModel, choose_model
 from services.calibrator.lens.result import LensFit, LensResult, PictureError
 from services.calibrator.lens.screening import fit_pictures
 
 
-def calibrate_lens(camera: str, detections: dict[str, Detection], board: Board) -> LensResult:
+def calibrate_lens(
+    camera: str, detections: dict[str, Detection], board: Board, kind: LensKind | None = None
+) -> LensResult:
     """Calibrate a camera's lens from the boards detected in its pictures (key -> detection).
 
-    Raises CalibrationError, with the reason, if the pictures cannot support a calibration.
+    kind is the lens model to use; None: the one with which held-out pictures fit better. Raises
+    CalibrationError, with the reason, if the pictures cannot support a calibration.
     """
-    fit, left_out = fit_pictures(camera, detections, board)
+    fit, left_out = fit_pictures(camera, detections, board, kind)
     check_fit(fit)
-    model = choose_model(lambda model: _held_out_px(fit, model))
-    fit = replace(fit, found=_refit(fit, model))
+    model = choose_model(lambda model: held_out_px(fit, model))
+    fit = replace(fit, found=refit(fit, model))
     pictures = _picture_errors(fit, model, board)
     estimate = fit.estimate()
     held_out_squares = held_out_rms([picture.held_out_squares for picture in pictures])
@@ -51,7 +47,7 @@ def calibrate_lens(camera: str, detections: dict[str, Detection], board: Board) 
         lens=estimate.lens,
         sigma=estimate.sigma,
         coverage=estimate.coverage,
-        model=model.name,
+        model=model.name_of(fit.found.state.lenses),
         rms_px=fit.found.rms_px,
         held_out_px=held_out_rms([picture.held_out_px for picture in pictures]),
         held_out_squares=held_out_squares,
@@ -61,33 +57,14 @@ def calibrate_lens(camera: str, detections: dict[str, Detection], board: Board) 
     )
 
 
-def _refit(fit: LensFit, model: LensModel) -> Adjustment:
-    """The fit with another model, from the lens there is; what the model lacks is zero."""
-    state = fit.found.state
-    lens = np.where(model.free, state.lenses[0], 0.0)
-    start = replace(state, lenses=lens[None])
-    return adjust(fit.views, start, FreeUnknowns.one_lens(model.free))
-
-
-def _held_out_px(fit: LensFit, model: LensModel) -> float:
-    """RMS px over all pictures, each with the lens from the folds it is not in."""
-    start = _refit(fit, model).state
-    free = FreeUnknowns.one_lens(model.free)
-    squares = []
-    for held_out in folds(len(fit.views)):
-        lens = adjust_without(fit.views, start, held_out, free).lenses[0]
-        squares += [rms(_best_pose(lens, fit.views[k]).residuals[0]) ** 2 for k in held_out]
-    return float(np.sqrt(np.mean(squares)))
-
-
 def _picture_errors(fit: LensFit, model: LensModel, board: Board) -> list[PictureError]:
     errors_px = rms_by_board(fit.views, fit.found.residuals, len(fit.keys))
-    without = leave_one_out(fit.views, fit.found, FreeUnknowns.one_lens(model.free))
+    without = leave_one_out(fit.views, fit.found, free_unknowns(fit, model))
     suspect = suspects(errors_px, [each.influence_percent for each in without])
     pictures = []
     for k, (key, view) in enumerate(zip(fit.keys, fit.views, strict=True)):
         lens = without[k].state.lenses[0]
-        pose = _best_pose(lens, view)
+        pose = best_pose(lens, view)
         on_board_m = _distance_on_board_m(lens, view, pose.state.T_rig_from_board[0])
         pictures.append(
             PictureError(
@@ -100,11 +77,6 @@ def _picture_errors(fit: LensFit, model: LensModel, board: Board) -> list[Pictur
             )
         )
     return pictures
-
-
-def _best_pose(lens: Array, view: View) -> Adjustment:
-    """The pose of one view's board that suits it best with this lens."""
-    return fit_poses(lens, [single_view(view)], only_free())
 
 
 def _distance_on_board_m(lens: Array, view: View, T_camera_from_board: Array) -> float:

@@ -8,7 +8,7 @@ from rhot.errors import CalibrationError
 from rhot.geometry.transforms import Array
 from services.calibrator.board.board_views import LeftOut
 from services.calibrator.board.coverage import Coverage
-from services.calibrator.bundle.lens_model import CX, CY, FX, FY, rays_from_pixels
+from services.calibrator.bundle.lens_model import CX, CY, FX, FY, is_fisheye, rays_from_pixels
 from services.calibrator.lens.result import LensEstimate, LensFit
 
 # Zhang (2000) needs three views in theory; with three, none can be held out.
@@ -21,8 +21,8 @@ _FOCAL_REFUSED, _FOCAL_WARNED = 0.02, 0.004
 # RMS of the fit, px at 640 px width. The real pairs reach .17; blurred and moving boards stay below
 # 1.
 _RMS_REFUSED = 3.0
-# Focal lengths in picture widths of lenses that this model describes: fields of view of 130 to 3
-# degrees.
+# Focal lengths in picture widths of lenses that the models describe: fields of view of 130 degrees
+# (170 with a fisheye) to 3.
 _FOCALS = (0.23, 20.0)
 # Boards this parallel leave focal length and distance inseparable. The real pairs span 60 degrees.
 _PARALLEL_DEG = 10.0
@@ -46,14 +46,12 @@ def check_count(camera: str, count: int, left_out: list[LeftOut] | None = None) 
     """Raise CalibrationError if a camera has too few pictures of the board."""
     if count >= MIN_VIEWS:
         return
-    usable = f"only {count} usable picture{'s' if count > 1 else ''} of the board"
     reason = (
-        f"camera {camera!r}: {usable if count else 'no picture shows the board as a whole'}, at "
-        f"least {MIN_VIEWS} are needed (12 to 20 are good)"
+        f"camera {camera!r}: only {count} usable picture{'' if count == 1 else 's'} of the board, "
+        f"at least {MIN_VIEWS} are needed (12 to 20 are good)"
     )
     if not count:
-        reason += ". Is --board its number of inner corners (one less than the squares each way)?"
-        raise CalibrationError(f"{reason} {_HOW_TO}")
+        reason += "; is --board its number of inner corners (one less than the squares each way)?"
     if left_out:
         named = (f"{item.key} ({item.reason})" for item in left_out[:_NAMED])
         reason += "; left out: " + "; ".join(named)
@@ -98,9 +96,12 @@ def check_lens(estimate: LensEstimate, held_out_squares: float | None = None) ->
             f"held-out corners are {held_out_squares:.3f} squares off; is the board flat, and were "
             "the pictures sharp?"
         )
-    if not np.all(np.isfinite(rays_from_pixels(estimate.lens, _border(estimate.size_px)))):
+    if not np.all(np.isfinite(rays_from_pixels(estimate.lens, border(estimate.size_px)))):
         warnings.append(
-            "the distortion cannot be undone at the edge of the image: pixels there are not "
+            "the edge of the image sees farther than 86 degrees from the lens's axis, or than its "
+            "model reaches: pixels there are not measured"
+            if is_fisheye(estimate.lens)
+            else "the distortion cannot be undone at the edge of the image: pixels there are not "
             "measured; add pictures that reach it"
         )
     return tuple(warnings)
@@ -118,8 +119,8 @@ def _refuse_held_out(camera: str, held_out_squares: float) -> None:
             f"camera {camera!r}: no lens explains the pictures; corners left out of the fit are "
             f"{held_out_squares:.2f} squares off (.01 is good, {_SQUARES_REFUSED:g} the limit). Is "
             "the board flat and rigid, are all pictures of the same camera, lens and focus, is "
-            "--board its number of inner corners? A fisheye lens of more than about 120 degrees "
-            "cannot be described by this model"
+            "--board its number of inner corners? Was --model given, and is it the lens's? Lenses "
+            "that see more than 170 degrees cannot be described"
         )
 
 
@@ -168,7 +169,7 @@ def _tilt_text(covered: Coverage) -> str:
     )
 
 
-def _border(size_px: tuple[int, int]) -> Array:
+def border(size_px: tuple[int, int]) -> Array:
     """Pixels (n, 2) around the edge of the picture."""
     width, height = size_px
     x = np.linspace(0.0, width - 1.0, _BORDER_X)

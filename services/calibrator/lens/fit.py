@@ -21,13 +21,15 @@ _STAGES = (
 )
 
 
-def fit_lens(size_px: tuple[int, int], views: list[View], free: np.ndarray) -> Adjustment:
+def fit_lens(
+    size_px: tuple[int, int], views: list[View], free: np.ndarray, *, fisheye: bool = False
+) -> Adjustment:
     """One camera's lens and the poses of its boards, from nothing but its views.
 
     The boards are numbered 0..n-1. free (9,) bool says which numbers of the lens may move; the
     others are those of an ideal lens.
     """
-    found = fit_poses(guess_lens(size_px, views), views, _STAGES[0] & free)
+    found = fit_poses(guess_lens(size_px, views, fisheye=fisheye), views, _STAGES[0] & free)
     # Last all again: a pose of the wrong branch (a near-frontal board turned the other way) is
     # found with the lens then known. And a stage that ends in a worse minimum than the one before,
     # as k3 does with boards that were never tilted, is forgotten.

@@ -115,7 +115,7 @@ def _fitted(lens: Array, views: list[View]) -> Adjustment:
     """The lens of these views, from the lens there is at the focal length that suits them."""
     share = float(np.median([_best_share(view, lens) for view in views]))
     own = [replace(view, board=n) for n, view in enumerate(views)]
-    return fit_poses(_scaled(lens, share), own, USUAL_MODEL.free)
+    return fit_poses(_scaled(lens, share), own, USUAL_MODEL.free_of(lens))
 
 
 def _error_px(lens: Array, view: View) -> float:

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rhot.errors import CalibrationError
-from rhot.files.calibration import CameraPlace, Lens, Matrix4, RigGeometry, Row3
+from rhot.files.calibration import CameraPlace, Lens, Matrix4, RigGeometry, Row3, lens_kind
 from rhot.geometry.transforms import Array, inverse
 from services.calibrator.board.board import Board
 from services.calibrator.board.detect import Detection
-from services.calibrator.bundle.lens_model import CX, CY, FX, FY, K1, lens_vector
+from services.calibrator.bundle.lens_model import CX, CY, FX, FY, distortion_of, lens_vector
 from services.calibrator.lens.result import LensResult
 from services.calibrator.recalibrate.refine_rig import RefinedRig
 from services.calibrator.rig.result import RigResult
@@ -83,7 +83,7 @@ def _lens(size_px: tuple[int, int], lens: Array, made: Provenance) -> Lens:
         (0.0, round(float(lens[FY]), 4), round(float(lens[CY]), 4)),
         (0.0, 0.0, 1.0),
     )
-    k1, k2, p1, p2, k3 = (round(float(value), 7) for value in lens[K1:])
+    distortion = tuple(round(float(value), 7) for value in distortion_of(lens))
     return Lens(
         date=made.date,
         tool=made.tool,
@@ -91,7 +91,8 @@ def _lens(size_px: tuple[int, int], lens: Array, made: Provenance) -> Lens:
         residuals=_finite(made.residuals),
         size_px=size_px,
         matrix=rows,
-        distortion=(k1, k2, p1, p2, k3),
+        distortion=distortion,
+        model=lens_kind(distortion),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from rhot.geometry.transforms import Array, inverse
 from services.calibrator.board.board import Board
 from services.calibrator.board.board_views import LeftOut
-from services.calibrator.bundle.lens_model import FX, FY, K1
+from services.calibrator.bundle.lens_model import FX, FY, distortion_of
 from services.calibrator.lens.result import LensResult
 from services.calibrator.recalibrate.refine_rig import RefinedRig
 from services.calibrator.rig.result import RigResult
@@ -130,7 +130,7 @@ def _with_sigmas(values: Array, sigmas: Array) -> str:
 
 def _lens(lens: Array, sigma: Array) -> str:
     known = f" +- {max(sigma[FX], sigma[FY]):.1f}" if np.any(sigma) else ""
-    k = " ".join(f"{value:.3g}" for value in lens[K1:])
+    k = " ".join(f"{value:.3g}" for value in distortion_of(lens))
     return (
         f"f {lens[FX]:.1f}, {lens[FY]:.1f}{known} px, centre {lens[2]:.1f}, {lens[3]:.1f} px, ({k})"
     )

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rhot.files.calibration import LensKind
 from rhot.geometry.transforms import Array
 from services.calibrator.board.board import Board
 from services.calibrator.board.board_views import LeftOut
@@ -24,7 +25,6 @@ from services.calibrator.bundle.cross_validation import (
     leave_one_out,
     suspects,
 )
-from services.calibrator.bundle.lens_model import LENS_SIZE
 from services.calibrator.bundle.outliers import OUTLIER_ROUNDS, outliers
 from services.calibrator.bundle.views import subset, views_of_board
 from services.calibrator.lens.model_selection import USUAL_MODEL, LensModel, choose_model
@@ -35,16 +35,20 @@ from services.calibrator.rig.result import PositionError, RigFit, RigResult, rig
 
 
 def calibrate_rig(
-    detections: Detections, board: Board, lenses: dict[str, Array] | None = None
+    detections: Detections,
+    board: Board,
+    lenses: dict[str, Array] | None = None,
+    kind: LensKind | None = None,
 ) -> RigResult:
     """Calibrate a rig from the boards in each camera's pictures; equal keys are one instant.
 
-    lenses (camera -> (9,)) are taken as they are if given, else found as well. The first camera is
-    the rig frame. Raises CalibrationError, with the reason, if the pictures cannot support a
+    lenses (camera -> (9,)) are taken as they are if given, else found as well: of that kind, or
+    each of the one with which held-out pictures fit better. The first camera is the rig frame.
+    Raises CalibrationError, with the reason, if the pictures cannot support a
     calibration.
     """
     check_cameras(detections)
-    start, left_out = initial_rig(detections, board, lenses)
+    start, left_out = initial_rig(detections, board, lenses, kind)
     # None: the lenses are held.
     model = USUAL_MODEL if lenses is None else None
     fit, outlier_positions = _adjust_without_outliers(start, _free_unknowns(start, model))
@@ -52,17 +56,16 @@ def calibrate_rig(
         model = choose_model(lambda model: _held_out_squares(fit, board, model))
         fit = _refit(fit, model)
     positions = _position_errors(fit, board, _free_unknowns(fit, model))
-    result = rig_result(
-        fit, board, positions, [*left_out, *outlier_positions], model.name if model else None
-    )
+    name = model.name_of(fit.found.state.lenses) if model else None
+    result = rig_result(fit, board, positions, [*left_out, *outlier_positions], name)
     return replace(result, warnings=check_rig(result))
 
 
 def _free_unknowns(fit: RigFit, model: LensModel | None) -> FreeUnknowns:
     """All boards, all cameras but the first, and the numbers of their lenses the model has."""
-    cameras = len(fit.names)
-    lens = model.free if model else np.zeros(LENS_SIZE, dtype=bool)
-    return FreeUnknowns(np.tile(lens, (cameras, 1)), np.arange(cameras) > 0)
+    lenses = fit.found.state.lenses
+    free = model.free_of(lenses) if model else np.zeros_like(lenses, dtype=bool)
+    return FreeUnknowns(free, np.arange(len(lenses)) > 0)
 
 
 def _adjust_without_outliers(fit: RigFit, free: FreeUnknowns) -> tuple[RigFit, list[LeftOut]]:
@@ -94,7 +97,7 @@ def _adjust_without_outliers(fit: RigFit, free: FreeUnknowns) -> tuple[RigFit, l
 def _refit(fit: RigFit, model: LensModel) -> RigFit:
     """The fit with another model, from the rig there is; what the model lacks is zero."""
     state = fit.found.state
-    start = replace(state, lenses=np.where(model.free, state.lenses, 0.0))
+    start = replace(state, lenses=model.reduced(state.lenses))
     return replace(fit, found=adjust(fit.views, start, _free_unknowns(fit, model)))
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rhot.files.calibration import LensKind
 from rhot.geometry.transforms import Array
 from services.calibrator.board.board import Board
 from services.calibrator.board.board_views import LeftOut, board_view, same_size
@@ -25,18 +26,22 @@ _BEHIND_PX = 1e6
 
 
 def initial_rig(
-    detections: Detections, board: Board, lenses: dict[str, Array] | None
+    detections: Detections,
+    board: Board,
+    lenses: dict[str, Array] | None,
+    kind: LensKind | None = None,
 ) -> tuple[RigFit, list[LeftOut]]:
     """The rig before it is adjusted as a whole, and the pictures left out.
 
-    lenses (camera -> (9,)) are found if they are not given. Raises CalibrationError if the pictures
+    lenses (camera -> (9,)) are found if they are not given, of that kind or the better one of each
+    camera. Raises CalibrationError if the pictures
     support no lens, or a camera's pose cannot be found.
     """
     left_out: list[LeftOut] = []
     sizes, usable, found = [], [], []
     for name in detections:
         if lenses is None:
-            size_px, kept, lens, others = _own_lens(name, detections[name], board)
+            size_px, kept, lens, others = _own_lens(name, detections[name], board, kind)
         else:
             size_px, kept, others = same_size(name, detections[name])
             lens = lenses[name]
@@ -65,10 +70,10 @@ def initial_rig(
 
 
 def _own_lens(
-    name: str, detections: dict[str, Detection], board: Board
+    name: str, detections: dict[str, Detection], board: Board, kind: LensKind | None
 ) -> tuple[tuple[int, int], dict[str, Detection], Array, list[LeftOut]]:
     """A camera's picture size, usable detections and lens, from its own pictures alone."""
-    fit, left_out = fit_pictures(name, detections, board)
+    fit, left_out = fit_pictures(name, detections, board, kind)
     check_fit(fit)
     usable = {key: detections[key] for key in fit.keys}
     return fit.size_px, usable, fit.found.state.lenses[0], left_out

@@ -45,7 +45,7 @@ def lens(
     pictures = one_camera(folder, name)
     known, found, blind = options.detect_all(pictures, known, shown.square_m, source.progress)
     settle([size_doubt(name, found[name])], yes=shown.yes)
-    result = calibrate_lens(name, found[name], known)
+    result = calibrate_lens(name, found[name], known, source.model.kind)
     result = replace(result, left_out=(*blind, *result.left_out))
     made = lens_file(result, known, options.now_text(), str(folder))
     path = options.out_folder(source.out, rig) / f"{name}.lens.json"

@@ -18,6 +18,7 @@ from services.cli.options import ConnectOption, ProgressOption
 from services.cli.progress import Progress
 
 if TYPE_CHECKING:
+    from rhot.files.calibration import LensKind
     from services.calibrator.board.board import Board
     from services.calibrator.board.board_views import LeftOut
     from services.calibrator.board.detect import Detections
@@ -32,6 +33,23 @@ class Kind(StrEnum):
 
     CHESSBOARD = "chessboard"
     CHARUCO = "charuco"
+
+
+class Model(StrEnum):
+    """The model of a lens."""
+
+    AUTO = "auto"
+    BROWN_CONRADY = "brown-conrady"
+    FISHEYE = "fisheye"
+
+    @property
+    def kind(self) -> LensKind | None:
+        """The same as calibration files have it; None: to be chosen."""
+        kinds: dict[Model, LensKind] = {
+            Model.BROWN_CONRADY: "brown-conrady",
+            Model.FISHEYE: "fisheye",
+        }
+        return kinds.get(self)
 
 
 CornersOption = Annotated[
@@ -61,6 +79,9 @@ ConfigOption = Annotated[Path | None, typer.Option("--config", help="rig.toml of
 LiveOption = Annotated[
     bool,
     typer.Option("--live", help="take the pictures now, from the running cameras, into the folder"),
+]
+ModelOption = Annotated[
+    Model, typer.Option("--model", help="lens model; auto: by the error of held-out pictures")
 ]
 CountOption = Annotated[
     int,
@@ -138,6 +159,7 @@ class PictureOptions:
     live: LiveOption = False
     connect: ConnectOption = None
     count: CountOption = 15
+    model: ModelOption = Model.AUTO
     progress: ProgressOption = None
     as_json: JsonOption = False
 

@@ -68,7 +68,8 @@ def stereo(
         {camera: load_lens(target, camera) for camera in pictures.cameras} if keep_lenses else None
     )
     known, found, blind = options.detect_all(pictures, known, shown.square_m, source.progress)
-    result = calibrate_rig(found, known, lens_vectors(kept, found) if kept else None)
+    lenses = lens_vectors(kept, found) if kept else None
+    result = calibrate_rig(found, known, lenses, source.model.kind)
     result = replace(result, left_out=(*blind, *result.left_out))
     settle(result.doubts(), yes=shown.yes)
     _write(result, target, folder, as_json=source.as_json)

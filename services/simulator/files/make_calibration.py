@@ -67,7 +67,7 @@ def lens(camera: CameraTable, date: str) -> Lens:
         tool=TOOL,
         size_px=camera.size_px,
         matrix=tuple(tuple(row) for row in rows),  # type: ignore[arg-type]
-        distortion=distortion,  # type: ignore[arg-type]
+        distortion=distortion,
     )
 
 

@@ -38,7 +38,7 @@ class CameraView(NamedTuple):
 
     rotation: Array  # (3, 3) camera from rig
     translation: Array  # (3,) m
-    lens: Array  # (9,) `projection.lens_parameters`
+    lens: Array  # (9,) or (8,) `projection.lens_parameters`
 
 
 class Surfaces(NamedTuple):

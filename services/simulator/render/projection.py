@@ -10,6 +10,8 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 
 Array32 = npt.NDArray[np.float32]
+# Numbers of a fisheye's lens parameters; Brown-Conrady has nine.
+_FISHEYE_LENS = 8
 
 
 def pixel_rays(camera: Camera) -> Array32:
@@ -33,7 +35,9 @@ def pixel_rays(camera: Camera) -> Array32:
 
 
 def lens_parameters(camera: Camera) -> Array:
-    """Intrinsics and distortion for `project`: fx, fy, cx, cy, k1, k2, p1, p2, k3; (9,)."""
+    """Intrinsics and distortion for `project`: fx, fy, cx, cy, then k1, k2, p1, p2, k3 of
+    Brown-Conrady, (9,), or k1, k2, k3, k4 of a fisheye, (8,).
+    """
     m = camera.matrix
     return np.concatenate([[m[0, 0], m[1, 1], m[0, 2], m[1, 2]], camera.distortion])
 
@@ -42,9 +46,16 @@ def lens_parameters(camera: Camera) -> Array:
 # compares the two.
 @njit(cache=True, nogil=True, error_model="numpy")
 def project(lens: Array, x: float, y: float, z: float) -> tuple[float, float]:
-    """Pixel of a point in front of the camera, Brown-Conrady distortion included."""
+    """Pixel of a point in front of the camera, distortion included."""
     x, y = x / z, y / z
     r2 = x * x + y * y
+    if len(lens) == _FISHEYE_LENS:
+        r = np.sqrt(r2)
+        theta = np.arctan(r)
+        s = theta * theta
+        seen = theta * (1.0 + s * (lens[4] + s * (lens[5] + s * (lens[6] + s * lens[7]))))
+        ratio = seen / r if r > 1e-6 else 1.0
+        return lens[0] * x * ratio + lens[2], lens[1] * y * ratio + lens[3]
     radial = 1.0 + r2 * (lens[4] + r2 * (lens[5] + r2 * lens[8]))
     xd = x * radial + 2.0 * lens[6] * x * y + lens[7] * (r2 + 2.0 * x * x)
     yd = y * radial + lens[6] * (r2 + 2.0 * y * y) + 2.0 * lens[7] * x * y

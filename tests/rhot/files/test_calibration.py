@@ -83,3 +83,16 @@ def test_a_hand_nobody_measured_comes_from_the_tables(tmp_path):
     cal.save(tmp_path / "hand.right.json", model)
     with pytest.raises(CalibrationError, match="is of a left hand"):
         cal.load_hand(tmp_path, "right")
+
+
+def test_a_lens_file_says_its_model_and_old_files_are_brown_conrady(tmp_path):
+    wide = msgspec.structs.replace(LENS, distortion=(-0.03, 0.01, 0.0, 0.0), model="fisheye")
+    cal.save(tmp_path / "left.lens.json", wide)
+    assert cal.load_lens(tmp_path, "left") == wide
+    old = msgspec.to_builtins(LENS)
+    del old["model"]
+    (tmp_path / "left.lens.json").write_bytes(msgspec.json.encode(old))
+    assert cal.load_lens(tmp_path, "left") == LENS
+    (tmp_path / "left.lens.json").write_bytes(msgspec.json.encode({**old, "model": "fisheye"}))
+    with pytest.raises(CalibrationError, match="model fisheye has 4 numbers, not 5"):
+        cal.load_lens(tmp_path, "left")

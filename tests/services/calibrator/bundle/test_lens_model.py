@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import pytest
 
 from rhot.geometry.camera import Camera
 from services.calibrator.bundle.lens_model import (
+    FISHEYE,
     LENS_SIZE,
     lens_camera,
     lens_vector,
@@ -17,6 +19,9 @@ from services.calibrator.bundle.lens_model import (
 
 LENS = np.array([530.0, 524.0, 316.0, 243.0, -0.29, 0.1, 0.001, -0.0007, -0.01])
 OTHER_LENS = np.array([610.0, 600.0, 330.0, 236.0, 0.1, -0.2, -0.002, 0.001, 0.05])
+
+
+WIDE_LENS = np.array([230.0, 231.0, 330.0, 236.0, -0.03, 0.006, -0.002, 0.0003, FISHEYE])
 
 
 def points(count: int = 40) -> np.ndarray:
@@ -43,7 +48,7 @@ def test_projection_agrees_with_rhot_and_opencv():
 def test_a_lens_for_each_point_agrees_with_rhots_cameras():
     """Why the adjustment may project with its own function, and with Jacobians: it is the same."""
     p = points()
-    lenses = np.where(np.arange(len(p))[:, None] % 2, OTHER_LENS, LENS)
+    lenses = np.stack([(LENS, OTHER_LENS, WIDE_LENS)[k % 3] for k in range(len(p))])
     one_by_one = [
         camera_of(lens).project_camera(point)[0] for lens, point in zip(lenses, p, strict=True)
     ]
@@ -51,20 +56,21 @@ def test_a_lens_for_each_point_agrees_with_rhots_cameras():
     np.testing.assert_allclose(project_with_jacobians(lenses, p)[0], one_by_one, atol=1e-10)
 
 
-def test_jacobians_agree_with_finite_differences():
+@pytest.mark.parametrize(("lens", "size"), [(LENS, LENS_SIZE), (WIDE_LENS, LENS_SIZE - 1)])
+def test_jacobians_agree_with_finite_differences(lens, size):
     p = points()
-    lenses = np.tile(LENS, (len(p), 1))
+    lenses = np.tile(lens, (len(p), 1))
     pixels, J_point, J_lens = project_with_jacobians(lenses, p)
-    np.testing.assert_allclose(pixels, project(LENS, p), atol=1e-12)
+    np.testing.assert_allclose(pixels, project(lens, p), atol=1e-12)
     for axis in range(3):
         step = np.zeros(3)
         step[axis] = 1e-6
-        numeric = (project(LENS, p + step) - project(LENS, p - step)) / 2e-6
+        numeric = (project(lens, p + step) - project(lens, p - step)) / 2e-6
         np.testing.assert_allclose(J_point[:, :, axis], numeric, rtol=1e-6, atol=1e-4)
-    for number in range(LENS_SIZE):
+    for number in range(size):
         step = np.zeros(LENS_SIZE)
         step[number] = 1e-6
-        numeric = (project(LENS + step, p) - project(LENS - step, p)) / 2e-6
+        numeric = (project(lens + step, p) - project(lens - step, p)) / 2e-6
         np.testing.assert_allclose(J_lens[:, :, number], numeric, rtol=1e-6, atol=1e-5)
 
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError
+from services.calibrator.bundle.lens_model import lens_camera
+from services.calibrator.lens.calibrate import calibrate_lens
 from services.calibrator.lens.screening import fit_pictures
 
 # k1, k2, p1, p2, k3 of lenses that need k3, and a focal length with which it shows at the edge.
 STRONG = {
     "barrel": (-0.36, 0.2, 0.001, -0.0005, -0.06),
     "pincushion": (0.15, -0.5, 0.0, 0.0, 0.6),
-    "moustache": (-0.3, 0.35, 0.0, 0.0, -0.2),
 }
 
 
@@ -77,5 +78,25 @@ def test_pictures_of_two_lenses_are_told_apart(make_bench):
 
 
 def test_no_picture_of_the_board_asks_for_its_corners(make_bench):
-    with pytest.raises(CalibrationError, match="no picture shows the board as a whole, at least 4"):
+    with pytest.raises(CalibrationError, match=r"only 0 usable pictures.* is --board its"):
         fit_pictures("left", {}, make_bench(1, 1).board)
+
+
+def test_a_wide_lens_is_given_the_fisheye_model_and_calibrated(make_bench):
+    """140 degrees across: f 272 px, boards up to 70 degrees and more from the axis."""
+    k = (-0.03, 0.006, -0.002, 0.0003)
+    wide = {"focal_px": 272.0, "distortion": k, "spread": 1.6, "depth_m": (0.12, 0.3)}
+    bench = make_bench(1, 45, **wide)
+    (found,) = bench.detections(0.12).values()
+    assert len(found) >= 8
+    result = calibrate_lens("left", dict(list(found.items())[:10]), bench.board)
+    assert result.model.startswith("fisheye")
+    assert result.left_out == ()
+    assert result.rms_px < 0.2
+    assert result.held_out_px < 0.25
+    camera = lens_camera("left", result.size_px, result.lens, np.eye(4))
+    assert len(camera.distortion) == 4
+    steep = np.tan(np.radians([30.0, 55.0, 70.0]))
+    rays = np.stack([steep, -0.3 * steep], axis=1)
+    truth = bench.cameras[0].pixels_from_rays(rays)
+    np.testing.assert_allclose(camera.pixels_from_rays(rays), truth, atol=0.7)

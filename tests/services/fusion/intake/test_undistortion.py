@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rhot.geometry.camera import Camera, pinhole
 from services.fusion.intake.undistortion import undistort
@@ -28,6 +29,23 @@ def test_equals_the_camera_and_inverts_the_projection():
         down = undistort(model, pixels + half_y)[0] - undistort(model, pixels - half_y)[0]
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
         np.testing.assert_allclose(scale, np.sqrt(area), rtol=1e-4)
+
+
+@pytest.mark.parametrize("distortion", [[0.0] * 4, [-0.03, 0.006, -0.002, 0.0003]])
+def test_a_fisheye_equals_the_camera(distortion):
+    matrix = np.array([[230.0, 0.0, 318.0], [0.0, 231.0, 241.0], [0.0, 0.0, 1.0]])
+    model = Camera("left", (640, 480), matrix, np.array(distortion), np.eye(4))
+    turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 200)
+    out = np.linspace(0.0, 290.0, 200)
+    pixels = np.array([318.0, 241.0]) + out[:, None] * np.stack([np.cos(turn), np.sin(turn)], 1)
+    rays, scale, valid = undistort(model, pixels)
+    assert valid.all()
+    np.testing.assert_allclose(rays, model.rays_from_pixels(pixels), rtol=1e-8, atol=1e-11)
+    right, down = (undistort(model, pixels + np.array(half))[0] for half in ((0.01, 0), (0, 0.01)))
+    (a, b), (c, d) = ((right - rays) / 0.01).T, ((down - rays) / 0.01).T
+    np.testing.assert_allclose(scale, np.sqrt(np.abs(a * d - b * c)), rtol=2e-2)
+    assert not undistort(model, np.array([[318.0 + 600.0, 241.0], [np.nan, 0.0]])).valid.any()
+    assert np.isnan(model.rays_from_pixels([[918.0, 241.0]])).all()
 
 
 def test_pixels_beyond_the_lens_are_not_valid():
