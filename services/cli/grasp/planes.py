@@ -19,7 +19,7 @@ from services.cli.grasp.film import open_video
 from studies.grasp.metrology.lens import lens_from_edges, straightened
 from studies.grasp.metrology.plane import Plane
 from studies.grasp.metrology.rectified import Raster, Rectified, raster_of
-from studies.grasp.metrology.reference import parse_points
+from studies.grasp.metrology.reference import Known, Reference, parse_points, plane_of
 
 Image = npt.NDArray[np.uint8]
 # Rates that a container may say; others are a broken header.
@@ -64,6 +64,17 @@ class Straight(NamedTuple):
                 " more; is it the lens of this camera, and of this size of pictures?"
             )
         return flat
+
+    def known(self, reference: Reference, sigma_px: float, picture: Image | None) -> Known:
+        """The plane of a reference in the camera's pixels."""
+        return plane_of(
+            reference,
+            self.size_px,
+            straighten=self.straighten,
+            matrix=self.calibrated,
+            sigma_px=sigma_px,
+            picture=picture,
+        )
 
     def distort(self, points_px: Array) -> Array:
         """Back; (n, 2)."""

@@ -17,7 +17,7 @@ from services.cli.options import ProgressOption
 
 if TYPE_CHECKING:
     from rhot.geometry.transforms import Array
-    from services.cli.grasp.planes import Straight
+    from services.cli.grasp.planes import Image, Straight
     from studies.grasp.metrology.plane import Plane
 
 _TWO = "two points, as '410,52 550,60'"
@@ -50,6 +50,9 @@ class PlaneOptions:
     sigma: Annotated[
         float, typer.Option(min=0.01, max=50.0, help="how well points are pointed at, px")
     ] = 1.0
+    refine: Annotated[
+        bool, typer.Option(help="look for the rectangle's own edges near what was pointed at")
+    ] = True
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def rectify(
 
     image = first_picture(picture)
     straight = straight_of((image.shape[1], image.shape[0]), seen.lens, seen.straight)
-    plane, about = _plane(known, straight)
+    plane, about, words = _plane(known, straight, image)
     if seen.nearer:
         plane = _nearer(plane, seen, straight)
     for text in distance or []:
@@ -104,23 +107,26 @@ def rectify(
     for path in write(picture, out, plane, straight, about, scale, line.advance):
         typer.echo(path)
     line.end()
+    typer.echo(words)
     typer.echo(straight.about)
 
 
-def _plane(known: PlaneOptions, straight: Straight) -> tuple[Plane, Array]:
-    """The plane, and the points (n, 2) px it is known by, of a picture without distortion."""
+def _plane(known: PlaneOptions, straight: Straight, image: Image) -> tuple[Plane, Array, str]:
+    """The plane, and the points (n, 2) px it is known by, of a picture without distortion; how
+    well it is known.
+    """
     import numpy as np
 
     from studies.grasp.metrology.plane import plane_from_view
-    from studies.grasp.metrology.reference import Reference, parse_points, parse_size, plane_of
+    from studies.grasp.metrology.reference import Reference, parse_points, parse_size
     from studies.grasp.metrology.view import view_from_edges
 
     if known.points is not None:
         if known.size is None:
             raise ConfigError("--points without --size: how large is the rectangle? --size 80x36")
         rectangle = Reference(parse_size(known.size), parse_points(known.points, 4))
-        about = straight.straighten(rectangle.points_px)
-        return plane_of(rectangle, straight.straighten, known.sigma), about
+        found = straight.known(rectangle, known.sigma, image if known.refine else None)
+        return found.plane, found.seen.points_px, found.about()
     if known.between is None or known.length is None:
         raise ConfigError(
             "no reference: give --points and --size of a rectangle, or --between and --length of a"
@@ -128,8 +134,9 @@ def _plane(known: PlaneOptions, straight: Straight) -> tuple[Plane, Array]:
         )
     ends = straight.straighten(parse_points(known.between, 2))
     if not (known.edge_x or known.edge_y):
-        length = Reference((known.length,), ends)
-        return plane_of(length, None, known.sigma), ends
+        length = Reference((known.length,), parse_points(known.between, 2))
+        found = straight.known(length, known.sigma, None)
+        return found.plane, ends, f"{found.about()}; the camera is taken to look squarely"
     groups = [
         [straight.straighten(parse_points(text, 2)) for text in texts or []]
         for texts in (known.edge_x, known.edge_y)
@@ -142,7 +149,10 @@ def _plane(known: PlaneOptions, straight: Straight) -> tuple[Plane, Array]:
         matrix=straight.calibrated,
     )
     plane = plane_from_view(view, ends[0], ends[1], known.length, known.sigma)
-    return plane, np.concatenate([ends, *groups[0], *groups[1]])
+    about = (
+        f"edges: focal length {view.focal_px:.0f} px +- {100 * view.covariance[3, 3] ** 0.5:.0f} %"
+    )
+    return plane, np.concatenate([ends, *groups[0], *groups[1]]), about
 
 
 def _nearer(plane: Plane, seen: LensOptions, straight: Straight) -> Plane:

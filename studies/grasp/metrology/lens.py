@@ -6,7 +6,7 @@ k1, k2 for a focal length that need not be true: only their product with its pow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +15,11 @@ import numpy.typing as npt
 from rhot.errors import CalibrationError
 from rhot.geometry.camera import distortion_derivatives, undistort
 from rhot.geometry.transforms import Array
+from studies.grasp.metrology.fit import Problem, fitted
 from studies.grasp.metrology.segments import inverted
-from studies.grasp.metrology.uncertainty import jacobian
 
 # What lenses of phones and webcams have; wide priors, for edges that say nothing of k2.
 _K1_SIGMA, _K2_SIGMA = 0.4, 0.2
-_HUBER, _ROUNDS = 2.0, 30
 # Fewer points of an edge show no bend.
 _FEWEST = 3
 # Edges that span less of the picture's diagonal show less bend than noise.
@@ -79,7 +78,7 @@ def lens_from_edges(
     def residuals(k: Array) -> Array:
         return np.append(_bends(rays, k) * (focal / sigma_px), k / (_K1_SIGMA, _K2_SIGMA))
 
-    k, information = _fitted(residuals)
+    k, information = fitted(Problem(2, 2), np.zeros(2), residuals, np.add)
     before, after = residuals(np.zeros(2))[:-2], residuals(k)[:-2]
     return StraightLens(
         matrix,
@@ -101,34 +100,6 @@ def _long_enough(edges: Sequence[npt.ArrayLike], diagonal: float) -> list[Array]
             " picture's border too"
         )
     return lines
-
-
-def _fitted(residuals: Callable[[Array], Array]) -> tuple[Array, Array]:
-    """k1 and k2 by Levenberg and Marquardt with Huber's weights, the priors' last two without; and
-    their information (2, 2).
-    """
-    k, damping = np.zeros(2), 1e-6
-    for _ in range(_ROUNDS):
-        off = residuals(k)
-        weight = np.minimum(1.0, _HUBER / np.maximum(np.abs(off), 1e-12))
-        weight[-2:] = 1.0
-        J = jacobian(residuals, k)
-        information = (J * weight[:, None]).T @ J
-        step = -np.linalg.solve(information * (1.0 + damping * np.eye(2)), J.T @ (weight * off))
-        new = residuals(k + step)
-        if np.isfinite(new).all() and _cost(new) <= _cost(off):
-            k, damping = k + step, damping * 0.2
-            if np.abs(step).max() < 1e-7:
-                break
-        else:
-            damping = max(damping * 10.0, 1e-3)
-            if damping > 1e6:
-                break
-    return k, information
-
-
-def _cost(off: Array) -> float:
-    return float(np.minimum(off**2, 9.0).sum())
 
 
 def _bends(rays: list[Array], k: Array) -> Array:

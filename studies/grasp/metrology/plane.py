@@ -112,8 +112,12 @@ def plane_from_rectangle(
     """
     width = checked_length(size_mm[0], "the rectangle's width")
     height = checked_length(size_mm[1], "the rectangle's height")
-    corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
-    return plane_from_points(corners_px, corners, sigma_px)
+    return plane_from_points(corners_px, rectangle_mm(width, height), sigma_px)
+
+
+def rectangle_mm(width: float, height: float) -> Array:
+    """Its corners (4, 2) from the upper left one on."""
+    return np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
 
 
 def plane_from_points(
@@ -127,7 +131,7 @@ def plane_from_points(
             f"{len(px)} points in the picture and {len(mm)} in the plane: four or more are needed,"
             " each in both"
         )
-    _not_in_a_line(px)
+    check_corners(px)
     # Both sides centred and scaled (Hartley 1997), so that all nine numbers are about 1.
     T_px, T_mm = _scaling(px), _scaling(mm)
     image, world = project(T_px, px), project(T_mm, mm)
@@ -228,7 +232,7 @@ def _direct(px: Array, mm: Array) -> Array:
     return np.linalg.svd(rows)[2][-1].reshape(3, 3)
 
 
-def _not_in_a_line(px: Array) -> None:
+def check_corners(px: Array) -> None:
     """CalibrationError where three of four corners, or all points, are in a line."""
     if not np.isfinite(px).all():
         raise CalibrationError("a corner's pixel is no number; give x,y of each in the picture")

@@ -7,10 +7,19 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from rhot.errors import ConfigError
 from rhot.geometry.transforms import Array
-from studies.grasp.metrology.plane import Plane, plane_from_length, plane_from_rectangle
+from studies.grasp.metrology.corners import Corners, corners_of
+from studies.grasp.metrology.plane import (
+    Plane,
+    check_corners,
+    checked_length,
+    plane_from_length,
+    rectangle_mm,
+)
+from studies.grasp.metrology.pose import plane_seen_by_camera
 
 EXAMPLE = "rectangle=80x36:410,52:550,60:548,124:408,116"
 # How well a corner is pointed at by hand.
@@ -25,6 +34,18 @@ class Reference(NamedTuple):
 
     size_mm: tuple[float, ...]
     points_px: Array
+
+
+class Known(NamedTuple):
+    """A reference's plane, and its points in a picture without distortion."""
+
+    plane: Plane
+    seen: Corners
+
+    def about(self) -> str:
+        """How sure it is, in words."""
+        how = "found by its edges" if self.seen.refined else "as pointed at"
+        return f"reference: {how}, to {self.seen.sigma_px:.2f} px"
 
 
 def parse_reference(text: str) -> Reference:
@@ -65,16 +86,35 @@ def parse_points(text: str, number: int) -> Array:
 
 def plane_of(
     reference: Reference,
+    size_px: tuple[int, int],
+    *,
     straighten: Callable[[Array], Array] | None = None,
+    matrix: Array | None = None,
     sigma_px: float = CLICK_SIGMA_PX,
-) -> Plane:
-    """The reference's plane. straighten takes pixels to those of a picture without distortion. A
-    length alone says the scale of a plane that the camera looks at squarely.
+    picture: npt.NDArray[np.uint8] | None = None,
+) -> Known:
+    """The reference's plane in pictures of size_px. straighten takes pixels to those of a picture
+    without distortion, matrix is the lens's (3, 3) where it is calibrated. In a picture (h, w, 3),
+    if given, a rectangle's own edges are looked for near what was pointed at. A length alone says
+    the scale of a plane that the camera looks at squarely.
     """
-    points = reference.points_px if straighten is None else straighten(reference.points_px)
-    if len(points) == 2:
-        return plane_from_length(points[0], points[1], reference.size_mm[0], sigma_px)
-    return plane_from_rectangle(points, (reference.size_mm[0], reference.size_mm[1]), sigma_px)
+    flat = straighten or (lambda px: px)
+    if len(reference.points_px) == 2:
+        ends = Corners(flat(reference.points_px), sigma_px, refined=False)
+        first, last = ends.points_px
+        plane = plane_from_length(first, last, reference.size_mm[0], sigma_px)
+        return Known(plane, ends)
+    width = checked_length(reference.size_mm[0], "the rectangle's width")
+    height = checked_length(reference.size_mm[1], "the rectangle's height")
+    rectangle = rectangle_mm(width, height)
+    seen = Corners(flat(reference.points_px), sigma_px, refined=False)
+    check_corners(reference.points_px)
+    if picture is not None:
+        seen = corners_of(picture, reference.points_px, sigma_px, flat)
+    plane = plane_seen_by_camera(
+        seen.points_px, rectangle, size_px, sigma_px=seen.sigma_px, matrix=matrix
+    )
+    return Known(plane, seen)
 
 
 def _numbers(text: str, number: int, whole: str) -> list[float]:

@@ -15,18 +15,17 @@ import numpy.typing as npt
 
 from rhot.errors import CalibrationError
 from rhot.geometry.transforms import Array, rotation_from_vector
+from studies.grasp.metrology.fit import Problem, fitted
 from studies.grasp.metrology.segments import homogeneous, inverted
-from studies.grasp.metrology.uncertainty import jacobian
 
 # Phones (26 mm equivalent, cropped for video) and webcams (60 to 78 deg) have focal lengths of
-# 0.6 to 0.9 widths, a portrait lens 1.4; sigma is the logarithm's.
-_FOCAL_SHARE, _FOCAL_SIGMA = 0.85, 0.3
+# 0.6 to 0.9 widths, zoomed and portrait lenses 1.4; sigma is the logarithm's.
+_FOCAL_SHARE, _FOCAL_SIGMA = 0.95, 0.4
 # Optical axes miss the picture's middle by 8 and 23 px of 640 (both cameras of stereo_chessboard).
 # Taken for the middle, a view at 45 deg had its focal length 9 % off with a sigma of 1 %.
 _CENTRE_SHARE = 0.025
 # A calibrated lens's focal length and centre are known to this.
 _KNOWN_SIGMA, _KNOWN_CENTRE_PX = 0.005, 1.0
-_HUBER, _ROUNDS = 2.0, 50
 
 
 class PlaneView(NamedTuple):
@@ -47,7 +46,7 @@ class PlaneView(NamedTuple):
         fit, as the covariance is of.
         """
         R = self.R @ rotation_from_vector(off[:3])
-        return _lens(self.focal_px * float(np.exp(off[3])), self.centre + off[4:]) @ R
+        return pinhole_of(self.focal_px * float(np.exp(off[3])), self.centre + off[4:]) @ R
 
 
 def view_from_edges(
@@ -70,27 +69,16 @@ def view_from_edges(
                 f"the direction {name} has {len(group)} edges, and needs 2 that are parallel and"
                 " apart; give more"
             )
-    prior = _prior(size_px, matrix)
+    prior = lens_prior(size_px, matrix)
     view = PlaneView(_first_turn(groups), prior.focal, prior.centre, np.eye(6), np.zeros(0, bool))
-    damping = 1e-3
-    for _ in range(_ROUNDS):
-        off, information, gradient = _slope(groups, view, prior, sigma_px)
-        step = -inverted(information + damping * np.diag(np.diag(information))) @ gradient
-        moved = _moved(view, step)
-        if _cost(_residuals(groups, moved, prior, sigma_px)) <= _cost(off):
-            view, damping = moved, max(damping * 0.2, 1e-9)
-            if np.abs(step).max() < 1e-7:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e9:
-                break
-    if np.linalg.eigvalsh(information)[0] < 1e-6:
-        raise CalibrationError(
-            "the edges of one direction lie on one line, which says nothing of the plane; give"
-            " edges that are parallel but apart"
-        )
-    return view._replace(covariance=inverted(information), inliers=np.abs(off[:-3]) < 3.0)
+
+    def residuals(view: PlaneView) -> Array:
+        off = _misses(groups, view.matrix(np.zeros(6))) / sigma_px
+        return np.concatenate([off, prior.misses(view.focal_px, view.centre)])
+
+    view, information = fitted(Problem(6, 3), view, residuals, _moved)
+    inliers = np.abs(residuals(view)[:-3]) < 3.0
+    return view._replace(covariance=inverted(information), inliers=inliers)
 
 
 def _moved(view: PlaneView, step: Array) -> PlaneView:
@@ -101,32 +89,11 @@ def _moved(view: PlaneView, step: Array) -> PlaneView:
     )
 
 
-def _residuals(groups: list[Array], view: PlaneView, prior: _Prior, sigma_px: float) -> Array:
-    """In sigmas: of each edge, of the focal length's logarithm, of the centre."""
-    focal = np.log(view.focal_px / prior.focal) / prior.focal_sigma
-    centre = (view.centre - prior.centre) / prior.centre_sigma
-    return np.concatenate([_misses(groups, view.matrix(np.zeros(6))) / sigma_px, [focal], centre])
-
-
-def _slope(
-    groups: list[Array], view: PlaneView, prior: _Prior, sigma_px: float
-) -> tuple[Array, Array, Array]:
-    """Residuals, their information (6, 6) and gradient (6,), with Huber's weights."""
-
-    def residuals(step: Array) -> Array:
-        return _residuals(groups, _moved(view, step), prior, sigma_px)
-
-    off = residuals(np.zeros(6))
-    weight = _weights(off)
-    J = jacobian(residuals, np.zeros(6))
-    return off, (J * weight[:, None]).T @ J, J.T @ (weight * off)
-
-
 def common_lens(views: Sequence[PlaneView], size_px: tuple[int, int]) -> Array:
     """The lens (3, 3) that several views of one camera agree on, each fitted without one: the mean
     of focal length's logarithm and centre, weighted by what each view adds to the prior.
     """
-    prior = _prior(size_px, None)
+    prior = lens_prior(size_px, None)
     expected = np.array([np.log(prior.focal), *prior.centre])
     sigma = np.array([prior.focal_sigma, prior.centre_sigma, prior.centre_sigma])
     known = np.diag(sigma**-2)
@@ -137,27 +104,35 @@ def common_lens(views: Sequence[PlaneView], size_px: tuple[int, int]) -> Array:
         information = information + own - known
         weighted = weighted + own @ found - known @ expected
     log_focal, *centre = inverted(information) @ weighted
-    return _lens(float(np.exp(log_focal)), np.array(centre))
+    return pinhole_of(float(np.exp(log_focal)), np.array(centre))
 
 
-class _Prior(NamedTuple):
+class LensPrior(NamedTuple):
+    """Focal length in px with its logarithm's sigma, centre (2,) px with its sigma."""
+
     focal: float
     focal_sigma: float
     centre: Array
     centre_sigma: float
 
+    def misses(self, focal_px: float, centre: Array) -> Array:
+        """How far a lens is from it, in sigmas; (3,)."""
+        off = np.log(focal_px / self.focal) / self.focal_sigma
+        return np.append(off, (centre - self.centre) / self.centre_sigma)
 
-def _prior(size_px: tuple[int, int], matrix: Array | None) -> _Prior:
+
+def lens_prior(size_px: tuple[int, int], matrix: Array | None) -> LensPrior:
     """What is known of the lens before an edge is seen."""
     if matrix is None:
         longer = max(size_px)
         middle = np.array([(size_px[0] - 1) / 2.0, (size_px[1] - 1) / 2.0])
-        return _Prior(_FOCAL_SHARE * longer, _FOCAL_SIGMA, middle, _CENTRE_SHARE * longer)
+        return LensPrior(_FOCAL_SHARE * longer, _FOCAL_SIGMA, middle, _CENTRE_SHARE * longer)
     focal = float(np.sqrt(matrix[0, 0] * matrix[1, 1]))
-    return _Prior(focal, _KNOWN_SIGMA, matrix[:2, 2].copy(), _KNOWN_CENTRE_PX)
+    return LensPrior(focal, _KNOWN_SIGMA, matrix[:2, 2].copy(), _KNOWN_CENTRE_PX)
 
 
-def _lens(focal_px: float, centre: Array) -> Array:
+def pinhole_of(focal_px: float, centre: Array) -> Array:
+    """A lens's matrix (3, 3)."""
     return np.array([[focal_px, 0.0, centre[0]], [0.0, focal_px, centre[1]], [0.0, 0.0, 1.0]])
 
 
@@ -183,15 +158,3 @@ def _first_turn(groups: list[Array]) -> Array:
     # y is a quarter turn from x, to the side that its edges have.
     side = 1.0 if np.sin(directions[1] - x) >= 0.0 else -1.0
     return np.array([[c, -s * side, 0.0], [s, c * side, 0.0], [0.0, 0.0, side]])
-
-
-def _weights(off: Array) -> Array:
-    """Huber's, and 1 for the three of the prior."""
-    weight = np.minimum(1.0, _HUBER / np.maximum(np.abs(off), 1e-12))
-    weight[-3:] = 1.0
-    return weight
-
-
-def _cost(off: Array) -> float:
-    size = np.abs(off)
-    return float(np.where(size < _HUBER, 0.5 * size**2, _HUBER * (size - 0.5 * _HUBER)).sum())

@@ -64,6 +64,7 @@ def test_a_picture_and_distances_from_a_rectangle(filmed, tmp_path, lens):
     )
     assert result.exit_code == 0, result.output
     assert np.allclose(millimetres(result.output), [shown.subject.lengths[0], 42.0], rtol=0.01)
+    assert "found by its edges" in result.output
     plane = json.loads((tmp_path / "plane.json").read_bytes())
     picture = cv2.imread(str(tmp_path / "rectified.png"))
     assert list(picture.shape[1::-1]) == plane["size_px"]

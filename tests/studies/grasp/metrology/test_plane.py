@@ -10,10 +10,12 @@ from rhot.geometry.transforms import rotation_x, rotation_y, rotation_z
 from studies.grasp.metrology.finger import finger_in_plane, points_in_plane
 from studies.grasp.metrology.plane import (
     plane_from_length,
+    plane_from_points,
     plane_from_rectangle,
     plane_from_view,
     project,
 )
+from studies.grasp.metrology.pose import plane_seen_by_camera
 from studies.grasp.metrology.space import space_from_height, space_from_lens
 from studies.grasp.metrology.view import view_from_edges
 
@@ -174,6 +176,29 @@ def test_a_fingers_angles_and_bones_with_the_sigmas_of_repeated_pictures():
     assert np.allclose(points.points_mm, mm, atol=1e-6)
     assert (points.sigma_mm > 0.05).all()
     assert (points.shared_mm > 0.05).all()
+
+
+def test_a_camera_knows_a_small_rectangles_plane_better_than_a_homography():
+    """Far from it, with the sigma of repeated clicks."""
+    rng = np.random.default_rng(8)
+    P = camera(25.0)
+    small, ends = CORNERS * 0.6, seen(P, [(-60.0, 90.0), (20.0, 100.0)])
+    seen_small, true = seen(P, small), float(np.hypot(80.0, 10.0))
+    plane = plane_seen_by_camera(seen_small, small, SIZE, sigma_px=0.4, matrix=K)
+    found, sigma = plane.distance(*ends, 0.1)
+    assert found == pytest.approx(true, rel=1e-3)
+    off: dict[bool, list[float]] = {True: [], False: []}
+    for _ in range(25):
+        noisy = seen_small + rng.normal(0, 0.4, (4, 2))
+        for by_camera in off:
+            plane = (
+                plane_seen_by_camera(noisy, small, SIZE, sigma_px=0.4, matrix=K)
+                if by_camera
+                else plane_from_points(noisy, small, 0.4)
+            )
+            off[by_camera].append(plane.distance(*(ends + rng.normal(0, 0.1, (2, 2))))[0] - true)
+    assert np.sqrt(np.mean(np.square(off[True]))) == pytest.approx(sigma, rel=0.4)
+    assert np.std(off[True]) < 0.8 * np.std(off[False])
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,12 @@ def test_a_rectangle_and_a_length():
     rectangle = parse_reference(EXAMPLE)
     assert rectangle.size_mm == (80.0, 36.0)
     assert rectangle.points_px.tolist()[1] == [550.0, 60.0]
-    plane = plane_of(rectangle)
-    assert plane.distance(*rectangle.points_px[:2])[0] == pytest.approx(80.0)
+    plane = plane_of(rectangle, (640, 480)).plane
+    assert plane.distance(*rectangle.points_px[:2])[0] == pytest.approx(80.0, rel=0.01)
     length = parse_reference("length=50:10,10:110,10")
     # Straightened: here a lens that halves all.
-    assert plane_of(length, lambda px: 0.5 * px).distance((0, 0), (0, 10))[0] == pytest.approx(10.0)
+    plane = plane_of(length, (640, 480), straighten=lambda px: 0.5 * px).plane
+    assert plane.distance((0, 0), (0, 10))[0] == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize(
