@@ -35,6 +35,7 @@ class Work(NamedTuple):
     measured_lengths: Array  # (n, 3), NaN where not measured
     limits: Array  # (4, 2)
     law: Law | None
+    doubt: float  # sigma of the fixed lengths together, as a share of them
     scale: float  # solver's units per unit of the recording
 
 
@@ -64,12 +65,14 @@ def _run(
     began_s = clock_s()
     for k in np.flatnonzero(ready).tolist():
         bones = lengths[k] * work.scale
-        finger = Finger(chain_of(bones, work.limits), bones, work.law)
+        doubt = work.doubt if kind == "fixed" else 0.0
+        finger = Finger(chain_of(bones, work.limits), bones, work.law, doubt)
         target = Target(
             track.tip[k] * work.scale,
             float(track.direction_rad[k]),
             track.angles_rad[k],
             float(track.sigma[k] * work.scale),
+            first=k == int(np.argmax(ready)),
         )
         steps[k] = step = method.solve(finger, target, start)
         start = step.angles

@@ -187,6 +187,7 @@ def _sequence(
         measured_lengths=piece.track.lengths,
         limits=one.limits,
         law=law,
+        doubt=_doubt(one),
         # The paper's damping is in mm or px; a finger in an unknown unit is taken for 80 mm.
         scale=1e-3 if one.lengths_hold else 0.08 / float(one.lengths.sum()),
     )
@@ -202,6 +203,12 @@ def _sequence(
         columns=[result.numbers(row) for row in piece.track.columns()],
         runs=runs,
     )
+
+
+def _doubt(one: _Prepared) -> float:
+    """Sigma of a finger's fixed lengths together, as a share of them; 0 where nobody says."""
+    sigmas = one.recording.lengths_sigma or (0.0, 0.0, 0.0)
+    return float(np.linalg.norm(sigmas) / one.lengths.sum())
 
 
 def _law_of_others(bends: list[tuple[Array, Array]], own: int, degree: int) -> Law | None:
