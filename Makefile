@@ -16,10 +16,11 @@ demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
 
 # Everything but the suites that need more than Python or minutes: `make browser`, `make wheel`,
-# `make test-field`, `make test-system`. What starts processes and watches their rates has the machine
-# to itself; the rest shares two cores. (5: of the tests that ARGS names, none is of that kind.)
+# `make test-field`, `make test-system`. What starts the whole rig's processes has the machine to itself.
+# Of the others' time a third is waiting, for messages and for processes: three of them share two
+# cores. (5: of the tests that ARGS names, none is of that kind.)
 test: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS) || [ $$? -eq 5 ]
+	$(BIN)/pytest -n 3 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS) || [ $$? -eq 5 ]
 	$(BIN)/pytest --durations=10 -m integration $(ARGS) || [ $$? -eq 5 ]
 
 check: $(STAMP)

@@ -75,25 +75,30 @@ def content(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.timeout(600)
 async def test_from_an_empty_folder_it_ends_by_itself_with_a_summary(tmp_path, repository):
     shipped = content(repository / "config")
     (tmp_path / "empty").mkdir()
     (tmp_path / "tmp").mkdir()
     environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
-    process = await demo("--seconds", "4", "--json", cwd=tmp_path / "empty", env=environment)
     pids: set[int] = set()
-    async with asyncio.timeout(DEADLINE_S):
-        output_task = asyncio.create_task(process.communicate())
-        while not output_task.done():
-            pids |= set(children_of(process.pid))
-            await asyncio.sleep(0.2)
-    output, said = await output_task
-    assert process.returncode == 0, said.decode()
-    summary = json.loads(output)
-    assert summary["poses"] > 30
+    # A machine that is busy with something else stands still for seconds: it is given more.
+    for seconds in ("4", "20", "60"):
+        options = ("--seconds", seconds, "--json")
+        process = await demo(*options, cwd=tmp_path / "empty", env=environment)
+        async with asyncio.timeout(DEADLINE_S):
+            output_task = asyncio.create_task(process.communicate())
+            while not output_task.done():
+                pids |= set(children_of(process.pid))
+                await asyncio.sleep(0.2)
+        output, said = await output_task
+        assert process.returncode == 0, said.decode()
+        summary = json.loads(output)
+        assert summary["restarts"] == {}
+        if min(summary["poses"], summary["object_poses"]) > 30:
+            break
+    assert min(summary["poses"], summary["object_poses"]) > 30
     assert summary["tip_error_rms_mm"] is not None
-    assert summary["object_poses"] > 30
-    assert summary["restarts"] == {}
     assert b"live view: http://127.0.0.1:" in said
     assert len(pids) >= 8
     assert none_left(list(pids))

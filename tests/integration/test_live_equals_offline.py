@@ -33,7 +33,7 @@ pytestmark = pytest.mark.integration
 SECONDS = 3.0
 # Of real speed. A machine that is busy with something else answers later than the rule allows; the
 # slower the recording is played, the more time it has. Points depend on stamps, not on speed.
-RATES = (1.0, 1.0, 0.4, 0.1)
+RATES = (1.0, 1.0, 0.4, 0.1, 0.1)
 # From a message's stamp of sending until the other process has it.
 _ON_ITS_WAY_NS = 5_000_000
 
@@ -44,10 +44,12 @@ class Heard:
 
     points: dict[int, HandPoints] = field(default_factory=dict)
     poses: dict[int, HandPose] = field(default_factory=dict)
+    # That came to fusion after points which they should have counted for, by its own count.
+    late_poses: float = 0.0
 
     def in_time(self, expected: list[int]) -> bool:
         """Whether each pose that offline has came before the points that rest on it."""
-        return all(
+        return not self.late_poses and all(
             stamp_ns in self.poses
             and all(
                 points.sent_ns > self.poses[stamp_ns].sent_ns + _ON_ITS_WAY_NS
@@ -83,10 +85,12 @@ async def test_live_points_are_those_of_the_files(recording: Capture, tmp_path: 
         heard = await _played_live(recording, rate)
         # The last ones wait for frames that never come.
         newest_ns = max(heard.points, default=0)
-        if heard.in_time([stamp_ns for stamp_ns in poses if stamp_ns < newest_ns]):
+        # What a busy machine drops on the way tells nothing either.
+        whole = len(offline) - len(heard.points) <= 2
+        if whole and heard.in_time([stamp_ns for stamp_ns in poses if stamp_ns < newest_ns]):
             break
     else:
-        pytest.fail("poses came later than the rule allows at a tenth of real speed")
+        pytest.fail("poses came later than the rule allows at a tenth of real speed, or got lost")
     assert len(offline) - len(heard.points) <= 2
     assert set(heard.points) <= set(offline)
     off_mm = [
@@ -137,6 +141,11 @@ async def _played_live(recording: Capture, rate: float) -> Heard:
             await asyncio.sleep(max(0.0, due_s - loop.time()))
             publishers[frame.camera].put(frame)
         await asyncio.sleep(0.5)
+        # Two beats: one may have been under way.
+        beats = bus.every(topics.HEALTH, 8, service="fusion", instance="main")
+        async with asyncio.timeout(START_S):
+            for _ in range(2):
+                heard.late_poses = (await anext(beats)).values["late_poses"]
         for listener in listeners:
             listener.cancel()
     return heard

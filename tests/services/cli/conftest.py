@@ -4,7 +4,10 @@ this room.
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +40,7 @@ from services.simulator.files.capture_writer import write_capture
 from services.simulator.scene.scene import load_scene
 
 START_NS = 1_700_000_000_000_000_000
+MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 
 
 @dataclass(frozen=True)
@@ -148,6 +152,28 @@ def made_up() -> MadeUpHand:
     return MadeUpHand(default_hand("right"))
 
 
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """`made_once(name, make)`: the folder that make(folder) filled, in whichever of the processes
+    that share the tests came first; the others wait for it.
+    """
+    # Of all of them; without pytest-xdist it is this one's alone.
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+    def folder_of(name: str, make: Callable[[Path], object]) -> Path:
+        folder = root / "made-once" / name / name
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with (folder.parent / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (folder.parent / "done").exists():
+                make(folder)
+                (folder.parent / "done").touch()
+        return folder
+
+    return folder_of
+
+
 def simulated(folder: Path, seconds: float) -> Path:
     """`fist`, seed 1, of the simulated rig."""
     write_capture(load_scene(load_rig(sim_toml()), "fist", 1), seconds, folder)
@@ -155,15 +181,15 @@ def simulated(folder: Path, seconds: float) -> Path:
 
 
 @pytest.fixture(scope="session")
-def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def capture(made_once: MadeOnce) -> Path:
     """Two seconds of the simulated rig. Do not write into it."""
-    return simulated(tmp_path_factory.mktemp("simulated") / "capture", 2.0)
+    return made_once("capture", lambda folder: simulated(folder, 2.0))
 
 
 @pytest.fixture(scope="session")
-def short_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def short_capture(made_once: MadeOnce) -> Path:
     """Half a second of it, for tests that break something. Do not write into it."""
-    return simulated(tmp_path_factory.mktemp("simulated") / "short", 0.5)
+    return made_once("short", lambda folder: simulated(folder, 0.5))
 
 
 @pytest.fixture
@@ -173,11 +199,9 @@ def copy(short_capture: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def result(capture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def result(capture: Path, made_once: MadeOnce) -> Path:
     """The capture, tracked. Do not write into it."""
-    folder = tmp_path_factory.mktemp("tracked") / "result"
-    run(job_of([str(capture)], None), folder)
-    return folder
+    return made_once("result", lambda folder: run(job_of([str(capture)], None), folder))
 
 
 _STREAMS = (
