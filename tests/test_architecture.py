@@ -262,6 +262,11 @@ ROOMS_TESTED_AS_A_WHOLE = {
             "services.openvr_bridge.service",
             {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib", "uvloop", "resource"},
         ),
+        # As long as scipy's interpolation takes, poses are gone when a simulator is started anew.
+        (
+            "services.simulator.service",
+            {"scipy", "viser", "mcap", "typer", "matplotlib", "cryptography"},
+        ),
         (
             "rhot.client",
             {"scipy", "numba", "viser", "cv2", "mcap", "typer", "matplotlib"},

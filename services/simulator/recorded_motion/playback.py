@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rhot.geometry.transforms import Array
 from services.simulator.recorded_motion.recording import LONGEST_GAP_S
@@ -56,6 +55,9 @@ class Curve:
     """
 
     def __init__(self, times_s: Array, samples: Array) -> None:
+        # Not above: a rig whose hand moves by itself would start half a second later.
+        from scipy.interpolate import CubicSpline
+
         seen = np.isfinite(samples.reshape(len(samples), -1)).all(axis=1)
         known_s = times_s[seen]
         self._spline = CubicSpline(known_s, samples[seen], axis=0)

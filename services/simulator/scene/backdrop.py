@@ -7,6 +7,8 @@ parallax. Colours are linear RGB. Clutter adds saturated objects in the same hue
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -40,8 +42,10 @@ _MUTED: tuple[Rgb, ...] = (
 _SATURATED = ("magenta", "blue", "green", "violet", "lime", "cyan", "red", "orange")
 
 
+# A scene's cameras see one wall, whose texture takes as long as a third of a camera's start.
+@lru_cache(maxsize=1)
 def wall_texture(seed: int, clutter: bool) -> Light32:
-    """Light that the wall sends back, (_SIDE, _SIDE, 3) linear RGB."""
+    """Light that the wall sends back, (_SIDE, _SIDE, 3) linear RGB; read-only."""
     rng = np.random.default_rng([seed, 19])
     size = (_SIDE, _SIDE)
     texture = np.empty((*size, 3), np.float32)
@@ -64,7 +68,9 @@ def wall_texture(seed: int, clutter: bool) -> Light32:
             )
     texture *= 1.0 + 0.10 * _fractal_noise(rng, size)[..., None]
     texture *= 1.0 + 0.05 * rng.standard_normal((*size, 1), np.float32)
-    return np.clip(cv2.GaussianBlur(texture, (0, 0), 1.2), 0.004, 1.0)
+    light = np.clip(cv2.GaussianBlur(texture, (0, 0), 1.2), 0.004, 1.0)
+    light.setflags(write=False)
+    return light
 
 
 def _draw_object(texture: Light32, rng: np.random.Generator, colour: Array, half: Array) -> None:
@@ -83,7 +89,11 @@ def _draw_object(texture: Light32, rng: np.random.Generator, colour: Array, half
             ((float(x), float(y)), (2.0 * float(half[0]), 2.0 * float(half[1])), angle)
         )
         cv2.fillConvexPoly(mask, corners.astype(np.int32), 1)
-    rows, columns = np.nonzero(mask)
+    # Searched no farther than the object reaches.
+    reach = float(np.hypot(*half)) + 2.0
+    top, left = max(0, int(y - reach)), max(0, int(x - reach))
+    rows, columns = np.nonzero(mask[top : int(y + reach) + 1, left : int(x + reach) + 1])
+    rows, columns = rows + top, columns + left
     side = (columns - x) / (2.0 * half[0])
     stripe = 1.0 + 0.35 * (np.sin((rows - y) * 40.0 / half[1] * 0.2) > 0.6)
     texture[rows, columns] = colour * (0.85 - 0.3 * side[:, None]) * stripe[:, None]
