@@ -142,20 +142,23 @@ def _draw(image: Image, tip: Tip, shading: float) -> tuple[float, float]:
     window = image[y0 : int(tip.y_px) + reach, x0 : int(tip.x_px) + reach]
     height, width = window.shape[:2]
     fine = window.repeat(_SUPERSAMPLING, 0).repeat(_SUPERSAMPLING, 1)
-    rows, columns = np.mgrid[: height * _SUPERSAMPLING, : width * _SUPERSAMPLING].astype(np.float32)
+    rows = np.arange(height * _SUPERSAMPLING, dtype=np.float32)[:, None]
+    columns = np.arange(width * _SUPERSAMPLING, dtype=np.float32)[None]
     x = (columns + 0.5) / _SUPERSAMPLING - 0.5 + x0 - tip.x_px
     y = (rows + 0.5) / _SUPERSAMPLING - 0.5 + y0 - tip.y_px
     c, s = np.cos(tip.turn_rad), np.sin(tip.turn_rad)
     along, across = x * c + y * s, -x * s + y * c
     radius, start = tip.width_px / 2, -tip.length_px / 2 + tip.width_px / 2
-    from_axis = np.where(along < start, np.hypot(along - start, across), np.abs(across))
+    from_axis, round_end = np.abs(across), along < start
+    from_axis[round_end] = np.hypot(along[round_end] - start, across[round_end])
     finger = (from_axis < radius) & (along < 3 * tip.length_px)
     paint = finger & (along < tip.length_px / 2)
-    facing = np.sqrt(np.clip(1 - (from_axis / radius) ** 2, 0, 1)) * np.cos(
+    facing = np.sqrt(np.clip(1 - (from_axis[finger] / radius) ** 2, 0, 1)) * np.cos(
         tip.light_rad
-    ) + across / radius * np.sin(tip.light_rad)
-    light = np.clip(1 - shading + shading * facing, _AMBIENT, 1.0)[..., None]
-    fine[finger] = (_linear_light(SKIN) * light)[finger]
-    fine[paint] = (_linear_light(PAINTS[tip.color]) * light)[paint]
+    ) + across[finger] / radius * np.sin(tip.light_rad)
+    light = np.clip(1 - shading + shading * facing, _AMBIENT, 1.0)[:, None]
+    painted = paint[finger][:, None]
+    fine[finger] = np.where(painted, _linear_light(PAINTS[tip.color]), _linear_light(SKIN)) * light
     window[:] = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
-    return float(x[paint].mean() + tip.x_px), float(y[paint].mean() + tip.y_px)
+    x, y = (np.broadcast_to(one, paint.shape)[paint] for one in (x, y))
+    return float(x.mean() + tip.x_px), float(y.mean() + tip.y_px)
