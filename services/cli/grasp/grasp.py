@@ -13,5 +13,4 @@ from services.cli.options import menu
 grasp = menu("grasp", "A filmed finger's joint angles, and the same from its tip's path alone.")
 
 for command in (render, measure, rectify, recover, report, compare):
-for command in (render, measure, recover, report, compare):
     grasp.command(name=command.__name__)(command)
