@@ -24,9 +24,9 @@ from services.fusion.monitors.shift_regression import Heights, Shift, fit_shift
 _ROUNDS, _SETTLED = 4, 0.02
 # A window, s, and how many at most.
 _WINDOW_S, _WINDOWS = 5.0, 120
-# Clocks of cameras differ by so much (one sigma): what little a short recording tells of a drift is
-# weighed against it. Quartz is within 20 to 50 ppm; beyond 200 none was seen.
-_DRIFT_SIGMA = 100e-6
+# Clocks of cameras differ by so much (one sigma: quartz is within 20 to 50 ppm): what little a
+# short recording tells of a drift is weighed against it; at 200 ppm it costs .3 ms in 10 s at most.
+_DRIFT_SIGMA = 50e-6
 # A line that leaves the one it was looked for from by more than this, s, is another one.
 _STRAY_S = 0.04
 # A landmark's constant height difference may be so large (a bumped camera, paint of some size).

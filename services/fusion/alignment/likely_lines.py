@@ -23,9 +23,12 @@ from services.fusion.alignment.offset_search import (
 
 # Clocks of cameras are within 100 ppm of the truth, cheap ones within 200.
 _DRIFT_MAX = 300e-6
-# A piece is so long, s, that a drift of 200 ppm moves it by 2 ms within it; there are no more than
-# so many, as each costs 30 ms.
-_PIECE_S, _PIECES = 10.0, 90
+# Pieces are so long, s, that wrong markers of some seconds spoil few of them, and that a drift of
+# 200 ppm moves nothing by more than 2 ms; there are so many, up to a limit, as each costs 30 ms.
+_PIECE_S, _PIECES, _MOST_PIECES = (3.0, 10.0), 12, 90
+# What a piece may say against an offset at most, as a share of its values: wrong markers would
+# outweigh all the others.
+_AGAINST = 0.2
 # So many lines are told; closer than this, s, two are one.
 _LINES, APART_S = 6, 0.15
 
@@ -34,7 +37,8 @@ def likely_lines(pairs: list[tuple[HeightTrack, HeightTrack]], range_s: float) -
     """The lines of the highest peaks, the best first."""
     begin_s = min(float(one.times_s[0]) for one, _ in pairs)
     end_s = max(float(one.times_s[-1]) for one, _ in pairs)
-    count = int(np.clip(round((end_s - begin_s) / _PIECE_S), 1, _PIECES))
+    piece_s = float(np.clip((end_s - begin_s) / _PIECES, *_PIECE_S))
+    count = int(np.clip(round((end_s - begin_s) / piece_s), 1, _MOST_PIECES))
     samples = int((end_s - begin_s) / (count * STEP_S)) + 1
     lags = 2 * int(range_s / STEP_S) + 1
     a, ma = resampled([one for one, _ in pairs], _grid(begin_s, count * samples))
@@ -55,6 +59,7 @@ def likely_lines(pairs: list[tuple[HeightTrack, HeightTrack]], range_s: float) -
         return []
     at_s = float(middles_s @ told / told.sum())
     best, drifts = _along_lines(scores, np.asarray(middles_s - at_s))
+    best[weights.sum(axis=0) == 0.0] = -np.inf
     lines: list[ClockLine] = []
     order = np.argsort(-best, kind="stable")
     for lag in order.tolist():
@@ -85,7 +90,8 @@ def _scores(a: Array, ma: Array, b: Array, mb: Array) -> tuple[Array, Array]:
         return np.zeros(lags), np.zeros(lags)
     a, ma, b, mb = a[known], ma[known], b[known], mb[known]
     own, left, weight = (x[:, :lags] for x in lag_variances(a, ma, b, mb, length))
-    return 0.5 * np.sum(weight * np.log(own / left), axis=0), weight.sum(axis=0)
+    gained = np.maximum(0.5 * np.log(own / left), -_AGAINST)
+    return np.sum(weight * gained, axis=0), weight.sum(axis=0)
 
 
 def _along_lines(scores: Array, since_s: Array) -> tuple[Array, Array]:

@@ -37,6 +37,8 @@ _BETTER_SHARE = 0.1
 # Rows that differ from their mean by more than so many sigmas of what is left are of a hand that
 # moves; of these such a share must fit, and so many there must be.
 _MOVING, _FIT, _FIT_SHARE, _MOVING_ROWS = 5.0, 4.7, 0.6, 20
+# Why it cannot be told, mostly.
+_NOTHING = "nothing moves that both see for long enough to tell"
 # Degrees of freedom of what is left, and the share of rows that may be of something else.
 _STUDENT, _WRONG = 4.0, 0.2
 
@@ -76,11 +78,11 @@ def find_recorded_offset(
         return undecided("no marker is seen by both cameras")
     lines = likely_lines(pairs, range_s)
     if not lines:
-        return undecided("the recordings do not overlap for long enough")
+        return undecided(_NOTHING)
     lines = [_best_about(pairs, line) for line in lines[:_ABOUT_LINES]] + lines[_ABOUT_LINES:]
     fits = [fit for line in lines if (fit := fit_line(pairs, line)) is not None]
     if not fits:
-        return undecided("nothing moves that would tell")
+        return undecided(_NOTHING)
     return _judged(pairs, fits)
 
 
@@ -115,7 +117,7 @@ def _judged(pairs: list[tuple[HeightTrack, HeightTrack]], fits: list[LineFit]) -
     scales = [_scale(one.left) for one in found]
     enough = [k for k, one in enumerate(found) if one.seconds >= max(0.1 * most, _OVERLAP_S)]
     if not enough:
-        return undecided("the recordings do not overlap for long enough")
+        return undecided(_NOTHING)
     scale = min(scales[k] for k in enough)
     gains = [_gain(found[k], scale) if k in enough else -math.inf for k in range(len(found))]
     best = int(np.argmax(gains))
@@ -136,7 +138,7 @@ def _judged(pairs: list[tuple[HeightTrack, HeightTrack]], fits: list[LineFit]) -
     fitting = float(np.mean(fits_well[moving])) if moving.any() else 0.0
     why_not = ""
     if gain < _BETTER or np.count_nonzero(moving) < _MOVING_ROWS:
-        why_not = "nothing moves that would tell"
+        why_not = _NOTHING
     elif fitting < _FIT_SHARE:
         why_not = "the views fit at no offset"
     elif better < max(_BETTER, _BETTER_SHARE * gain):

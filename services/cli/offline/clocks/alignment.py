@@ -18,6 +18,7 @@ from services.cli.offline.clocks.camera_clock import CameraClock, Verdict, warni
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.fusion.alignment.clock_line import ClockLine, LineFit
 from services.fusion.alignment.recorded_offset import (
+    RANGE_S,
     RecordedOffset,
     find_recorded_offset,
     undecided,
@@ -204,6 +205,7 @@ def _told(
             verdict=verdict,
             used_offset_s=used.offset_s,
             found=False,
+            range_s=RANGE_S,
             why_not=found.why_not,
         )
     second = not math.isnan(found.second_s)
@@ -214,6 +216,7 @@ def _told(
         used_offset_s=round(used.offset_s, 7),
         used_drift_ppm=round(1e6 * used.drift, 3),
         found=found.decided,
+        range_s=RANGE_S,
         why_not=found.why_not,
         offset_s=round(fit.line.offset_s, 7),
         offset_sigma_s=round(fit.offset_sigma_s, 7),

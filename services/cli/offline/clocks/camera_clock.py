@@ -17,7 +17,8 @@ class CameraClock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     """By how much a camera's times are later than those of the camera that it is held against.
 
     offset_s holds where that camera's clock reads at_s, seconds since its first frame; drift_ppm is
-    by how much it grows. found: whether the markers' motion tells offset and drift; why_not if not.
+    by how much it grows. found: whether the markers' motion tells offset and drift, searched within
+    +-range_s; why_not if not.
     residual_px is the height difference that is left (robust RMS). second_offset_s is the offset
     that fits second best, with what it leaves and by how much it is less likely (log-likelihood).
     """
@@ -28,6 +29,7 @@ class CameraClock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     used_offset_s: float
     used_drift_ppm: float = 0.0
     found: bool
+    range_s: float
     why_not: str = ""
     offset_s: float | None = None
     offset_sigma_s: float | None = None
@@ -45,7 +47,7 @@ class CameraClock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 def found_text(one: CameraClock) -> str:
     """What the markers' motion tells, in words."""
     if not one.found or one.offset_s is None or one.at_s is None:
-        return f"the markers' motion does not tell ({one.why_not})"
+        return f"the markers' motion does not tell: {_why_not(one)}"
     text = (
         f"{one.camera}'s times are {_seconds(one.offset_s)} than {one.against}'s, "
         f"+-{_ms(one.offset_sigma_s)} ms"
@@ -73,9 +75,10 @@ def warnings_of(one: CameraClock) -> list[str]:
     if one.verdict == "unknown":
         told.append(
             f"{one.camera}: its clock is not {one.against}'s, and the markers do not tell the "
-            f"offset ({one.why_not}): the recordings are taken to begin together, and points are "
-            "off by as much as the hand moves meanwhile; film some seconds of irregular motion "
-            f"that both see, or give it by hand: --offset {one.camera}=SECONDS"
+            f"offset within +-{one.range_s:.0f} s: {_why_not(one)}. The recordings are taken to "
+            "begin together, and points are off by as much as the hand moves meanwhile; film some "
+            "seconds of irregular motion that both see, or give it by hand: "
+            f"--offset {one.camera}=SECONDS"
         )
     if one.verdict == "corrected":
         told.append(
@@ -106,6 +109,16 @@ def contradicts(one: CameraClock) -> bool:
     if one.offset_s is None or one.offset_sigma_s is None:
         return False
     return abs(one.used_offset_s - one.offset_s) > 4.0 * one.offset_sigma_s + 1e-3
+
+
+def _why_not(one: CameraClock) -> str:
+    """Why the markers do not tell, with what fits best and second best."""
+    if one.offset_s is None or one.second_offset_s is None:
+        return one.why_not
+    return (
+        f"{one.why_not} ({one.offset_s:+.3f} s leaves {one.residual_px:.2f} px, "
+        f"{one.second_offset_s:+.3f} s {one.second_residual_px:.2f} px)"
+    )
 
 
 def _seconds(offset_s: float) -> str:

@@ -128,7 +128,7 @@ def test_what_cannot_be_told_is_said(tmp_path):
     still = stamped({"right": 0.5}, frames(RIG, MovingHand(speed_m_s=0.0), 4.0))
     clocks, frames_ = clocks_of(still, tmp_path, ["left", "right"])
     assert clocks.told[0].verdict == "unknown"
-    assert "nothing moves that would tell" in clocks.warnings[0]
+    assert "nothing moves that both see" in clocks.warnings[0]
     assert "--offset right=SECONDS" in clocks.warnings[0]
     assert {frame.clock_offset_ns for frame in frames_} == {0}
     blind, _ = clocks_of(still, tmp_path, ["left", "right"], calibrated=False)
