@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
@@ -34,7 +35,7 @@ from rhot.files.rig_tables import (
     Tracker,
     Viewer,
 )
-from rhot.hand import HANDS, LANDMARKS
+from rhot.hand import CHAIN_JOINTS, DIGITS, HANDS, JOINTS, LANDMARKS
 from rhot.topics import Rate
 
 
@@ -92,19 +93,43 @@ class RigConfig(Table, frozen=True, kw_only=True):
         """Every colour some hand's marker uses."""
         return sorted({color for hand in self.hand.values() for color in hand.markers.values()})
 
+    def markers_of(self, colors: Iterable[str]) -> list[str]:
+        """What the markers of colours are called in messages: as the colour, but for dots."""
+        dots = self.dots
+        return [name for color in colors for name in dots.get(color, {"": color}).values()]
+
+    @property
+    def dots(self) -> dict[str, dict[str, str]]:
+        """Of each colour that several landmarks share: their markers' names by landmark."""
+        found: dict[str, dict[str, str]] = {}
+        for table in self.hand.values():
+            for landmark, name in table.marker_names.items():
+                if name != table.markers[landmark]:
+                    found.setdefault(table.markers[landmark], {})[landmark] = name
+        return found
+
+    def color_of(self, marker: str) -> str:
+        """The colour of a marker of that name: its own name, but of dots that share a colour."""
+        for color, names in self.dots.items():
+            if marker in names.values():
+                return color
+        return marker
+
     def wearer(self, color: str) -> str:
         """What carries a colour, for people: "the cup's tracker"; "" if nothing does."""
+        if color in self.dots:
+            return f"the dots of one colour ({len(self.dots[color])} joints)"
         for hand, table in self.hand.items():
-            for landmark, own in table.markers.items():
+            for landmark, own in table.marker_names.items():
                 if own == color:
                     return f"the {hand} hand's {landmark.replace('_', ' ')}"
         return next((f"the {o.name}'s tracker" for o in self.object if o.marker == color), "")
 
     def counted(self, colors: Iterable[str]) -> list[str]:
-        """Of a camera's colours those that tell how well it sees: the hands'. An object's tracker
+        """Of a camera's markers those that tell how well it sees: the hands'. An object's tracker
         turns its paint away as it likes; without a hand all count.
         """
-        own = self.hand_colors
+        own = {name for hand in self.hand.values() for name in hand.marker_names.values()}
         return [name for name in colors if name in own or not own]
 
     def tracked_colors(self, calibrated: Iterable[str]) -> list[str]:
@@ -137,6 +162,10 @@ def load_rig(path: str | Path) -> RigConfig:
     if "folder" in data:
         raise ConfigError(f"{path}: unknown key `folder`")
     config: RigConfig = msgspec.structs.replace(_convert(data, path), folder=str(path.parent))
+    for hand, table in config.hand.items():
+        if wrong := joints_problem(table):
+            raise ConfigError(f"{path}: [hand.{hand}]: {wrong}")
+    config = with_joints(config)
     _check(config, path)
     return config
 
@@ -163,6 +192,39 @@ def _convert(data: dict[str, Any], path: Path) -> RigConfig:
         raise ConfigError(f"{path}: {explain(str(error), RigConfig)}") from None
 
 
+def joints_problem(table: HandTable) -> str | None:
+    """What is wrong with a hand's joints and fingers together; None if nothing is."""
+    if table.fingers and not table.joints:
+        return 'has fingers, but no joints; write joints = "red", or name each dot in markers'
+    twice = sorted({name for name in table.fingers if table.fingers.count(name) > 1})
+    return f"fingers has {twice[0]!r} twice" if twice else None
+
+
+def sharing_problem(table: HandTable) -> str | None:
+    """What is wrong with landmarks of a hand that have one colour; None if nothing is."""
+    wearers = Counter(table.markers.values())
+    for landmark, color in table.markers.items():
+        if wearers[color] > 1 and landmark in ("palm", "wrist"):
+            return (
+                f"colour {color!r} is used twice, once for {landmark}; only joints of fingers can "
+                "share one"
+            )
+    return None
+
+
+def with_joints(config: RigConfig) -> RigConfig:
+    """The same with `joints` of each hand written out as markers."""
+    hands: dict[Literal["left", "right"], HandTable] = {}
+    for hand, table in config.hand.items():
+        written = dict(table.markers)
+        if table.joints is not None:
+            for finger in table.fingers or DIGITS:
+                for index in CHAIN_JOINTS[DIGITS.index(finger)]:
+                    written.setdefault(JOINTS[index], table.joints)
+        hands[hand] = msgspec.structs.replace(table, markers=written)
+    return msgspec.structs.replace(config, hand=hands)
+
+
 def _check(config: RigConfig, path: Path) -> None:
     """Rules that one field alone cannot say."""
     _unique([c.name for c in config.camera], "[[camera]] name", path)
@@ -177,14 +239,15 @@ def _check(config: RigConfig, path: Path) -> None:
                 raise ConfigError(
                     f"{where}: unknown landmark {landmark!r}; {hint}Valid: {', '.join(LANDMARKS)}"
                 )
+        if wrong := sharing_problem(table):
+            raise ConfigError(f"{where}: {wrong}")
         if not table.markers:
             raise ConfigError(
                 f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'
             )
-        _unique(list(table.markers.values()), f"colour in [hand.{hand}.markers]", path)
     _unique(
         [
-            *(c for h in HANDS if h in config.hand for c in config.hand[h].markers.values()),
+            *(c for h in HANDS if h in config.hand for c in set(config.hand[h].markers.values())),
             *(item.marker for item in config.object if item.marker),
         ],
         "colour of all hands and objects together",

@@ -42,7 +42,7 @@ def _node_at(root: type, path: str) -> Any:
         node = _not_none(node)
         if isinstance(node, inspect.DictType):
             node = node.value_type
-        elif isinstance(node, inspect.ListType):
+        elif isinstance(node, inspect.ListType | inspect.VarTupleType):
             node = node.item_type
         else:
             node = next(field.type for field in node.fields if field.encode_name == part)

@@ -5,6 +5,7 @@ A value outside its bounds is an error that names them (rhot/files/config.py rea
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Annotated, Literal
 
 import msgspec
@@ -191,10 +192,27 @@ class Objects(Table, frozen=True, kw_only=True):
 
 class HandTable(Table, frozen=True, kw_only=True):
     # Landmark = colour: wrist, thumb_tip, index_tip, middle_tip, ring_tip, little_tip, and as an
-    # extra any other OpenXR joint; middle_proximal, the middle knuckle, helps most.
-    markers: dict[str, Name]
+    # extra any other OpenXR joint; middle_proximal, the middle knuckle, helps most. Landmarks may
+    # share a colour: their dots are told apart by how they hang together and move. Show all of
+    # them at the start, fingers apart, or give their places (`rhot track --seed`).
+    markers: dict[str, Name] = {}
+    # The one colour of dots on all four joints of each of `fingers`, e.g. "red". A landmark in
+    # `markers` has the colour that it has there.
+    joints: Name | None = None
+    # Empty: those whose dots there are: of 4 dots the index finger, of 8 thumb and index finger, of
+    # 12 the middle finger too, of 16 all but the thumb, of 20 all.
+    fingers: tuple[Literal["thumb", "index", "middle", "ring", "little"], ...] = ()
     # Size against the average adult until `rhot calibrate hand` has measured it.
     scale: Annotated[float, msgspec.Meta(ge=0.4, le=1.6)] = 1.0
+
+    @property
+    def marker_names(self) -> dict[str, str]:
+        """What each landmark's marker is called: its colour; if shared, e.g. red.index_tip."""
+        wearers = Counter(self.markers.values())
+        return {
+            landmark: color if wearers[color] == 1 else f"{color}.{landmark}"
+            for landmark, color in self.markers.items()
+        }
 
 
 class Simulator(Table, frozen=True, kw_only=True):

@@ -161,7 +161,9 @@ class RigMonitor:
         return CameraRow(
             camera=camera,
             markers=markers,
-            expected_markers=len(self._config.counted(self._config.colors)),
+            expected_markers=len(
+                self._config.counted(self._config.markers_of(self._config.colors))
+            ),
             rate_hz=rate_hz,
             expected_hz=expected_hz,
         )

@@ -115,7 +115,7 @@ class FusionFaults:
 
     def _color(self, found: UnseenMarker) -> str:
         landmark = self._step.landmarks[found.landmark]
-        return self._config.hand[landmark.hand].markers[landmark.name]
+        return self._config.hand[landmark.hand].marker_names[landmark.name]
 
     def _marker(self, found: UnseenMarker) -> str:
         """What people call it: `lime (little tip)`, with the hand where there are two."""

@@ -7,7 +7,7 @@ CalibrationError at the start, not later.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -15,9 +15,10 @@ import cv2
 from rhot.files.calibration import Colors, Lens
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker, MarkerFrame
-from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.detect.color_table import ColorTable, compile_colors
 from services.pi_tracker.detect.marker_finder import MarkerFinder
 from services.pi_tracker.detect.paper_finder import PaperFinder
+from services.pi_tracker.dots.finder import DotFinder, dot_markers
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier
 
@@ -30,7 +31,9 @@ class TrackerStep:
     color_names are the colours to track; all must be in colors, else CalibrationError (naming
     colors_path). size_px is the size in rig.toml; a frame of another size is tracked as it is.
     clock, if given, is read at the end of each stage, for times_ms. With a lens, frames are
-    undistorted first (image/rectify.py).
+    undistorted first (image/rectify.py). dots are colours that several landmarks share, with the
+    names of their markers by landmark (RigConfig.dots); seeds are where landmarks are in the first
+    picture, px.
     """
 
     def __init__(
@@ -43,6 +46,8 @@ class TrackerStep:
         clock: Clock | None = None,
         colors_path: Path | str = "",
         lens: Lens | None = None,
+        dots: Mapping[str, Mapping[str, str]] | None = None,
+        seeds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         # More OpenCV threads gain nothing on images this small, and cost the other cores.
         cv2.setNumThreads(1)
@@ -53,6 +58,10 @@ class TrackerStep:
         self._rectifier = None if lens is None else Rectifier(lens)
         self._clock = clock
         self._last_ns = 0
+        wanted = {} if dots is None else dots
+        self._names = {color: wanted[color] for color in self._color_names if color in wanted}
+        self._seeds = seeds or {}
+        self._dots: dict[str, DotFinder] = {}
         # Duration of each stage of the last step in ms; empty without a clock.
         self.times_ms: dict[str, float] = {}
         self.apply_colors(colors, colors_path or f"{camera_name}.colors.json")
@@ -63,11 +72,21 @@ class TrackerStep:
         Raises CalibrationError and keeps the old ones.
         """
         table = compile_colors(colors, self._color_names, path)
-        self._finder: MarkerFinder | PaperFinder
+        self._use_for_dots(table)
+        single = tuple(name for name in self._color_names if name not in self._names)
+        self._finder: MarkerFinder | PaperFinder | None = None
+        if not single and self._names:
+            return
         if self._settings.method == "paper":
-            self._finder = PaperFinder(colors, self._settings, self._color_names)
+            self._finder = PaperFinder(colors, self._settings, single)
         else:
-            self._finder = MarkerFinder(table, self._settings, self._time_stage)
+            own = compile_colors(colors, single, path) if self._names else table
+            self._finder = MarkerFinder(own, self._settings, self._time_stage)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a person should know of how the dots of one colour were told apart."""
+        return [note for finder in self._dots.values() for note in finder.tracker.notes]
 
     def step(self, frame: Frame, clock_offset_ns: int = 0, clock_sigma_ns: int = -1) -> MarkerFrame:
         """Find the markers of one frame.
@@ -90,12 +109,30 @@ class TrackerStep:
             markers=markers,
         )
 
+    def _use_for_dots(self, table: ColorTable) -> None:
+        for color, names in self._names.items():
+            if color in self._dots:
+                self._dots[color].use(table)
+                continue
+            seeds = {name: self._seeds[name] for name in names if name in self._seeds}
+            self._dots[color] = DotFinder(
+                table, color, self._settings, tuple(names), self.size_px, seeds
+            )
+
     def _find(self, frame: Frame) -> list[Marker]:
         if self._rectifier is None:
-            return self._finder.find(frame)
+            return self._all_markers(frame)
         rectified = self._rectifier.rectify(frame)
         self._time_stage("rectify")
-        return self._rectifier.to_camera_pixels(self._finder.find(rectified))
+        return self._rectifier.to_camera_pixels(self._all_markers(rectified))
+
+    def _all_markers(self, frame: Frame) -> list[Marker]:
+        markers = [] if self._finder is None else self._finder.find(frame)
+        for color, finder in self._dots.items():
+            markers += dot_markers(finder.find(frame), self._names[color])
+        if self._dots:
+            self._time_stage("dots")
+        return markers
 
     def _time_stage(self, stage: str) -> None:
         """Note how long the stage that ends now took."""

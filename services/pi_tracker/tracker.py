@@ -59,6 +59,7 @@ class CameraTracker:
             self._clock,
             self.colors_path,
             lens,
+            config.dots,
         )
 
     def use(self, colors: Colors, step: TrackerStep) -> None:

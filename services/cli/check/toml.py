@@ -15,7 +15,14 @@ from typing import Any, get_args, get_origin
 import msgspec
 
 from rhot.errors import ConfigError
-from rhot.files.config import RigConfig, load_rig, shape_problem
+from rhot.files.config import (
+    RigConfig,
+    joints_problem,
+    load_rig,
+    shape_problem,
+    sharing_problem,
+    with_joints,
+)
 from rhot.files.config_errors import explain
 from rhot.hand import LANDMARKS
 from services.cli.check.problems import Problem, error
@@ -38,6 +45,7 @@ def read_rig(path: Path) -> tuple[RigConfig | None, list[Problem]]:
     clean = _clean(data, RigConfig, "", str(path), problems)
     config = msgspec.structs.replace(msgspec.convert(clean, RigConfig), folder=str(path.parent))
     problems += _rules(config, path, problems)
+    config = with_joints(config)
     return config, problems or _leftover(path)
 
 
@@ -119,7 +127,11 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
             if name not in LANDMARKS
         ]
         # A table is not called empty for what was taken out of it.
-        if not table.markers and not any(
+        if wrong_joints := joints_problem(table):
+            problems.append(error(path, f"[hand.{hand}]: {wrong_joints}"))
+        if shared := sharing_problem(table):
+            problems.append(error(path, f"{where}: {shared}"))
+        if not (table.markers or table.joints) and not any(
             f"hand.{hand}.markers" in problem.what for problem in known
         ):
             problems.append(
@@ -127,7 +139,8 @@ def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]
                     path, f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'
                 )
             )
-        colors.update(table.markers.values())
+        # Landmarks of one hand may share a colour.
+        colors.update({*table.markers.values(), *([table.joints] if table.joints else [])})
     colors.update(item.marker for item in config.object if item.marker)
     problems += [
         error(path, f"[[object]] {item.name!r}: {wrong}")

@@ -57,8 +57,9 @@ def _listeners(
             if (camera := seen.cameras.get(frame.camera)) is not None:
                 camera.frames += 1
                 camera.clock_known += frame.clock_sigma_ns >= 0
-                for color in {marker.color for marker in frame.markers}:
-                    if seen.config is not None and color in seen.config.colors:
+                if seen.config is not None:
+                    found = {seen.config.color_of(marker.color) for marker in frame.markers}
+                    for color in found.intersection(seen.config.colors):
                         camera.colors[color] = camera.colors.get(color, 0) + 1
 
     async def points() -> None:

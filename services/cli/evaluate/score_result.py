@@ -112,7 +112,8 @@ def _objects(
 def _stages(
     config: RigConfig, hand: HandName, model: HandModel, track: HandTrack, result: Path
 ) -> Stages:
-    landmark_of = {color: landmark for landmark, color in config.hand[hand].markers.items()}
+    names = config.hand[hand].marker_names
+    landmark_of = {name: landmark for landmark, name in names.items()}
     points = landmark_truth(model, track, landmark_of.values())
     cameras = load_rig_cameras(config)
     frames = read_lines(result / "markers.jsonl", MarkerFrame)

@@ -7,7 +7,7 @@ interruption .partial files (results.py).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -27,21 +27,32 @@ from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
 from services.cli.offline.results import ResultWriter
+from services.cli.offline.seeds import dot_notes, seeds_of
 from services.cli.offline.track_summary import CameraCounter, Summary
 from services.cli.progress import Progress
 from services.object_tracker.step import ObjectStep
 from services.pi_tracker.step import TrackerStep
 
 
-def run(job: Job, out: Path, progress: bool | None = False, offsets: Sequence[str] = ()) -> Summary:
+def run(
+    job: Job,
+    out: Path,
+    progress: bool | None = False,
+    offsets: Sequence[str] = (),
+    seeds: Sequence[str] = (),
+) -> Summary:
     """Track one job into the folder `out`. progress None shows it on a terminal only.
 
-    offsets: CAM=SECONDS by hand. Raises RhotError if anything needed is missing, or if no frame
-    could be read.
+    offsets: CAM=SECONDS by hand; seeds: [CAM:]LANDMARK=X,Y of dots. Raises RhotError if anything
+    needed is missing, or if no frame could be read.
     """
     by_hand = offsets_of(offsets, job.cameras)
     cameras, markers_only = geometry(job.config, job.cameras)
-    trackers = {one.camera: tracker_step(job.config, one.camera, job.colors) for one in job.inputs}
+    starts = seeds_of(seeds, job.config, job.cameras)
+    trackers = {
+        one.camera: tracker_step(job.config, one.camera, job.colors, starts[one.camera])
+        for one in job.inputs
+    }
     clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
     with ResultWriter(out) as writer, closing(RecordedMarkers(out)) as recorded:
@@ -62,7 +73,7 @@ def run(job: Job, out: Path, progress: bool | None = False, offsets: Sequence[st
             **writer.counts,
             refusals=pipeline.refusals,
             complete=not unread,
-            warnings=[*unread, *clocks.warnings],
+            warnings=[*unread, *clocks.warnings, *dot_notes(trackers)],
             notes=[*notes, *object_notes, *_pose_notes(pipeline, writer.counts)],
             clocks=clocks.told if clocks.worth_telling else msgspec.UNSET,
             origin=job.origin,
@@ -138,7 +149,12 @@ def _fuse(
         shown.end()
 
 
-def tracker_step(config: RigConfig, name: str, only: Sequence[str] = ()) -> TrackerStep:
+def tracker_step(
+    config: RigConfig,
+    name: str,
+    only: Sequence[str] = (),
+    seeds: Mapping[str, tuple[float, float]] | None = None,
+) -> TrackerStep:
     """The tracker of one camera with its calibration, for `only` these colours if any are named.
 
     Raises CalibrationError naming the command that helps.
@@ -153,7 +169,17 @@ def tracker_step(config: RigConfig, name: str, only: Sequence[str] = ()) -> Trac
         )
     lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
     size_px = config.camera_named(name).size_px
-    return TrackerStep(name, colors, config.tracker, size_px, wanted, colors_path=path, lens=lens)
+    return TrackerStep(
+        name,
+        colors,
+        config.tracker,
+        size_px,
+        wanted,
+        colors_path=path,
+        lens=lens,
+        dots=config.dots,
+        seeds=seeds,
+    )
 
 
 def _write(writer: ResultWriter, output: Output, contacts: ContactTrack) -> None:

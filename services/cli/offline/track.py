@@ -17,6 +17,7 @@ import typer
 
 from services.cli.interruption import interruptible
 from services.cli.offline.clocks.by_hand import OffsetOption
+from services.cli.offline.seeds import SeedOption
 from services.cli.options import ProgressOption
 from services.cli.unpacked_capture import readable
 
@@ -54,6 +55,7 @@ def track(
         ),
     ] = None,
     offset: OffsetOption = None,
+    seed: SeedOption = None,
     progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:
@@ -67,7 +69,7 @@ def track(
         job = job_of(found, config, fps or (), color or ())
         # What was asked for, not what a recording was unpacked to.
         job = replace(job, origin=origin_of(sources, config, fps or ()))
-        summary = run(job, out, progress, offset or ())
+        summary = run(job, out, progress, offset or (), seed or ())
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
         return

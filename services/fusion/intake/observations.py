@@ -75,7 +75,7 @@ class ObservationBuilder:
         self._landmark_of: dict[str, int] = {}  # colour -> index
         for hand in HANDS:
             if hand in config.hand:
-                for name, color in config.hand[hand].markers.items():
+                for name, color in config.hand[hand].marker_names.items():
                     self._landmark_of[color] = len(landmarks)
                     landmarks.append(Landmark(hand, name))
         self.landmarks = tuple(landmarks)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rhot.files.rig_tables import Tracker
+from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
@@ -38,17 +39,21 @@ class DotFinder:
         settings: Tracker,
         landmarks: Sequence[str],
         size_px: tuple[int, int],
-        seeds: Mapping[str, tuple[float, float]],
+        seeds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         """table has the colour, and others that are not to be taken for it.
 
         landmarks and seeds are DotTracker's; size_px is the picture's.
         """
-        self._class = table.names.index(color)
-        self._settings = settings
-        self._detector = BlobDetector(table, settings)
+        self._color, self._settings = color, settings
         self._noise = Noise()
+        self.use(table)
         self.tracker = DotTracker(landmarks, size_px, seeds)
+
+    def use(self, table: ColorTable) -> None:
+        """Search with another table from the next frame on; dots keep their names."""
+        self._class = table.names.index(self._color)
+        self._detector = BlobDetector(table, self._settings)
 
     def find(self, frame: Frame) -> dict[str, Dot]:
         """The dots of one picture by landmark; empty until tracking has started."""
@@ -76,3 +81,19 @@ class DotFinder:
                 whole = (one.x_px, one.y_px)
                 found.append(Patch(x, y, area, sigma, _PART_QUALITY * one.quality, number, whole))
         return found
+
+
+def dot_markers(dots: Mapping[str, Dot], names: Mapping[str, str]) -> list[Marker]:
+    """The dots that were seen as markers with these names by landmark; carried ones are none."""
+    return [
+        Marker(
+            color=names[landmark],
+            x_px=round(dot.x_px, 3),
+            y_px=round(dot.y_px, 3),
+            area_px=round(dot.area_px, 1),
+            sigma_px=round(dot.sigma_px, 4),
+            quality=round(min(max(dot.quality, 0.0), 1.0), 3),
+        )
+        for landmark, dot in dots.items()
+        if dot.state != "carried"
+    ]

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains
+from services.pi_tracker.dots.shape import strain
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -34,15 +35,14 @@ _WANDER, _SHARED = 0.05, 0.35
 # Where half a disc is hidden its centre moves by .24 of the root of its area, as in
 # detect/marker_finder.py; areas vary by less than the second without anything being hidden.
 _HIDDEN, _AREA_NOISE = 0.34, 0.25
-# A dot's area varies by so much (sigma of its logarithm), and no patch is judged by more than so
-# many nats on it.
-_AREA_SIGMA, _AREA_NATS = 0.45, 2.0
-# A bone longer than the longest it was by more than a share is unlikely: sigma of that, and the
-# most that one bone costs in a picture.
-_LENGTH_SLACK, _LENGTH_SIGMA, _LENGTH_NATS = 0.08, 0.12, 6.0
+# A dot's area varies by so much (sigma of its logarithm) below and above what it was of late, and
+# no patch is judged by more than so many nats on it.
+_AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (2.0, 4.0)
 # Weight of a longer length in a bone's longest one; a shorter one counts after this time (the hand
 # goes away from the camera).
 _LONGER_WEIGHT, _LENGTH_MEMORY_S = 0.3, 10.0
+# No bone is so many times longer than the others say by an average adult's proportions.
+_LONGEST_RATIO = 1.4
 # Weight of a new area.
 _AREA_WEIGHT = 0.1
 
@@ -111,7 +111,11 @@ class View:
         self._diameters = diameters
         # (n, m): the log likelihood of the areas, and each measurement's variance.
         ratio = np.log(patches.areas[None] / parent.areas[:, None])
-        self._area_nats = np.minimum(0.5 * (ratio / _AREA_SIGMA) ** 2, _AREA_NATS)
+        self._area_nats = np.where(
+            ratio < 0.0,
+            np.minimum(0.5 * (ratio / _AREA_SIGMA[0]) ** 2, _AREA_NATS[0]),
+            np.minimum(0.5 * (ratio / _AREA_SIGMA[1]) ** 2, _AREA_NATS[1]),
+        )
         hidden = np.clip(1.0 - np.exp(ratio), 0.0, 0.9)
         hidden[hidden < _AREA_NOISE] = 0.0
         offset = _HIDDEN * hidden * np.sqrt(parent.areas)[:, None]
@@ -240,19 +244,21 @@ class View:
         """The bones' longest lengths with this assignment, and what it costs to be longer."""
         chains = self._around.chains
         lengths = self.parent.lengths * float(np.exp(-self._elapsed_s / _LENGTH_MEMORY_S))
-        near, far = chains.spans[:, 0], chains.spans[:, 1]
         seen = patch >= 0
-        both = np.flatnonzero(seen[near] & seen[far])
-        if not len(both):
+        if not seen.any():
             return lengths, 0.0
-        bones = self.patches.places[patch[far[both]]] - self.patches.places[patch[near[both]]]
-        now = np.hypot(bones[:, 0], bones[:, 1])
-        unsure = (shared[near[both]] | shared[far[both]]) * float(np.median(self._diameters))
-        excess = (now - unsure) / self.parent.lengths[both] - 1.0 - _LENGTH_SLACK
-        nats = np.minimum(0.5 * (np.maximum(excess, 0.0) / _LENGTH_SIGMA) ** 2, _LENGTH_NATS)
-        longer = np.where(unsure > 0.0, 0.0, np.maximum(now - lengths[both], 0.0))
-        lengths[both] += _LONGER_WEIGHT * longer
-        return lengths, float(nats.sum())
+        places = self.patches.places[patch]
+        unsure = np.where(shared, self._diameters, 0.0)
+        nats = strain(chains, places, seen, unsure, self.parent.lengths)
+        near, far = chains.spans[:, 0], chains.spans[:, 1]
+        alone = seen & ~shared
+        bones = places[far] - places[near]
+        longer = np.maximum(np.hypot(bones[:, 0], bones[:, 1]) - lengths, 0.0)
+        lengths += _LONGER_WEIGHT * longer * (alone[near] & alone[far])
+        if len(lengths) > 2:
+            usual = float(np.median(lengths / chains.spans_m))
+            lengths = np.minimum(lengths, _LONGEST_RATIO * usual * chains.spans_m)
+        return lengths, nats
 
 
 def normalised(hypotheses: list[Hypothesis]) -> list[Hypothesis]:

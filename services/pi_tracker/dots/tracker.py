@@ -1,9 +1,9 @@
 """Dots of one colour on a hand, told apart: patches of a picture in, named dots out.
 
-Identity at the start comes from seeds, which are given points (constellation.py), afterwards from
-motion and from bones that do not grow (hypothesis.py). Several accounts are kept side by side; what
-is told is the likeliest one's, so that a mix-up is undone as soon as the next pictures speak
-against it. Pure: time is an argument.
+Identity at the start comes from seeds, which are given points, or from the constellation (start.py,
+constellation.py), afterwards from motion and from bones that do not grow (hypothesis.py). Several
+accounts are kept side by side; what is told is the likeliest one's, so that a mix-up is undone as
+soon as the next pictures speak against it. Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains, chains_of
-from services.pi_tracker.dots.constellation import Start, from_seeds
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.extend import extend
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, normalised
+from services.pi_tracker.dots.repair import repaired
+from services.pi_tracker.dots.start import Start, from_seeds, from_shape
 
 Array = npt.NDArray[np.float64]
 
 # So many accounts are kept, and none that is so much (nats) less likely than the best.
 _KEPT, _WORSE_NATS = 12, 12.0
 # The hand's acceleration, m/s^2: at the start, least and most. (Real hands: 8..20 within a frame.)
-_ACCELERATION, _LEAST, _MOST = 6.0, 0.5, 60.0
+_ACCELERATION, _LEAST, _MOST = 3.0, 0.5, 60.0
 # Sharper ones, m/s^2, and the log probability that one begins: a finger that sets off, a jerk.
-_SHARPER = ((8.0, -3.0), (50.0, -6.0))
+_SHARPER = ((6.0, -3.0), (40.0, -6.0))
 # It grows fast where dots surprise and falls slowly where they do not: powers of the innovations'
 # mean square.
 _GROWTH, _DECAY = 0.3, 0.15
@@ -52,20 +53,21 @@ class _Scale:
 class DotTracker:
     """Follows the dots of one colour.
 
-    landmarks name them (rhot.hand.JOINTS); seeds are points of the first picture by landmark, px.
-    A landmark without a seed has no dot.
+    landmarks name them (rhot.hand.JOINTS); seeds are points of the first picture by landmark, px:
+    a landmark without one has no dot. Without any seed, tracking starts with the first picture that
+    shows as many dots as there are landmarks, or as some fingers of four have.
     """
 
     def __init__(
         self,
         landmarks: Sequence[str],
         size_px: tuple[int, int],
-        seeds: Mapping[str, tuple[float, float]],
+        seeds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         """size_px is the picture's. Raises ValueError on a landmark that no hand has."""
         self.landmarks = tuple(landmarks)
         self._size_px = size_px
-        self._seeds = dict(seeds)
+        self._seeds = dict(seeds or {})
         unknown = sorted(set(self._seeds) - set(self.landmarks))
         if unknown:
             raise ValueError(
@@ -94,6 +96,9 @@ class DotTracker:
             children += extend(one, arrays, around, elapsed_s, best - _WORSE_NATS)
             best = max(child.score for child in children)
         self._hypotheses = _pruned(children)
+        self._hypotheses = _pruned(
+            [*self._hypotheses, *repaired(self._hypotheses[0], self._chains)]
+        )
         self._learn(len(patches))
         return self._dots(patches)
 
@@ -103,7 +108,10 @@ class DotTracker:
         return float(np.median(self._hypotheses[0].areas)) if self._hypotheses else 0.0
 
     def _start(self, patches: Sequence[Patch], time_s: float) -> None:
-        found = from_seeds(self._chains, self._seeds, patches)
+        if self._seeds:
+            found = from_seeds(self._chains, self._seeds, patches)
+        else:
+            found = from_shape(self._chains, patches)
         if found is not None:
             self._begin(found, patches, time_s)
 

@@ -113,5 +113,6 @@ class CameraFaults:
         if self._source is None or self._monitor.rate_hz is None:
             return "waiting for pictures"
         colors = self._tracker.wanted(self._tracker.colors)
-        wanted = len(self._service.config.counted(colors))
+        config = self._service.config
+        wanted = len(config.counted(config.markers_of(colors)))
         return f"{self._monitor.rate_hz:.0f} Hz, {self.markers} of {wanted} markers"

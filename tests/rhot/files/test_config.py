@@ -89,3 +89,49 @@ def test_hands_and_trackers_wear_colors():
     assert config.wearer("orange") == "the cup's tracker"
     assert config.wearer("green") == ""
     assert (config.colors, config.hand_colors) == (["blue", "orange"], ["blue"])
+
+
+def test_joints_of_one_colour_are_markers_with_names_of_their_own(rig):
+    config = load_rig(
+        rig(
+            '[hand.right]\njoints = "red"\nfingers = ["thumb", "index"]\n'
+            '[hand.right.markers]\nwrist = "blue"\nindex_tip = "lime"\n'
+        )
+    )
+    names = config.hand["right"].marker_names
+    assert len(names) == 9
+    assert (names["wrist"], names["index_tip"]) == ("blue", "lime")
+    assert names["thumb_distal"] == "red.thumb_distal"
+    assert config.colors == ["blue", "lime", "red"]
+    assert config.dots == {"red": {k: v for k, v in names.items() if v.startswith("red.")}}
+    assert sorted(config.markers_of(["blue", "red"])) == sorted(
+        ["blue", *config.dots["red"].values()]
+    )
+    assert config.color_of("red.thumb_tip") == "red"
+    assert config.wearer("red.thumb_tip") == "the right hand's thumb tip"
+    assert "7 joints" in config.wearer("red")
+
+
+def test_joints_without_fingers_are_all_that_there_may_be(rig):
+    config = load_rig(rig('[hand.left]\njoints = "red"'))
+    assert len(config.dots["red"]) == 20
+    shared = load_rig(rig('[hand.left.markers]\nindex_distal = "red"\nindex_tip = "red"'))
+    assert set(shared.dots["red"]) == {"index_distal", "index_tip"}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('[hand.right]\nfingers = ["index"]', "has fingers, but no joints"),
+        ('[hand.right]\njoints = "red"\nfingers = ["index", "index"]', "'index' twice"),
+        ('[hand.right]\njoints = "red"\nfingers = ["pinky"]', "valid: index"),
+        ('[hand.right]\njoints = "red"\n[hand.left]\njoints = "red"', "'red' is used twice"),
+        (
+            '[hand.right]\njoints = "red"\n[[object]]\nname = "cup"\nserial = "a"\nmarker = "red"',
+            "'red' is used twice",
+        ),
+    ],
+)
+def test_wrong_joints_are_told(rig, text, says):
+    with pytest.raises(ConfigError, match=says):
+        load_rig(rig(text))

@@ -67,7 +67,8 @@ name = "left"
 [hand.middle.markers]
 wrist = "red"
 [hand.right.markers]
-wrst = "red"
+wrst = "lime"
+wrist = "red"
 index_tip = "red"
 thumb_tip = 3
 [fusion]
@@ -87,7 +88,7 @@ x = 1
         "unknown key `middle`. Valid: left, right",
         "unknown landmark `wrst`, did you mean `wrist`?",
         "`hand.right.markers.thumb_tip`",
-        "colour 'red' is used 2 times",
+        "colour 'red' is used twice, once for wrist",
         "'left' is used 2 times",
         "'kalmann'; valid: disparity, joint, kalman, triangulate",
         "`fusion.one_euro.beta`",
