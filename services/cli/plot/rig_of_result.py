@@ -12,11 +12,11 @@ from services.cli.offline.results import SUMMARY
 from services.cli.offline.track_summary import Origin, Summary
 
 
-def origin_of_result(result: Path) -> Origin | None:
-    """What was tracked; None where summary.json does not say. Raises CaptureError."""
+def summary_of_result(result: Path) -> Summary:
+    """A result's summary.json. Raises CaptureError."""
     path = result / SUMMARY
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Summary).origin
+        return msgspec.json.decode(path.read_bytes(), type=Summary)
     except (OSError, msgspec.DecodeError) as error:
         raise CaptureError(f"{path}: {error}; run `rhot track` into the folder again") from None
 
@@ -26,7 +26,7 @@ def rig_of_result(result: Path, rig_toml: Path | None = None) -> RigConfig | Non
 
     rig_toml: of a recording, which brings its own. Raises ConfigError if the file is broken.
     """
-    found = rig_toml_of(origin_of_result(result), rig_toml)
+    found = rig_toml_of(summary_of_result(result).origin, rig_toml)
     return None if found is None else load_rig(found)
 
 

@@ -88,9 +88,10 @@ class Pen:
         x, y = at
         if right:
             x -= cv2.getTextSize(text, _FONT, size, thin)[0][0]
-        origin = (round(x), round(y))
-        cv2.putText(self.image, text, origin, _FONT, size, _BLACK, thin + 2, cv2.LINE_AA)
-        cv2.putText(self.image, text, origin, _FONT, size, color, thin, cv2.LINE_AA)
+        # A shadow, and no thicker outline: OpenCV 5 makes bold letters wider.
+        for paint, shift in ((_BLACK, max(1, round(self.width))), (color, 0)):
+            origin = (round(x) + shift, round(y) + shift)
+            cv2.putText(self.image, text, origin, _FONT, size, paint, thin, cv2.LINE_AA)
 
     def shade(self, left: float, top: float, right: float, bottom: float) -> None:
         """Darkens a box of the output, for text to be read on."""

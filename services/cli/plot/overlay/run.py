@@ -29,7 +29,7 @@ from services.cli.plot.overlay.hand_track import HandTrack, ShownHand
 from services.cli.plot.overlay.legend import draw_legend, draw_time
 from services.cli.plot.overlay.projection import pixels_of
 from services.cli.plot.overlay.webm import WebmWriter
-from services.cli.plot.rig_of_result import origin_of_result, rig_toml_of
+from services.cli.plot.rig_of_result import rig_toml_of, summary_of_result
 from services.cli.progress import Progress
 from services.cli.unpacked_capture import readable
 from services.pi_tracker.image.frame import Frame, Image
@@ -64,7 +64,9 @@ def write_overlays(
     with ExitStack() as stack:
         job = _job(request, stack)
         cameras = _cameras(request, job)
-        shown = Progress("rhot plot:", sum(one.total for one in job.inputs), progress)
+        counts = summary_of_result(request.result).cameras
+        total = sum(counts[one.camera].frames for one in job.inputs if one.camera in counts)
+        shown = Progress("rhot plot:", total, progress)
         stack.callback(shown.end)
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -79,7 +81,7 @@ def write_overlays(
 
 def _job(request: OverlayRequest, stack: ExitStack) -> Job:
     """The pictures of a result, as they were tracked."""
-    origin = origin_of_result(request.result)
+    origin = summary_of_result(request.result).origin
     give = "give them with --pictures CAPTURE, or --pictures CAM=VIDEO for each camera"
     if request.pictures:
         config = rig_toml_of(origin, request.rig_toml)
