@@ -1,5 +1,5 @@
 """`rhot grasp measure VIDEO|FRAMES --out DIR`: a finger's joint angles, lengths and path, picture
-by picture, from dots on its joints.
+by picture, from dots on its joints or from its edges.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class SeedOptions:
             metavar="JOINT=X,Y",
             help="a joint's pixel in the first picture, as index_pip=512,300; once for each joint "
             "(index_mcp, index_pip, index_dip, index_tip, thumb_cmc, thumb_mp, thumb_ip, "
-            "thumb_tip; of the base line index_wrist)",
+            "thumb_tip; of the base line index_wrist, or index_b1 and index_b2 with edges)",
         ),
     ] = None
     seeds: Annotated[
@@ -59,6 +59,13 @@ class SeedOptions:
 class LookOptions:
     """How joints are found."""
 
+    method: Annotated[
+        Literal["dots", "edges", "edges-paper"],
+        typer.Option(
+            help="dots painted on the joints, the edges of a plain finger, or edges with the "
+            "paper's centroids as joints, for comparison"
+        ),
+    ] = "dots"
     hsv: Annotated[
         str | None,
         typer.Option(
@@ -125,11 +132,11 @@ def measure(
     if not seeds:
         raise _seeds_wanted(pictures, out)
     line = Progress("measuring", 0, progress)
-    seen = see(pictures, seeds, "dots", color, line.advance)
+    seen = see(pictures, seeds, look.method, color, line.advance)
     line.end()
     notes = missing_notes(seeds, has_base=wanted.base is not None)
     notes[""] = pictures.notes()
-    findings = recordings(seen, list(seeds), wanted, "dots", notes)
+    findings = recordings(seen, list(seeds), wanted, look.method, notes)
     _write(out, findings, seen)
     if overlay:
         drawing = Progress("drawing", len(seen), progress)

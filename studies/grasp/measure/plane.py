@@ -127,8 +127,11 @@ def measured_frame(plan: FingerPlan, seen: Seen) -> GraspFrame:
             angles[joint] = plan.palm * found.angle_rad
             sigmas[joint] = found.sigma_rad
     points, points_sigma = _points(plan, seen.places)
-    missing = [name for name in _needed(plan) if name not in seen.places]
-    notes = [f"{name}: {seen.lost.get(name, 'not seen')}" for name in missing]
+    notes = [
+        f"{name}: {seen.lost.get(name, 'not seen')}"
+        for name in _needed(plan)
+        if name in seen.lost or name not in seen.places
+    ]
     present = [seen.places[name].quality for name in _needed(plan) if name in seen.places]
     return GraspFrame(
         frame=seen.frame,

@@ -37,6 +37,7 @@ Flexion = Literal["auto", "clockwise", "counterclockwise"]
 Length = tuple[float, float]
 # What a base line that was given as two points of the picture is called among the places.
 GIVEN_BASE = Segment("base_start", "base_end")
+_NOTES = {"edges-paper": "joints are the centroids of the paper's regions"}
 # A normal distribution's sigma is so much of its median absolute deviation.
 _SIGMA_PER_MAD = 1.4826
 # A phalanx that looks this much longer or shorter than its median is not in the plane, or a dot is
@@ -105,14 +106,21 @@ def recordings(
     for finger, plan in plans.items():
         palm, side_note = palm_side(plan, pictures, wanted.flexion)
         plan = plan._replace(palm=palm, scale=scale.per_px, scale_sigma=scale.sigma)
-        own = [*notes.get("", ()), *notes.get(finger, ()), base_note(plan), side_note, scale.note]
+        own = [
+            *notes.get("", ()),
+            *notes.get(finger, ()),
+            base_note(plan),
+            side_note,
+            scale.note,
+            _NOTES.get(method, ""),
+        ]
         frames = [_frame(plan, seen, lengths[finger]) for seen in pictures]
         bones, sigmas = _bones(plan, lengths[finger])
         recording = GraspRecording(
             subject=wanted.subject,
             finger=finger,
             source=wanted.source,
-            method=method,
+            method="dots" if method == "dots" else "edges",
             unit="mm" if scale.unit == "mm" else "px",
             lengths=bones,
             lengths_sigma=sigmas,

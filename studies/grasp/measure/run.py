@@ -8,7 +8,9 @@ from typing import Protocol
 from rhot.files.calibration import ColorRange
 from services.pi_tracker.image.frame import Frame
 from studies.grasp.measure.dots.finder import DotJoints
-from studies.grasp.measure.joints import Place, Seen
+from studies.grasp.measure.edges.finder import EdgeFinder
+from studies.grasp.measure.gaps import bridged
+from studies.grasp.measure.joints import Place, Seen, fingers_in
 from studies.grasp.measure.pictures import Pictures, corrected_seeds
 from studies.grasp.measure.seeds import Method, Seeds, check_seeds
 
@@ -36,14 +38,19 @@ def see(
         if not finders:
             check_seeds(seeds, frame.size_px, method)
             corrected = corrected_seeds(seeds, pictures.lens)
-            finders = _finders(frame, corrected, color)
+            finders = _finders(frame, corrected, method, color)
         seen.append(_together([finder.find(frame) for finder in finders]))
         advance()
-    return seen
+    return bridged(seen) if method == "dots" else seen
 
 
-def _finders(first: Frame, seeds: Seeds, color: ColorRange | None) -> list[Finder]:
-    return [DotJoints(first, seeds, color)]
+def _finders(first: Frame, seeds: Seeds, method: Method, color: ColorRange | None) -> list[Finder]:
+    if method == "dots":
+        return [DotJoints(first, seeds, color)]
+    return [
+        EdgeFinder(finger, seeds, paper=method == "edges-paper")
+        for finger in fingers_in(list(seeds))
+    ]
 
 
 def _together(seen: Sequence[Seen]) -> Seen:

@@ -19,7 +19,7 @@ _ALIASES = {
     "index_base": "index_wrist",
     "thumb_mcp": "thumb_mp",
 }
-Method = Literal["dots", "edges"]
+Method = Literal["dots", "edges", "edges-paper"]
 _SEED = re.compile(r"(?P<place>\w+)=(?P<x>-?[\d.]+),(?P<y>-?[\d.]+)")
 _EXAMPLE = "--seed index_mcp=410,352 --seed index_pip=512,300"
 
