@@ -41,6 +41,9 @@ class SeedOptions:
     seeds: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help='{"index_tip": [512, 300], ...}')
     ] = None
+    click: Annotated[
+        bool, typer.Option("--click", help="click on the joints on a page of this machine")
+    ] = False
     base: Annotated[
         str | None,
         typer.Option(
@@ -129,6 +132,8 @@ def measure(
     color = _color(look)
     wanted = _wanted(video, subject, at, scaled, pictures)
     seeds = _seeds(at)
+    if at.click:
+        seeds |= _clicked(pictures, look)
     if not seeds:
         raise _seeds_wanted(pictures, out)
     line = Progress("measuring", 0, progress)
@@ -176,6 +181,16 @@ def _seeds(at: SeedOptions) -> Seeds:
     return {**seeds, **parse_seeds(at.seed or [])}
 
 
+def _clicked(pictures: Pictures, look: LookOptions) -> Seeds:
+    from services.cli.grasp.click_page import as_options, clicked
+    from services.pi_tracker.image.yuv_planes import bgr_image
+
+    camera = type(pictures)(pictures.path, pictures.fps)
+    seeds = clicked(bgr_image(camera.first()), look.method, typer.echo)
+    typer.echo(f"the same again: {as_options(seeds)}")
+    return seeds
+
+
 def _seeds_wanted(pictures: Pictures, out: Path) -> CaptureError:
     """The error of a command without seeds, after showing the first picture with a grid."""
     import cv2
@@ -191,7 +206,7 @@ def _seeds_wanted(pictures: Pictures, out: Path) -> CaptureError:
         return CaptureError(f"no seeds, and {path} cannot be written")
     return CaptureError(
         f"no seeds: say where each joint is in the first picture. {path} shows it with a grid of "
-        "pixels; then --seed index_mcp=410,352 --seed index_pip=512,300 ..."
+        "pixels; then --seed index_mcp=410,352 --seed index_pip=512,300 ..., or --click on a page"
     )
 
 

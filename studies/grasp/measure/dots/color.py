@@ -13,7 +13,7 @@ import numpy as np
 
 from rhot.errors import CalibrationError, CaptureError
 from rhot.files.calibration import ColorRange
-from services.pi_tracker.colors.bounds import hues_of
+from services.pi_tracker.colors.bounds import bounds, hues_of
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.paint_patch import PaintPatch, find_patch
 from services.pi_tracker.colors.pointer import Pointer
@@ -29,6 +29,9 @@ _SAME_HUE = 12.0
 # Dots of one hand are about of one size: a patch so many times larger than the median holds skin,
 # too (red paint on dark skin: 5.9 times).
 _MUCH_LARGER = 2.5
+# Under a click, cells of 2 px to this distance are looked at; dots end within this share of the
+# picture's width.
+_SAMPLED_CELLS, _RIM_SHARE = 2.5, 0.02
 # A range is widened to a paler dot's own saturation and value less this: the next picture's noise.
 _WIDER = 8
 _RANGE = re.compile(r"(\d+),(\d+),(\d+)-(\d+),(\d+),(\d+)")
@@ -96,6 +99,27 @@ def widened(color: ColorRange, first: Frame, seeds: Seeds, radius_px: float) -> 
         ),
         hsv_high=(round(middle + to_hue) % 180, 255, 255),
     )
+
+
+def color_about(first: Frame, seeds: Seeds) -> ColorRange:
+    """The range of what is right under the seeds, against everything that is not near one.
+
+    For dots that do not stand out enough to be outlined: red on dark skin, in a compressed video.
+    """
+    cells = cells_of(first)
+    height, width = cells.shape
+    rows, columns = np.mgrid[0:height, 0:width]
+    apart = np.full(cells.shape, np.inf)
+    for x, y in seeds.values():
+        apart = np.minimum(apart, np.hypot(columns + 0.25 - 0.5 * x, rows + 0.25 - 0.5 * y))
+    paint = cells[apart <= _SAMPLED_CELLS]
+    # A click may be on a rim: what is least like the skin around is paint.
+    around = cells[(apart > _RIM_SHARE * width) & (apart <= 2.0 * _RIM_SHARE * width)]
+    skin = np.median(around.chromaticity, axis=0)
+    unlike = np.hypot(*(paint.chromaticity - skin).T)
+    paint = paint[unlike >= np.median(unlike)]
+    foreign = cells[apart > _RIM_SHARE * width]
+    return bounds(paint, hues_of(paint), [], foreign, 1)
 
 
 def _alike(cells: Cells, patches: dict[str, PaintPatch]) -> list[str]:

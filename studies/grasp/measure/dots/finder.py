@@ -6,6 +6,7 @@ checked, and dots become places, or reasons why there is none.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from typing import Protocol
@@ -23,7 +24,7 @@ from services.pi_tracker.dots.tracker import DotTracker
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import picture
-from studies.grasp.measure.dots.color import DOTS, color_at, no_dot, widened
+from studies.grasp.measure.dots.color import DOTS, color_about, color_at, no_dot, widened
 from studies.grasp.measure.dots.ink import InkFinder, InkPatches
 from studies.grasp.measure.joints import WRIST, Place, Seen
 from studies.grasp.measure.seeds import Seeds
@@ -54,12 +55,12 @@ class DotJoints:
         named = {landmark_of(place): at for place, at in seeds.items()}
         self._names = {landmark_of(place): place for place in seeds}
         self._finder: _Finder
-        found = color or color_at(first, seeds)
+        found = _color(first, seeds, color)
         if found is None:
             ink = _ink(first, seeds)
             self._finder = InkFinder(ink, DotTracker(list(named), first.size_px, named))
         else:
-            table = _table(_checked(first, seeds, found, given=color is not None))
+            table = _table(found)
             self._finder = DotFinder(table, DOTS, Tracker(), list(named), first.size_px, named)
         self._size_px = first.size_px
 
@@ -97,6 +98,22 @@ def landmark_of(place: str) -> str:
             f"through {finger}_{WRIST}, or is given by --base"
         )
     return f"{finger}_{bone}"
+
+
+def _color(first: Frame, seeds: Seeds, given: ColorRange | None) -> ColorRange | None:
+    """The dots' range, which takes one at every seed; None of dots without a colour.
+
+    Raises CaptureError naming a seed at which there is no dot.
+    """
+    found = given or color_at(first, seeds)
+    if found is not None:
+        return _checked(first, seeds, found, given=given is not None)
+    with contextlib.suppress(CaptureError):
+        faint = color_about(first, seeds)
+        areas = _areas(_patches(first, faint), seeds)
+        if max(areas, default=np.inf) <= _MUCH_LARGER * min(areas, default=0.0):
+            return _checked(first, seeds, faint, given=True)
+    return None
 
 
 def _table(color: ColorRange) -> ColorTable:
@@ -176,6 +193,8 @@ def _missed(patches: Sequence[Patch], seeds: Seeds) -> dict[str, float]:
 
 def _areas(patches: Sequence[Patch], seeds: Seeds) -> list[float]:
     """The area of the patch nearest to each seed, px^2."""
+    if not patches:
+        return []
     return [
         min(patches, key=lambda one: math.hypot(one.x_px - x, one.y_px - y)).area_px
         for x, y in seeds.values()

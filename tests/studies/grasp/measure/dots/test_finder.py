@@ -91,6 +91,28 @@ def test_the_dots_own_colour_is_found_at_the_seeds(pinch, pinch_seeds):
     assert color_at(replace(frames[0], image=grey), pinch_seeds) is None
 
 
+def test_faint_dots_are_known_by_what_is_right_under_the_clicks(pinch_options):
+    """Red on dark skin, in a shadow, blurred and compressed: no dot can be outlined by itself."""
+    experiment = Experiment(SUBJECTS[4], pinch_options._replace(dots="red"), 3)
+    shade = np.linspace(0.5, 1.1, 480)[None, :, None]
+    finder = None
+    for number in range(3):
+        picture = cv2.GaussianBlur(experiment.picture(number), (0, 0), 1.0) * shade
+        coded = cv2.imencode(".jpg", picture.clip(0, 255).astype(np.uint8), [1, 35])[1]
+        frame = frame_of(cv2.imdecode(coded, cv2.IMREAD_COLOR), number)
+        truth = experiment.pixels_of(number)
+        truth = {n if n[0:5] == "thumb" else f"index_{n}": at for n, at in truth.items()}
+        truth.pop("index_base")
+        seeds = {place: tuple(at.tolist()) for place, at in truth.items()}
+        if finder is None:
+            assert color_at(frame, seeds) is None
+            finder = DotJoints(frame, seeds)
+        places = finder.find(frame).places
+        assert len(places) == 8
+        for place, found in places.items():
+            assert np.hypot(*(truth[place] - (found.x_px, found.y_px))) < 1.5
+
+
 def test_black_dots_as_the_papers_are_followed_as_well(pinch_options):
     experiment = Experiment(SUBJECTS[0], pinch_options._replace(dots="black", thumb=False), 22)
     seeds = {
