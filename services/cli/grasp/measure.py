@@ -99,6 +99,14 @@ class ScaleOptions:
     scale_mm_per_px: Annotated[
         float | None, typer.Option("--scale-mm-per-px", help="millimetres a pixel")
     ] = None
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rectangle=WxH:X,Y:X,Y:X,Y:X,Y",
+            help="a rectangle of known size (mm) in the finger's plane, its corners' pixels in the "
+            "first picture in order: tilt and scale are taken from it; or length=MM:X,Y:X,Y",
+        ),
+    ] = None
     fps: Annotated[
         float | None,
         typer.Option(min=0.1, max=10_000, help="frame rate, instead of the video's own times"),
@@ -121,6 +129,7 @@ def measure(
     """Measure a finger's joint angles in a video: one JSON and one CSV for each finger."""
     # Not above: OpenCV takes longer to import than other commands take to run.
     from rhot.files.calibration import Lens, load
+    from services.cli.grasp.in_plane import in_plane, reference_of
     from services.cli.progress import Progress
     from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.recordings import recordings
@@ -141,7 +150,14 @@ def measure(
     line.end()
     notes = missing_notes(seeds, has_base=wanted.base is not None)
     notes[""] = pictures.notes()
-    findings = recordings(seen, list(seeds), wanted, look.method, notes)
+
+    def recorded(seen: list[Seen], wanted: Wanted) -> dict[Finger, Finding]:
+        return recordings(seen, list(seeds), wanted, look.method, notes)
+
+    if scaled.reference is None:
+        findings = recorded(seen, wanted)
+    else:
+        findings = in_plane(reference_of(scaled.reference, pictures), seen, wanted, recorded)
     _write(out, findings, seen)
     if overlay:
         drawing = Progress("drawing", len(seen), progress)

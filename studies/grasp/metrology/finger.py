@@ -58,11 +58,15 @@ def points_in_plane(
 
 
 def finger_in_plane(
-    plane: Plane, places_px: npt.ArrayLike, sigma_px: npt.ArrayLike
+    plane: Plane,
+    places_px: npt.ArrayLike,
+    sigma_px: npt.ArrayLike,
+    *,
+    base_to_mcp: bool = False,
 ) -> FingerInPlane:
     """Angles and bones of n pictures. places_px (n, 6, 2): two points of the base line, towards
     the finger, then MCP, PIP, DIP, tip, px of pictures without distortion; sigma_px (n, 6), or one
-    for all.
+    for all. base_to_mcp: the base line's second point is the MCP joint, with the same error.
     """
     px = np.asarray(places_px, dtype=np.float64).reshape(-1, 6, 2)
     sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), px.shape[:2])
@@ -79,6 +83,9 @@ def finger_in_plane(
         return measured(back, px + step.reshape(6, 2))
 
     by_place = jacobian(moved, np.zeros(12)).reshape(-1, 6, 6, 2)
+    if base_to_mcp:
+        by_place[:, :, 2] += by_place[:, :, 1]
+        by_place[:, :, 1] = 0.0
     own = (by_place**2 * (sigma**2)[:, None, :, None]).sum(axis=(2, 3))
     whole = np.sqrt(np.maximum(own + shared, 0.0))
     return FingerInPlane(
