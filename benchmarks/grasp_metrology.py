@@ -5,10 +5,11 @@ Rendered views (k1 -0.18, k2 0.05): a finger of 40, 23 and 18 mm somewhere in th
 joints and the reference rectangle's corners pointed at with noise; bones in per cent and MCP, PIP
 and DIP angles in degrees, mean, 95 % and worst, by the camera's tilt and the noise:
     scale          pixels a millimetre of the rectangle's upper edge, lens and tilt left alone
-    plane          the rectangle's plane, lens left alone
+    plane          the homography of the rectangle, lens left alone
     plane_lens     the same, lens from edges that are straight in the world (noise 0.3 px)
     edges_lens     the same lens; plane from the rectangle's edges, scale from its upper edge alone
-calibrated beside them is plane_lens with the true lens.
+    camera_lens    the same lens; the rectangle's plane as a camera of unknown focal length sees it
+    calibrated     as a camera whose lens is calibrated sees it
 
 Real photographs (`stereo_chessboard` of RHOT_DATA, both cameras, 13 pictures each): the board's
 outer corners are seen, its 28 inner ones are not; all their distances are predicted from ONE
@@ -39,9 +40,11 @@ from studies.grasp.metrology.plane import (
     plane_from_length,
     plane_from_rectangle,
     plane_from_view,
+    rectangle_mm,
 )
+from studies.grasp.metrology.pose import plane_seen_by_camera
 from studies.grasp.metrology.segments import segment_of
-from studies.grasp.metrology.view import common_lens, view_from_edges
+from studies.grasp.metrology.view import PlaneView, common_lens, view_from_edges
 from studies.grasp.scene.backdrop import Rectangle, straight_lines
 from studies.grasp.scene.subjects import chain
 from studies.grasp.scene.view import ViewOptions, place_camera
@@ -87,7 +90,14 @@ def one_view(tilt_deg: float, noise_px: float, seed: int) -> dict[str, tuple[Arr
             plane_from_rectangle(lens.straightened(corners), rectangle.size),
         ),
         "edges_lens": (lens.straightened, by_edges(lens.straightened(corners), rectangle)),
-        "calibrated": (calibrated, plane_from_rectangle(calibrated(corners), rectangle.size)),
+        "camera_lens": (
+            lens.straightened,
+            by_camera(lens.straightened(corners), rectangle, noise_px, None),
+        ),
+        "calibrated": (
+            calibrated,
+            by_camera(calibrated(corners), rectangle, noise_px, camera.matrix),
+        ),
     }
     places, angles = fingers(rng)
     seen = view.pixels(places.reshape(-1, 2)) + rng.normal(0.0, noise_px, (places.size // 2, 2))
@@ -104,6 +114,12 @@ def by_edges(corners: Array, rectangle: Rectangle) -> Plane:
     a, b, c, d = corners
     view = view_from_edges([[a, b], [d, c]], [[a, d], [b, c]], SIZE)
     return plane_from_view(view, a, b, rectangle.size[0])
+
+
+def by_camera(corners: Array, rectangle: Rectangle, noise_px: float, matrix: Array | None) -> Plane:
+    """As `rhot grasp measure --reference` has it."""
+    mm = rectangle_mm(*rectangle.size)
+    return plane_seen_by_camera(corners, mm, SIZE, sigma_px=noise_px, matrix=matrix)
 
 
 def fingers(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -192,8 +208,8 @@ def view_of(board: Array, matrix: Array | None):
     return view_from_edges([upper, lower], [left, right], SIZE, sigma_px=0.2, matrix=matrix)
 
 
-def planes(boards: Sequence[Array], views: Sequence) -> list[Plane]:
-    """In squares divided by 10, so that a reference is 80 long as a rectangle in mm is."""
+def planes(boards: Sequence[Array], views: Sequence[PlaneView]) -> list[Plane]:
+    """A square is the unit: the upper border is 8 of them."""
     return [
         plane_from_view(view, board[0, 0], board[0, -1], 8.0, 0.2)
         for board, view in zip(boards, views, strict=True)

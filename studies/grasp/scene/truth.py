@@ -14,6 +14,7 @@ from rhot.geometry.transforms import Array
 from studies.grasp.recording import ANGLES, JOINTS, GraspFrame, GraspRecording
 from studies.grasp.scene.backdrop import straight_lines
 from studies.grasp.scene.experiment import INDEX_JOINTS, THUMB_JOINTS, Experiment
+from studies.grasp.scene.hand import THUMB_BASE
 
 Pixel = tuple[float, float]
 
@@ -63,7 +64,7 @@ def truth_of(experiment: Experiment) -> list[GraspRecording]:
             unit="mm",
             lengths=lengths,
             lengths_sigma=(0.0, 0.0, 0.0),
-            notes=["rendered", *_THUMB_NOTE[finger == "thumb"]],
+            notes=_notes(experiment, finger),
             frames=[
                 GraspFrame(
                     frame=frame,
@@ -79,13 +80,21 @@ def truth_of(experiment: Experiment) -> list[GraspRecording]:
     ]
 
 
-_THUMB_NOTE: tuple[list[str], list[str]] = (
-    [],
-    [
-        "mcp, pip, dip are the thumb's CMC, MP and IP joints, in the index finger's frame",
-        "where the thumb opposes the finger its angles are negative",
-    ],
-)
+def _notes(experiment: Experiment, finger: str) -> list[str]:
+    notes = ["rendered"]
+    if experiment.options.thumb:
+        # From the line between two dots angles are larger by this.
+        off = np.degrees(np.arctan2(THUMB_BASE[1], -THUMB_BASE[0]))
+        notes.append(
+            f"the base line is the back of the hand's; that from thumb_cmc to index_mcp would make"
+            f" the first angle {off:.2f} degrees larger"
+        )
+    if finger == "thumb":
+        notes.append(
+            "mcp, pip, dip are the thumb's CMC, MP and IP joints, in the index finger's frame:"
+            " where it opposes the finger its angles are negative"
+        )
+    return notes
 
 
 def _angles(angles: Array) -> dict:
@@ -101,9 +110,10 @@ def _points(joints: dict[str, Array], names: tuple[str, ...]) -> dict:
 
 def seeds_of(experiment: Experiment) -> dict[str, Pixel]:
     """Where somebody would click in the first picture: joint -> x, y px. `base` is a second point
-    of the base line; the thumb's joints are told where it has dots.
+    of the base line, which has no dot where the thumb's joints have theirs.
     """
-    wanted = ("base", *INDEX_JOINTS, *(THUMB_JOINTS if experiment.options.thumb else ()))
+    thumb = experiment.options.thumb
+    wanted = (*INDEX_JOINTS, *THUMB_JOINTS) if thumb else ("base", *INDEX_JOINTS)
     pixels = experiment.pixels_of(0)
     return {name: _rounded(pixels[name][None])[0] for name in wanted}
 
