@@ -83,18 +83,14 @@ class Experiment:
         plane = np.stack(list(joints.values())) @ self._turned(frame).T + self._mcp(frame)
         return dict(zip(joints, self.view.pixels(plane), strict=True))
 
+    def hand(self, frame: int) -> list[Layer]:
+        """What is laid over the backdrop, from the back."""
+        angles, thumb = self.motion.angles[frame], self.motion.thumb[frame]
+        return list(layers(self.subject, angles, thumb, self._pixels(frame), self.look))
+
     def picture(self, frame: int) -> npt.NDArray[np.uint8]:
         """One picture (h, w, 3), blue, green, red."""
-        pixels = self._pixels(frame)
-        hand = list(
-            layers(
-                self.subject,
-                self.motion.angles[frame],
-                self.motion.thumb[frame],
-                pixels,
-                self.look,
-            )
-        )
+        hand = self.hand(frame)
         picture = self._backdrop * self._shadow(hand)
         for (rows, columns), colour, share in hand:
             part = picture[:, rows, columns]
@@ -135,13 +131,11 @@ class Experiment:
         turned, mcp = self._turned(frame), self._mcp(frame)
         back = np.linalg.inv(turned).astype(np.float32)
         x, y = self._plane[..., 0] - np.float32(mcp[0]), self._plane[..., 1] - np.float32(mcp[1])
-        probe = self.view.pixels(np.array([(0, 0), (40, 0), (0, 40)]) @ turned.T + mcp)
-        slopes = (probe[1:] - probe[0]).T / 40.0
         return Pixels(
             back[0, 0] * x + back[0, 1] * y,
             back[1, 0] * x + back[1, 1] * y,
             self._mm_per_px,
-            np.concatenate([slopes, probe[0][:, None]], axis=1),
+            lambda points: self.view.pixels(points @ turned.T + mcp),
         )
 
     def _shadow(self, hand: list[Layer]) -> Picture:

@@ -4,6 +4,7 @@ the chain, and on which side. All in mm of the finger's frame; vectorised over a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,13 +24,12 @@ class Pixels(NamedTuple):
     x: Picture
     y: Picture
     size: Picture
-    px_of: Array  # (2, 3): about where the finger's frame lies in the picture, px
+    px_of: Callable[[Array], Array]  # points (n, 2) of the finger's frame -> px, lens included
 
     def box(self, points: Array, margin_mm: float) -> Box | None:
         """The pixels about points (n, 2) of the finger's frame; None if none is in the picture."""
         spread = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)]) * margin_mm
-        corners = (points[:, None] + spread).reshape(-1, 2) @ self.px_of[:, :2].T
-        corners += self.px_of[:, 2]
+        corners = self.px_of((points[:, None] + spread).reshape(-1, 2))
         limit = (self.x.shape[1], self.x.shape[0])
         low = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, limit)
         high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, limit)

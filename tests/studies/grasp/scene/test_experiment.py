@@ -124,3 +124,15 @@ def test_an_unknown_subject_is_told_the_known_ones():
     assert subject_named("4") is subject_named("subject-4")
     with pytest.raises(ConfigError, match="subject-1, subject-2"):
         subject_named("me")
+
+
+def test_no_limb_is_cut_off_by_its_box_however_the_camera_stands():
+    for tilt in (0.0, 35.0):
+        view = SMALL._replace(tilt_deg=tilt)
+        shown = Experiment(SUBJECTS[2], Options(view=view, cycles=SHORT, thumb=tilt > 0.0), 20)
+        for frame in (0, 9):
+            for (rows, columns), _, share in shown.hand(frame):
+                inside = (rows.start > 0, rows.stop < 240, columns.start > 0, columns.stop < 320)
+                sides = (share[0], share[-1], share[:, 0], share[:, -1])
+                for side, within in zip(sides, inside, strict=True):
+                    assert not within or side.max() < 0.02
