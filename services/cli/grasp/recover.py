@@ -72,7 +72,8 @@ def recover(
     if len(failed) == len(named):
         raise CaptureError(f"nothing could be recovered: {failed[-1]}")
     done = len(named) - len(failed)
-    typer.echo(f"{out}: {done} of {len(named) + len(left_out) - len(failed)} recovered")
+    asked = len(named) + len(left_out) - len(failed)
+    typer.echo(f"{out}: {done} of {asked} recovered; `rhot grasp report {out}`")
 
 
 def _written(named: list[Named], settings: Settings, out: Path, progress: bool | None) -> list[str]:

@@ -9,7 +9,8 @@ from studies.grasp.recover.result import Recovery
 def lines_of(name: str, recovery: Recovery) -> list[str]:
     """Which pieces were found, each method's error with fixed lengths, and the notes."""
     kinds = {sequence.kind for sequence in recovery.sequences}
-    kind = "whole recording" if kinds == {"whole"} else f"{'/'.join(sorted(kinds))}s"
+    several = "s" if len(recovery.sequences) > 1 else ""
+    kind = "whole recording" if kinds == {"whole"} else "/".join(sorted(kinds)) + several
     head = (
         f"{name}: {recovery.subject}, {recovery.finger}, {len(recovery.sequences)} {kind},"
         f" lengths {' '.join(f'{one:.1f}' for one in recovery.lengths)} {recovery.unit}"
