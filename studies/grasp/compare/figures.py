@@ -57,18 +57,22 @@ def deviation_figure(found: Comparison) -> Drawn | None:
     if found.band is None or not found.judged:
         return None
     joints = [name for name in ANGLES if name in found.joint_bands]
-    figure = new_figure((3.7 * (1 + len(joints)) + 0.3, 3.9))
-    grid = figure.subplots(1, 1 + len(joints), squeeze=False)[0]
+    columns = min(1 + len(joints), 2)
+    rows = -(-(1 + len(joints)) // columns)
+    figure = new_figure((4.4 * columns + 0.3, 3.0 * rows + 0.7))
+    grid = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in grid[1 + len(joints) :]:
+        axes.remove()
     share = np.linspace(0.0, 100.0, len(found.band.mean))
     _banded(grid[0], share, np.zeros(len(share)), found.band.half_width)
     for k, one in enumerate(found.judged, start=found.references):
         line: dict[str, Any] = {"color": color_of(k), "linestyle": _dashes(found, k)}
         grid[0].plot(share, one.shape.deviation, linewidth=2.0, label=one.someone.subject, **line)
-        for axes, joint in zip(grid[1:], joints, strict=True):
+        for axes, joint in zip(grid[1:], joints, strict=False):
             angles = one.someone.angles_deg[:, ANGLES.index(joint)]
             axes.plot(share, angles, linewidth=2.0, **line)
     style(grid[0], "closing / %", "beside the mean path / finger lengths", "path (pace removed)")
-    for axes, joint in zip(grid[1:], joints, strict=True):
+    for axes, joint in zip(grid[1:], joints, strict=False):
         band = found.joint_bands[joint]
         _banded(axes, share, band.mean, band.half_width)
         style(axes, "closing / %", f"{joint.upper()} flexion / deg", joint.upper())
@@ -76,8 +80,8 @@ def deviation_figure(found: Comparison) -> Drawn | None:
     return Drawn(
         "deviation",
         "Where a recording leaves the band",
-        "Left: distance from the references' mean path along its normal, over the mean closing."
-        " Right: each joint's angle over the closing, with the references' mean and band; pace"
+        "First: distance from the references' mean path along its normal, over the mean closing."
+        " Then each joint's angle over the closing, with the references' mean and band; pace"
         " counts there.",
         figure,
     )
