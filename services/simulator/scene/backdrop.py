@@ -68,7 +68,7 @@ def wall_texture(seed: int, clutter: bool) -> Light32:
             )
     texture *= 1.0 + 0.10 * _fractal_noise(rng, size)[..., None]
     texture *= 1.0 + 0.05 * rng.standard_normal((*size, 1), np.float32)
-    light: Light32 = np.clip(cv2.GaussianBlur(texture, (0, 0), 1.2), 0.004, 1.0, dtype=np.float32)
+    light: Light32 = np.clip(cv2.GaussianBlur(texture, (0, 0), 1.2), 0.004, 1.0)
     light.setflags(write=False)
     return light
 
