@@ -149,8 +149,9 @@ async def test_a_thousand_questions_a_second_for_pictures(tracker, router):
     def listen(reply):
         if reply.ok is not None:
             pictures.append(len(reply.ok.payload))
-        else:
-            refusals.append(reply.err.payload.to_bytes())
+        elif (said := reply.err.payload.to_bytes()) != b"Timeout":
+            # That is what Zenoh says where nobody had the time to answer.
+            refusals.append(said)
 
     began_s, during_hz, peak_mb = time.monotonic(), 0.0, 0.0
     with flood(router, lambda one: one.get(key, listen, timeout=1.0), 1000.0):

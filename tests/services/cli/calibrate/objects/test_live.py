@@ -34,7 +34,7 @@ async def test_a_cup_that_is_moved_is_where_it_is(
     running: Callable, router: str, rig_toml: Path, scene: PaintedTracker
 ) -> None:
     moving = replace(scene, seconds=600.0)
-    async with asyncio.timeout(120.0), open_bus("desk", [router]) as bus:
+    async with asyncio.timeout(240.0), open_bus("desk", [router]) as bus:
         player = asyncio.create_task(play(bus, moving))
         process = await command(rig_toml, "--seconds", "8")
         said = (await process.communicate())[0].decode()
