@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.cli.plot.overlay.webm import WebmWriter
+from services.cli.video.webm import WebmWriter
 
 pytestmark = pytest.mark.browser
 

@@ -22,7 +22,7 @@ from services.cli.calibrate import options
 from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
 from services.cli.calibrate.live_pictures import next_frames
 from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
-from services.cli.recorded_frames import frame_names, frames_by_number, spread_numbers
+from services.cli.recorded.frames import frame_names, frames_by_number, spread_numbers
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer

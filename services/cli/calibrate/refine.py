@@ -19,7 +19,7 @@ from rhot.files.calibration import load_cameras, save
 from rhot.files.config import load_rig
 from rhot.messages import MarkerFrame
 from services.cli.calibrate import options
-from services.cli.recorded_messages import messages
+from services.cli.recorded.messages import messages
 
 if TYPE_CHECKING:
     from services.calibrator.recalibrate.refine_rig import Wand

@@ -17,7 +17,7 @@ from services.cli.export.motion_options import (
 )
 from services.cli.interruption import interruptible
 from services.cli.options import ProgressOption, ResultArgument
-from services.cli.unpacked_capture import folder_beside
+from services.cli.recorded.unpacked_capture import folder_beside
 
 
 def export(

@@ -21,7 +21,7 @@ from services.cli.export.tables import TABLES, Row, Table
 from services.cli.export.writers import WRITERS, TableWriter
 from services.cli.offline.results import PARTIAL, SUMMARY, check_result
 from services.cli.progress import Progress
-from services.cli.recorded_messages import arrivals
+from services.cli.recorded.messages import arrivals
 
 # Rows of a table that are gathered before they are written.
 _BATCH = 10_000

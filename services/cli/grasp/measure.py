@@ -4,7 +4,7 @@ by picture, from dots on its joints or from its edges.
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -17,6 +17,7 @@ from services.cli.options import ProgressOption
 
 if TYPE_CHECKING:
     from rhot.files.calibration import ColorRange
+    from services.pi_tracker.image.frame import Image
     from studies.grasp.measure.joints import Finger, Seen
     from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.recordings import Finding, Line, Wanted
@@ -268,18 +269,28 @@ def _draw(
     wanted: Wanted,
     line: object,
 ) -> None:
-    from services.cli.video_writer import SUFFIX, VideoWriter, rate_of
+    import cv2
+
+    from services.cli.video.constant_rate import at_rate, rate_hz
+    from services.cli.video.webm import WebmWriter, video_size
     from services.pi_tracker.image.yuv_planes import bgr_image
     from studies.grasp.measure.draw import drawn
     from studies.grasp.measure.recordings import with_base
 
-    size_px = pictures.first().size_px
-    fps = rate_of([one.time_s for one in seen])
-    with closing(VideoWriter(out / f"overlay{SUFFIX}", fps, size_px)) as video:
+    size_px = video_size(pictures.first().size_px)
+    stamps_ns = [round(1e9 * one.time_s) for one in seen]
+    hz = rate_hz("the video", stamps_ns)
+
+    def shown() -> Iterator[tuple[int, Image]]:
         for number, frame in enumerate(pictures.frames()):
             place = with_base(seen[number], wanted.base)
-            video.write(drawn(bgr_image(frame), place, findings, number))
+            picture = drawn(bgr_image(frame), place, findings, number)
             line.advance()  # type: ignore[attr-defined]
+            yield stamps_ns[number], cv2.resize(picture, size_px, interpolation=cv2.INTER_AREA)
+
+    with WebmWriter(out / "overlay.webm", size_px, hz) as video:
+        for picture in at_rate(shown(), hz):
+            video.write(picture)
 
 
 def _summary(finger: Finger, finding: Finding) -> str:

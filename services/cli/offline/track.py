@@ -19,7 +19,7 @@ from services.cli.interruption import interruptible
 from services.cli.offline.clocks.by_hand import OffsetOption
 from services.cli.offline.seeds import SeedOption
 from services.cli.options import ProgressOption
-from services.cli.unpacked_capture import readable
+from services.cli.recorded.unpacked_capture import readable
 
 ColorOption = Annotated[
     list[str] | None,

@@ -18,7 +18,7 @@ import typer
 from rhot import topics
 from rhot.messages import HandPoints
 from services.cli.options import menu
-from services.cli.recorded_messages import messages
+from services.cli.recorded.messages import messages
 
 if TYPE_CHECKING:
     from services.fusion.paired.one_euro_tuning import Proposal

@@ -15,7 +15,7 @@ import typer
 from rhot.errors import ConfigError
 from services.cli.interruption import interruptible
 from services.cli.options import ProgressOption, ResultArgument
-from services.cli.unpacked_capture import folder_beside, is_recording
+from services.cli.recorded.unpacked_capture import folder_beside, is_recording
 
 
 def plot(
@@ -45,7 +45,7 @@ def plot(
     """Draw marker tracks, 3D points, joint angles, residuals, and objects with their errors."""
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
-    from services.cli.unpacked import unpacked
+    from services.cli.recorded.unpacked import unpacked
 
     folder = folder_beside(result, out)
     if pictures and not video:

@@ -9,7 +9,7 @@ from rhot import topics
 from rhot.errors import CaptureError
 from rhot.hand import HandName
 from rhot.messages import HandPoints
-from services.cli.recorded_messages import messages as messages_of
+from services.cli.recorded.messages import messages as messages_of
 
 
 def recorded(path: Path, which: HandName, config: Path | None) -> list[HandPoints]:

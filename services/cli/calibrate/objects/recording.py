@@ -15,7 +15,7 @@ from rhot.geometry.camera import Camera
 from rhot.messages import MarkerFrame
 from rhot.messages.objects import OpenVrPose
 from services.cli.calibrate.objects.wanted import Painted
-from services.cli.recorded_messages import messages
+from services.cli.recorded.messages import messages
 
 if TYPE_CHECKING:
     from services.calibrator.objects.sightings import Sightings

@@ -14,7 +14,7 @@ from services.cli.export.motion.clip import Clip, clips
 from services.cli.export.motion.gltf import gltf_file
 from services.cli.export.motion.opensim import mot_lines, trc_lines
 from services.cli.offline.results import PARTIAL, check_result
-from services.cli.recorded_messages import arrivals
+from services.cli.recorded.messages import arrivals
 
 
 def _text(lines: Callable[[Clip], Iterator[str]]) -> Callable[[Clip], bytes]:

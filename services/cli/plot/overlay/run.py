@@ -23,21 +23,18 @@ from rhot.messages import HandPose, MarkerFrame
 from services.cli.offline.camera_input import CameraInput
 from services.cli.offline.inputs import Job, job_of
 from services.cli.offline.results import check_result
-from services.cli.plot.overlay.constant_rate import at_rate, rate_hz
 from services.cli.plot.overlay.draw import Pen, draw_hand, draw_markers
 from services.cli.plot.overlay.hand_track import HandTrack, ShownHand
 from services.cli.plot.overlay.legend import draw_legend, draw_time
 from services.cli.plot.overlay.projection import pixels_of
-from services.cli.plot.overlay.webm import WebmWriter
 from services.cli.plot.rig_of_result import rig_toml_of, summary_of_result
 from services.cli.progress import Progress
-from services.cli.unpacked_capture import readable
+from services.cli.recorded.unpacked_capture import readable
+from services.cli.video.constant_rate import at_rate, rate_hz
+from services.cli.video.webm import WebmWriter, video_size
 from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.image.yuv_planes import bgr_image
 
-# The longer side of the videos: larger pictures are made smaller. Encoding is what takes time, and
-# takes as long a pixel: 960 x 540 shows every joint of a hand and the legend.
-_MAX_SIDE_PX = 960
 # Poses that lie further apart than so many pictures have a gap between them.
 _REACH_FRAMES = 2.5
 
@@ -199,9 +196,7 @@ def _drawn(
 ) -> Image:
     """The picture with all that was found, (h, w, 3) with even sizes."""
     width, height = frame.size_px
-    scale = min(1.0, _MAX_SIDE_PX / max(width, height))
-    # Chroma is stored for every second pixel.
-    size_px = (round(scale * width) // 2 * 2, round(scale * height) // 2 * 2)
+    size_px = video_size((width, height))
     picture = bgr_image(frame)
     if size_px == (width, height):
         picture = picture.copy()

@@ -17,7 +17,7 @@ from services.cli.application import application
 from services.cli.offline.inputs import job_of
 from services.cli.offline.results import STREAMS
 from services.cli.offline.run import run
-from services.cli.unpacked_capture import readable
+from services.cli.recorded.unpacked_capture import readable
 from services.recorder.recorder import attachments
 from services.recorder.writer import RecordingWriter
 

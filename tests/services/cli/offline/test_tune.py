@@ -13,8 +13,8 @@ from rhot import topics
 from rhot.errors import CaptureError
 from rhot.files.capture import write_lines
 from rhot.messages import HandPoint, HandPoints
-from services.cli import recorded_messages
 from services.cli.offline.tune import tune
+from services.cli.recorded import messages as recorded_messages
 from services.recorder.writer import RecordingWriter
 from testing.synthetic_points import START_NS, MovingHand
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rhot.errors import CaptureError
-from services.cli.recorded_frames import frames_by_number, spread_numbers
+from services.cli.recorded.frames import frames_by_number, spread_numbers
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rhot.errors import CaptureError
-from services.cli.plot.overlay.webm import WebmWriter
+from services.cli.video.webm import WebmWriter
 
 SIZE_PX = (64, 48)
 

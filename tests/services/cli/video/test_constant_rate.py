@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot.errors import CaptureError
-from services.cli.plot.overlay.constant_rate import at_rate, rate_hz
+from services.cli.video.constant_rate import at_rate, rate_hz
 
 MS = 1_000_000
 

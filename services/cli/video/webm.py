@@ -28,6 +28,16 @@ _MIN_FREE_BYTES = 2_000_000
 # A WebM's header tells its duration, from which OpenCV estimates the count.
 _SLACK_FRAMES = 2
 _SILENT = 0
+# The longer side of a video: larger pictures are made smaller. Encoding is what takes time, and
+# takes as long a pixel: 960 x 540 shows every joint of a hand and the legend.
+_MAX_SIDE_PX = 960
+
+
+def video_size(size_px: tuple[int, int]) -> tuple[int, int]:
+    """The size that pictures of a size (width, height) have in a video: no larger, and even."""
+    scale = min(1.0, _MAX_SIDE_PX / max(size_px))
+    # Chroma is stored for every second pixel.
+    return round(scale * size_px[0]) // 2 * 2, round(scale * size_px[1]) // 2 * 2
 
 
 class WebmWriter:

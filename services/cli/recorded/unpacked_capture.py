@@ -19,7 +19,7 @@ from rhot.files.capture import Capture
 from rhot.files.config import RigConfig
 from rhot.messages import MarkerFrame
 from rhot.messages.objects import OpenVrPose
-from services.cli.recorded_messages import arrivals
+from services.cli.recorded.messages import arrivals
 
 # What a capture without pictures is made of.
 _STREAMS: dict[topics.Topic[Any], type[Any]] = {

@@ -20,8 +20,8 @@ from rhot.messages.objects import ObjectContacts, ObjectPose
 from rhot.messages.simulator import Truth
 from services.cli.offline.results import ResultWriter
 from services.cli.offline.track_summary import CameraCounter, Summary
-from services.cli.recorded_messages import arrivals
-from services.cli.unpacked_capture import is_recording, unpack_rig, unpacking
+from services.cli.recorded.messages import arrivals
+from services.cli.recorded.unpacked_capture import is_recording, unpack_rig, unpacking
 
 # Streams of a result, and what they hold.
 _RESULT: dict[topics.Topic[Any], tuple[str, type[Any]]] = {
