@@ -135,7 +135,7 @@ def measure(
     from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.recordings import recordings
     from studies.grasp.measure.run import see
-    from studies.grasp.measure.seeds import missing_notes
+    from studies.grasp.measure.seeds import for_method, missing_notes
 
     lens = load(scaled.lens, Lens, "rhot calibrate lens") if scaled.lens else None
     pictures = Pictures(video, scaled.fps, lens)
@@ -144,6 +144,7 @@ def measure(
     seeds = _seeds(at)
     if at.click:
         seeds |= _clicked(pictures, look)
+    seeds = for_method(seeds, look.method)
     if not seeds:
         raise _seeds_wanted(pictures, out)
     line = Progress("measuring", 0, progress)

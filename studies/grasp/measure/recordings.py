@@ -37,7 +37,10 @@ Flexion = Literal["auto", "clockwise", "counterclockwise"]
 Length = tuple[float, float]
 # What a base line that was given as two points of the picture is called among the places.
 GIVEN_BASE = Segment("base_start", "base_end")
-_NOTES = {"edges-paper": "joints are the centroids of the paper's regions"}
+_NOTES = {
+    "edges": "bones are as long as the clicks in the first picture say",
+    "edges-paper": "joints are the centroids of the paper's regions",
+}
 # A normal distribution's sigma is so much of its median absolute deviation.
 _SIGMA_PER_MAD = 1.4826
 # A phalanx that looks this much longer or shorter than its median is not in the plane, or a dot is
@@ -96,6 +99,8 @@ def recordings(
     pictures = [with_base(seen, wanted.base) for seen in pictures]
     plans = {finger: _plan(finger, names, wanted) for finger in fingers_in(list(names))}
     lengths = {finger: median_lengths(plan, pictures) for finger, plan in plans.items()}
+    if method != "dots":
+        lengths = {finger: _as_clicked(own) for finger, own in lengths.items()}
     if not any(lengths.values()):
         raise CaptureError(
             f"no hand: in none of {len(pictures)} pictures were two neighbouring joints seen; see "
@@ -161,6 +166,12 @@ def median_lengths(plan: FingerPlan, pictures: Sequence[Seen]) -> dict[Joint, Le
         spread = _SIGMA_PER_MAD * float(np.median(np.abs(np.array(values) - middle)))
         found[joint] = (middle, spread)
     return found
+
+
+def _as_clicked(lengths: Mapping[Joint, Length]) -> dict[Joint, Length]:
+    """Edges keep the lengths of the first picture's clicks: they are as sure as those."""
+    click_px = float(np.hypot(CLICK_SIGMA_PX, CLICK_SIGMA_PX))
+    return {joint: (px, float(np.hypot(sigma, click_px))) for joint, (px, sigma) in lengths.items()}
 
 
 def scale_for(wanted: Wanted, lengths: Mapping[Finger, Mapping[Joint, Length]]) -> Scale:

@@ -9,7 +9,16 @@ from typing import Literal
 import msgspec
 
 from rhot.errors import UNDECODABLE, CaptureError
-from studies.grasp.measure.joints import FINGERS, all_places, base_places, fingers_in, joints_of
+from studies.grasp.measure.joints import (
+    B1,
+    B2,
+    FINGERS,
+    WRIST,
+    all_places,
+    base_places,
+    fingers_in,
+    joints_of,
+)
 
 Seeds = dict[str, tuple[float, float]]
 # Other names of a place. Without a finger it is the index finger's, the study's.
@@ -20,6 +29,8 @@ _ALIASES = {
     "thumb_mcp": "thumb_mp",
 }
 Method = Literal["dots", "edges", "edges-paper"]
+# Where B2 lies on the way from wrist to knuckle: before the knuckle's own swelling.
+_B2_SHARE = 0.8
 _SEED = re.compile(r"(?P<place>\w+)=(?P<x>-?[\d.]+),(?P<y>-?[\d.]+)")
 _EXAMPLE = "--seed index_mcp=410,352 --seed index_pip=512,300"
 
@@ -62,6 +73,24 @@ def decode_seeds(content: bytes, name: str) -> Seeds:
         raise CaptureError(
             f'{name}: holds no seeds ({error}); it should be {{"index_tip": [512, 300], ...}}'
         ) from None
+
+
+def for_method(seeds: Seeds, method: Method) -> Seeds:
+    """The same seeds; for edges, regions B1 and B2 on the line from wrist to knuckle.
+
+    Where no b1 and b2 are given but a wrist: the back of the hand lies along that line.
+    """
+    result = dict(seeds)
+    if method == "dots":
+        return result
+    for finger in FINGERS:
+        b1, b2, wrist, knuckle = (f"{finger}_{name}" for name in (B1, B2, WRIST, "mcp"))
+        if wrist in result and not {b1, b2} <= set(result) and knuckle in result:
+            (x0, y0), (x1, y1) = result[wrist], result[knuckle]
+            result[b1] = (x0, y0)
+            result[b2] = (x0 + _B2_SHARE * (x1 - x0), y0 + _B2_SHARE * (y1 - y0))
+            del result[wrist]
+    return result
 
 
 def _known(given: Seeds) -> Seeds:

@@ -119,6 +119,14 @@ def test_lengths_come_from_a_known_bone():
     assert any("no reference length" in note for note in without.notes)
 
 
+def test_bones_by_edges_are_as_sure_as_the_clicks():
+    pictures = [seen(angles, k) for k, angles in enumerate(CLOSING)]
+    names = ("index_wrist", *NAMES)
+    recording = recordings(pictures, names, Wanted(), "edges", {})["index"].recording
+    assert recording.lengths_sigma == pytest.approx((2**0.5,) * 3, abs=1e-3)
+    assert any("as long as the clicks" in note for note in recording.notes)
+
+
 def test_a_phalanx_that_shrinks_is_doubted():
     pictures = [seen(angles, k) for k, angles in enumerate(CLOSING)]
     pip, dip = pictures[5].places["index_pip"], pictures[5].places["index_dip"]

@@ -9,6 +9,7 @@ from studies.grasp.measure.scale import known_scale, parse_lengths, scale_of_len
 from studies.grasp.measure.seeds import (
     check_seeds,
     decode_seeds,
+    for_method,
     missing_notes,
     parse_line,
     parse_seeds,
@@ -77,6 +78,16 @@ def test_what_is_missing_and_can_be_done_without_is_noted():
     assert notes[0].startswith("no seed for index_tip")
     assert notes[1].startswith("no base line")
     assert missing_notes(FOUR, has_base=True) == {"index": []}
+
+
+def test_edges_have_their_base_regions_between_wrist_and_knuckle():
+    seeds = {**FOUR, "index_wrist": (0.0, 80.0)}
+    assert for_method(seeds, "dots") == seeds
+    regions = for_method(seeds, "edges")
+    assert regions["index_b1"] == (0.0, 80.0)
+    assert regions["index_b2"] == (80.0, 80.0)
+    assert "index_wrist" not in regions
+    assert for_method(regions, "edges") == regions
 
 
 def test_metres_for_millimetres():
