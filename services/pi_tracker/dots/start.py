@@ -21,6 +21,8 @@ _SEED_DIAMETERS = 2.0
 # A guess that is likelier than any other by less than this may be wrong. (Of 80 pictures of thumb
 # and index finger of real hands from any side one was guessed wrong, by .5 nats.)
 _SURE_NATS = 0.6
+# Without seeds no dot is smaller than this share of the median patch.
+_SPECK = 0.3
 # Of px per m where there is no bone to measure it on: a hand of 0.2 m fills a third of the picture.
 _HAND_M = 0.2
 
@@ -92,7 +94,10 @@ def from_shape(chains: Chains, patches: Sequence[Patch]) -> Start | None:
     Of all five fingers, those that so many dots are most likely on; more patches than dots are
     false ones.
     """
-    places = np.array([(p.x_px, p.y_px) for p in patches]).reshape(-1, 2)
+    sizes = np.array([p.area_px for p in patches])
+    # A speck is no dot, and would make nine of eight.
+    large = np.flatnonzero(sizes >= _SPECK * np.median(sizes)) if len(sizes) else sizes.astype(int)
+    places = np.array([(patches[k].x_px, patches[k].y_px) for k in large]).reshape(-1, 2)
     count = len(chains.landmarks)
     if len(places) < count and set(finger_joints(DIGITS)) == set(chains.landmarks):
         wanted = set(finger_joints(likely_fingers(len(places))))
@@ -103,7 +108,8 @@ def from_shape(chains: Chains, patches: Sequence[Patch]) -> Start | None:
     if found is None:
         return None
     starts = places[list(found.patch)]
-    areas = np.array([patches[k].area_px for k in found.patch])
+    own = large[list(found.patch)]
+    areas = sizes[own]
     sigmas = 0.1 * np.sqrt(4.0 / np.pi * areas)
     notes = []
     if found.margin < _SURE_NATS:
@@ -111,7 +117,8 @@ def from_shape(chains: Chains, patches: Sequence[Patch]) -> Start | None:
             "the dots could be named in another way as well: see whether they are right, or start "
             "with fingers apart and straight, or give the dots' places (`rhot track --seed`)"
         )
-    return Start(chains, found.patch, starts, sigmas, px_per_m(chains, starts), notes)
+    scale = px_per_m(chains, starts)
+    return Start(chains, tuple(own.tolist()), starts, sigmas, scale, notes)
 
 
 def finger_joints(fingers: Sequence[str]) -> list[str]:

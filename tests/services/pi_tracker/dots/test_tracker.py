@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rhot.hand import DIGITS
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.tracker import DotTracker
 
+JOINTS_OF_FINGERS = tuple(name for digit in DIGITS for name in finger_landmarks(digit))
 SIZE = (1280, 720)
 NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
 THUMB = np.array([[400.0, 500.0], [490.0, 470.0], [550.0, 440.0], [600.0, 415.0]])
@@ -112,3 +114,15 @@ def test_no_patches_at_all_is_no_error_and_time_may_stand_still() -> None:
     assert {dot.state for dot in dots.values()} == {"carried"}
     assert {dot.state for dot in tracker.step(_patches(REST), 1 / 30).values()} == {"seen"}
     assert DotTracker(NAMES, SIZE, {}).step([], 0.0) == {}
+
+
+@pytest.mark.parametrize("landmarks", [NAMES, JOINTS_OF_FINGERS])
+def test_without_seeds_the_constellation_names_the_dots(landmarks: tuple[str, ...]) -> None:
+    """Also where rig.toml leaves open which fingers have dots, and with a speck among them."""
+    tracker = DotTracker(landmarks, SIZE)
+    assert tracker.step(_patches(REST[:5]), 0.0) == {}
+    order = np.random.default_rng(2).permutation(8)
+    dots = tracker.step([Patch(620.0, 300.0, 16.0), *_patches(REST[order])], 1 / 30)
+    assert set(dots) == set(NAMES)
+    assert _errors(dots, REST).max() == 0.0
+    assert not tracker.notes
