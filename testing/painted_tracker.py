@@ -183,11 +183,17 @@ def write_cameras(scene: PaintedTracker, folder: Path) -> None:
         save(folder / f"{name}.lens.json", lens)
 
 
-async def play(bus: Bus, scene: PaintedTracker, moved: Array | None = None) -> None:
-    """Poses and pictures at their own pace, by this computer's clock; moved as in `poses`."""
+async def play(
+    bus: Bus, scene: PaintedTracker, moved: Array | None = None, began_ns: int | None = None
+) -> None:
+    """Poses and pictures at their own pace, by this computer's clock; moved as in `poses`.
+
+    The scene begins at began_ns: who compares with its truth must say when, as a busy machine may
+    start this later.
+    """
     poses = bus.publisher(topics.OPENVR, serial=scene.serial)
     frames = {name: bus.publisher(topics.MARKERS, camera=name) for name in scene.cameras()}
-    began_ns = clock.now_ns()
+    began_ns = clock.now_ns() if began_ns is None else began_ns
     for second in range(int(scene.seconds)):
         one = replace(scene, seconds=1.0)
         due = [(pose.stamp_ns, 0, pose) for pose in one.poses(float(second), moved)]

@@ -84,7 +84,7 @@ async def test_poses_are_corrected_if_rig_toml_asks_for_it(
         scene = PaintedTracker(seconds=600.0, outliers=0.0)
         moved = transform(rotation_y(np.deg2rad(0.5)), (0.003, 0.004, 0.0))
         began_ns = clock.now_ns()
-        player = asyncio.create_task(play(bus, scene, moved))
+        player = asyncio.create_task(play(bus, scene, moved, began_ns))
         while service.values.get("correction_mm", 0.0) < 8.0:
             await asyncio.sleep(0.1)
         assert "; poses are corrected by " in _drift(service)[0]

@@ -48,7 +48,7 @@ async def test_a_cup_that_is_moved_is_where_it_is(
     async with running("object_tracker", serve, config) as (service, bus):
         exact = replace(moving, outliers=0.0)
         began_ns = clock.now_ns()
-        player = asyncio.create_task(play(bus, exact))
+        player = asyncio.create_task(play(bus, exact, None, began_ns))
         errors_m = []
         async for pose in bus.every(topics.OBJECT, 64):
             if pose.tracking != "ok":
