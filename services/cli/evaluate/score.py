@@ -41,8 +41,8 @@ def score(
     # Not above: scipy takes longer to import than the other commands take to run.
     from services.cli.evaluate.score_result import score_result
     from services.cli.evaluate.score_table import score_text
-    from services.cli.recorded.unpacked import unpacked
     from services.cli.recorded.unpacked_capture import is_recording
+    from services.cli.unpacked import unpacked
 
     if result is None and not is_recording(capture):
         raise ConfigError(

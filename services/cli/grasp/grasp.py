@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from services.cli.grasp.compare import compare
-from services.cli.grasp.measure import measure
+from services.cli.grasp.measuring.measure import measure
 from services.cli.grasp.recover import recover
 from services.cli.grasp.rectify import rectify
 from services.cli.grasp.render import render

@@ -45,7 +45,7 @@ def plot(
     """Draw marker tracks, 3D points, joint angles, residuals, and objects with their errors."""
     # Not above: matplotlib is of the extra `study`, and takes longer to import than other commands
     # take to run.
-    from services.cli.recorded.unpacked import unpacked
+    from services.cli.unpacked import unpacked
 
     folder = folder_beside(result, out)
     if pictures and not video:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.cli.grasp.click_page import ClickServer, as_options, clicked
+from services.cli.grasp.measuring.click_page import ClickServer, as_options, clicked
 
 PICTURE = np.full((60, 80, 3), 90, np.uint8)
 

@@ -5,13 +5,13 @@ by picture, from dots on its joints or from its edges.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rhot.errors import CaptureError, writing
+from services.cli.grasp.measuring.options import LookOptions, ScaleOptions, SeedOptions
 from services.cli.option_groups import grouped
 from services.cli.options import ProgressOption
 
@@ -21,97 +21,9 @@ if TYPE_CHECKING:
     from studies.grasp.measure.joints import Finger, Seen
     from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.recordings import Finding, Line, Wanted
-    from studies.grasp.measure.seeds import Seeds
+    from studies.grasp.measure.seeds import Method, Seeds
 
 _GRID = "first-frame.png"
-
-
-@dataclass(frozen=True)
-class SeedOptions:
-    """Where the joints are in the first picture."""
-
-    seed: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=X,Y",
-            help="a joint's pixel in the first picture, as index_pip=512,300; once for each joint "
-            "(index_mcp, index_pip, index_dip, index_tip, thumb_cmc, thumb_mp, thumb_ip, "
-            "thumb_tip; of the base line index_wrist, or index_b1 and index_b2 with edges)",
-        ),
-    ] = None
-    seeds: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help='{"index_tip": [512, 300], ...}')
-    ] = None
-    click: Annotated[
-        bool, typer.Option("--click", help="click on the joints on a page of this machine")
-    ] = False
-    base: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X1,Y1,X2,Y2",
-            help="base line of the MCP angle, two pixels towards the finger, at rest in the "
-            "picture; default: b1 to b2, else wrist to knuckle, else thumb_cmc to index_mcp",
-        ),
-    ] = None
-    flexion: Annotated[
-        Literal["auto", "clockwise", "counterclockwise"],
-        typer.Option(help="which way the finger closes on the screen; auto: as it bends most"),
-    ] = "auto"
-
-
-@dataclass(frozen=True)
-class LookOptions:
-    """How joints are found."""
-
-    method: Annotated[
-        Literal["dots", "edges", "edges-paper"],
-        typer.Option(
-            help="dots painted on the joints, the edges of a plain finger, or edges with the "
-            "paper's centroids as joints, for comparison"
-        ),
-    ] = "dots"
-    hsv: Annotated[
-        str | None,
-        typer.Option(
-            metavar="H,S,V-H,S,V", help="range of the dots' colour; default: found at the seeds"
-        ),
-    ] = None
-    color: Annotated[
-        str | None, typer.Option(help="the dots' colour by its name in the file of --colors")
-    ] = None
-    colors: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.colors.json", help="written by `rhot calibrate colors`"),
-    ] = None
-
-
-@dataclass(frozen=True)
-class ScaleOptions:
-    """What makes pixels millimetres, and seconds."""
-
-    lens: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.lens.json", help="lens calibration: pictures are corrected"),
-    ] = None
-    length: Annotated[
-        list[str] | None,
-        typer.Option(metavar="BONE_mm=MM", help="a known length, as index_proximal_mm=43.6"),
-    ] = None
-    scale_mm_per_px: Annotated[
-        float | None, typer.Option("--scale-mm-per-px", help="millimetres a pixel")
-    ] = None
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="rectangle=WxH:X,Y:X,Y:X,Y:X,Y",
-            help="a rectangle of known size (mm) in the finger's plane, its corners' pixels in the "
-            "first picture in order: tilt and scale are taken from it; or length=MM:X,Y:X,Y",
-        ),
-    ] = None
-    fps: Annotated[
-        float | None,
-        typer.Option(min=0.1, max=10_000, help="frame rate, instead of the video's own times"),
-    ] = None
 
 
 @grouped
@@ -130,12 +42,10 @@ def measure(
     """Measure a finger's joint angles in a video: one JSON and one CSV for each finger."""
     # Not above: OpenCV takes longer to import than other commands take to run.
     from rhot.files.calibration import Lens, load
-    from services.cli.grasp.in_plane import in_plane, reference_of
     from services.cli.progress import Progress
     from studies.grasp.measure.pictures import Pictures
-    from studies.grasp.measure.recordings import recordings
     from studies.grasp.measure.run import see
-    from studies.grasp.measure.seeds import for_method, missing_notes
+    from studies.grasp.measure.seeds import for_method
 
     lens = load(scaled.lens, Lens, "rhot calibrate lens") if scaled.lens else None
     pictures = Pictures(video, scaled.fps, lens)
@@ -150,16 +60,7 @@ def measure(
     line = Progress("measuring", 0, progress)
     seen = see(pictures, seeds, look.method, color, line.advance)
     line.end()
-    notes = missing_notes(seeds, has_base=wanted.base is not None)
-    notes[""] = pictures.notes()
-
-    def recorded(seen: list[Seen], wanted: Wanted) -> dict[Finger, Finding]:
-        return recordings(seen, list(seeds), wanted, look.method, notes)
-
-    if scaled.reference is None:
-        findings = recorded(seen, wanted)
-    else:
-        findings = in_plane(reference_of(scaled.reference, pictures), seen, wanted, recorded)
+    findings = _findings(seen, seeds, look.method, scaled.reference, wanted, pictures)
     _write(out, findings, seen)
     if overlay:
         drawing = Progress("drawing", len(seen), progress)
@@ -168,6 +69,30 @@ def measure(
     for finger, finding in findings.items():
         typer.echo(_summary(finger, finding))
     typer.echo(f"written: {out}")
+
+
+def _findings(
+    seen: list[Seen],
+    seeds: Seeds,
+    method: Method,
+    reference: str | None,
+    wanted: Wanted,
+    pictures: Pictures,
+) -> dict[Finger, Finding]:
+    """What was seen as recordings of fingers, in the reference's plane if there is one."""
+    from services.cli.grasp.measuring.in_plane import in_plane, reference_of
+    from studies.grasp.measure.recordings import recordings
+    from studies.grasp.measure.seeds import missing_notes
+
+    notes = missing_notes(seeds, has_base=wanted.base is not None)
+    notes[""] = pictures.notes()
+
+    def recorded(seen: list[Seen], wanted: Wanted) -> dict[Finger, Finding]:
+        return recordings(seen, list(seeds), wanted, method, notes)
+
+    if reference is None:
+        return recorded(seen, wanted)
+    return in_plane(reference_of(reference, pictures), seen, wanted, recorded)
 
 
 def _color(look: LookOptions) -> ColorRange | None:
@@ -200,7 +125,7 @@ def _seeds(at: SeedOptions) -> Seeds:
 
 
 def _clicked(pictures: Pictures, look: LookOptions) -> Seeds:
-    from services.cli.grasp.click_page import as_options, clicked
+    from services.cli.grasp.measuring.click_page import as_options, clicked
     from services.pi_tracker.image.yuv_planes import bgr_image
 
     camera = type(pictures)(pictures.path, pictures.fps)

@@ -10,7 +10,7 @@ from rhot.files.capture import Capture
 from services.cli.evaluate.score import score
 from services.cli.evaluate.score_result import score_result
 from services.cli.plot.plot import plot
-from services.cli.recorded.unpacked import unpacked
+from services.cli.unpacked import unpacked
 from services.recorder.writer import RecordingWriter
 
 
