@@ -7,7 +7,8 @@ fingers. Seeds are given, as by clicks. Reported, of the dots of which a third s
 share that is right (within 1.3 radii), lost, another's, or elsewhere; and the longest exchange of
 names. Beside the tracker of dots: each dot takes the nearest blob, and the optimal assignment of
 all dots to blobs within 60 px. Constants were chosen on `grab` and `splay` with seeds 0 to 4 at 8
-dots; here are other seeds, two recordings that no figure was chosen on, and 15 dots.
+dots; here are other seeds, two recordings on which only the dots' joint motion was fitted, and 15
+dots.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ import cv2
 
 from rhot.errors import CaptureError, DiskFullError, RhotError
 from services.pi_tracker.image.frame import Image
-from services.pi_tracker.sources.video_decoder import VideoDecoder
+from services.pi_tracker.sources.video_decoder import VideoDecoder, silenced_opencv
 
 _CODEC = "VP80"
 # OpenCV picks the container by the name's end.
@@ -27,7 +27,6 @@ _UNFINISHED = ".partial.webm"
 _MIN_FREE_BYTES = 2_000_000
 # A WebM's header tells its duration, from which OpenCV estimates the count.
 _SLACK_FRAMES = 2
-_SILENT = 0
 # The longer side of a video: larger pictures are made smaller. Encoding is what takes time, and
 # takes as long a pixel: 960 x 540 shows every joint of a hand and the legend.
 _MAX_SIDE_PX = 960
@@ -55,7 +54,7 @@ class WebmWriter:
     def __enter__(self) -> Self:
         codec = cv2.VideoWriter_fourcc(*_CODEC)  # type: ignore[attr-defined]
         name = str(self._unfinished)
-        with _silent_standard_error(), _silent_opencv():
+        with _silent_standard_error(), silenced_opencv():
             self._video = cv2.VideoWriter(name, cv2.CAP_FFMPEG, codec, self._hz, self._size_px)
         if not self._video.isOpened():
             raise self._failure(f"this OpenCV ({cv2.__version__}) may have no VP8 encoder")
@@ -67,14 +66,14 @@ class WebmWriter:
             raise self._failure("it is not open")
         if shutil.disk_usage(self._path.parent).free < _MIN_FREE_BYTES:
             raise DiskFullError(f"{self._path}: cannot be written: No space left on device")
-        with _silent_opencv():
+        with silenced_opencv():
             self._video.write(image)
         self._count += 1
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             if self._video is not None:
-                with _silent_opencv():
+                with silenced_opencv():
                     self._video.release()
             if error is None:
                 self._check()
@@ -97,17 +96,6 @@ class WebmWriter:
 
     def _failure(self, cause: str) -> CaptureError:
         return CaptureError(f"{self._path}: the video cannot be written; {cause}")
-
-
-@contextlib.contextmanager
-def _silent_opencv() -> Iterator[None]:
-    """Without OpenCV's own warning for each picture that cannot be written."""
-    logging = getattr(cv2.utils, "logging", cv2)
-    level = logging.setLogLevel(_SILENT)
-    try:
-        yield
-    finally:
-        logging.setLogLevel(level)
 
 
 @contextlib.contextmanager

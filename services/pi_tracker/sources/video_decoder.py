@@ -38,7 +38,7 @@ class VideoDecoder:
     def open(self) -> None:
         if not self._path.is_file():
             raise CaptureError(f"{self._path}: no such video file")
-        with _silenced_opencv():
+        with silenced_opencv():
             self._capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise CaptureError(
@@ -85,7 +85,7 @@ class VideoDecoder:
 
 
 @contextlib.contextmanager
-def _silenced_opencv() -> Iterator[None]:
+def silenced_opencv() -> Iterator[None]:
     """Without OpenCV's and FFmpeg's own messages on a broken file.
 
     They would come before ours, on the raw standard error.
