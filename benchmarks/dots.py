@@ -34,6 +34,7 @@ from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints
 from testing.synthetic_dots import DotFrame, dot_frames, scene_of
 
+DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
 RECORDINGS = {"grab": "grab", "splay": "HandSplay-110fps", "pinch": "pinch", "wave": "wave"}
 DOTS = {
     8: tuple((digit, joint) for digit in (0, 1) for joint in range(4)),
@@ -168,14 +169,27 @@ def show(row: dict[str, Any]) -> str:
     )
 
 
+def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Rows by dots, recording and method."""
+    found: dict[str, Any] = {}
+    for row in rows:
+        of_recording = found.setdefault(str(row["dots on"]), {}).setdefault(row["recording"], {})
+        of_recording[row["method"]] = {
+            "right_percent": round(100.0 * row["right"] / row["dots"], 2),
+            "longest_exchange_frames": row["longest"],
+            "ms_a_frame": row["ms a frame"],
+        }
+    return found
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--clips", type=int, default=6, help="of each recording")
     options = parser.parse_args()
-    folder = Path(os.environ.get("RHOT_DATA", "")) / "hand_motion" / "leap"
+    folder = DATA / "hand_motion" / "leap"
     if not folder.is_dir():
-        print("set RHOT_DATA to the folder with hand_motion/leap", file=sys.stderr)
+        print(f"no {folder}; set RHOT_DATA to the folder of real recordings", file=sys.stderr)
         return 2
     recorded: dict[str, RecordedJoints] = {}
     for name, file in RECORDINGS.items():
@@ -192,7 +206,7 @@ def main() -> int:
             rows.append(row)
             print(show(row), flush=True)
     if options.json:
-        options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        options.json.write_text(json.dumps(figures(rows), indent=1) + "\n", encoding="utf-8")
     return 0
 
 

@@ -49,6 +49,7 @@ from studies.grasp.scene.backdrop import Rectangle, straight_lines
 from studies.grasp.scene.subjects import chain
 from studies.grasp.scene.view import ViewOptions, place_camera
 
+DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SIZE = (640, 480)
 TILTS_DEG = (0.0, 5.0, 10.0, 20.0, 30.0)
 NOISES_PX = (0.1, 0.5, 1.0)
@@ -246,7 +247,7 @@ def main() -> int:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     found: dict[str, dict] = {"rendered": rendered(options.seeds)}
-    folder = Path(os.environ.get("RHOT_DATA", "/nowhere")) / "stereo_chessboard"
+    folder = DATA / "stereo_chessboard"
     for side in ("left", "right"):
         if folder.is_dir():
             print(f"\nphotographed, {side} camera, per cent")
