@@ -154,7 +154,6 @@ def default_hand(hand: HandName = "right", scale: float = 1.0) -> HandModel:
         digits=(thumb, index, middle, ring, little),
         paint=_default_paint(scale),
         wrist_radius_m=0.021 * scale,
-        palm_radius_m=0.018 * scale,
     )
 
 

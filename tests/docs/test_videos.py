@@ -50,7 +50,7 @@ def outputs(tmp_path_factory) -> dict[str, str]:
     slow = [msgspec.structs.replace(camera, fps=20.0) for camera in rig.camera]
     scene = load_scene(msgspec.structs.replace(rig, object=[], camera=slow), "wave", 1)
     # Shorter recordings do not tell how far the videos are apart.
-    write_capture(scene, 2.6, folder / "capture")
+    write_capture(scene, 5.0, folder / "capture")
     late_s = write_phone_pair(folder / "capture", folder / "filmed")
     (folder / "filmed" / "rig.toml").write_text(only_block("toml"))
     before, found = Path.cwd(), {"": str(folder / "filmed"), "late": f"{late_s}"}

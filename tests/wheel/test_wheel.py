@@ -82,7 +82,11 @@ def environment(request, wheel, tmp_path_factory) -> tuple[str, Path]:
 def test_it_holds_the_packages_and_the_ready_rig_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     tops = {name.split("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"rhot", "services"}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {
+        "rhot",
+        "services",
+        "studies",
+    }
     for ready in ("sim.toml", "rig.example.toml", "calibration/rig.json"):
         assert f"services/cli/config/{ready}" in names
     assert "rhot/py.typed" in names

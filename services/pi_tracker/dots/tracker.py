@@ -19,6 +19,7 @@ from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.extend import extend
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, normalised
+from services.pi_tracker.dots.reclaim import Unclaimed, reclaimed
 from services.pi_tracker.dots.repair import repaired
 from services.pi_tracker.dots.start import Start, from_seeds, from_shape
 
@@ -77,6 +78,7 @@ class DotTracker:
         self._chains: Chains = chains_of(self.landmarks)
         self._scale = _Scale(1.0, 1.0)
         self._hypotheses: list[Hypothesis] = []
+        self._unclaimed = Unclaimed()
         self._time_s = 0.0
         # What a person should know of the start; empty if all is well.
         self.notes: list[str] = []
@@ -96,9 +98,10 @@ class DotTracker:
             children += extend(one, arrays, around, elapsed_s, best - _WORSE_NATS)
             best = max(child.score for child in children)
         self._hypotheses = _pruned(children)
-        self._hypotheses = _pruned(
-            [*self._hypotheses, *repaired(self._hypotheses[0], self._chains)]
-        )
+        best_one = self._hypotheses[0]
+        ages = self._unclaimed.note(best_one.false)
+        found = reclaimed(best_one, self._chains, arrays.places, arrays.areas, ages)
+        self._hypotheses = _pruned([*self._hypotheses, *found, *repaired(best_one, self._chains)])
         self._learn(len(patches))
         return self._dots(patches)
 
