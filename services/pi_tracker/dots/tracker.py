@@ -21,7 +21,7 @@ from services.pi_tracker.dots.extend import extend
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, normalised
 from services.pi_tracker.dots.reclaim import Unclaimed, reclaimed
 from services.pi_tracker.dots.repair import repaired
-from services.pi_tracker.dots.start import Start, from_seeds, from_shape
+from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 
 Array = npt.NDArray[np.float64]
 
