@@ -59,7 +59,7 @@ RUNS = {
         "rhot demo", "--no-viewer --json --seconds 30", "--no-viewer --json --seconds 3", 1
     ),
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
-    "dots": _script("dots", "", "--clips 1", 6),
+    "dots": _script("dots", "", "--clips 1", 4),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
     "grasp_metrology": _script("grasp_metrology", "", "--seeds 1", 0.5),
@@ -83,7 +83,7 @@ RUNS = {
     "solver": _script("solver", "", "--quick", 1.5),
     "solver_markers": _script("solver_markers", "", None, 0.6),
     "tracker": _script("tracker", "", "--frames 90", 1),
-    "video_sync": _script("video_sync", "", "--only clean", 6),
+    "video_sync": _script("video_sync", "--seeds 1", "--only clean --seeds 1", 6),
 }
 
 
