@@ -11,8 +11,8 @@ import numpy.typing as npt
 from rhot.hand import DIGITS
 from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.chains import Chains, chains_of, finger_landmarks
-from services.pi_tracker.dots.start.constellation import guess, likely_fingers
 from services.pi_tracker.dots.dot import Patch
+from services.pi_tracker.dots.start.constellation import guess, likely_fingers
 
 Array = npt.NDArray[np.float64]
 
