@@ -11,6 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import asyncio
 import contextlib
 import resource
+import signal
 import socket
 import subprocess
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -24,6 +25,10 @@ from rhot.bus.bus import Bus, open_bus, router_config
 from rhot.files.config import RigConfig
 from rhot.process.lifecycle import Serve
 from rhot.process.service import Service
+
+# A shell's background job ignores Ctrl-C, and so would every process that tests start and end.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 REPOSITORY = Path(__file__).parents[1]
 

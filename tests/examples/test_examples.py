@@ -60,10 +60,6 @@ async def test_all_work_and_end_quietly(router, tmp_path):
         assert left is None or (tmp_path / left).stat().st_size > 200
 
 
-def _hear_ctrl_c() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 async def _run(name: str, router: str, folder: Path, prints: str) -> tuple[int, str]:
     """Exit code and what stands on stderr, ended by Ctrl-C once it has printed what it should."""
     environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(EXAMPLES.parent)}
@@ -77,8 +73,6 @@ async def _run(name: str, router: str, folder: Path, prints: str) -> tuple[int, 
         env=environment,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
-        # A suite in the background may have been told to ignore Ctrl-C, and so would its children.
-        preexec_fn=_hear_ctrl_c,
     )
     assert process.stdout is not None
     assert process.stderr is not None

@@ -36,12 +36,10 @@ async def _until_cancelled(task):
 
 @pytest.fixture
 def ctrl_c():
-    """Presses Ctrl-C in half a second; suites in the background may be told to ignore it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Presses Ctrl-C half a second after its start."""
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     yield timer
     timer.cancel()
-    signal.signal(signal.SIGINT, before)
 
 
 def test_poses_in_a_for_loop(streaming):
