@@ -138,7 +138,8 @@ async def test_a_slow_steamvr_is_polled_as_it_can(running, steamvr, rig):
         second = await anext(poses)
         assert second.seq == first.seq + 1
         await until(lambda: service.values.get("poll_ms", 0.0) >= 50.0)
-        assert service.values["late_polls"] > 0
+        # Told with the next beat, if the first one had a single poll.
+        await until(lambda: service.values["late_polls"] > 0)
 
 
 async def test_a_steamvr_that_hangs_ends_the_bridge(running, steamvr, rig, monkeypatch):
