@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args
 
 from rhot import clock, topics
-from rhot.bus.bus import Bus, open_bus
+from rhot.bus.bus import Bus, open_bus_within
 from rhot.bus.liveliness import AliveWatch
 from rhot.bus.security.credentials import with_certificates
 from rhot.bus.subscription import Subscription
@@ -42,6 +42,10 @@ _EVENT_QUEUE = 256
 # How long `connect` looks for a router: one that starts at the same time is there in two seconds.
 CONNECT_S = 10.0
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+_NO_ROUTER = (
+    "`rhot demo` and `rhot up` start one (and print its endpoint), `rhot doctor` tells what is in "
+    "the way. timeout_s=None waits for it"
+)
 
 
 class RigClient:
@@ -264,17 +268,7 @@ async def connect(
     """
     folder = None if certificates is None else Path(certificates)
     endpoints = with_certificates([endpoint], folder, "connect")
-    async with contextlib.AsyncExitStack() as stack:
-        try:
-            async with asyncio.timeout(timeout_s):
-                bus = await stack.enter_async_context(
-                    open_bus(rig, endpoints, despite_certificates=False)
-                )
-        except TimeoutError:
-            raise BusError(
-                f"no router answers at {endpoint}; `rhot demo` and `rhot up` start one (and print "
-                "its endpoint), `rhot doctor` tells what is in the way. timeout_s=None waits for it"
-            ) from None
+    async with open_bus_within(timeout_s, rig, endpoints, _NO_ROUTER) as bus:
         yield RigClient(bus)
 
 

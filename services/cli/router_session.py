@@ -5,14 +5,12 @@ Services wait for the router instead, as long as it takes (rhot.bus.bus.open_bus
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from rhot.bus.bus import Bus, open_bus
-from rhot.bus.security.credentials import client_endpoints, plain, with_certificates
-from rhot.errors import BusError
+from rhot.bus.bus import Bus, open_bus_within
+from rhot.bus.security.credentials import client_endpoints, with_certificates
 from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
 
@@ -39,15 +37,6 @@ async def router_session(rig: str, endpoints: list[str]) -> AsyncIterator[Bus]:
 
     Raises BusError if none answers in time, or a certificate is not accepted.
     """
-    async with contextlib.AsyncExitStack() as stack:
-        try:
-            async with asyncio.timeout(_TIMEOUT_S):
-                bus = await stack.enter_async_context(
-                    open_bus(rig, endpoints, despite_certificates=False)
-                )
-        except TimeoutError:
-            raise BusError(
-                f"no router answers at {', '.join(map(plain, endpoints))}; start the rig "
-                "(`rhot demo`, `rhot up CONFIG`) or name another with --connect"
-            ) from None
+    advice = "start the rig (`rhot demo`, `rhot up CONFIG`) or name another with --connect"
+    async with open_bus_within(_TIMEOUT_S, rig, endpoints, advice) as bus:
         yield bus

@@ -98,10 +98,10 @@ class DotTracker:
             children += extend(one, arrays, around, elapsed_s, best - _WORSE_NATS)
             best = max(child.score for child in children)
         self._hypotheses = _pruned(children)
-        best_one = self._hypotheses[0]
-        ages = self._unclaimed.note(best_one.false)
-        found = reclaimed(best_one, self._chains, arrays.places, arrays.areas, ages)
-        self._hypotheses = _pruned([*self._hypotheses, *found, *repaired(best_one, self._chains)])
+        likeliest = self._hypotheses[0]
+        ages = self._unclaimed.note(likeliest.false)
+        found = reclaimed(likeliest, self._chains, arrays.places, arrays.areas, ages)
+        self._hypotheses = _pruned([*self._hypotheses, *found, *repaired(likeliest, self._chains)])
         self._learn(len(patches))
         return self._dots(patches)
 
