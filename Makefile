@@ -7,6 +7,12 @@ STAMP := $(VENV)/.installed
 HOUSE := tests/test_architecture.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
 QUICK := not browser and not wheel and not integration and not field and not system
 SHELL := /bin/bash
+# pytest with these arguments; if tests failed (1), those once more, one after the other. (5: of the
+# tests that ARGS names, none is of that kind.)
+twice = $(BIN)/pytest $(1); code=$$?; \
+	if [ $$code -eq 1 ]; then echo "== failed above: once more, alone"; \
+	$(BIN)/pytest $(1) -n 0 --last-failed --last-failed-no-failures none; code=$$?; fi; \
+	[ $$code -eq 0 ] || [ $$code -eq 5 ]
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
@@ -18,10 +24,11 @@ demo: $(STAMP)
 # Everything but the suites that need more than Python or minutes: `make browser`, `make wheel`,
 # `make test-field`, `make test-system`. What starts the whole rig's processes has the machine to itself.
 # Of the others' time a third is waiting, for messages and for processes: three of them share two
-# cores. (5: of the tests that ARGS names, none is of that kind.)
+# cores. Messages on a machine that is too busy may be lost: a test that failed beside others runs
+# once more alone, both outcomes are printed, and the second counts.
 test: $(STAMP)
-	$(BIN)/pytest -n 3 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS) || [ $$? -eq 5 ]
-	$(BIN)/pytest --durations=10 -m integration $(ARGS) || [ $$? -eq 5 ]
+	$(call twice,-n 3 --dist loadfile --durations=10 -m "$(QUICK)" $(ARGS))
+	$(call twice,--durations=10 -m integration $(ARGS))
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -272,10 +272,17 @@ class Bus:
         self._open.append(watch)
         return watch
 
-    def put_raw(self, key: str, payload: Payload, encoding: str = "application/json") -> None:
-        """Publish bytes on a full key, for replay."""
-        drop = zenoh.CongestionControl.DROP
-        self._session.put(key, payload, encoding=encoding, congestion_control=drop)
+    def put_raw(
+        self, key: str, payload: Payload, encoding: str = "application/json", *, wait: bool = False
+    ) -> None:
+        """Publish bytes on a full key, for replay.
+
+        A line that is full loses them, as it does live data. With wait it is waited for, up to 5 s,
+        which is nothing for the event loop: call it in a thread.
+        """
+        control = zenoh.CongestionControl
+        full = control.BLOCK if wait else control.DROP
+        self._session.put(key, payload, encoding=encoding, congestion_control=full)
 
     def close(self, one: Subscription[Any] | RawSubscription | AliveWatch | Publisher[Any]) -> None:
         """End one subscription or publisher before the session ends; its stream leaves health."""

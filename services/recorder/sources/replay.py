@@ -20,8 +20,8 @@ from services.recorder.reader import Record, read
 
 # A longer gap is a pause of the recording, or a damaged time: it is shortened to this.
 _LONGEST_GAP_NS = 10_000_000_000
-# At rate 0, messages sent before the event loop and Zenoh's sender get their turn; larger bursts
-# overflow Zenoh's queues.
+# Messages that are late are sent in bursts of so many before the event loop gets its turn; larger
+# bursts overflow Zenoh's queues.
 _BURST = 16
 
 
@@ -85,7 +85,13 @@ async def _replay_once(
         last_ns = record.log_time_ns
         if due_s > clock.time() or sent % _BURST == 0:
             await asyncio.sleep(max(0.0, due_s - clock.time()))
-        bus.put_raw(route.key, record.payload, route.encoding)
+        if 0.0 < rate <= 1.0:
+            bus.put_raw(route.key, record.payload, route.encoding)
+        else:
+            # Perhaps faster than a busy router forwards: nothing is lost, and nothing else waits.
+            await asyncio.to_thread(
+                bus.put_raw, route.key, record.payload, route.encoding, wait=True
+            )
         sent += 1
         if report is not None:
             report(record)
