@@ -5,7 +5,8 @@ A service is one coroutine, `serve(service)`. It runs in one TaskGroup together 
 and the watchdog; whatever fails there ends the process with a message and a code (2: the user can
 mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0;
 new calibration files end it with code 75, to be started with them at once.
-While the router is away at start, the service waits for it.
+While the router is away at start, the service waits for it. Fusion, solver and object tracker may
+serve several rigs (rhot/process/rigs/).
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import importlib
 import logging
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -32,6 +34,8 @@ from rhot.process.certificate_watch import watch_certificate
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
 from rhot.process.restart_hold import hold_back
+from rhot.process.rigs.files import rig_files
+from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.service import Service, rhot_version
 
 Serve = Callable[[Service], Awaitable[None]]
@@ -42,18 +46,57 @@ EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
 # EX_TEMPFAIL of sysexits.h, "try again": nothing is wrong, the service wants to be started anew.
 EXIT_AGAIN = 75
 
+_SEVERAL = "rig.toml; several of them, or a folder of *.toml: each rig on its own"
 
-def command(name: str, module: str, about: str | None, instance_option: str = "instance") -> None:
+
+def command(
+    name: str,
+    module: str,
+    about: str | None,
+    instance_option: str = "instance",
+    *,
+    several_rigs: bool = False,
+) -> None:
     """The whole main() of a service: options, imports, logging, loop, exit code.
 
     module holds the coroutine `serve`. It is imported once the options are read, so that --help and
     --version need no extra of the package; about is what --help says. instance_option names the
     option that says which one of several this is, e.g. "camera"; any other than "instance" is
-    required.
+    required. several_rigs: --config may be given more than once, or be a folder.
     """
     program = _program(name)
+    parser = _parser(program, about, instance_option, several_rigs=several_rigs)
+    options = parser.parse_args()
+    if not several_rigs and len(options.config) > 1:
+        parser.error("--config is given twice; this service serves one rig")
+    try:
+        serve: Serve = importlib.import_module(module).serve
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error, program)
+        if missing is None:
+            raise
+        parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
+    try:
+        logs.set_up(f"{name}/{options.name}")
+    except RhotError as error:
+        parser.exit(EXIT_USER, f"{program}: error: {error}\n")
+    if several_rigs and (len(options.config) > 1 or options.config[0].is_dir()):
+        sys.exit(run_several(name, options.name, options.config, serve, options.connect))
+    sys.exit(run(name, options.name, options.config[0], serve, options.connect))
+
+
+def _parser(
+    program: str, about: str | None, instance_option: str, *, several_rigs: bool
+) -> argparse.ArgumentParser:
+    """The options of a service: see command."""
     parser = argparse.ArgumentParser(prog=program, description=about)
-    parser.add_argument("--config", type=Path, required=True, help="rig.toml")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        required=True,
+        action="append",
+        help=_SEVERAL if several_rigs else "rig.toml",
+    )
     required = instance_option != "instance"
     parser.add_argument(
         f"--{instance_option}",
@@ -69,19 +112,7 @@ def command(name: str, module: str, about: str | None, instance_option: str = "i
         help="router endpoint, instead of [bus] connect of rig.toml",
     )
     parser.add_argument("--version", action="version", version=rhot_version())
-    options = parser.parse_args()
-    try:
-        serve: Serve = importlib.import_module(module).serve
-    except ModuleNotFoundError as error:
-        missing = missing_extra(error, program)
-        if missing is None:
-            raise
-        parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
-    try:
-        logs.set_up(f"{name}/{options.name}")
-    except RhotError as error:
-        parser.exit(EXIT_USER, f"{program}: error: {error}\n")
-    sys.exit(run(name, options.name, options.config, serve, options.connect))
+    return parser
 
 
 def run(
@@ -91,18 +122,32 @@ def run(
     started_s = time.monotonic()
     files = [config_path, config_path.parent / "calibration"]
     try:
-        config = load_rig(config_path)
-        if connect:
-            config = msgspec.structs.replace(
-                config, bus=msgspec.structs.replace(config.bus, connect=tuple(connect))
-            )
+        config = _load(config_path, connect)
         files = [config_path, config.calibration_dir]
-        run_loop(_live(name, instance, config, serve))
+        run_loop(_live(_serve_rig(name, instance, config, serve)))
     except Exception as error:
         code = _explain(error, name, instance)
         if code != EXIT_AGAIN:
             hold_back(error, time.monotonic() - started_s, files)
         return code
+    finally:
+        systemd.notify("STOPPING=1")
+    return EXIT_OK
+
+
+def run_several(
+    name: str, instance: str, paths: Sequence[Path], serve: Serve, connect: Sequence[str] = ()
+) -> int:
+    """Run a service for all rigs of these files and folders, each on its own; its exit code."""
+    keeper = RigKeeper(
+        lambda path: _load(path, connect),
+        lambda config: _serve_rig(name, instance, config, serve),
+        lambda error: _explain(error, name, instance) == EXIT_AGAIN,
+    )
+    try:
+        run_loop(_live(keeper.keep_all(rig_files(paths))))
+    except Exception as error:
+        return _explain(error, name, instance)
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
@@ -133,28 +178,42 @@ def _explain(error: Exception, name: str, instance: str) -> int:
     for one in errors:
         log.error("%s", one)
     if errors:
-        systemd.notify(f"STATUS={systemd.one_line('; '.join(map(str, errors)))}")
+        systemd.tell_status("; ".join(map(str, errors)))
         return EXIT_USER
     log.error("%s %s failed", name, instance, exc_info=error)
     return EXIT_BUG
 
 
-async def _live(name: str, instance: str, config: RigConfig, serve: Serve) -> None:
+def _load(path: Path, connect: Sequence[str]) -> RigConfig:
+    """The rig.toml; connect, if any, replaces its endpoints."""
+    config = load_rig(path)
+    if not connect:
+        return config
+    bus = msgspec.structs.replace(config.bus, connect=tuple(connect))
+    return msgspec.structs.replace(config, bus=bus)
+
+
+async def _live(work: Coroutine[Any, Any, None]) -> None:
+    """Do the process's work until it ends, or a signal comes."""
     stopping = stop_on_signals()
     with cancelled_by(stopping):
-        async with (
-            fed_watchdog(),
-            open_bus(config.rig.name, client_endpoints(config)) as bus,
-            asyncio.TaskGroup() as tasks,
-        ):
-            service = Service(name, instance, config, bus, tasks)
-            company = (service.beat(), service.listen(), watch_certificate(service))
-            companions = [tasks.create_task(one) for one in company]
-            await serve(service)
-            # A source that ended (a file, a replay) ends its service; what keeps it company goes
-            # too.
-            for task in companions:
-                task.cancel()
+        async with fed_watchdog():
+            await work
+
+
+async def _serve_rig(name: str, instance: str, config: RigConfig, serve: Serve) -> None:
+    """Run the service for one rig, with a bus, a task group and health of its own."""
+    async with (
+        open_bus(config.rig.name, client_endpoints(config)) as bus,
+        asyncio.TaskGroup() as tasks,
+    ):
+        service = Service(name, instance, config, bus, tasks)
+        company = (service.beat(), service.listen(), watch_certificate(service))
+        companions = [tasks.create_task(one) for one in company]
+        await serve(service)
+        # A source that ended (a file, a replay) ends its service; what keeps it company goes too.
+        for task in companions:
+            task.cancel()
 
 
 @contextlib.asynccontextmanager

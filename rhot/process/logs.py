@@ -2,8 +2,9 @@
 
 RHOT_LOG_FORMAT is `text` (the default) or `json`; RHOT_LOG sets the level (default info). Text has
 the time, except in the journal, which has its own; there each line begins with its priority
-(sd-daemon(3)). One record is one line, and control characters of strangers' texts are spaces; only
-a traceback, which is a bug's, has several.
+(sd-daemon(3)). Where a process serves several rigs, the line names the rig. One record is one line,
+and control characters of strangers' texts are spaces; only a traceback, which is a bug's, has
+several.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TextIO
 
 from rhot.errors import ConfigError
 from rhot.plain_text import printable
+from rhot.process.rigs.context import RIG
 
 FORMAT = "RHOT_LOG_FORMAT"
 _FORMATS = ("text", "json")
@@ -86,6 +88,8 @@ class _JsonLines(logging.Formatter):
             "who": self._who,
             "text": printable(record.getMessage()),
         }
+        if rig := RIG.get():
+            line["rig"] = rig
         if record.exc_info:
             line["trace"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)
@@ -110,7 +114,8 @@ class _JournalLines(_Lines):
     """`<4>text`: the journal knows time, host and unit itself."""
 
     def start(self, record: logging.LogRecord) -> str:
-        return f"<{_PRIORITY.get(record.levelname, 6)}>"
+        rig = RIG.get()
+        return f"<{_PRIORITY.get(record.levelname, 6)}>{f'{rig}: ' if rig else ''}"
 
 
 class _TimedLines(_Lines):
@@ -122,7 +127,8 @@ class _TimedLines(_Lines):
 
     def start(self, record: logging.LogRecord) -> str:
         level = "" if record.levelname == "INFO" else f" {record.levelname.lower()}"
-        return f"{self.formatTime(record, self.datefmt)} {self._who}{level}: "
+        rig = f" {RIG.get()}" if RIG.get() else ""
+        return f"{self.formatTime(record, self.datefmt)} {self._who}{rig}{level}: "
 
 
 class _CommandLines(_Lines):

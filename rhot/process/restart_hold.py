@@ -41,18 +41,23 @@ def hold_back(error: Exception, lived_s: float, files: Iterable[Path]) -> None:
 
     A signal ends the process as usual. systemd sees the error, and that we are alive.
     """
-    ends = list(leaves(error))
-    of_a_file = any(isinstance(end, ConfigError | CalibrationError) for end in ends)
-    watched, until_s = list(files), time.monotonic() + hold_s(lived_s, of_a_file=of_a_file)
-    before = _state(watched)
-    status = f"STATUS={' '.join(str(ends[0]).split())} (tried again once a file changes, or later)"
-    while time.monotonic() < until_s and _state(watched) == before:
+    first = next(leaves(error))
+    watched = list(files)
+    until_s = time.monotonic() + hold_s(lived_s, of_a_file=is_of_a_file(error))
+    before = state_of(watched)
+    status = f"STATUS={' '.join(str(first).split())} (tried again once a file changes, or later)"
+    while time.monotonic() < until_s and state_of(watched) == before:
         systemd.notify(f"{status}\nWATCHDOG=1")
         systemd.ask_for_time()
         time.sleep(_LOOK_EVERY_S)
 
 
-def _state(paths: list[Path]) -> list[tuple[str, int, int]]:
+def is_of_a_file(error: Exception) -> bool:
+    """Whether a changed file may mend it."""
+    return any(isinstance(end, ConfigError | CalibrationError) for end in leaves(error))
+
+
+def state_of(paths: Iterable[Path]) -> list[tuple[str, int, int]]:
     """What changes when a file comes, goes, is written or may be read (its change time)."""
     found = []
     for path in paths:

@@ -84,7 +84,8 @@ class Service:
         self.state = "running"
         self._ready_s = time.monotonic()
         self.bus.alive(self.name, self.instance)
-        systemd.notify(f"READY=1\nSTATUS={self.state}")
+        systemd.notify("READY=1")
+        systemd.tell_status(self.state)
         log.info("%s %s ready", self.name, self.instance)
 
     @property
@@ -164,10 +165,10 @@ class Service:
     def _tell_status(self) -> None:
         """`systemctl status` shows the state, and what is wrong."""
         texts = [fault.text for fault in self.faults.standing()]
-        status = systemd.one_line("; ".join([self.status or self.state, *texts]))
+        status = "; ".join([self.status or self.state, *texts])
         if status != self._told_status:
             self._told_status = status
-            systemd.notify(f"STATUS={status}")
+            systemd.tell_status(status)
 
     def _health(self, streams: list[StreamHealth], cpu_percent: float) -> Health:
         return Health(

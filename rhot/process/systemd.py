@@ -9,6 +9,7 @@ import os
 import socket
 
 from rhot.plain_text import printable
+from rhot.process.rigs.context import joined_status
 
 # `systemctl status` shows a line; systemd takes some kB.
 _MAX_STATUS = 500
@@ -38,6 +39,14 @@ def notify(state: str) -> bool:
     return True
 
 
+def tell_status(text: str) -> None:
+    """What `systemctl status` shows of the current rig.
+
+    As one line: a line break, such as a stranger's message may hold, would begin another field.
+    """
+    notify(f"STATUS={printable(joined_status(text))[:_MAX_STATUS]}")
+
+
 def ask_for_time() -> None:
     """Say that the start takes longer, as long as it is not over (the router may be away).
 
@@ -45,13 +54,6 @@ def ask_for_time() -> None:
     """
     if not _Start.over:
         notify(f"EXTEND_TIMEOUT_USEC={_START_S * 1_000_000}")
-
-
-def one_line(text: str) -> str:
-    """A text as a STATUS: a line break in it, such as a stranger's message may hold, would begin
-    another field.
-    """
-    return printable(text)[:_MAX_STATUS]
 
 
 def watchdog_s() -> float | None:

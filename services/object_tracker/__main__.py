@@ -7,7 +7,7 @@ from rhot.process.lifecycle import command
 
 def main() -> None:
     """Entry point of rhot-object-tracker."""
-    command("object_tracker", "services.object_tracker.service", __doc__)
+    command("object_tracker", "services.object_tracker.service", __doc__, several_rigs=True)
 
 
 if __name__ == "__main__":
