@@ -1,0 +1,248 @@
+"""From a marker to a pose through real processes, beside as many hops of bare Zenoh.
+
+    python benchmarks/latency.py [--seconds 20] [--rates 30 60 90] [--json FILE]
+
+rhot-fusion and rhot-solver, a router, and two relays that do nothing but put a payload of the same
+size, each a process of its own. Two cameras' frames are put at the pace of their stamps, and half
+way to the next frame a bare message takes as many hops: whatever else this machine does, it does to
+both. Latencies from the put of the frame that points become due with (a replay of the same frames
+tells which) to the callback that has the pose:
+    latency_ratio_p50   median of ours over the median of bare Zenoh, at 60 fps
+    latency_p99_ms      of ours, at 60 fps
+Where the time goes: `sent_ns` of points and poses splits it, in a run of its own, as whoever
+listens to points takes time as well; steps, decoding and encoding alone are timed in this process
+(step_us, medians of processor time; _over_fit: held against the compiled fit of a hand), a hop is a
+third of the bare message, and what is left is waking up.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import zenoh
+from latency_rig import BARE_KEYS, RIG, Recording, record, running
+from latency_steps import alone_us
+
+from rhot import topics
+from rhot.bus.zenoh_config import client_config
+from rhot.messages import HandPoints, HandPose
+
+MAIN_FPS = 60.0
+# From mid-exposure to the tracker's put: readout and the tracker's step.
+TRACKER_S = 0.015
+# Left out at the beginning: the first pose, the first challenges, caches.
+WARM_S = 2.0
+START_S = 60.0
+
+
+class Played:
+    """When frames were put (ns, by their stamp), and when what came of them was here."""
+
+    def __init__(self, endpoint: str, recording: Recording, *, points: bool) -> None:
+        self._recording = recording
+        self._session = zenoh.open(client_config([endpoint]))
+        self.put_ns: dict[int, int] = {}  # by stamp of the points that are due with it
+        self.bare_put_ns: list[int] = []
+        self.bare_ns: list[int] = []
+        self.pose_ns: list[tuple[int, bytes]] = []
+        self.points: list[bytes] = []
+        pose_key = topics.POSE.key(RIG, hand="right")
+        self._session.declare_subscriber(pose_key, self._on_pose)
+        self._session.declare_subscriber(
+            BARE_KEYS[2], lambda _: self.bare_ns.append(time.time_ns())
+        )
+        if points:
+            self._session.declare_subscriber(
+                topics.POINTS.key(RIG, hand="right"),
+                lambda sample: self.points.append(sample.payload.to_bytes()),
+            )
+        self._markers = {name: self._publisher(name) for name in recording.rig.names}
+        self._bare = self._session.declare_publisher(
+            BARE_KEYS[0], priority=zenoh.Priority.REAL_TIME, express=True
+        )
+
+    def _publisher(self, camera: str) -> zenoh.Publisher:
+        return self._session.declare_publisher(
+            topics.MARKERS.key(RIG, camera=camera),
+            priority=zenoh.Priority.REAL_TIME,
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=True,
+        )
+
+    def _on_pose(self, sample: zenoh.Sample) -> None:
+        self.pose_ns.append((time.time_ns(), sample.payload.to_bytes()))
+
+    def play(self) -> None:
+        """Put all frames at their pace, and a bare message after each that points are due with."""
+        deadline_s = time.monotonic() + START_S
+        waiting = [*self._markers.values(), self._bare]
+        # The stub says bool.
+        while not all(one.matching_status.matching for one in waiting):  # type: ignore[attr-defined]
+            if time.monotonic() > deadline_s:
+                raise SystemExit("fusion, the solver or a relay did not start")
+            time.sleep(0.05)
+        time.sleep(1.0)
+        bare = self._recording.example[0]
+        shift_ns = time.time_ns() + 100_000_000 - self._recording.frames[0].stamp_ns
+        half_s = 0.25 / self._recording.rig.fps
+        for frame, points in zip(self._recording.frames, self._recording.points, strict=True):
+            stamp_ns = frame.stamp_ns + shift_ns
+            sleep_until(stamp_ns * 1e-9 + TRACKER_S)
+            message = msgspec.structs.replace(frame, stamp_ns=stamp_ns, sent_ns=time.time_ns())
+            payload = msgspec.json.encode(message)
+            if points is not None:
+                self.put_ns[points.stamp_ns + shift_ns] = time.time_ns()
+            self._markers[frame.camera].put(payload)
+            if points is not None:
+                sleep_until(stamp_ns * 1e-9 + TRACKER_S + half_s)
+                self.bare_put_ns.append(time.time_ns())
+                self._bare.put(bare)
+        time.sleep(0.5)
+        self._session.close()
+
+    def figures(self) -> dict[str, Any]:
+        """Latencies in ms of poses and of bare messages, after the warm-up."""
+        first_ns = min(self.put_ns.values()) + round(WARM_S * 1e9)
+        ours = []
+        for received_ns, payload in self.pose_ns:
+            put_ns = self._due_with(msgspec.json.decode(payload, type=HandPose))
+            if put_ns >= first_ns:
+                ours.append((received_ns - put_ns) * 1e-6)
+        bare = [
+            (end - begin) * 1e-6
+            for begin, end in zip(self.bare_put_ns, self.bare_ns, strict=True)
+            if begin >= first_ns
+        ]
+        due = sum(put_ns >= first_ns for put_ns in self.put_ns.values())
+        return {"ours": quantiles(ours), "bare": quantiles(bare), "poses": len(ours), "due": due}
+
+    def _due_with(self, pose: HandPose) -> int:
+        """When the frame was put that a pose was due with; 0 if none was.
+
+        Its stamp is off by nanoseconds where the present is another epoch than the recording's.
+        """
+        stamps_ns = np.array(list(self.put_ns))
+        nearest = int(np.abs(stamps_ns - pose.stamp_ns).argmin())
+        near = abs(int(stamps_ns[nearest]) - pose.stamp_ns) < 1_000_000
+        return self.put_ns[int(stamps_ns[nearest])] if near else 0
+
+    def split_us(self) -> dict[str, float]:
+        """Medians: put to points sent, to the pose sent, to the pose here."""
+        sent_ns = {
+            points.stamp_ns: points.sent_ns
+            for points in (msgspec.json.decode(one, type=HandPoints) for one in self.points)
+        }
+        parts = []
+        for received_ns, payload in self.pose_ns[60:]:
+            pose = msgspec.json.decode(payload, type=HandPose)
+            put_ns, points_ns = self._due_with(pose), sent_ns.get(pose.stamp_ns, 0)
+            if put_ns > 0 and points_ns > 0:
+                parts.append(np.diff([put_ns, points_ns, pose.sent_ns, received_ns]) * 1e-3)
+        names = ("put_to_points_us", "points_to_pose_us", "pose_to_here_us")
+        return dict(zip(names, np.median(parts, axis=0).tolist(), strict=True))
+
+
+def sleep_until(instant_s: float) -> None:
+    """Sleep until an instant of the real-time clock."""
+    left_s = instant_s - time.time()
+    if left_s > 0.0:
+        time.sleep(left_s)
+
+
+def quantiles(values: list[float]) -> dict[str, float]:
+    """p50, p95, p99 and the maximum."""
+    p50, p95, p99, most = np.percentile(values, [50.0, 95.0, 99.0, 100.0]).tolist()
+    return {"p50": p50, "p95": p95, "p99": p99, "max": most}
+
+
+def measure(fps: float, seconds: float) -> dict[str, Any]:
+    """One rate: latencies, then where they come from."""
+    recording = record(fps, seconds + WARM_S)
+    found = played(recording, points=False).figures()
+    if fps == MAIN_FPS:
+        found["split"] = played(recording, points=True).split_us()
+        found["alone"] = alone_us(recording)
+    return found
+
+
+def played(recording: Recording, *, points: bool) -> Played:
+    """A recording, played to processes of its own."""
+    with tempfile.TemporaryDirectory() as folder, running(Path(folder), recording) as endpoint:
+        run = Played(endpoint, recording, points=points)
+        run.play()
+    return run
+
+
+def stages(found: dict[str, Any]) -> list[tuple[str, float]]:
+    """Where the median goes, in us: what is timed alone, the hops, and what is left."""
+    split, alone = found["split"], found["alone"]
+    hop = found["bare"]["p50"] * 1e3 / 3.0
+    fusion = alone["decode_markers"] + alone["fusion_telling"]
+    solver = alone["encode_points"] + alone["decode_points"] + alone["solver"]
+    return [
+        ("three hops of bare Zenoh", 3.0 * hop),
+        ("fusion: decode markers", alone["decode_markers"]),
+        ("fusion: step that tells points", alone["fusion_telling"]),
+        ("fusion: wake up, and the rest", split["put_to_points_us"] - hop - fusion),
+        ("fusion: encode points", alone["encode_points"]),
+        ("solver: decode points", alone["decode_points"]),
+        ("solver: step", alone["solver"]),
+        ("solver: wake up, and the rest", split["points_to_pose_us"] - hop - solver),
+        ("solver: encode the pose", alone["encode_pose"]),
+        ("pose here: the rest", split["pose_to_here_us"] - hop - alone["encode_pose"]),
+    ]
+
+
+def print_table(results: dict[float, dict[str, Any]]) -> None:
+    """Latencies of all rates, then the stages."""
+    print(f"{'2 cameras, router':<24} {'p50':>8} {'95 %':>8} {'p99':>8} {'max':>8}  ms")
+    for fps, found in results.items():
+        for name, row in (("marker to pose", found["ours"]), ("bare Zenoh", found["bare"])):
+            told = " ".join(f"{value:8.3f}" for value in row.values())
+            print(f"{fps:3.0f} fps {name:<16} {told}")
+        ratio = found["ours"]["p50"] / found["bare"]["p50"]
+        print(f"        ratio {ratio:12.2f}, {found['poses']} of {found['due']} poses")
+    for found in results.values():
+        if "split" in found:
+            print("\nwhere the median goes at 60 fps, us")
+            for name, value in stages(found):
+                print(f"  {name:<34} {value:7.0f}")
+            alone = found["alone"]
+            print(f"  {'fusion: step that tells none':<34} {alone['fusion_silent']:7.0f}")
+
+
+def main() -> None:
+    """Measure all rates and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--rates", type=float, nargs="+", default=[30.0, MAIN_FPS, 90.0])
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    # What a time limit ends must end its processes.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    results = {fps: measure(fps, options.seconds) for fps in options.rates}
+    print_table(results)
+    summary: dict[str, Any] = {f"fps_{fps:.0f}": found for fps, found in results.items()}
+    if MAIN_FPS in results:
+        main_rate = results[MAIN_FPS]
+        ours, bare = main_rate["ours"], main_rate["bare"]
+        summary["latency_ratio_p50"] = ours["p50"] / bare["p50"]
+        summary["latency_p99_ms"] = ours["p99"]
+        summary["step_us"] = main_rate["alone"]
+        print(f"\nlatency_ratio_p50 {summary['latency_ratio_p50']:.2f}", end="")
+        print(f"   latency_p99_ms {ours['p99']:.2f}")
+    if options.json:
+        options.json.write_text(json.dumps(summary, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
