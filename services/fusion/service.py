@@ -53,6 +53,7 @@ async def serve(service: Service) -> None:
         began_s = time.perf_counter()
         for points in step.step(frame):
             publishers[points.hand].put(points)
+        step.settle()
         health.note_frame(time.perf_counter() - began_s)
 
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSou
 from services.fusion.alignment.clock_alignment import ClockAlignment
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
-from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder
+from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
 from services.fusion.joint.estimator import JointMethod
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Estimates, Method
@@ -93,6 +94,8 @@ class FusionStep:
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
         self._admission = FrameAdmission(len(self._cameras))
         self._schedule = OutputSchedule(self._fps, self._lag_frames)
+        # What of the last frame is not done yet: settle().
+        self._unsettled: list[Callable[[], None]] = []
         self._epoch_ns = 0
         self._seq = 0
 
@@ -117,12 +120,14 @@ class FusionStep:
 
     def step(self, frame: MarkerFrame) -> list[HandPoints]:
         """Take in one frame; the points that are due with it, one message per hand, or none."""
+        self.settle()
         view = self._builder.build(frame)
         if isinstance(view, FrameRejection):
             return self._reject(view.value, frame.camera)
         self.refusals["marker"] += view.ignored
         stamp_ns = view.instant_ns + view.clock_offset_ns
-        realigned = self.alignment.observe(view)
+        realigned = self.alignment.note_announced(view)
+        self._unsettled.append(partial(self._align, view))
         view = self.alignment.aligned(view)
         verdict = self._admission.admit(view.camera, view.instant_ns, stamp_ns, frame.seq)
         astray = verdict is Verdict.ASTRAY
@@ -133,16 +138,36 @@ class FusionStep:
         self.admitted[frame.camera] += 1
         if verdict is Verdict.RESTART:
             self._restart(view.instant_ns)
-        self.mirrors.observe(view)
-        self.unseen_markers.observe(view)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
-        late_s, clock_sigma_s = self.clocks.observe(view, times_s)
+        late_s, clock_sigma_s = self.clocks.note_announced(view)
+        self._unsettled.insert(0, partial(self._watch, view, times_s))
         hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
         white = np.hypot(self._systematic.white_sigmas(view), hidden)
         view = dataclasses.replace(view, sigmas=white)
         self.method.observe(view, times_s - late_s, clock_sigma_s)
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._points_at(due_ns)
+
+    def settle(self) -> None:
+        """Do what a frame's points do not wait for: watch it, and learn the clocks from it.
+
+        After the points are out; the next step() does it where nobody has. Counts from the next
+        frame on.
+        """
+        unsettled, self._unsettled = self._unsettled, []
+        for work in unsettled:
+            work()
+
+    def _watch(self, view: View, times_s: Array) -> None:
+        """Learn from an admitted frame, whose observations have times_s (n,)."""
+        self.mirrors.observe(view)
+        self.unseen_markers.observe(view)
+        self.clocks.observe(view, times_s)
+
+    def _align(self, view: View) -> None:
+        """Look in a frame, as announced, for clocks that are off by more."""
+        if self.alignment.observe(view):
+            self._restart(self._admission.newest_ns or view.instant_ns)
 
     def note_pose(self, pose: HandPose) -> None:
         """Learn from the solver which way the fingers point: where in its paint a tip is.
@@ -156,7 +181,9 @@ class FusionStep:
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
         waiting_ns = self._schedule.take_waiting()
-        return [points for instant_ns in waiting_ns for points in self._points_at(instant_ns)]
+        waiting = [points for instant_ns in waiting_ns for points in self._points_at(instant_ns)]
+        self.settle()
+        return waiting
 
     def _reject(self, reason: str, camera: str) -> list[HandPoints]:
         """Count a frame that has no other effect."""

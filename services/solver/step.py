@@ -50,6 +50,17 @@ class SolverStep:
         hand = self._hands.get(points.hand)
         return hand.step(points) if hand is not None else None
 
+    def challenge_due(self, hand: HandName) -> bool:
+        """Whether challenge() of that hand has something to do."""
+        return self._hands[hand].tracker.challenge_due
+
+    def challenge(self, hand: HandName) -> None:
+        """Look for another pose that explains the points as well, where that is due: 5 ms.
+
+        For when the pose is out; the next step() does it where nobody has.
+        """
+        self._hands[hand].tracker.challenge()
+
 
 class _Hand:
     """One hand: its model in the forms the kernels use, and its tracker."""
@@ -58,17 +69,17 @@ class _Hand:
         check_model(model)
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
-        self._tracker = HandTracker(model, self._landmarks)
-        self._model_error = ModelError(model, self._tracker.chains, self._landmarks)
+        self.tracker = HandTracker(model, self._landmarks)
+        self._model_error = ModelError(model, self.tracker.chains, self._landmarks)
         self._radii: list[float] = rounded(joint_radii_m(model))
 
     def step(self, points: HandPoints) -> HandPose | None:
         observed = self._model_error.widened(usable_points(points, self._landmarks))
-        estimate = self._tracker.track(points.stamp_ns, observed)
+        estimate = self.tracker.track(points.stamp_ns, observed)
         if estimate is None:
             return None
         fingers = self._solve_fingers(estimate, observed)
-        limits = self._tracker.chains.limits_rad
+        limits = self.tracker.chains.limits_rad
         covariance = self._model_error.pose_covariance(points.stamp_ns, estimate, observed)
         return hand_pose(
             points,
@@ -82,7 +93,7 @@ class _Hand:
         self, estimate: HandEstimate, observed: Mapping[str, Observation]
     ) -> FingerSolution:
         """The digits by the configured method, angles rounded as they go out."""
-        chains = self._tracker.chains
+        chains = self.tracker.chains
         tips = {
             digit: _tip_in_wrist(estimate, observed[name])
             for digit, name in zip(DIGITS, TIPS, strict=True)
@@ -101,7 +112,7 @@ class _Hand:
         solved = [any(self._landmarks[name].digit == row for name in measured) for row in range(5)]
         positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
         hand_frames(
-            self._tracker.chains,
+            self.tracker.chains,
             estimate.rotation,
             estimate.position_m,
             fingers.angles_rad,

@@ -75,7 +75,7 @@ class ClockAlignment:
         """Take in a frame as announced; whether clocks are put right otherwise than before."""
         if not self.enabled:
             return False
-        changed = self._note_announced(view)
+        changed = self.note_announced(view)
         self._memory.add(view)
         newest_s = self._memory.newest_s(view.camera)
         known_s = self._memory.length_s(view.camera)
@@ -115,8 +115,11 @@ class ClockAlignment:
         self._candidates.pop(camera, None)
         self._memory.clear(camera)
 
-    def _note_announced(self, view: View) -> bool:
-        """Forget a camera's offset if its clock was set; whether there was one."""
+    def note_announced(self, view: View) -> bool:
+        """Forget a camera's offset if its clock was set; whether there was one.
+
+        observe() does so, too; where that comes late, this is to be asked before aligned().
+        """
         known = self._announced.get(view.camera)
         self._announced[view.camera] = (view.clock_offset_ns, view.clock_sigma_s)
         if known is None:

@@ -136,7 +136,7 @@ class ClockOffsetEstimator:
 
         Returns its camera's clock error and the sigma of that for pairing, both in s.
         """
-        self._note_announced(view)
+        self.note_announced(view)
         for landmark, time_s, ray, sigma in zip(
             view.landmarks.tolist(), times_s.tolist(), view.rays, view.sigmas.tolist(), strict=True
         ):
@@ -149,10 +149,13 @@ class ClockOffsetEstimator:
                     self._updated_s[pair] = newest_s
                     self._update_pair(index, pair, newest_s)
                     self._combine(newest_s)
-        return float(self._late_s[view.camera]), self._pairing_sigma_s(view.camera)
+        return self._of(view.camera)
 
-    def _note_announced(self, view: View) -> None:
-        """Start anew for a camera whose clock was set, or is heard of for the first time."""
+    def note_announced(self, view: View) -> tuple[float, float]:
+        """As observe(), from what was learned before, and of this frame what its clock claims.
+
+        Starts anew for a camera whose clock was set, or is heard of for the first time.
+        """
         sigma_s = max(view.clock_sigma_s, _CLOCK_FLOOR_S)
         c = view.camera
         known = self._announced[c]
@@ -166,6 +169,11 @@ class ClockOffsetEstimator:
             self._cov[:, c] = 0.0
             self._cov[c, c] = sigma_s**2
         self._announced[c] = (view.clock_offset_ns, sigma_s)
+        return self._of(c)
+
+    def _of(self, camera: int) -> tuple[float, float]:
+        """A camera's clock error, and the sigma of that for pairing."""
+        return float(self._late_s[camera]), self._pairing_sigma_s(camera)
 
     def _update_pair(self, index: int, cameras: tuple[int, int], newest_s: float) -> None:
         """Compare the newest heights of all landmarks in two cameras, and find the clocks anew."""

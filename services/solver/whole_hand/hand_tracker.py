@@ -4,7 +4,8 @@
   (initialise.py): from one camera's first look they may be anywhere along its rays.
 - From then on every message is fitted from the motion prior.
 - A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
-  and every three seconds. It initialises the hand as if nothing were known. Another pose that
+  and every three seconds. It initialises the hand as if nothing were known, once the pose is out
+  (`challenge`), and counts from the next message on. Another pose that
   explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
   won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
 - What fits cost says how far the hand model is to be believed (model_misfit.py).
@@ -79,12 +80,15 @@ class HandTracker:
         self._misfit_m2 = 0.0
         self._rival: Rival | None = None
         self._restart_landmarks: frozenset[str] = frozenset()
+        # An estimate that is to be compared with a restart, and what it was fitted to.
+        self._to_challenge: tuple[HandEstimate, Observations] | None = None
 
     def track(self, stamp_ns: int, observed: Mapping[str, Observation]) -> HandEstimate | None:
         """The hand at stamp_ns given its usable landmarks (point_check.usable_points).
 
         None while it has not been found.
         """
+        self.challenge()
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         if self._estimate is not None and self._is_lost(stamp_ns, seconds):
             self._estimate = None
@@ -101,10 +105,28 @@ class HandTracker:
         else:
             own = self._follow(self._estimate, seconds, observations)
             if self._restart_due(own, frozenset(observed)):
-                self._consider_restart(own, observations)
+                self._to_challenge = own, observations
         self._misfit_m2 = learned_misfit(self._misfit_m2, observations.whitening, own.cost, seconds)
         self._estimate, self._stamp_ns = own, stamp_ns
         return own if self._rival is None else self._rival.told(own)
+
+    @property
+    def challenge_due(self) -> bool:
+        """Whether challenge() has something to do."""
+        return self._to_challenge is not None
+
+    def challenge(self) -> None:
+        """Compare the last pose with a restart, where one is due.
+
+        It takes 5 ms: after the pose is out; the next track() does it where nobody has.
+        """
+        if self._to_challenge is not None:
+            own, observations = self._to_challenge
+            self._to_challenge = None
+            # Without the motion prior, both are judged by the same measure: landmarks and habit.
+            own_cost = self._cost_without_history(own, observations)
+            found = initialise(self.chains, self._uninformed, observations)
+            self._follow_rival(own, own_cost, found)
 
     def _follow(
         self, last: HandEstimate, seconds: float, observations: Observations
@@ -132,10 +154,12 @@ class HandTracker:
         best, *others = initialise(self.chains, self._uninformed, observations)
         self._rival = None
         own = _estimate_of(best)
-        self._challenge(own, best.cost, others)
+        self._follow_rival(own, best.cost, others)
         return own
 
-    def _challenge(self, own: HandEstimate, own_cost: float, found: Sequence[Hypothesis]) -> None:
+    def _follow_rival(
+        self, own: HandEstimate, own_cost: float, found: Sequence[Hypothesis]
+    ) -> None:
         """Have the first other pose followed that explains a message about as well as the pose."""
         for hypothesis in found:
             odds, other = 0.5 * (own_cost - hypothesis.cost), _estimate_of(hypothesis)
@@ -167,11 +191,6 @@ class HandTracker:
             return False
         self._updates_to_restart, self._restart_landmarks = RESTART_INTERVAL, names
         return True
-
-    def _consider_restart(self, own: HandEstimate, observations: Observations) -> None:
-        # Without the motion prior, both are judged by the same measure: landmarks and habit.
-        own_cost = self._cost_without_history(own, observations)
-        self._challenge(own, own_cost, initialise(self.chains, self._uninformed, observations))
 
     def _cost_without_history(self, estimate: HandEstimate, observations: Observations) -> float:
         """The least cost near the estimate where the prior says nothing of the wrist."""

@@ -251,3 +251,14 @@ def test_whatever_comes_nothing_breaks(given_frames):
             # A message that decodes is finite and within the bounds of its fields.
             msgspec.json.decode(msgspec.json.encode(message), type=type(message))
     step.flush()
+
+
+def test_what_points_do_not_wait_for_is_the_same_whoever_does_it():
+    """Live it is done once the points are out, offline with the next frame."""
+    given_frames = frames(SETUP, MOVING, 2.0)
+    one, two = (FusionStep(SETUP.config(), SETUP.rig(), point_hands()) for _ in range(2))
+    for frame in given_frames:
+        told = two.step(frame)
+        two.settle()
+        assert one.step(frame) == told
+    assert two.clocks.updates > 0

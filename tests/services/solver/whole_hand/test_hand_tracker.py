@@ -151,3 +151,17 @@ def test_two_hands_in_a_row(world: Callable, tracker: HandTracker) -> None:
     for frame, instant in enumerate([*a, *b]):
         estimate = tracker.track(frame * FRAME_NS, _observed(ours.points(instant)))
     assert angle_between(estimate.rotation, b[-1].rotation) < np.deg2rad(30.0)
+
+
+def test_a_challenge_is_the_same_whoever_asks_for_it(world: Callable, tracker: HandTracker) -> None:
+    """Live it comes after the pose is out, offline with the next message."""
+    ours = world("right")
+    other, asked = HandTracker(ours.model, hand_landmarks(ours.model)), 0
+    for frame, instant in enumerate(ours.motion(5, 12)):
+        observed = _observed(ours.points(instant))
+        one, two = (each.track(frame * FRAME_NS, observed) for each in (tracker, other))
+        np.testing.assert_array_equal(one.covariance, two.covariance)
+        asked += other.challenge_due
+        other.challenge()
+        assert not other.challenge_due
+    assert asked
