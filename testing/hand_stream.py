@@ -9,10 +9,10 @@ import numpy as np
 
 from rhot import clock, topics
 from rhot.bus.bus import open_bus
-from rhot.geometry.transforms import quaternion_from_rotation
-from rhot.hand import DIGITS, JOINTS, default_hand, forward
-from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
-from rhot.messages.objects import Grasp, ObjectContacts, ObjectPose
+from rhot.hand import default_hand
+from rhot.messages import HandPose
+from rhot.messages.objects import Grasp, ObjectContacts
+from testing.sample_hands import hand_pose, object_pose
 
 _MODEL = default_hand("right")
 _OPEN = np.zeros((5, 4))
@@ -25,57 +25,7 @@ def pose_at(seconds: float, stamp_ns: int, seq: int) -> HandPose:
     share = 0.5 - 0.5 * np.cos(2.0 * np.pi * seconds)
     angles = _OPEN + share * (_PINCHED - _OPEN)
     wrist_m = np.array([0.0, 0.05, 0.5])
-    positions, rotations = forward(_MODEL, np.eye(3), wrist_m, angles)
-    joints = [
-        HandJoint(
-            name=name,
-            position_m=tuple(position.tolist()),
-            orientation_wxyz=tuple(quaternion_from_rotation(rotation).tolist()),
-            radius_m=0.01,
-            source="solved",
-        )
-        for name, position, rotation in zip(JOINTS, positions, rotations, strict=True)
-    ]
-    return HandPose(
-        hand="right",
-        seq=seq,
-        stamp_ns=stamp_ns,
-        method="dls",
-        wrist=WristPose(position_m=tuple(wrist_m.tolist()), orientation_wxyz=(1.0, 0.0, 0.0, 0.0)),
-        joints=joints,
-        fingers=[_finger(name, row) for name, row in zip(DIGITS, angles.tolist(), strict=True)],
-    )
-
-
-def _finger(name: str, angles: list[float]) -> FingerPose:
-    first, second, third, fourth = angles
-    named = (
-        FingerAngles(abduction=first, cmc=second, mcp=third, pip=0.0, dip=fourth)
-        if name == "thumb"
-        else FingerAngles(abduction=first, mcp=second, pip=third, dip=fourth)
-    )
-    return FingerPose(
-        name=name,  # type: ignore[arg-type]
-        angles_rad=named,
-        residual_m=0.0,
-        iterations=1,
-        status="solved",
-    )
-
-
-def _cup(stamp_ns: int, seq: int) -> ObjectPose:
-    return ObjectPose(
-        object="cup",
-        serial="LHR-1",
-        seq=seq,
-        stamp_ns=stamp_ns,
-        position_m=(0.02, 0.05, 0.4),
-        orientation_wxyz=(1.0, 0.0, 0.0, 0.0),
-        velocity_m_s=(0.0, 0.0, 0.0),
-        angular_velocity_rad_s=(0.0, 0.0, 0.0),
-        tracking="ok",
-        registered=True,
-    )
+    return hand_pose(_MODEL, np.eye(3), wrist_m, angles, stamp_ns=stamp_ns, seq=seq)
 
 
 async def stream_hand(endpoint: str, seconds: float) -> None:
@@ -89,7 +39,7 @@ async def stream_hand(endpoint: str, seconds: float) -> None:
         while (now_s := time.monotonic() - begin_s) < seconds:
             stamp_ns, seq = clock.now_ns(), seq + 1
             poses.put(pose_at(now_s, stamp_ns, seq))
-            cups.put(_cup(stamp_ns, seq))
+            cups.put(object_pose("cup", stamp_ns=stamp_ns, seq=seq))
             holds = now_s % 1.0 > 0.5
             if holds and not held:
                 held = [Grasp(hand="right", parts=["thumb", "index"], since_ns=stamp_ns)]

@@ -52,6 +52,7 @@ IMPURE_ROOMS = {
     "services/pi_tracker/sources",
     "services/object_tracker/drift.py",
     "services/object_tracker/sources",
+    "services/bridges/endpoints",
     "services/openvr_bridge/endpoints",
     "services/openvr_bridge/sources",
     "services/recorder/sources",

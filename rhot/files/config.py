@@ -18,6 +18,7 @@ from typing import Any, Literal
 import msgspec
 
 from rhot.errors import ConfigError
+from rhot.files.bridge_tables import Bridges
 from rhot.files.config_errors import explain
 from rhot.files.rig_tables import (
     Bus,
@@ -55,6 +56,7 @@ class RigConfig(Table, frozen=True, kw_only=True):
     viewer: Viewer = Viewer()
     recorder: Recorder = Recorder()
     metrics: Metrics = Metrics()
+    bridges: Bridges = Bridges()
     folder: str = "."
 
     @property

@@ -11,7 +11,8 @@ def comments_of(table: type[Table]) -> dict[str, str]:
     """The comment lines above each key of a table, as one text."""
     found: dict[str, str] = {}
     above: list[str] = []
-    for line in inspect.getsource(table).splitlines():
+    tables = [one for one in reversed(table.__mro__) if issubclass(one, Table)]
+    for line in (line for one in tables for line in inspect.getsource(one).splitlines()):
         text = line.strip()
         if text.startswith("#"):
             above.append(text.lstrip("# "))

@@ -12,16 +12,20 @@ from rhot.errors import RhotError
 EXTRAS = {
     "cryptography": "master",
     "cv2": "master",
+    "foxglove": "bridges",
     "matplotlib": "study",
     "mcap": "master",
     "numba": "master",
     "openvr": "openvr",
+    "pythonosc": "bridges",
     "prometheus_client": "master",
     "pyarrow": "tables",
+    "rosbags": "bridges",
     "scipy": "master",
     "trimesh": "master",
     "typer": "master",
     "viser": "master",
+    "websockets": "bridges",
 }
 # On a Raspberry Pi, which needs less than the master.
 _PI_PROGRAM, _PI_EXTRAS = "rhot-pi-tracker", {"cv2": "pi"}

@@ -58,6 +58,7 @@ def test_every_service_of_the_rig_has_a_unit():
         "rhot-viewer.service",
         "rhot-recorder.service",
         "rhot-simulator.service",
+        "rhot-bridge@.service",
     } <= set(SERVICES)
     assert TARGETS == ["rhot-master.target", "rhot-pi.target"]
 

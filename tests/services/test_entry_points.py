@@ -145,7 +145,11 @@ def test_rhot_helps_without_what_only_single_commands_need(without):
 
 def test_every_module_of_an_extra_is_known():
     """A dependency that is new in pyproject.toml belongs into rhot/process/extras.py too."""
-    modules = {"opencv-python-headless": "cv2"}
+    modules = {
+        "opencv-python-headless": "cv2",
+        "foxglove-sdk": "foxglove",
+        "python-osc": "pythonosc",
+    }
     optional = PROJECT["optional-dependencies"]
     for extra in ("pi", *sorted(set(EXTRAS.values()) & set(optional))):
         for requirement in optional[extra]:

@@ -25,13 +25,15 @@ ENTRY_POINTS = (
     "rhot-viewer",
     "rhot-recorder",
     "rhot-metrics",
+    "rhot-bridge",
 )
 # What each extra is for: these entry points must start with it alone.
+# rhot-bridge imports what a bridge needs once it knows which.
 COMPLETE = {
-    "pi": {"rhot-pi-tracker", "rhot-object-tracker", "rhot-openvr-bridge"},
+    "pi": {"rhot-pi-tracker", "rhot-object-tracker", "rhot-openvr-bridge", "rhot-bridge"},
     "master": set(ENTRY_POINTS),
-    "openvr": {"rhot-object-tracker", "rhot-openvr-bridge"},
-    "study": {"rhot-object-tracker", "rhot-openvr-bridge"},
+    "openvr": {"rhot-object-tracker", "rhot-openvr-bridge", "rhot-bridge"},
+    "study": {"rhot-object-tracker", "rhot-openvr-bridge", "rhot-bridge"},
 }
 
 

@@ -29,6 +29,7 @@ def master_units(config: RigConfig) -> list[str]:
         units.append("rhot-object-tracker.service")
     if config.recorder.autostart:
         units.append("rhot-recorder.service")
+    units += [f"rhot-bridge@{name}.service" for name in config.bridges.enabled]
     return units
 
 

@@ -1,8 +1,9 @@
 """`rhot up CONFIG`: the master's processes of a real rig, supervised.
 
-These are router, fusion, solver, object tracker, viewer, recorder and metrics. Cameras whose `host`
-is empty are tracked on this machine too; those of other hosts run `rhot-pi-tracker` there. It says
-that the rig is up once it is, and otherwise what is missing and why.
+These are router, fusion, solver, object tracker, viewer, recorder, metrics and bridges to other
+programs. Cameras whose `host` is empty are tracked on this machine too; those of other hosts run
+`rhot-pi-tracker` there. It says that the rig is up once it is, and otherwise what is missing and
+why.
 """
 
 from __future__ import annotations
@@ -55,6 +56,10 @@ def children_of(
         children.append(Child("recorder", service_argv("recorder", *common)))
     if config.metrics.enabled:
         children.append(Child("metrics", service_argv("metrics", *common)))
+    children += [
+        Child(f"bridge/{name}", service_argv("bridges", *common, "--instance", name))
+        for name in config.bridges.enabled
+    ]
     return children
 
 

@@ -51,6 +51,16 @@ def test_steamvr_on_the_master_is_its_users(objects, units, tmp_path):
     assert ("openvr_bridge" in names) == bool(units)
 
 
+def test_bridges_that_are_enabled_run(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text("[bridges.vmc]\nenabled = true\n[bridges.monado]\nenabled = true\n")
+    bridges = [one for one in asked("units", path).stdout.split() if "bridge" in one]
+    assert bridges == ["rhot-bridge@vmc.service", "rhot-bridge@monado.service"]
+    children = children_of(load_rig(path), path, viewer=True)
+    (vmc, _) = [child for child in children if child.name.startswith("bridge/")]
+    assert vmc.argv[-2:] == ["--instance", "vmc"]
+
+
 def test_install_sh_gets_lines(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text('[bus]\nconnect = ["tcp/a:1", "tls/b:2"]\n[recorder]\nautostart = true\n')
