@@ -35,10 +35,11 @@ class PlacedBridge(Bridge, frozen=True, kw_only=True):
     # whose y points down.
     up: Literal["x", "-x", "y", "-y", "z", "-z"] = "-y"
     # Where the rig's origin is in the other program's space: x right, y up, z backward, in metres.
-    # A camera at the height of a table, in front of who sits there.
-    position_m: tuple[Metres, Metres, Metres] = (0.0, 0.8, -0.6)
-    # The rig's turn about the vertical after that, counter-clockwise as seen from above.
-    yaw_deg: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)] = 0.0
+    # Cameras on a table, in front of who sits there.
+    position_m: tuple[Metres, Metres, Metres] = (0.0, 0.8, -0.9)
+    # The rig's turn about the vertical, counter-clockwise as seen from above: 180 are cameras that
+    # look at the person, 0 cameras that look the same way.
+    yaw_deg: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)] = 180.0
 
 
 class Vmc(PlacedBridge, frozen=True, kw_only=True):

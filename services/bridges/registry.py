@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rhot.errors import ConfigError
 
-BRIDGES: tuple[str, ...] = ()
+BRIDGES: tuple[str, ...] = ("vmc",)
 
 
 def module_of(name: str) -> str:

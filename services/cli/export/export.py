@@ -44,7 +44,7 @@ def export(
     Or hands' motion, in the formats of other programs.
     """
     # Not above: other commands should not wait for what these import.
-    from services.cli.export.motion.clip import UPS
+    from rhot.geometry.up_axes import UPS
     from services.cli.export.motion.run import FORMATS, export_motion
     from services.cli.export.run import export as export_tables
     from services.cli.export.tables import TABLES

@@ -14,20 +14,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from rhot.errors import CaptureError
-from rhot.geometry.transforms import Array, rotation_x
+from rhot.geometry.transforms import Array
+from rhot.geometry.up_axes import UPS
 from rhot.hand import HANDS, JOINT_INDEX, JOINTS, HandName
 from rhot.hand_mesh.skinned_hand import PARENTS, SKIN_JOINTS
 from rhot.messages import HandPose
 
-# Which way of the rig's frame is up, and what turns it so that it is +y, as in these formats.
-UPS = {
-    "y": np.eye(3),
-    "-y": rotation_x(np.pi),
-    "z": rotation_x(-np.pi / 2),
-    "-z": rotation_x(np.pi / 2),
-    "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-    "-x": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-}
 # A break in the sequence of poses that is worth a word.
 _GAP_S = 0.5
 # Cameras of 1 to 1000 pictures a second.

@@ -33,7 +33,7 @@ FORMATS: dict[str, tuple[str, Callable[[Clip], bytes]]] = {
 def export_motion(recording: Path, out: Path, formats: Sequence[str], up: str) -> dict[Path, Clip]:
     """Write each hand of a recording into out in each of FORMATS; what each file holds.
 
-    up is a key of clip.UPS. Raises RhotError.
+    up is a key of rhot.geometry.up_axes.UPS. Raises RhotError.
     """
     poses = _poses(recording)
     first = next(poses, None)

@@ -14,11 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from rhot.errors import CaptureError, ConfigError
 from rhot.files.capture import read_lines
+from rhot.geometry.up_axes import UPS
 from rhot.hand import DIGIT_ANGLES, DIGITS, JOINT_INDEX, TIPS
 from rhot.hand_mesh.skinned_hand import PARENTS, SKIN_JOINTS, webxr_name
 from rhot.messages import HandPose
 from services.cli.export.export import export
-from services.cli.export.motion.clip import UPS, clips
+from services.cli.export.motion.clip import clips
 from services.cli.export.motion.run import export_motion
 from testing.hand_stream import pose_at
 
