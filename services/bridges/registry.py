@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rhot.errors import ConfigError
 
-BRIDGES: tuple[str, ...] = ("vmc",)
+BRIDGES: tuple[str, ...] = ("vmc", "monado")
 
 
 def module_of(name: str) -> str:
