@@ -53,6 +53,8 @@ IMPURE_ROOMS = {
     "services/object_tracker/drift.py",
     "services/object_tracker/sources",
     "services/bridges/endpoints",
+    "services/bridges/ros2/node.py",
+    "services/bridges/websocket/server.py",
     "services/openvr_bridge/endpoints",
     "services/openvr_bridge/sources",
     "services/recorder/sources",

@@ -82,6 +82,8 @@ class Ros2(Bridge, frozen=True, kw_only=True):
     connect: tuple[str, ...] = ()
     # ROS_DOMAIN_ID of the other side.
     domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
+    # Humble has no hashes of types in its keys; all later distributions are as Jazzy.
+    distribution: Literal["humble", "jazzy"] = "jazzy"
 
 
 class Foxglove(Bridge, frozen=True, kw_only=True):
@@ -95,12 +97,21 @@ class WebSocket(Bridge, frozen=True, kw_only=True):
     """JSON over WebSocket, for browsers and every language."""
 
     port: ServerPort = 8766
+    # What programs of other machines must show, 16 letters or more; none can connect without.
+    token: str = ""
+    # Web pages that may connect, e.g. "http://localhost:3000"; programs always may.
+    origins: tuple[str, ...] = ()
 
 
 class WebXr(PlacedBridge, frozen=True, kw_only=True):
     """A page with hands and objects in a browser's WebXR scene."""
 
     port: ServerPort = 8767
+    # What browsers of other machines must show, 16 letters or more: http://HOST:PORT/xr?token=...
+    token: str = ""
+    # Certificate and key (PEM), relative to rig.toml: headsets show no scene without https.
+    certificate: str = ""
+    key: str = ""
 
 
 class Bridges(Table, frozen=True, kw_only=True):

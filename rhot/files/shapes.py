@@ -7,10 +7,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
 from rhot.errors import CalibrationError, ConfigError
 from rhot.files.config import shape_problem
 from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.solids import Box, Cylinder, Solid, Sphere
+from rhot.geometry.transforms import Array
 
 # A ball of 200 000 triangles took 2.5 s and 250 MB to read on a PC, and 7 ms for the distances of
 # the 216 points of a hand. More is a mistake.
@@ -44,14 +48,26 @@ def load_mesh(path: Path) -> Solid:
 
     Raises CalibrationError saying what is wrong with the file, and what to do.
     """
+    vertices_m, faces = read_triangles(path)
+    from rhot.geometry.meshes import Mesh
+
+    try:
+        return Mesh(vertices_m, faces)
+    except ValueError as error:
+        raise CalibrationError(f"{path}: {error}; export it again") from None
+
+
+def read_triangles(path: Path) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Vertices (v, 3) in metres and faces (f, 3) of a GLB or STL file, for who draws them.
+
+    Raises as load_mesh does.
+    """
     if path.suffix.lower() not in _MESH_FILES:
         raise CalibrationError(f"{path}: is no {' or '.join(_MESH_FILES)} file; export one")
     if not path.is_file():
         raise CalibrationError(f"{path}: no such file; `mesh` is relative to rig.toml")
     try:
         import trimesh
-
-        from rhot.geometry.meshes import Mesh
     except ImportError as error:
         raise ConfigError(
             f"{path}: a mesh needs {error.name}: install rhot[master], or use a box, a cylinder or "
@@ -69,13 +85,14 @@ def load_mesh(path: Path) -> Solid:
         raise CalibrationError(
             f"{path}: has {faces} triangles; 1 to {_MAX_TRIANGLES} can be used. Simplify it"
         )
-    try:
-        mesh = Mesh(read.vertices, read.faces)
-    except ValueError as error:
-        raise CalibrationError(f"{path}: {error}; export it again") from None
-    if mesh.reach_m > _MAX_REACH_M:
+    vertices_m, triangles = (
+        np.asarray(read.vertices, dtype=np.float64),
+        np.asarray(read.faces, np.int64),
+    )
+    reach_m = float(np.linalg.norm(vertices_m[np.unique(triangles)], axis=1).max())
+    if reach_m > _MAX_REACH_M:
         raise CalibrationError(
-            f"{path}: reaches {mesh.reach_m:.0f} m from its origin; its unit must be the metre. "
+            f"{path}: reaches {reach_m:.0f} m from its origin; its unit must be the metre. "
             "Export it in metres"
         )
-    return mesh
+    return vertices_m, triangles

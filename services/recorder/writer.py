@@ -18,8 +18,9 @@ from mcap.exceptions import UnsupportedCompressionError
 from mcap.writer import CompressionType, Writer
 
 from rhot.errors import CaptureError, DiskFullError, disk_full
+from rhot.messages.json_schema import json_schema
 from rhot.topics import Topic
-from services.recorder.schemas import SCHEMA_ENCODING, json_schema, schema_name
+from services.recorder.schemas import SCHEMA_ENCODING, schema_name
 
 # The MCAP profile by which readers know a recording of rhot.
 PROFILE = "rhot"

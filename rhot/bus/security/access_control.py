@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rhot import topics
+from rhot.bus.security import ros_keys
 from rhot.bus.security.roles import MASTER, Role, cameras_by_certificate, common_name
 from rhot.files.config import RigConfig
 from rhot.topics import Kind, Topic
@@ -132,7 +133,8 @@ def _holder(config: RigConfig, role: Role, name: str) -> _Subject:
 def _masters(config: RigConfig) -> list[_Subject]:
     here = _Subject("loopback", {"interfaces": list(LOOPBACK), "link_protocols": list(_PLAIN)})
     master = _holder(config, "master", MASTER)
-    for subject, keys in ((here, [_EVERYTHING, _ADMIN]), (master, [_EVERYTHING])):
+    ros = ros_keys.graph_keys(config) if ros_keys.in_rigs_router(config) else []
+    for subject, keys in ((here, [_EVERYTHING, _ADMIN, *ros]), (master, [_EVERYTHING, *ros])):
         for flow in ("ingress", "egress"):
             subject.allow(flow, _ALL_MESSAGES, keys)
     return [here, master]
@@ -181,7 +183,25 @@ def _object_source(config: RigConfig, name: str) -> _Subject:
 def _viewer(config: RigConfig, name: str) -> _Subject:
     subject = _holder(config, "viewer", name)
     _looks_on(subject, [config.rig.name, *config.bus.partners])
+    if ros_keys.in_rigs_router(config):
+        _looks_on_in_ros(subject, config)
     return subject
+
+
+def _looks_on_in_ros(subject: _Subject, config: RigConfig) -> None:
+    """What the bridge to ROS 2 says, and that it is there; nothing of other nodes."""
+    subject.receives(ros_keys.bridge_keys(config))
+    # What is kept is asked for by other keys than it is answered with.
+    subject.allow("egress", ["reply"], ros_keys.bridge_keys(config))
+    # Heartbeats of what is kept are messages, too.
+    kept = ros_keys.kept_keys(config)
+    subject.asks(kept)
+    subject.receives(kept)
+    subject.subscribes(kept)
+    watched = ros_keys.graph_keys(config)
+    subject.allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], watched)
+    subject.allow("egress", ["liveliness_token"], ros_keys.bridge_tokens(config))
+    subject.allow("egress", _DECLARATIONS, kept)
 
 
 def _looks_on(subject: _Subject, rigs: list[str]) -> None:
