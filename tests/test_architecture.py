@@ -59,6 +59,8 @@ IMPURE_ROOMS = {
     "services/openvr_bridge/sources",
     "services/recorder/sources",
     "services/viewer/calibration/page.py",
+    "services/viewer/pictures/feed.py",
+    "services/viewer/visits/visits.py",
     "rhot/watch/follow.py",
     "services/cli",
 }

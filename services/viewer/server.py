@@ -12,7 +12,7 @@ import contextlib
 import functools
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import viser
 import websockets.asyncio.server
@@ -73,24 +73,3 @@ def _own_pages_only() -> Iterator[None]:
         yield
     finally:
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
-
-
-class BrowserCount:
-    """Counts connected browsers; changed(count) is called from viser's thread."""
-
-    def __init__(self, server: viser.ViserServer, changed: Callable[[int], object]) -> None:
-        self._ids: set[int] = set()
-        self._changed = changed
-        server.on_client_connect(self._connected)
-        server.on_client_disconnect(self._disconnected)
-
-    # Coroutines, so that viser runs them one after the other on its own loop instead of in a pool
-    # of threads.
-
-    async def _connected(self, client: viser.ClientHandle) -> None:
-        self._ids.add(client.client_id)
-        self._changed(len(self._ids))
-
-    async def _disconnected(self, client: viser.ClientHandle) -> None:
-        self._ids.discard(client.client_id)
-        self._changed(len(self._ids))

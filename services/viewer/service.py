@@ -23,11 +23,15 @@ from rhot.topics import Topic
 from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.calibration.page import CalibrationPage
-from services.viewer.live.gui import LivePanel
 from services.viewer.live.model import ViewModel
-from services.viewer.live.scene import LiveScene
-from services.viewer.server import BrowserCount, open_server
+from services.viewer.live.scene import TRAILS, LiveScene
+from services.viewer.panel.live_tab import LiveSection
+from services.viewer.pictures.feed import PictureFeed
+from services.viewer.server import open_server
 from services.viewer.setup import read_setup
+from services.viewer.visits.layer import Layer
+from services.viewer.visits.section import Seen
+from services.viewer.visits.visits import Visits
 
 log = logging.getLogger("rhot.viewer")
 
@@ -38,7 +42,6 @@ _TEXT_S = 0.2
 async def serve(service: Service) -> None:
     """Shows the rig live at http://127.0.0.1:8080 (or [viewer] port)."""
     config = service.config
-    loop = asyncio.get_running_loop()
     # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
     names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
     files = [config.calibration_dir / name for name in names]
@@ -46,12 +49,9 @@ async def serve(service: Service) -> None:
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer.host, config.viewer.port) as server:
-        connected = asyncio.Event()
-        BrowserCount(
-            server,
-            lambda count: loop.call_soon_threadsafe(connected.set if count else connected.clear),
-        )
-        panel = LivePanel(server, config, setup.notes)
+        trails = Layer(TRAILS)
+        sections = [LiveSection(config, setup.notes, PictureFeed(service), trails)]
+        visits = Visits(server, sections)
         scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
         calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
         service.values["port"] = server.get_port()
@@ -59,15 +59,14 @@ async def serve(service: Service) -> None:
         service.ready()
         try:
             while True:
-                await connected.wait()
-                await _show_live(service, connected, panel, scene)
+                await visits.anybody.wait()
+                await _show_live(service, visits, scene, trails)
         finally:
             calibrating.cancel()
+            visits.close()
 
 
-async def _show_live(
-    service: Service, connected: asyncio.Event, panel: LivePanel, scene: LiveScene
-) -> None:
+async def _show_live(service: Service, visits: Visits, scene: LiveScene, trails: Layer) -> None:
     """Subscribe and draw for as long as a browser is connected."""
     rig = RigMonitor(service.config, clock.now_ns())
     model = ViewModel()
@@ -76,19 +75,17 @@ async def _show_live(
             tasks.create_task(_follow(service.bus, topic, take))
             for topic, take in _handlers(model, service.config)
         ]
-        pictures: asyncio.Task[None] | None = None
         text_due_s = 0.0
-        while connected.is_set():
+        while visits.anybody.is_set():
             now_s = time.monotonic()
             view = model.view(now_s)
-            scene.show(view, trails=panel.trails)
+            scene.show(view, trails=trails.wanted)
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
                 now_ns = clock.now_ns()
-                panel.show(view, rig.state(now_ns).faults, now_ns)
-                pictures = _switch_pictures(tasks, pictures, service, panel)
+                visits.update(Seen(view, rig.state(now_ns).faults, now_s, now_ns))
             await asyncio.sleep(1.0 / service.config.viewer.rate_hz)
-        for follower in [*followers, *([pictures] if pictures else [])]:
+        for follower in followers:
             follower.cancel()
 
 
@@ -118,31 +115,3 @@ async def _follow(bus: Bus, topic: Topic[Any], take: Callable[[Any], None]) -> N
             take(message)
     finally:
         bus.close(subscription)
-
-
-def _switch_pictures(
-    tasks: asyncio.TaskGroup,
-    pictures: asyncio.Task[None] | None,
-    service: Service,
-    panel: LivePanel,
-) -> asyncio.Task[None] | None:
-    """Subscribe to previews only while the switch is on: cameras send none otherwise."""
-    if panel.pictures == (pictures is not None):
-        return pictures
-    panel.show_pictures(panel.pictures)
-    if pictures is None:
-        return tasks.create_task(_follow_pictures(service, panel))
-    pictures.cancel()
-    return None
-
-
-async def _follow_pictures(service: Service, panel: LivePanel) -> None:
-    # One being shown and the next of each of two cameras; more would only be older.
-    samples = service.bus.raw(topics.PREVIEW, 4)
-    try:
-        async for sample in samples:
-            camera = (topics.PREVIEW.names(sample.key) or {}).get("camera", "")
-            if not panel.set_picture(camera, sample.payload):
-                service.error(f"{sample.key} carries no JPEG of a camera of this rig")
-    finally:
-        service.bus.close(samples)

@@ -1,6 +1,6 @@
 """What the panel and the labels in the scene say of objects: states, touches, grasps. Pure.
 
-Plain text: panels.py escapes it.
+Plain text: who shows it escapes it.
 """
 
 from __future__ import annotations

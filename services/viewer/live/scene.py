@@ -36,6 +36,8 @@ _ON_DESK = np.array([1.0, 1.0, 0.0])
 # Joints at their full skin radius would hide the bones; with these shares of it, both are seen.
 _JOINT_SHARE, _BONE_SHARE = 0.72, 0.42
 _POINT_RADIUS_M, _PREDICTED_RADIUS_M, _HIDDEN_RADIUS_M = 0.008, 0.004, 1e-6
+# Each visitor shows or hides what is under it (services/viewer/visits/layer.py).
+TRAILS = "/trails"
 _TRAIL_RGB: Rgb = (90, 90, 90)
 # Sources from most to least certain: a bone is as certain as its worse end.
 _SOURCES = tuple(SOURCE_RGB)
@@ -156,7 +158,7 @@ class _Hand:
             lod="off",
         )
         self._trails = scene.add_line_segments(
-            f"/hands/{hand}/trails", np.zeros((1, 2, 3)), _TRAIL_RGB, thickness=0.001, visible=False
+            f"{TRAILS}/{hand}", np.zeros((1, 2, 3)), _TRAIL_RGB, thickness=0.001, visible=False
         )
 
     def show(self, view: HandView | None, trail: Array | None) -> None:

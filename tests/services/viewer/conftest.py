@@ -205,8 +205,8 @@ class Browser:
     def _send(self, message: _messages.Message) -> None:
         self._connection.send(msgspec.msgpack.encode(message.as_serializable_dict()))
 
-    def click(self, uuid: str, value: bool) -> None:
-        """Set a checkbox."""
+    def click(self, uuid: str, value: bool | str) -> None:
+        """Set a checkbox, or choose of a list."""
         self._send(_messages.GuiUpdateMessage(uuid, {"value": value}))
 
     def share(self) -> None:
@@ -228,6 +228,15 @@ class Browser:
                     return message
             at = len(self._heard)
             self._heard += _decode(self._connection.recv(timeout=timeout_s))
+
+    def heard_of(self, what: str, type_: str = "", **fields: Any) -> bool:
+        """Whether any message until now, of that type if one is given, has these words in it."""
+        return any(
+            what in str(message)
+            and (not type_ or message["type"] == type_)
+            and all(message.get(key) == value for key, value in fields.items())
+            for message in self._heard
+        )
 
     def forget(self) -> None:
         """Forget the messages heard so far."""

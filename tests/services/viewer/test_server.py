@@ -9,12 +9,11 @@ from collections.abc import Callable
 from urllib.request import urlopen
 
 import pytest
-import viser
 import websockets.asyncio.server
 from websockets.exceptions import InvalidStatus
 
 from rhot.errors import BusError
-from services.viewer.server import BrowserCount, open_server
+from services.viewer.server import open_server
 
 
 def addresses() -> list[str]:
@@ -76,27 +75,3 @@ def test_foreign_pages_are_refused(browse: Callable[..., object]) -> None:
                 browse(server.get_port(), origin=origin)
         for origin in (f"http://127.0.0.1:{server.get_port()}", "http://localhost:9000"):
             browse(server.get_port(), origin=origin)
-
-
-def test_browsers_are_counted(browse: Callable[..., object]) -> None:
-    counts: list[int] = []
-    changed = threading.Condition()
-
-    def note(count: int) -> None:
-        with changed:
-            counts.append(count)
-            changed.notify()
-
-    def seen(count: int) -> bool:
-        with changed:
-            return changed.wait_for(lambda: bool(counts) and counts[-1] == count, timeout=60.0)
-
-    with open_server("127.0.0.1", 0) as server:
-        BrowserCount(server, note)
-        first = browse(server.get_port())
-        assert seen(1)
-        browse(server.get_port())
-        assert seen(2)
-        first.close()  # type: ignore[attr-defined]
-        assert seen(1)
-    assert issubclass(type(server), viser.ViserServer)

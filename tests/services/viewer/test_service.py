@@ -132,33 +132,72 @@ async def test_nothing_is_done_while_nobody_looks(
             assert service.bus.streams == []
 
 
-async def test_pictures_are_asked_for_only_while_the_switch_is_on(
+async def test_pictures_are_asked_for_by_who_looks_and_shown_to_nobody_else(
     running: Callable, config: RigConfig, browse: Make, sending: Callable
 ) -> None:
     async with running("viewer", serve, config) as (service, bus):
         await until(lambda: service.state == "running")
-        publisher = bus.publisher(topics.PREVIEW, camera="left")
-        browser = await asyncio.to_thread(browse, int(service.values["port"]))
-        switch = await asyncio.to_thread(
-            browser.wait_for, "GuiCheckboxMessage", props=lambda p: p["label"] == "camera pictures"
-        )
-        assert not publisher.wanted
-        browser.click(switch["uuid"], True)
-        await until(lambda: publisher.wanted)
+        left, right = (bus.publisher(topics.PREVIEW, camera=name) for name in ("left", "right"))
+        port = int(service.values["port"])
+        looks, other = [await asyncio.to_thread(browse, port) for _ in range(2)]
+        choices = [
+            await asyncio.to_thread(
+                browser.wait_for,
+                "GuiDropdownMessage",
+                props=lambda p: p["label"] == "camera pictures",
+            )
+            for browser in (looks, other)
+        ]
+        assert choices[0]["props"]["options"] == ["none", "left", "right", "all"]
+        assert not left.wanted
+        looks.click(choices[0]["uuid"], "left")
+        await until(lambda: left.wanted)
+        assert not right.wanted, "of cameras that nobody looks at nothing is asked"
+        other.click(choices[1]["uuid"], "right")
 
         def send() -> None:
-            publisher.put_bytes(JPEG)
-            bus.put_raw("rhot-picture/desk/camera/right/preview", b"<script>")
-            bus.put_raw("rhot-picture/desk/camera/nobody/preview", JPEG)
+            left.put_bytes(JPEG)
+            right.put_bytes(b"<script>")
 
         with sending(send):
             shown = await asyncio.to_thread(
-                browser.wait_for,
+                looks.wait_for,
                 "GuiUpdateMessage",
                 updates=lambda u: "data:image/jpeg" in u.get("content", ""),
             )
             assert "left<br>" in shown["updates"]["content"]
             await until(lambda: service.errors >= 2)
-        assert "no JPEG of a camera" in service.last_error
-        browser.click(switch["uuid"], False)
-        await until(lambda: not publisher.wanted)
+        assert "no JPEG" in service.last_error
+        # All that the other was told until now: nothing of the first one's pictures.
+        other.click(choices[1]["uuid"], "none")
+        await asyncio.to_thread(
+            other.wait_for, "GuiUpdateMessage", updates=lambda u: u.get("visible") is False
+        )
+        assert not other.heard_of("data:image/jpeg")
+        await until(lambda: not right.wanted)
+        await asyncio.to_thread(looks.close)
+        await until(lambda: not left.wanted)
+
+
+async def test_trails_are_one_visitors_alone(
+    running: Callable, config: RigConfig, browse: Make
+) -> None:
+    async with running("viewer", serve, config) as (service, _):
+        await until(lambda: service.state == "running")
+        port = int(service.values["port"])
+        looks, other = [await asyncio.to_thread(browse, port) for _ in range(2)]
+        for browser in (looks, other):
+            shown = await asyncio.to_thread(
+                browser.wait_for, "SetSceneNodeVisibilityMessage", name="/trails"
+            )
+            assert shown["visible"] is False
+        switch = await asyncio.to_thread(
+            looks.wait_for, "GuiCheckboxMessage", props=lambda p: p["label"] == "finger trails"
+        )
+        looks.click(switch["uuid"], True)
+        await asyncio.to_thread(
+            looks.wait_for, "SetSceneNodeVisibilityMessage", name="/trails", visible=True
+        )
+        # What is drawn for all: a trail that was waited for, and to the other still hidden.
+        await asyncio.to_thread(other.wait_for, "GuiUpdateMessage")
+        assert not other.heard_of("/trails", "SetSceneNodeVisibilityMessage", visible=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rhot.watch.rig_state import StandingFault
-from services.viewer.live.fault_panel import faults
+from services.viewer.panel.fault_texts import faults
 from testing.sample_health import NOW_NS, fault
 
 EVIL = '<script>alert("x")</script><img src=x onerror=alert(1)>\x1b[2J'

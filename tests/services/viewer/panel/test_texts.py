@@ -14,8 +14,8 @@ from rhot.files.config import RigConfig
 from rhot.messages import FingerAngles, HandPoints, HandPose
 from rhot.messages.health import Health
 from rhot.messages.objects import ObjectPose
-from services.viewer.live import panels
 from services.viewer.live.model import ViewModel
+from services.viewer.panel import texts
 
 STAMP_NS = 1_700_000_000_000_000_000
 EVIL = '<script>alert("x")</script><img src=x onerror=alert(1)>{alert(2)}&amp;\n\x00'
@@ -45,7 +45,7 @@ def test_waiting_is_said_with_what_to_look_at(
     config: RigConfig, make_health: Callable[..., Health]
 ) -> None:
     model = ViewModel()
-    said = panels.status(config, model.view(0.0), ["camera left is not drawn"])
+    said = texts.status(config, model.view(0.0), ["camera left is not drawn"])
     assert "waiting for hand poses of the right hand" in said
     assert "no camera's tracker is heard" in said
     assert "waiting for the object cup" in said
@@ -56,7 +56,7 @@ def test_waiting_is_said_with_what_to_look_at(
         ("solver", "two cameras"),
     ):
         model.health(make_health(service), 0.0)
-        assert next_missing in panels.status(config, model.view(0.0), [])
+        assert next_missing in texts.status(config, model.view(0.0), [])
 
 
 def test_what_is_there_is_said(
@@ -67,24 +67,24 @@ def test_what_is_there_is_said(
 ) -> None:
     model = ViewModel()
     model.points(make_points("wrist"), 0.0)
-    assert "waiting for poses ... (is rhot-solver running?)" in panels.status(
+    assert "waiting for poses ... (is rhot-solver running?)" in texts.status(
         config, model.view(0.0), []
     )
     model.pose(make_pose(), 0.0, STAMP_NS + 31_400_000)
     model.object(make_object(registered=False), 0.0)
-    said = panels.status(config, model.view(0.0), [])
+    said = texts.status(config, model.view(0.0), [])
     assert "right hand: tracked, 31 ms after the light" in said
     assert "object cup: not registered" in said
     model.object(make_object(tracking="out_of_range"), 0.0)
-    assert "object cup: out of the lighthouses" in panels.status(config, model.view(0.0), [])
+    assert "object cup: out of the lighthouses" in texts.status(config, model.view(0.0), [])
 
 
 def test_a_rig_without_hands() -> None:
-    assert "no hand is configured" in panels.status(RigConfig(), ViewModel().view(0.0), [])
+    assert "no hand is configured" in texts.status(RigConfig(), ViewModel().view(0.0), [])
 
 
 def test_angles_are_degrees_of_every_finger(make_pose: Callable[..., HandPose]) -> None:
-    said = panels.angles(make_pose())
+    said = texts.angles(make_pose())
     assert_harmless(said)
     assert said.count("57&deg;") == 4  # pip 1 rad; the thumb has none
     assert said.count("29&deg;") == 5
@@ -97,7 +97,7 @@ def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]
     finger = msgspec.structs.replace(
         pose.fingers[1], angles_rad=angles, residual_m=1e300, status="not_converged"
     )
-    said = panels.angles(
+    said = texts.angles(
         msgspec.structs.replace(pose, fingers=[pose.fingers[0], finger, *pose.fingers[2:]])
     )
     assert "index (not converged)" in said
@@ -106,13 +106,13 @@ def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]
 
 
 def test_rates_against_expectation(make_health: Callable[..., Health]) -> None:
-    assert "waiting for the services' health" in panels.rates([])
-    good = panels.rates([make_health()])
+    assert "waiting for the services' health" in texts.rates([])
+    good = texts.rates([make_health()])
     assert "hand/right/points" in good
     assert "29.9" in good
     assert "1.2" in good
     assert "#c0392b" not in good
-    bad = panels.rates(
+    bad = texts.rates(
         [
             make_health(
                 last_error="camera gone",
@@ -127,7 +127,7 @@ def test_rates_against_expectation(make_health: Callable[..., Health]) -> None:
 
 
 def test_rates_are_bounded(make_health: Callable[..., Health]) -> None:
-    said = panels.rates([make_health(f"s{i}") for i in range(64)])
+    said = texts.rates([make_health(f"s{i}") for i in range(64)])
     assert "and 69 more" in said
     huge = make_health(
         cpu_percent=1e300,
@@ -138,12 +138,12 @@ def test_rates_are_bounded(make_health: Callable[..., Health]) -> None:
             "dropped": 2**63 - 1,
         },
     )
-    assert len(panels.rates([huge])) < 2000
+    assert len(texts.rates([huge])) < 2000
 
 
 @pytest.mark.parametrize("evil", [EVIL, "x" * 100_000, "\u202e\u2028\ufeff", "</td></table>"])
 def test_nothing_from_the_network_is_code(make_health: Callable[..., Health], evil: str) -> None:
-    said = panels.rates(
+    said = texts.rates(
         [
             make_health(last_error=evil, stream={"key": evil}),
             make_health("x", stream={"key": f"rhot/desk/*/{evil}"}),
@@ -155,5 +155,5 @@ def test_nothing_from_the_network_is_code(make_health: Callable[..., Health], ev
 
 
 def test_previews() -> None:
-    assert "waiting for the picture of left" in panels.preview("left", None)
-    assert 'src="data:image/jpeg;base64,AAAA"' in panels.preview("left", "AAAA")
+    assert "waiting for the picture of left" in texts.preview("left", None)
+    assert 'src="data:image/jpeg;base64,AAAA"' in texts.preview("left", "AAAA")

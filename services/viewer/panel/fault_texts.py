@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rhot.watch.rig_state import StandingFault
-from services.viewer.live.panels import text
+from services.viewer.panel.texts import text
 
 # More than fit above the switches of a small screen; the rest is counted.
 _MAX_FAULTS = 8

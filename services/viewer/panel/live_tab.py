@@ -1,0 +1,118 @@
+"""The tab "Live" of one visitor: switches, texts and camera pictures.
+
+Its texts are made in services/viewer/panel/texts.py.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Sequence
+
+import viser
+
+from rhot.files.config import RigConfig
+from rhot.hand import HandName
+from services.viewer.live.model import View
+from services.viewer.panel import fault_texts, texts
+from services.viewer.pictures.feed import PictureFeed
+from services.viewer.visits.layer import Layer
+from services.viewer.visits.section import Seen
+
+_NO_CAMERA, _ALL = "none", "all"
+
+
+class LiveSection:
+    """What is tracked now, and how well."""
+
+    title = "Live"
+
+    def __init__(
+        self, config: RigConfig, notes: Sequence[str], feed: PictureFeed, trails: Layer
+    ) -> None:
+        self._config, self._notes, self._feed, self._trails = config, notes, feed, trails
+
+    def open(self, client: viser.ClientHandle, tab: viser.GuiTabHandle) -> LiveTab:  # noqa: ARG002
+        """Fill one visitor's tab."""
+        return LiveTab(client, self._config, self._notes, self._feed, self._trails)
+
+
+class LiveTab:
+    """Switches and texts of one visitor."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        config: RigConfig,
+        notes: Sequence[str],
+        feed: PictureFeed,
+        trails: Layer,
+    ) -> None:
+        gui = client.gui
+        self._client, self._config, self._notes = client, config, notes
+        self._feed, self._trails = feed, trails
+        # Above everything else, and not there while all is well.
+        self._faults = gui.add_html("", visible=False)
+        self._status = gui.add_html(texts.status(config, _NOTHING, notes))
+        gui.add_html(texts.legend())
+        self._with_trails = gui.add_checkbox("finger trails", False)
+        self._trails.show(client, False)
+        names = [camera.name for camera in config.camera]
+        self._choice = gui.add_dropdown(
+            "camera pictures",
+            (_NO_CAMERA, *names, *([_ALL] if len(names) > 1 else [])),
+            disabled=not names,
+            hint="cameras send pictures only while somebody looks at them",
+        )
+        self._previews = {
+            name: gui.add_html(texts.preview(name, None), visible=False) for name in names
+        }
+        self._watched: dict[str, Callable[[], None]] = {}
+        self._angles: dict[HandName, viser.GuiHtmlHandle] = {}
+        for hand in config.hand:
+            with gui.add_folder(f"{hand} hand, degrees"):
+                self._angles[hand] = gui.add_html("")
+        with gui.add_folder("rates", expand_by_default=False):
+            self._rates = gui.add_html(texts.rates([]))
+
+    def update(self, seen: Seen) -> None:
+        """Bring the texts up to date, and watch the cameras that are chosen."""
+        view = seen.view
+        self._faults.visible = bool(seen.faults)
+        self._faults.content = fault_texts.faults(seen.faults, seen.now_ns)
+        self._status.content = texts.status(self._config, view, self._notes)
+        self._rates.content = texts.rates(view.health)
+        for hand, handle in self._angles.items():
+            handle.content = (
+                texts.angles(view.hands[hand].pose) if hand in view.hands else texts.no_angles()
+            )
+        self._trails.show(self._client, bool(self._with_trails.value))
+        self._watch(str(self._choice.value))
+
+    def close(self) -> None:
+        """The visitor has gone: nobody wants his pictures."""
+        for stop in self._watched.values():
+            stop()
+        self._watched.clear()
+        self._trails.forget(self._client)
+
+    def _watch(self, choice: str) -> None:
+        for camera, handle in self._previews.items():
+            wanted = choice in (camera, _ALL)
+            if wanted == (camera in self._watched):
+                continue
+            handle.visible = wanted
+            if wanted:
+                self._watched[camera] = self._feed.watch(camera, self._showing(camera))
+            else:
+                self._watched.pop(camera)()
+                handle.content = texts.preview(camera, None)
+
+    def _showing(self, camera: str) -> Callable[[bytes, bytes], None]:
+        def show(jpeg: bytes, _sent_with: bytes) -> None:
+            picture = base64.b64encode(jpeg).decode()
+            self._previews[camera].content = texts.preview(camera, picture)
+
+        return show
+
+
+_NOTHING = View(hands={}, points={}, objects={}, trails={}, health=[], latency_ms={})

@@ -1,0 +1,32 @@
+"""One visitor's page: a tab for each section, in the visitor's own controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import viser
+
+from services.viewer.visits.section import Section, Seen
+
+
+class Visit:
+    """A browser that looks, with everything that only it sees."""
+
+    def __init__(self, client: viser.ClientHandle, sections: Sequence[Section]) -> None:
+        self.client = client
+        self._open = []
+        tabs = client.gui.add_tab_group()
+        for section in sections:
+            with (tab := tabs.add_tab(section.title)):
+                self._open.append(section.open(client, tab))
+
+    def update(self, seen: Seen) -> None:
+        """Bring every tab up to date."""
+        with self.client.atomic():
+            for section in self._open:
+                section.update(seen)
+
+    def close(self) -> None:
+        """The visitor has gone."""
+        for section in self._open:
+            section.close()
