@@ -60,6 +60,7 @@ IMPURE_ROOMS = {
     "services/recorder/sources",
     "services/viewer/calibration/page.py",
     "services/viewer/pictures/feed.py",
+    "services/viewer/server.py",
     "services/viewer/visits/visits.py",
     "rhot/watch/follow.py",
     "services/cli",

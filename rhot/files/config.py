@@ -36,6 +36,7 @@ from rhot.files.rig_tables import (
     Tracker,
     Viewer,
 )
+from rhot.files.viewer_access import access_problem
 from rhot.hand import CHAIN_JOINTS, DIGITS, HANDS, JOINTS, LANDMARKS
 from rhot.topics import Rate
 
@@ -259,6 +260,8 @@ def _check(config: RigConfig, path: Path) -> None:
         wrong = shape_problem(item)
         if wrong:
             raise ConfigError(f"{path}: [[object]] {item.name!r}: {wrong}")
+    if wrong := access_problem(config.viewer):
+        raise ConfigError(f"{path}: {wrong}")
 
 
 # How many lengths size_m has, and what they are.

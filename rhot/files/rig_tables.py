@@ -247,16 +247,17 @@ class Simulator(Table, frozen=True, kw_only=True):
     tracker_dropouts: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
     # How much later than their instants the trackers' stamps are.
     tracker_late_ms: Annotated[float, msgspec.Meta(ge=-500.0, le=500.0)] = 0.0
-    # Somebody moves the base stations after so many seconds, by so much, to see whether it is
-    # noticed.
+    # Somebody moves the base stations after so many seconds, by so much: is it noticed?
     lighthouse_moves_s: NonNegative = 0.0
     lighthouse_shift_m: Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)] = 0.0
     lighthouse_turn_deg: Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)] = 0.0
 
 
 class Viewer(Table, frozen=True, kw_only=True):
-    # This machine only; from another one, `ssh -L 8080:127.0.0.1:8080 MASTER`.
-    host: Literal["127.0.0.1", "localhost"] = "127.0.0.1"
+    # For browsers of this machine; "0.0.0.0" lets in others, who need the token.
+    host: str = "127.0.0.1"
+    # 16 or more letters, digits, "-", "_"; the page is then at http://HOST:8080/?token=TOKEN.
+    token: Annotated[str, msgspec.Meta(pattern=r"^([A-Za-z0-9_-]{16,128})?$")] = ""
     # Of the live view; the next free one if it is taken, 0 for any.
     port: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 8080
     # How often the view is drawn, in Hz.

@@ -20,6 +20,7 @@ import numpy as np
 from rhot import topics
 from rhot.errors import UNDECODABLE, CaptureError
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Viewer
 from rhot.messages import Session
 from rhot.topics import Topic
 from services.recorder.rig_keys import RigKeys
@@ -68,7 +69,9 @@ def attachments(config: RigConfig) -> dict[str, bytes]:
 
     A recording cannot be understood later without them.
     """
-    files = {"config.json": msgspec.json.encode(config)}
+    # Recordings are passed on: the page's token is nobody else's.
+    shared = msgspec.structs.replace(config, viewer=Viewer())
+    files = {"config.json": msgspec.json.encode(shared)}
     for path in sorted(config.calibration_dir.glob("*.json")):
         try:
             if path.stat().st_size <= _MAX_ATTACHMENT_BYTES:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
+from rhot.files.viewer_access import page_address
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.service import Service
 from rhot.topics import Topic
@@ -48,14 +50,15 @@ async def serve(service: Service) -> None:
     setup = load_and_watch(service, files, lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
-    with open_server(config.viewer.host, config.viewer.port) as server:
+    with open_server(config.viewer) as server:
         trails = Layer(TRAILS)
         sections = [LiveSection(config, setup.notes, PictureFeed(service), trails)]
         visits = Visits(server, sections)
         scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
         calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
         service.values["port"] = server.get_port()
-        log.info("live view at http://127.0.0.1:%d", server.get_port())
+        address = page_address(config.viewer, server.get_port(), socket.gethostname())
+        log.info("live view at %s", address)
         service.ready()
         try:
             while True:

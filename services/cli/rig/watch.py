@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from rhot import topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.bus.security.credentials import client_endpoints
 from rhot.files.config import RigConfig
+from rhot.files.viewer_access import page_address
 from services.cli.rig.readiness import Missing, Readiness
 
 _POLL_S = 0.25
@@ -79,7 +81,8 @@ class RigWatch:
         port = self._readiness.viewer_port
         if port and port != self._port:
             self._port = port
-            self._say(f"live view: http://127.0.0.1:{port}")
+            address = page_address(self._config.viewer, port, socket.gethostname())
+            self._say(f"live view: {address}")
 
     def _tell(self, missing: Sequence[Missing], after_s: float) -> None:
         name = f"rig {self._config.rig.name!r}"

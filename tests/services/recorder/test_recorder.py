@@ -10,7 +10,7 @@ import pytest
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.files.rig_tables import CameraTable, Objects, RigTable
+from rhot.files.rig_tables import CameraTable, Objects, RigTable, Viewer
 from rhot.files.rig_tables import Recorder as RecorderTable
 from rhot.messages import Session
 from services.recorder.reader import read, read_attachments
@@ -124,6 +124,11 @@ def test_attachments_are_the_configuration_and_the_calibration(tmp_path: Path) -
     files = attachments(config)
     assert set(files) == {"config.json", "calibration/rig.json"}
     assert msgspec.json.decode(files["config.json"], type=RigConfig) == config
+
+
+def test_the_pages_token_is_not_recorded() -> None:
+    config = RigConfig(viewer=Viewer(host="0.0.0.0", token="a-secret_of-16-or-more"))
+    assert b"a-secret" not in attachments(config)["config.json"]
 
 
 def test_a_storm_of_sessions_makes_a_few_files_and_loses_nothing(

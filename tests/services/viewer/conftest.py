@@ -260,9 +260,9 @@ def browse() -> Iterator[Callable[..., Browser]]:
     """Open a Browser at a port; closed at the end of the test."""
     connections: list[ClientConnection] = []
 
-    def open_(port: int, **options: Any) -> Browser:
+    def open_(port: int, target: str = "", **options: Any) -> Browser:
         connection = connect(
-            f"ws://127.0.0.1:{port}",
+            f"ws://127.0.0.1:{port}{target}",
             subprotocols=[f"viser-v{viser.__version__}"],
             max_size=None,
             **options,

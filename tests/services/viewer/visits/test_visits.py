@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rhot.files.rig_tables import Viewer
 from services.viewer.live.model import ViewModel
 from services.viewer.server import open_server
 from services.viewer.visits.layer import Layer
@@ -50,7 +51,7 @@ class NotingTab:
 
 async def test_every_browser_has_its_own_tabs(browse: Callable[..., Any]) -> None:
     notes: list[str] = []
-    with open_server("127.0.0.1", 0) as server:
+    with open_server(Viewer(port=0)) as server:
         visits = Visits(server, [Noting("Live", notes), Noting("Recording", notes)])
         assert not visits.anybody.is_set()
         first = await asyncio.to_thread(browse, server.get_port())
@@ -84,7 +85,7 @@ async def test_every_browser_has_its_own_tabs(browse: Callable[..., Any]) -> Non
 
 async def test_a_layer_is_wanted_while_one_visitor_shows_it(browse: Callable[..., Any]) -> None:
     layer = Layer("/trails")
-    with open_server("127.0.0.1", 0) as server:
+    with open_server(Viewer(port=0)) as server:
         browsers = [await asyncio.to_thread(browse, server.get_port()) for _ in range(2)]
         await until(lambda: len(server.get_clients()) == 2)
         first, second = server.get_clients().values()
