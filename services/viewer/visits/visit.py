@@ -8,6 +8,9 @@ import viser
 
 from services.viewer.visits.section import Section, Seen
 
+# A row of the rates' table fits; at 1280 pixels the scene has two thirds of the window.
+_PANEL_PX = 400.0
+
 
 class Visit:
     """A browser that looks, with everything that only it sees."""
@@ -15,6 +18,9 @@ class Visit:
     def __init__(self, client: viser.ClientHandle, sections: Sequence[Section]) -> None:
         self.client = client
         self._open = []
+        # Beside the scene and not over it. A phone has it as a sheet at the bottom anyway.
+        client.gui.main_panel.dock_right()
+        client.gui.main_panel.set_width(_PANEL_PX)
         tabs = client.gui.add_tab_group()
         for section in sections:
             with (tab := tabs.add_tab(section.title)):
