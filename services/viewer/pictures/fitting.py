@@ -1,4 +1,4 @@
-"""Where a picture lies in a window of another shape, and where a click in the window is in it. Pure."""
+"""Where a picture lies in a window of another shape, and where a click is in it. Pure."""
 
 from __future__ import annotations
 

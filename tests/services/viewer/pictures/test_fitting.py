@@ -1,4 +1,4 @@
-"""A picture in a window of any shape: whole, unscaled, and clicks on it are where they were made."""
+"""A picture in a window of any shape: whole, unscaled, and clicks are where they were made."""
 
 from __future__ import annotations
 
