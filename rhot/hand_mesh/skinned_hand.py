@@ -30,6 +30,8 @@ PARENTS: dict[str, str | None] = {
     else SKIN_JOINTS[SKIN_JOINTS.index(name) - 1]
     for name in SKIN_JOINTS
 }
+# Shorter than any bone: a message may say anything.
+_NO_BONE_M = 1e-4
 _PHALANGES = ("proximal", "intermediate", "distal")
 
 
@@ -65,7 +67,8 @@ class SkinnedHand:
             a, b = JOINT_INDEX[name], JOINT_INDEX[child]
             bone = rotations[a].T @ (positions_m[b] - positions_m[a])
             own = self.rest[j, :3, :3].T @ (self.rest[b - 1, :3, 3] - self.rest[j, :3, 3])
-            turns[j] = _turn(own, bone)
+            if float(np.linalg.norm(bone)) > _NO_BONE_M:
+                turns[j] = _turn(own, bone)
             ours, meshes = ours + float(np.linalg.norm(bone)), meshes + float(np.linalg.norm(own))
         for finger in DIGITS:
             tip = SKIN_JOINTS.index(f"{finger}_tip")
@@ -134,4 +137,4 @@ def _turn(a: Array, b: Array) -> Array:
     a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
     v, c = np.cross(a, b), float(a @ b)
     K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + K + K @ K / (1.0 + c)
+    return np.eye(3) + K + K @ K / max(1.0 + c, 1e-12)

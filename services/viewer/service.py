@@ -12,7 +12,7 @@ import asyncio
 import logging
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rhot import clock, topics
@@ -26,9 +26,10 @@ from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.calibration.page import CalibrationPage
 from services.viewer.live.model import ViewModel
-from services.viewer.live.scene import TRAILS, LiveScene
 from services.viewer.panel.live_tab import LiveSection
 from services.viewer.pictures.feed import PictureFeed
+from services.viewer.scene.layers import LAYERS, LayerName
+from services.viewer.scene.scene import LiveScene
 from services.viewer.server import open_server
 from services.viewer.setup import read_setup
 from services.viewer.visits.layer import Layer
@@ -51,8 +52,8 @@ async def serve(service: Service) -> None:
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer) as server:
-        trails = Layer(TRAILS)
-        sections = [LiveSection(config, setup.notes, PictureFeed(service), trails)]
+        layers = {name: Layer(f"/{name}") for name in LAYERS}
+        sections = [LiveSection(config, setup.notes, PictureFeed(service), layers)]
         visits = Visits(server, sections)
         scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
         calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
@@ -63,13 +64,15 @@ async def serve(service: Service) -> None:
         try:
             while True:
                 await visits.anybody.wait()
-                await _show_live(service, visits, scene, trails)
+                await _show_live(service, visits, scene, layers)
         finally:
             calibrating.cancel()
             visits.close()
 
 
-async def _show_live(service: Service, visits: Visits, scene: LiveScene, trails: Layer) -> None:
+async def _show_live(
+    service: Service, visits: Visits, scene: LiveScene, layers: Mapping[LayerName, Layer]
+) -> None:
     """Subscribe and draw for as long as a browser is connected."""
     rig = RigMonitor(service.config, clock.now_ns())
     model = ViewModel()
@@ -82,7 +85,7 @@ async def _show_live(service: Service, visits: Visits, scene: LiveScene, trails:
         while visits.anybody.is_set():
             now_s = time.monotonic()
             view = model.view(now_s)
-            scene.show(view, trails=trails.wanted)
+            scene.show(view, {name for name, layer in layers.items() if layer.wanted})
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
                 now_ns = clock.now_ns()

@@ -22,8 +22,8 @@ from rhot.files.calibration import (
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandName
-from services.viewer.live.object_looks import ObjectLook, read_mesh
 from services.viewer.live.palette import Rgb, paint_rgb
+from services.viewer.scene.object_looks import ObjectLook, read_mesh
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, LANDMARKS, HandName
-from rhot.messages import HandPoints, HandPose
+from rhot.messages import HandPoint, HandPoints, HandPose
 from rhot.messages.health import Health
 from rhot.messages.objects import (
     Grasp,
@@ -39,8 +41,8 @@ HEALTH_STALE_S = 3.5
 # Beyond any room; float32 on the way to the browser would overflow at 1e38.
 _MAX_M = 100.0
 _MAX_OBJECTS, _MAX_SERVICES = 32, 64
-# Two seconds of finger tips at 30 Hz.
-TRAIL = 60
+# Trails are to show a movement, not to fill the page; of no more tips than that.
+TRAIL_S, TRAIL = 0.7, 60
 # A stamp further from now than this is a replay's or another clock's, and says nothing about
 # latency.
 _MAX_LATENCY_S = 10.0
@@ -56,15 +58,30 @@ class HandView:
     sources: tuple[str, ...]
     pose: HandPose
 
+    @cached_property
+    def rotations(self) -> Array:
+        """(26, 3, 3) of the joints; one whose orientation is none is not turned."""
+        wxyz = self.pose.orientations_wxyz
+        length = np.sqrt(np.sum(np.minimum(np.abs(wxyz), 1e9) ** 2, axis=1))
+        turned = (length > 0.5) & (length < 2.0)
+        rotations: Array = Rotation.from_quat(
+            np.where(turned[:, None], wxyz, [1.0, 0.0, 0.0, 0.0])[:, [1, 2, 3, 0]]
+        ).as_matrix()
+        return rotations
+
 
 @dataclass(frozen=True)
 class PointView:
-    """A painted landmark; a predicted one is not measured at this instant."""
+    """A painted landmark; a predicted one is not measured at this instant.
+
+    covariance_m2 of its position: xx, xy, xz, yy, yz, zz.
+    """
 
     hand: HandName
     name: str
     position_m: tuple[float, float, float]
     predicted: bool
+    covariance_m2: tuple[float, ...] = (0.0,) * 6
 
 
 @dataclass(frozen=True)
@@ -117,12 +134,12 @@ class HoldView:
 
 @dataclass(frozen=True)
 class View:
-    """Everything to draw at one instant; trails (n, 5, 3) are finger tips, oldest first."""
+    """Everything to draw at one instant; trails are finger tips, (5, 3) each, oldest first."""
 
     hands: dict[HandName, HandView]
     points: dict[tuple[HandName, str], PointView]
     objects: dict[str, ObjectView]
-    trails: dict[HandName, Array]
+    trails: Mapping[HandName, Sequence[Array]]
     health: list[Health]
     # From exposure to the newest pose's arrival here, ms; None where its stamp is no guide.
     latency_ms: dict[HandName, float | None]
@@ -137,7 +154,8 @@ class _Hand:
     view: HandView
     seen_s: float
     latency_ms: float | None
-    trail: deque[Array] = field(default_factory=lambda: deque(maxlen=TRAIL))
+    # When, and where the tips were.
+    trail: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=TRAIL))
 
 
 class ViewModel:
@@ -171,7 +189,7 @@ class ViewModel:
         if known is None or now_s - known.seen_s > STALE_S:
             known = self._hands[pose.hand] = _Hand(view, now_s, latency_ms)
         known.view, known.seen_s, known.latency_ms = view, now_s, latency_ms
-        known.trail.append(positions[CHAIN_JOINTS[:, 3]])
+        known.trail.append((now_s, positions[CHAIN_JOINTS[:, 3]]))
 
     def points(self, points: HandPoints, now_s: float) -> None:
         """Take the painted landmarks of a hand."""
@@ -180,7 +198,11 @@ class ViewModel:
             if point.name in LANDMARKS and all(abs(v) <= _MAX_M for v in point.position_m):
                 drawn.append(
                     PointView(
-                        points.hand, point.name, point.position_m, point.source == "predicted"
+                        points.hand,
+                        point.name,
+                        point.position_m,
+                        point.source == "predicted",
+                        _covariance(point),
                     )
                 )
             else:
@@ -233,7 +255,10 @@ class ViewModel:
             hands={name: hand.view for name, hand in self._hands.items()},
             points={(p.hand, p.name): p for _, points in self._points.values() for p in points},
             objects={name: view for name, (_, view) in self._objects.items()},
-            trails={name: np.array(hand.trail) for name, hand in self._hands.items()},
+            trails={
+                name: [tips for at_s, tips in hand.trail if now_s - at_s <= TRAIL_S]
+                for name, hand in self._hands.items()
+            },
             health=[
                 health for _, (_, health) in sorted(self._health.items(), key=lambda item: item[0])
             ],
@@ -246,6 +271,14 @@ class ViewModel:
                 if name not in self._objects
             },
         )
+
+
+def _covariance(point: HandPoint) -> tuple[float, ...]:
+    if point.covariance_m2 is not None:
+        return point.covariance_m2
+    # Where no more than sigma is known, its square is bounded as positions are.
+    x, y, z = (min(sigma, _MAX_M) ** 2 for sigma in point.sigma_m)
+    return (x, 0.0, 0.0, y, 0.0, z)
 
 
 def _hold(name: str, grasp: Grasp) -> HoldView:

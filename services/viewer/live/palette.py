@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from rhot.files.calibration import ColorRange, Colors
 from rhot.messages import JointSource
@@ -26,6 +27,13 @@ TOUCH: Rgb = (255, 214, 10)
 # Where it touches: seen on the object as on the finger.
 CONTACT: Rgb = (255, 50, 50)
 TRACKER: Rgb = (45, 45, 50)
+# A joint that can bend no further: no other thing of the scene is purple.
+LIMIT: Rgb = (190, 50, 160)
+# Thin lines, and what they fade into: the page's own background.
+LINE: Rgb = (120, 120, 125)
+BACKGROUND: Rgb = (250, 250, 250)
+# A skin that is nobody's: light enough for joints to be seen beneath it.
+SKIN: Rgb = (214, 190, 174)
 # Paints by the names people use in rig.toml, calibrated or not.
 _NAMED: dict[str, Rgb] = {
     "red": (220, 40, 40),
@@ -42,6 +50,23 @@ _NAMED: dict[str, Rgb] = {
     "white": (245, 245, 245),
     "black": (30, 30, 30),
 }
+
+
+class LegendEntry(NamedTuple):
+    """A colour of the scene, and what it means to who looks."""
+
+    rgb: Rgb
+    words: str
+
+
+LEGEND: tuple[LegendEntry, ...] = (
+    LegendEntry(SOURCE_RGB["measured"], "measured: the cameras see it"),
+    LegendEntry(SOURCE_RGB["solved"], "worked out from what is measured"),
+    LegendEntry(SOURCE_RGB["predicted"], "expected there, not seen now"),
+    LegendEntry(TOUCH, "touches"),
+    LegendEntry(CONTACT, "where it touches"),
+    LegendEntry(LIMIT, "can bend no further"),
+)
 
 
 def paint_rgb(color: str, calibrations: Iterable[Colors]) -> Rgb:

@@ -6,7 +6,7 @@ Its texts are made in services/viewer/panel/texts.py.
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import viser
 
@@ -15,6 +15,7 @@ from rhot.hand import HandName
 from services.viewer.live.model import View
 from services.viewer.panel import fault_texts, texts
 from services.viewer.pictures.feed import PictureFeed
+from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.visits.layer import Layer
 from services.viewer.visits.section import Seen
 
@@ -27,13 +28,17 @@ class LiveSection:
     title = "Live"
 
     def __init__(
-        self, config: RigConfig, notes: Sequence[str], feed: PictureFeed, trails: Layer
+        self,
+        config: RigConfig,
+        notes: Sequence[str],
+        feed: PictureFeed,
+        layers: Mapping[LayerName, Layer],
     ) -> None:
-        self._config, self._notes, self._feed, self._trails = config, notes, feed, trails
+        self._config, self._notes, self._feed, self._layers = config, notes, feed, layers
 
     def open(self, client: viser.ClientHandle, tab: viser.GuiTabHandle) -> LiveTab:  # noqa: ARG002
         """Fill one visitor's tab."""
-        return LiveTab(client, self._config, self._notes, self._feed, self._trails)
+        return LiveTab(client, self._config, self._notes, self._feed, self._layers)
 
 
 class LiveTab:
@@ -45,17 +50,20 @@ class LiveTab:
         config: RigConfig,
         notes: Sequence[str],
         feed: PictureFeed,
-        trails: Layer,
+        layers: Mapping[LayerName, Layer],
     ) -> None:
         gui = client.gui
         self._client, self._config, self._notes = client, config, notes
-        self._feed, self._trails = feed, trails
+        self._feed, self._layers = feed, layers
         # Above everything else, and not there while all is well.
         self._faults = gui.add_html("", visible=False)
         self._status = gui.add_html(texts.status(config, _NOTHING, notes))
         gui.add_html(texts.legend())
-        self._with_trails = gui.add_checkbox("finger trails", False)
-        self._trails.show(client, False)
+        self._switches = {
+            name: gui.add_checkbox(words.label, words.on, hint=words.hint)
+            for name, words in LAYERS.items()
+        }
+        self._show_layers()
         names = [camera.name for camera in config.camera]
         self._choice = gui.add_dropdown(
             "camera pictures",
@@ -85,7 +93,7 @@ class LiveTab:
             handle.content = (
                 texts.angles(view.hands[hand].pose) if hand in view.hands else texts.no_angles()
             )
-        self._trails.show(self._client, bool(self._with_trails.value))
+        self._show_layers()
         self._watch(str(self._choice.value))
 
     def close(self) -> None:
@@ -93,7 +101,12 @@ class LiveTab:
         for stop in self._watched.values():
             stop()
         self._watched.clear()
-        self._trails.forget(self._client)
+        for layer in self._layers.values():
+            layer.forget(self._client)
+
+    def _show_layers(self) -> None:
+        for name, switch in self._switches.items():
+            self._layers[name].show(self._client, bool(switch.value))
 
     def _watch(self, choice: str) -> None:
         for camera, handle in self._previews.items():

@@ -237,6 +237,13 @@ class Browser:
             and all(message.get(key) == value for key, value in fields.items())
             for message in self._heard
         )
+    def window(self, timeout_s: float = 60.0) -> list[dict[str, Any]]:
+        """The messages that come together next, with their arrays: a browser draws them at once."""
+        return _decode(self._connection.recv(timeout=timeout_s))
+
+    def heard(self, type_: str) -> list[dict[str, Any]]:
+        """The messages of a type heard since `forget`."""
+        return [message for message in self._heard if message["type"] == type_]
 
     def forget(self) -> None:
         """Forget the messages heard so far."""
@@ -248,11 +255,24 @@ class Browser:
 
 
 def _decode(frame: str | bytes) -> list[dict[str, Any]]:
+    """Messages, and after them their arrays, each from a multiple of 8 bytes on."""
     assert isinstance(frame, bytes)
-    size = int.from_bytes(frame[8:16], "little")
-    return msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size]))[
-        "messages"
-    ]
+    end = 16 + int.from_bytes(frame[8:16], "little")
+    inner = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(frame[16:end]))
+    arrays: list[bytes] = []
+    for size in inner["binaryBufferLengths"]:
+        start = -(-end // 8) * 8
+        end = start + size
+        arrays.append(frame[start:end])
+    return [_with_arrays(message, arrays) for message in inner["messages"]]
+
+
+def _with_arrays(value: Any, arrays: list[bytes]) -> Any:
+    if not isinstance(value, dict):
+        return value
+    if "__binary_index" in value:
+        return np.frombuffer(arrays[value["__binary_index"]], value["dtype"])
+    return {key: _with_arrays(one, arrays) for key, one in value.items()}
 
 
 @pytest.fixture

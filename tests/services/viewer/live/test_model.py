@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from rhot.messages import HandPoints, HandPose
 from rhot.messages.health import Health
 from rhot.messages.objects import ObjectContacts, ObjectPose
-from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, ViewModel
+from services.viewer.live.model import HEALTH_STALE_S, STALE_S, TRAIL, TRAIL_S, ViewModel
 
 STAMP_NS = 1_700_000_000_000_000_000
 
@@ -151,17 +152,46 @@ def test_an_object_that_comes_no_more_is_missed(make_object: Callable[..., Objec
     assert model.view(7.0).silent_s == {}
 
 
-def test_trails_are_the_last_finger_tips_and_begin_anew_after_a_loss(
+def test_trails_are_where_the_tips_have_just_been_and_begin_anew_after_a_loss(
     make_pose: Callable[..., HandPose],
 ) -> None:
     model = ViewModel()
-    for i in range(TRAIL + 10):
+    for i in range(100):
         model.pose(make_pose((0.001 * i, 0.0, 0.5)), 0.03 * i, STAMP_NS)
-    trail = model.view(0.03 * (TRAIL + 9)).trails["right"]
-    assert trail.shape == (TRAIL, 5, 3)
-    np.testing.assert_allclose(trail[:, 0, 0], 0.001 * np.arange(10, TRAIL + 10))
+    trail = np.array(model.view(0.03 * 99).trails["right"])
+    assert trail.shape == (1 + int(TRAIL_S / 0.03), 5, 3)
+    np.testing.assert_allclose(trail[:, 0, 0], 0.001 * np.arange(100 - len(trail), 100))
+    for i in range(10 * TRAIL):
+        model.pose(make_pose(), 3.0 + 1e-4 * i, STAMP_NS)
+    assert len(model.view(3.0 + 1e-3 * TRAIL).trails["right"]) == TRAIL
     model.pose(make_pose(), 100.0, STAMP_NS)
-    assert model.view(100.0).trails["right"].shape == (1, 5, 3)
+    assert len(model.view(100.0).trails["right"]) == 1
+
+
+def test_a_joint_without_an_orientation_is_not_turned(make_pose: Callable[..., HandPose]) -> None:
+    pose = make_pose()
+    joints = list(pose.joints)
+    joints[3] = msgspec.structs.replace(joints[3], orientation_wxyz=(0.0, 0.0, 0.0, 0.0))
+    joints[4] = msgspec.structs.replace(joints[4], orientation_wxyz=(1e300, 0.0, 1e300, 0.0))
+    joints[5] = msgspec.structs.replace(joints[5], orientation_wxyz=(0.0, 1.0, 0.0, 0.0))
+    model = ViewModel()
+    model.pose(make_pose(joints=joints), 0.0, STAMP_NS)
+    rotations = model.view(0.0).hands["right"].rotations
+    np.testing.assert_allclose(rotations[3:5], [np.eye(3)] * 2)
+    np.testing.assert_allclose(rotations[5], np.diag([1.0, -1.0, -1.0]), atol=1e-12)
+
+
+def test_what_is_known_of_a_marker_s_error_is_kept(make_points: Callable[..., HandPoints]) -> None:
+    model = ViewModel()
+    points = make_points("index_tip")
+    model.points(points, 0.0)
+    (view,) = model.view(0.0).points.values()
+    np.testing.assert_allclose(view.covariance_m2, [1e-6, 0, 0, 1e-6, 0, 1e-6])
+    known = (3e-6, 1e-7, 0.0, 2e-6, 0.0, 1e-6)
+    point = msgspec.structs.replace(points.points[0], covariance_m2=known)
+    model.points(msgspec.structs.replace(points, points=[point]), 0.0)
+    (view,) = model.view(0.0).points.values()
+    assert view.covariance_m2 == known
 
 
 def test_state_is_bounded(

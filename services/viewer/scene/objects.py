@@ -1,12 +1,13 @@
 """Objects in the scene: each in its shape, with axes, its tracker and its name.
 
 Without a shape in rig.toml, or with a mesh that cannot be read, the axes and the name are all there
-is. What is not certain is orange and faint; what is lost or not registered is hidden.
+is. What is not certain is orange and faint, what is touched is lit; what is lost or not registered
+is hidden.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,9 @@ from rhot.geometry.transforms import (
     transform,
 )
 from services.viewer.live.model import ObjectView
-from services.viewer.live.object_looks import ObjectLook
 from services.viewer.live.object_texts import label
-from services.viewer.live.palette import SOURCE_RGB, TRACKER
+from services.viewer.live.palette import SOURCE_RGB, TOUCH, TRACKER
+from services.viewer.scene.object_looks import ObjectLook
 
 # Fingers behind an object, and contacts on its far side, stay in sight.
 _OPACITY, _FAINT = 0.55, 0.2
@@ -44,13 +45,13 @@ class Objects:
         self._looks = looks
         self._objects: dict[str, _Object] = {}
 
-    def show(self, views: Mapping[str, ObjectView]) -> None:
-        """Move, colour, and hide what is gone."""
+    def show(self, views: Mapping[str, ObjectView], touched: Collection[str]) -> None:
+        """Move, colour, and hide what is gone; touched are the names of those that are touched."""
         for name in {*self._objects, *views}:
             if name not in self._objects:
                 look = self._looks.get(name, _NO_LOOK)
                 self._objects[name] = _Object(self._scene, name, look)
-            self._objects[name].show(views.get(name))
+            self._objects[name].show(views.get(name), name in touched)
 
 
 class _Object:
@@ -64,20 +65,18 @@ class _Object:
             _puck(scene, f"{path}/tracker", look.place)
         # Above the object, not across it: y is down in a camera's frame.
         self._label = scene.add_label(f"{path}/name", name, anchor="bottom-center")
-        self._certain: bool | None = None
 
-    def show(self, view: ObjectView | None) -> None:
+    def show(self, view: ObjectView | None, touched: bool) -> None:
         self._frame.visible = view is not None and view.drawn
         if view is None or not view.drawn:
             return
         self._frame.position = view.position_m
         self._frame.wxyz = view.orientation_wxyz
-        if (said := label(view)) != self._label.text:
-            self._label.text = said
-        if view.certain != self._certain and self._body is not None:
-            self._body.color = SOURCE_RGB["measured" if view.certain else "predicted"]
+        self._label.text = label(view)
+        if self._body is not None:
+            source = SOURCE_RGB["measured" if view.certain else "predicted"]
+            self._body.color = TOUCH if touched else source
             self._body.opacity = _OPACITY if view.certain else _FAINT
-        self._certain = view.certain
 
 
 def _body(scene: viser.SceneApi, path: str, look: ObjectLook) -> Any:

@@ -8,7 +8,14 @@ import pytest
 
 from rhot.geometry.transforms import rotation_from_quaternion
 from rhot.hand import JOINTS
-from services.viewer.live.shapes import BONES, cylinders, unit_cylinder, unit_sphere
+from services.viewer.scene.shapes import (
+    BONES,
+    cylinders,
+    ellipsoids,
+    fading_lines,
+    unit_cylinder,
+    unit_sphere,
+)
 
 
 def test_bones_connect_every_joint_but_the_palm() -> None:
@@ -67,3 +74,30 @@ def test_the_tube_is_seen_from_outside() -> None:
     normal, middle = normals((vertices, faces))
     assert np.all(np.sum(normal[:, :2] * middle[:, :2], axis=1) > 0.0)
     assert len(faces) == len(vertices)
+
+
+def test_an_ellipsoid_has_nineteen_errors_of_twenty_inside() -> None:
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(3, 3)) * 1e-3
+    covariance = root @ root.T
+    (wxyz,), (axes,) = ellipsoids(covariance[np.triu_indices(3)][None])
+    errors = rng.multivariate_normal(np.zeros(3), covariance, 20000)
+    inside = np.linalg.norm(errors @ rotation_from_quaternion(wxyz) / axes, axis=1) < 1.0
+    assert inside.mean() == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e300, np.nan, np.inf])
+def test_a_covariance_that_is_none_is_drawn_finite_and_no_larger_than_a_hand(value: float) -> None:
+    wxyz, axes = ellipsoids(np.full((2, 6), value))
+    np.testing.assert_allclose(np.linalg.norm(wxyz, axis=1), 1.0)
+    assert np.all((axes > 0.0) & (axes <= 0.1))
+
+
+def test_trails_fade_away_from_the_tip() -> None:
+    trail = np.arange(4 * 2 * 3, dtype=float).reshape(4, 2, 3)
+    lines_m, colors = fading_lines(trail, (250, 250, 250), (100, 100, 100))
+    assert lines_m.shape == colors.shape == (6, 2, 3)
+    np.testing.assert_array_equal(lines_m[0], trail[0:2, 0])
+    np.testing.assert_array_equal(lines_m[-1], trail[2:4, 1])
+    assert colors[0, 0].tolist() == [250] * 3
+    assert colors[-1, 1].tolist() == [100] * 3

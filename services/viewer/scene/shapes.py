@@ -10,9 +10,20 @@ import itertools
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from rhot.geometry.transforms import Array
 from rhot.hand import CHAIN_JOINTS, JOINT_INDEX
+from services.viewer.live.palette import Rgb
+
+# A normal error in three dimensions is within so many standard deviations 95 % of the time:
+# sqrt(chi2.ppf(0.95, 3)).
+_SIGMAS = 2.7955
+# What is as uncertain as this says nothing of where it is; a browser is sent no size of zero.
+_MAX_AXIS_M, _MIN_AXIS_M = 0.1, 1e-6
+_MAX_M2 = 1.0
+# xx, xy, xz, yy, yz, zz as the rows of a matrix.
+_SYMMETRIC = [0, 1, 2, 1, 3, 4, 2, 4, 5]
 
 Faces = npt.NDArray[np.uint32]
 
@@ -50,6 +61,20 @@ def cylinders(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
         norm[:, None] > 1e-6, wxyz / np.maximum(norm, 1e-6)[:, None], [0.0, 1.0, 0.0, 0.0]
     )
     return 0.5 * (start_m + end_m), wxyz, length
+
+
+def ellipsoids(covariance_m2: Array) -> tuple[Array, Array]:
+    """Orientations wxyz (n, 4) and half axes (n, 3) that 95 % of errors stay inside of.
+
+    covariance_m2 (n, 6): xx, xy, xz, yy, yz, zz. Whatever came over the network: no NaN, and none
+    larger than a hand.
+    """
+    bounded = np.clip(np.nan_to_num(covariance_m2, nan=_MAX_M2), -_MAX_M2, _MAX_M2)
+    variances, axes = np.linalg.eigh(bounded[:, _SYMMETRIC].reshape(-1, 3, 3))
+    # A mirrored triple of axes is no rotation; an axis turned round is the same ellipsoid's.
+    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
+    wxyz = Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]]
+    return wxyz, np.clip(_SIGMAS * np.sqrt(np.maximum(variances, 0.0)), _MIN_AXIS_M, _MAX_AXIS_M)
 
 
 def unit_sphere(rings: int = 10, segments: int = 16) -> tuple[Array, Faces]:
@@ -96,6 +121,15 @@ def _strips(rings: int, segments: int) -> npt.NDArray[np.intp]:
             np.stack([upper, lower_right, right], -1).reshape(-1, 3),
         ]
     )
+
+
+def fading_lines(trail_m: Array, faint: Rgb, strong: Rgb) -> tuple[Array, npt.NDArray[np.uint8]]:
+    """Lines (s, 2, 3) along k trails (n, k, 3), oldest first; colours (s, 2, 3) fade."""
+    lines_m = np.stack([trail_m[:-1], trail_m[1:]], axis=2).reshape(-1, 2, 3)
+    share = np.linspace(0.0, 1.0, len(trail_m))[:, None]
+    rgb = np.rint((1.0 - share) * faint + share * np.array(strong)).astype(np.uint8)  # (n, 3)
+    colors = np.repeat(np.stack([rgb[:-1], rgb[1:]], axis=1), trail_m.shape[1], axis=0)
+    return lines_m, colors
 
 
 def f32(values: Array) -> npt.NDArray[np.float32]:

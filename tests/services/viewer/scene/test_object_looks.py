@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from rhot.errors import ConfigError
-from services.viewer.live.object_looks import read_mesh
+from services.viewer.scene.object_looks import read_mesh
 
 
 @pytest.mark.parametrize("name", ["cup.glb", "cup.stl", "CUP.STL"])

@@ -6,7 +6,7 @@ from typing import get_args
 
 from rhot.hand import JOINTS
 from rhot.messages.objects import HandPart
-from services.viewer.live.touches import joint_of
+from services.viewer.scene.touches import joint_of
 
 
 def test_every_part_has_a_joint_of_its_own() -> None:

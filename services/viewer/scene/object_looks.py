@@ -15,7 +15,7 @@ from rhot.errors import ConfigError
 from rhot.files.calibration import ObjectPlace
 from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import Array
-from services.viewer.live.shapes import Faces
+from services.viewer.scene.shapes import Faces
 
 # A scan of a cup has some 2 MB; what is larger takes seconds to reach a browser.
 _MAX_BYTES = 20_000_000
