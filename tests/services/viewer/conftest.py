@@ -237,6 +237,7 @@ class Browser:
             and all(message.get(key) == value for key, value in fields.items())
             for message in self._heard
         )
+
     def window(self, timeout_s: float = 60.0) -> list[dict[str, Any]]:
         """The messages that come together next, with their arrays: a browser draws them at once."""
         return _decode(self._connection.recv(timeout=timeout_s))
