@@ -280,9 +280,9 @@ class Bus:
         A line that is full loses them, as it does live data. With wait it is waited for, up to 5 s,
         which is nothing for the event loop: call it in a thread.
         """
-        control = zenoh.CongestionControl
-        full = control.BLOCK if wait else control.DROP
-        self._session.put(key, payload, encoding=encoding, congestion_control=full)
+        full = zenoh.CongestionControl.BLOCK if wait else zenoh.CongestionControl.DROP
+        now = not wait  # else Zenoh would gather messages for a millisecond
+        self._session.put(key, payload, encoding=encoding, congestion_control=full, express=now)
 
     def close(self, one: Subscription[Any] | RawSubscription | AliveWatch | Publisher[Any]) -> None:
         """End one subscription or publisher before the session ends; its stream leaves health."""

@@ -9,28 +9,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
+from mcap.records import Channel, ChunkIndex, Statistics
+from mcap.summary import Summary as Index
 
 from rhot.errors import CaptureError
-from services.recorder.writer import PROFILE
+from services.recorder.chunks import RECORD_LIMIT, in_order
+from services.recorder.writer import COMPANION, PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
-# Records of rhot are at most 65 KiB and the largest message; a longer one is damage, and no memory
-# must be allocated for it.
-RECORD_LIMIT = 16 * 1024 * 1024
 
 
-@dataclass(frozen=True)
-class Record:
+class Record(NamedTuple):
     """One recorded payload; log_time_ns is its arrival on the recorder's clock."""
 
     log_time_ns: int
     key: str
-    payload: bytes
     encoding: str
+    payload: bytes
 
 
 @dataclass(frozen=True)
@@ -58,25 +57,48 @@ def is_finished(path: Path) -> bool:
         return size > 2 * len(MAGIC) and file.read() == MAGIC
 
 
-def read(path: Path) -> Iterator[Record]:
-    """Every message of a recording in the order of arrival.
+def read(path: Path, start_ns: int = 0, end_ns: int | None = None) -> Iterator[Record]:
+    """Every message of a recording in the order of arrival, those of start_ns to end_ns alone.
 
-    Raises CaptureError for files that are missing, damaged, cut off or not of rhot.
+    Both ends count. What lies before is not read: the file's index says where to begin. Raises
+    CaptureError for files that are missing, damaged, cut off or not of rhot.
     """
     with _open(path) as file:
         reader = _reader(path, file)
         try:
-            for _, channel, message in reader.iter_messages():
-                yield Record(
-                    message.log_time,
-                    channel.topic,
-                    message.data,
-                    channel.metadata.get("encoding", channel.message_encoding),
-                )
+            channels, chunks = _index(path, reader)
+            for message in in_order(file, chunks, start_ns, end_ns):
+                channel = channels.get(message.channel)
+                if channel is not None:
+                    yield Record(message.log_time_ns, *channel, message.payload)
         except CaptureError:
             raise
         except Exception as error:  # decoders of damaged bytes may raise anything
             raise _damaged(path, error) from None
+
+
+def _index(
+    path: Path, reader: SeekingReader
+) -> tuple[dict[int, tuple[str, str]], list[ChunkIndex]]:
+    """Key and encoding of each channel, and where the chunks are."""
+    index, _ = _summary_of(path, reader)
+    channels = {
+        channel.id: (channel.topic, channel.metadata.get("encoding", channel.message_encoding))
+        for channel in _own_channels(index)
+    }
+    return channels, index.chunk_indexes
+
+
+def _summary_of(path: Path, reader: SeekingReader) -> tuple[Index, Statistics]:
+    index = reader.get_summary()
+    if index is None or index.statistics is None:
+        raise CaptureError(f"{path}: has no summary; it was not written by rhot's recorder")
+    return index, index.statistics
+
+
+def _own_channels(index: Index) -> list[Channel]:
+    """Those that hold what was on the bus; beside them the recorder writes pictures of it."""
+    return [c for c in index.channels.values() if COMPANION not in c.metadata]
 
 
 def summarize(path: Path) -> Summary:
@@ -92,18 +114,16 @@ def summarize(path: Path) -> Summary:
 
 
 def _summary(path: Path, reader: SeekingReader) -> Summary:
-    summary = reader.get_summary()
-    if summary is None or summary.statistics is None:
-        raise CaptureError(f"{path}: has no summary; it was not written by rhot's recorder")
+    index, statistics = _summary_of(path, reader)
     rigs = [m.metadata.get("rig", "") for m in reader.iter_metadata() if m.name == "rhot"]
-    statistics = summary.statistics
     counts = statistics.channel_message_counts
+    keys = {c.topic: counts.get(c.id, 0) for c in _own_channels(index)}
     return Summary(
         rig=rigs[0] if rigs else "",
-        messages=statistics.message_count,
+        messages=sum(keys.values()),
         start_ns=statistics.message_start_time,
         end_ns=statistics.message_end_time,
-        keys={c.topic: counts.get(c.id, 0) for c in summary.channels.values()},
+        keys=keys,
     )
 
 

@@ -19,7 +19,8 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from rhot import topics
 from rhot.errors import CaptureError
-from services.recorder.reader import RECORD_LIMIT, is_finished
+from services.recorder.chunks import RECORD_LIMIT
+from services.recorder.reader import is_finished
 from services.recorder.writer import PROFILE, RecordingWriter
 
 _SUFFIX = ".recovered.mcap"

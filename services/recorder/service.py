@@ -25,7 +25,8 @@ from services.recorder.recover import recover, truncated_recordings
 # Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a
 # camera, and no memory to speak of.
 QUEUE = 512
-_FLUSH_S = 1.0
+# What a recorder loses that is killed.
+_FLUSH_S = 0.5
 # Between two tries to go on after a full disk; each opens a file.
 _RESUME_S = 5.0
 # Samples that are dropped stand in health for so long after the last one.
@@ -50,7 +51,7 @@ async def serve(service: Service) -> None:
         async with asyncio.TaskGroup() as tasks:
             for topic, samples in subscriptions:
                 tasks.create_task(keeper.record_topic(topic, samples))
-            tasks.create_task(keeper.look_every_second(subscriptions))
+            tasks.create_task(keeper.look_regularly(subscriptions))
     finally:
         keeper.recorder.stop()
 
@@ -122,7 +123,7 @@ class _Keeper:
         self._service.state = "waiting"
         self._service.faults.report("disk_full", error.cause, str(self.recorder.folder))
 
-    async def look_every_second(self, subscriptions: Subscriptions) -> None:
+    async def look_regularly(self, subscriptions: Subscriptions) -> None:
         """Keep the file and the service's health up to date, for ever."""
         while True:
             await asyncio.sleep(_FLUSH_S)

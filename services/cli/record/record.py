@@ -22,7 +22,8 @@ from services.cli.terminal import Terminal
 from services.recorder.recorder import Recorder
 from services.recorder.service import record_topic, subscribe
 
-_STATUS_PERIOD_S = 1.0
+# What is lost if the command is killed.
+_STATUS_PERIOD_S = 0.5
 
 
 def record(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,26 +10,28 @@ from typing import Annotated
 import typer
 import uvloop
 
+from rhot.bus.bus import Bus
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints, router_session
 from services.cli.terminal import Terminal
-from services.recorder.reader import Record, Summary, summarize
+from services.recorder.pace import window
+from services.recorder.reader import Summary, summarize
 from services.recorder.recover import recover as recover_file
-from services.recorder.sources.replay import check_names
-from services.recorder.sources.replay import replay as replay_file
+from services.recorder.sources.playback import Playback, check_names
+from services.recorder.sources.replay import publishing
 
-# Messages between two updates of the status line.
-_STATUS_EVERY = 100
+_STATUS_PERIOD_S = 0.2
 
 
 @dataclass(frozen=True)
-class _Playback:
+class _How:
     """How a file is replayed: see replay's options of the same names."""
 
     rate: float
     loop: bool
     only: list[str]
+    window_ns: tuple[int, int]
 
 
 def replay(
@@ -45,6 +48,15 @@ def replay(
     loop: Annotated[
         bool, typer.Option("--loop", help="begin again at the end, until Ctrl-C")
     ] = False,
+    from_s: Annotated[
+        float | None,
+        typer.Option(
+            "--from", metavar="SECONDS", help="begin here; negative: so long before the end"
+        ),
+    ] = None,
+    to_s: Annotated[
+        float | None, typer.Option("--to", metavar="SECONDS", help="end here; likewise")
+    ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
@@ -62,43 +74,62 @@ def replay(
 ) -> None:
     """Publish a recording on its keys again, with its original stamps."""
     if recover:
-        done = recover_file(file)
-        typer.echo(
-            f"{done.target}: {done.messages} messages restored, "
-            f"{done.damaged_chunks} damaged pieces left out"
-        )
+        typer.echo(_recovered(file))
         return
     summary = summarize(file)
     if info:
         typer.echo(_text(file, summary))
         return
     check_names(only or ())
-    playback = _Playback(rate, loop, only or [])
-    count = uvloop.run(_replay(file, summary, playback, config, connect))
+    how = _How(rate, loop, only or [], window(summary, from_s, to_s))
+    count = uvloop.run(_replay(file, how, config, connect))
     typer.echo(f"replayed {count} messages")
 
 
-async def _replay(
-    file: Path, summary: Summary, playback: _Playback, config: Path | None, connect: str | None
-) -> int:
+async def _replay(file: Path, how: _How, config: Path | None, connect: str | None) -> int:
     stopping = stop_on_signals()
     rig, endpoints = rig_and_endpoints(config, connect)
     terminal, sent = Terminal(), 0
-
-    def report(record: Record) -> None:
-        nonlocal sent
-        sent += 1
-        if sent % _STATUS_EVERY == 0:
-            at_s = (record.log_time_ns - summary.start_ns) * 1e-9
-            terminal.status(f"{at_s:.1f} of {summary.duration_s:.1f} s, {sent} messages")
-
     with cancelled_by(stopping):
         async with router_session(rig.rig.name, endpoints) as bus:
-            await replay_file(
-                bus, file, playback.rate, loop=playback.loop, only=playback.only, report=report
-            )
+            playback = _playback(bus, file, how)
+            showing = asyncio.create_task(_show(playback, terminal))
+            try:
+                await playback.run()
+            finally:
+                sent = playback.sent
+                showing.cancel()
     terminal.end()
     return sent
+
+
+def _playback(bus: Bus, file: Path, how: _How) -> Playback:
+    return Playback(
+        file,
+        bus.rig,
+        publishing(bus, patient=not 0.0 < how.rate <= 1.0),
+        rate=how.rate,
+        loop=how.loop,
+        only=how.only,
+        window_ns=how.window_ns,
+    )
+
+
+async def _show(playback: Playback, terminal: Terminal) -> None:
+    """Where the playing is, in the status line, for ever."""
+    summary = playback.summary
+    while True:
+        at_s = (playback.position_ns - summary.start_ns) * 1e-9
+        terminal.status(f"{at_s:.1f} of {summary.duration_s:.1f} s, {playback.sent} messages")
+        await asyncio.sleep(_STATUS_PERIOD_S)
+
+
+def _recovered(file: Path) -> str:
+    done = recover_file(file)
+    return (
+        f"{done.target}: {done.messages} messages restored, "
+        f"{done.damaged_chunks} damaged pieces left out"
+    )
 
 
 def _text(file: Path, summary: Summary) -> str:

@@ -17,7 +17,8 @@ from rhot.files.rig_tables import Recorder as RecorderTable
 from rhot.messages import Session
 from services.recorder.reader import Record, read
 from services.recorder.service import serve
-from services.recorder.sources.replay import check_names, replay
+from services.recorder.sources.playback import check_names
+from services.recorder.sources.replay import replay
 from services.recorder.writer import RecordingWriter
 
 Write = Callable[..., Path]

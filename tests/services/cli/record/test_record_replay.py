@@ -163,6 +163,20 @@ def test_replay(router: str, rig_toml: Path, recording: Path, invoke: Invoke) ->
     assert heard.empty()
 
 
+def test_replay_of_a_part(router: str, rig_toml: Path, recording: Path, invoke: Invoke) -> None:
+    """Messages lie 10 ms apart, from 0 to 0.19 s."""
+    where = ("--config", rig_toml, "--connect", router, "--rate", 0)
+    for part, count in (
+        (("--from", 0.1), 10),
+        (("--to", "-0.1"), 10),
+        (("--from", "-0.05", "--to", "-0.02"), 4),
+        (("--from", 0.19), 1),
+    ):
+        assert f"replayed {count} messages" in invoke("replay", recording, *where, *part)
+    with pytest.raises(CaptureError, match="--from must come before --to"):
+        invoke("replay", recording, *where, "--from", 0.15, "--to", 0.05)
+
+
 def test_replay_info(recording: Path, invoke: Invoke) -> None:
     said = invoke("replay", recording, "--info")
     assert "rig 'desk', 20 messages in 0.2 s" in said
