@@ -16,6 +16,7 @@ import rhot.messages as m
 import rhot.messages.camera as c
 import rhot.messages.health as h
 import rhot.messages.objects as o
+import rhot.messages.recording as r
 import rhot.messages.simulator as s
 from rhot.errors import BusError
 
@@ -241,6 +242,13 @@ SESSION = Topic(
     recorded=True,
     about="the start broadcast",
 )
+RECORDER = _query(
+    "control/recorder",
+    r.RecorderState,
+    Priority.DATA,
+    "what the recorder does; a query with a RecorderRequest changes it",
+)
+RECORDINGS = _query("control/recordings", r.Recordings, Priority.DATA, "the recorder's files")
 CLOCK = _query("control/clock", m.ClockEcho, Priority.REAL_TIME, "the master's clock")
 HEALTH = Topic(
     "service/{service}/{instance}/health",
@@ -280,6 +288,8 @@ TOPICS: tuple[Topic, ...] = (
     EXPOSURE,
     FIT,
     SESSION,
+    RECORDER,
+    RECORDINGS,
     CLOCK,
     HEALTH,
     ALIVE,

@@ -18,8 +18,9 @@ import importlib
 import logging
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -55,6 +56,7 @@ def command(
     about: str | None,
     instance_option: str = "instance",
     *,
+    variants: Mapping[str, tuple[str, str]] = MappingProxyType({}),
     several_rigs: bool = False,
 ) -> None:
     """The whole main() of a service: options, imports, logging, loop, exit code.
@@ -62,15 +64,20 @@ def command(
     module holds the coroutine `serve`. It is imported once the options are read, so that --help and
     --version need no extra of the package; about is what --help says. instance_option names the
     option that says which one of several this is, e.g. "camera"; any other than "instance" is
-    required. several_rigs: --config may be given more than once, or be a folder.
+    required. variants are options without a value: each with the coroutine that it runs instead,
+    and its help. several_rigs: --config may be given more than once, or be a folder.
     """
     program = _program(name)
     parser = _parser(program, about, instance_option, several_rigs=several_rigs)
+    for option, (function, text) in variants.items():
+        parser.add_argument(
+            f"--{option}", dest="serve", action="store_const", const=function, help=text
+        )
     options = parser.parse_args()
     if not several_rigs and len(options.config) > 1:
         parser.error("--config is given twice; this service serves one rig")
     try:
-        serve: Serve = importlib.import_module(module).serve
+        serve: Serve = getattr(importlib.import_module(module), options.serve)
     except ModuleNotFoundError as error:
         missing = missing_extra(error, program)
         if missing is None:
@@ -112,6 +119,7 @@ def _parser(
         help="router endpoint, instead of [bus] connect of rig.toml",
     )
     parser.add_argument("--version", action="version", version=rhot_version())
+    parser.set_defaults(serve="serve")
     return parser
 
 

@@ -7,7 +7,13 @@ from rhot.process.lifecycle import command
 
 def main() -> None:
     """Entry point of rhot-recorder."""
-    command("recorder", "services.recorder.service", __doc__)
+    on_request = (
+        "serve_on_request",
+        "record only what the page asks for, unless [recorder] autostart",
+    )
+    command(
+        "recorder", "services.recorder.service", __doc__, variants={"on-request": on_request}
+    )
 
 
 if __name__ == "__main__":

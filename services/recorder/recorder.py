@@ -94,7 +94,7 @@ class Recorder:
         self, config: RigConfig, folder: Path, version: str = "", *, follow_sessions: bool = True
     ) -> None:
         self._config = config
-        self._follow_sessions = follow_sessions
+        self.follows_sessions = follow_sessions
         self._folder = folder
         self._version = version
         self._writer: RecordingWriter | None = None
@@ -102,6 +102,8 @@ class Recorder:
         self._part_ns = 0
         self._part_bytes = 0
         self._named: Path | None = None
+        # Whether there is something to record, also while the disk is full.
+        self._wanted = False
         self._keys = RigKeys(config)
         # The session that is recorded, and the one that was announced last.
         self._session_ns: int | None = None
@@ -128,8 +130,8 @@ class Recorder:
 
     def start(self, start_ns: int, path: Path | None = None) -> Path:
         """Open a file for what starts at start_ns (closing the one before); raises CaptureError."""
-        self.stop()
-        self._named = path
+        self._close()
+        self._wanted, self._named = True, path
         path = path or recording_path(self._folder, self._config.rig.name, start_ns)
         # The first look at the clock says when it began: a session's start may be long ago.
         self._part_ns, self._part_bytes = 0, self.bytes
@@ -140,6 +142,10 @@ class Recorder:
 
     def stop(self) -> None:
         """Finish the file, if one is open; raises DiskFullError if the disk is full."""
+        self._wanted = False
+        self._close()
+
+    def _close(self) -> None:
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
@@ -151,7 +157,7 @@ class Recorder:
         """
         self.suspended = True
         with contextlib.suppress(CaptureError):
-            self.stop()
+            self._close()
 
     def resume(self, now_ns: int) -> None:
         """Go on, in a new file, if there is something to record; raises DiskFullError if the disk
@@ -159,7 +165,7 @@ class Recorder:
         """
         check_space(self._folder, _RESUME_BYTES)
         self.suspended = False
-        if self._session_ns is not None or self._config.recorder.autostart:
+        if self._wanted:
             self.start(now_ns)
 
     def follow(self, session: Session, now_ns: int) -> None:
@@ -184,15 +190,15 @@ class Recorder:
         self._changed_ns.append(now_ns)
         self._session_ns = self._announced_ns
         if self.suspended:
-            return
-        if self._session_ns is not None:
+            self._wanted = self._session_ns is not None or self._config.recorder.autostart
+        elif self._session_ns is not None:
             self.start(self._session_ns)
         elif not self._config.recorder.autostart:
             self.stop()
 
     def add(self, topic: Topic, key: str, payload: bytes, log_time_ns: int) -> None:
         """Take one sample; it is kept if a file is open. Raises CaptureError."""
-        follows = self._follow_sessions and topic is topics.SESSION
+        follows = self.follows_sessions and topic is topics.SESSION
         session = self._session(payload) if follows else None
         if session is not None and session.running:
             self.follow(session, log_time_ns)

@@ -43,7 +43,7 @@ def truncated_recordings(folder: Path) -> list[Path]:
         for path in sorted(folder.glob("*.mcap"))
         if not path.name.endswith(_SUFFIX)
         and not target_of(path).exists()
-        and not _is_in_use(path)
+        and not is_in_use(path)
         and not is_finished(path)
     ]
 
@@ -61,7 +61,7 @@ def recover(path: Path) -> Recovered:
     """
     target = target_of(path)
     try:
-        if _is_in_use(path):
+        if is_in_use(path):
             raise CaptureError(f"{path}: is being recorded into; stop that recorder first")
         target.unlink(missing_ok=True)
         with path.open("rb") as file:
@@ -145,7 +145,7 @@ def _until_damaged(file: IO[bytes]) -> Iterator[McapRecord]:
         return
 
 
-def _is_in_use(path: Path) -> bool:
+def is_in_use(path: Path) -> bool:
     """Whether a recorder holds its lock on the file."""
     with path.open("rb") as file:
         try:

@@ -14,13 +14,17 @@ from pathlib import Path
 from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.bus.subscription import RawSubscription
-from rhot.errors import CaptureError, DiskFullError
+from rhot.errors import CaptureError, DiskFullError, RefusedError
 from rhot.files.config import RigConfig
 from rhot.messages import Session
+from rhot.messages.recording import RecorderState, replay_rig
 from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
+from services.recorder.deck import Deck
+from services.recorder.library import Library
 from services.recorder.recorder import Recorder, recorded_topics
 from services.recorder.recover import recover, truncated_recordings
+from services.recorder.requests import Requests
 
 # Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a
 # camera, and no memory to speak of.
@@ -36,24 +40,36 @@ Subscriptions = list[tuple[Topic, RawSubscription]]
 
 async def serve(service: Service) -> None:
     """Records every session (or all the time: [recorder] autostart) into [recorder] folder."""
+    await _serve(service, on_request=False)
+
+
+async def serve_on_request(service: Service) -> None:
+    """Records what it is asked for (or all the time: [recorder] autostart)."""
+    await _serve(service, on_request=not service.config.recorder.autostart)
+
+
+async def _serve(service: Service, *, on_request: bool) -> None:
     config = service.config
     folder = Path(config.folder) / config.recorder.folder
     for note in await asyncio.to_thread(recover_all, folder):
         service.error(note)
-    keeper = _Keeper(service, Recorder(config, folder, rhot_version()))
+    recorder = Recorder(config, folder, rhot_version(), follow_sessions=not on_request)
+    keeper = _Keeper(service, recorder)
+    deck = Deck(service.bus, replay_rig(config.rig.name))
     try:
         if config.recorder.autostart:
             keeper.start()
-        subscriptions = subscribe(service.bus, config)
-        for session in await service.bus.get(topics.SESSION):
-            keeper.follow(session)
+        if not on_request:
+            keeper.listen()
+            for session in await service.bus.get(topics.SESSION):
+                keeper.follow(session)
+        Requests(deck, Library(folder), keeper).answer_on(service.bus)
         service.ready()
-        async with asyncio.TaskGroup() as tasks:
-            for topic, samples in subscriptions:
-                tasks.create_task(keeper.record_topic(topic, samples))
-            tasks.create_task(keeper.look_regularly(subscriptions))
+        await keeper.look_regularly()
     finally:
-        keeper.recorder.stop()
+        await deck.close()
+        keeper.deafen()
+        recorder.stop()
 
 
 def subscribe(bus: Bus, config: RigConfig) -> Subscriptions:
@@ -93,6 +109,66 @@ class _Keeper:
         self._service = service
         self._refused = self._postponed = self._dropped = 0
         self._tried_s = 0.0
+        # What is listened to, and who does; the samples that were dropped before.
+        self._subscriptions: Subscriptions = []
+        self._listeners: list[asyncio.Task[None]] = []
+        self._dropped_before = 0
+        # What the counts were when the recording was asked for, and when that was.
+        self._asked = (0, 0)
+        self._asked_ns = 0
+
+    def listen(self) -> None:
+        """Take all samples from now on."""
+        if not self._subscriptions:
+            self._subscriptions = subscribe(self._service.bus, self._service.config)
+            self._listeners = [
+                self._service.tasks.create_task(self.record_topic(topic, samples))
+                for topic, samples in self._subscriptions
+            ]
+
+    def deafen(self) -> None:
+        """Take none: what nobody records shall cost nothing."""
+        self._dropped_before = self._dropped_in_all()
+        for listener in self._listeners:
+            listener.cancel()
+        for _, samples in self._subscriptions:
+            self._service.bus.close(samples)
+        self._subscriptions, self._listeners = [], []
+
+    def _dropped_in_all(self) -> int:
+        now = sum(samples.stats.dropped_in_all for _, samples in self._subscriptions)
+        return self._dropped_before + now
+
+    def record(self) -> None:
+        """Record until stop(), because somebody asked for it."""
+        recorder = self.recorder
+        if recorder.path is not None:
+            raise RefusedError(f"{recorder.path.name} is being recorded already", "busy")
+        self._asked, self._asked_ns = (recorder.messages, recorder.bytes), clock.now_ns()
+        recorder.start(self._asked_ns)
+        self.listen()
+
+    def stop(self) -> None:
+        """End the recording, because somebody asked for it."""
+        if self.recorder.path is None and not self.recorder.suspended:
+            raise RefusedError("nothing is being recorded", "invalid")
+        self.recorder.stop()
+        if not self.recorder.follows_sessions:
+            self.deafen()
+
+    def state(self) -> RecorderState:
+        """What is being recorded, for who asks."""
+        recorder = self.recorder
+        path = recorder.path
+        if path is None:
+            return RecorderState()
+        messages, size = self._asked
+        return RecorderState(
+            file=path.name,
+            since_ns=self._asked_ns,
+            messages=recorder.messages - messages,
+            size_mb=round((recorder.bytes - size) / 1e6, 3),
+        )
 
     def start(self) -> None:
         """Record from now on."""
@@ -123,7 +199,7 @@ class _Keeper:
         self._service.state = "waiting"
         self._service.faults.report("disk_full", error.cause, str(self.recorder.folder))
 
-    async def look_regularly(self, subscriptions: Subscriptions) -> None:
+    async def look_regularly(self) -> None:
         """Keep the file and the service's health up to date, for ever."""
         while True:
             await asyncio.sleep(_FLUSH_S)
@@ -131,7 +207,7 @@ class _Keeper:
                 self._flush_or_resume()
             except DiskFullError as error:
                 self._suspend(error)
-            self._report(sum(samples.stats.dropped_in_all for _, samples in subscriptions))
+            self._report(self._dropped_in_all())
 
     def _flush_or_resume(self) -> None:
         recorder = self.recorder

@@ -20,6 +20,7 @@ from rhot import topics
 from rhot.bus.security import ros_keys
 from rhot.bus.security.roles import MASTER, Role, cameras_by_certificate, common_name
 from rhot.files.config import RigConfig
+from rhot.messages.recording import replay_rig
 from rhot.topics import Kind, Topic
 
 # Linux's and BSD's name of it.
@@ -47,8 +48,9 @@ SEEN = tuple(
     for topic in topics.TOPICS
     if topic is topics.SESSION or (topic.kind is Kind.STREAM and topic is not topics.SIM_FRAME)
 )
-# What may be asked without changing anything. A query with a payload changes colours and exposure,
-# and Zenoh's rules do not look at payloads: those keys are the master's.
+# What may be asked without changing anything. A query with a payload changes colours and exposure
+# or starts recording and replay, and Zenoh's rules do not look at payloads: those keys are the
+# master's. What is replayed, only the master's recorder sends.
 ASKED = (topics.SESSION, topics.CLOCK)
 
 
@@ -182,7 +184,8 @@ def _object_source(config: RigConfig, name: str) -> _Subject:
 
 def _viewer(config: RigConfig, name: str) -> _Subject:
     subject = _holder(config, "viewer", name)
-    _looks_on(subject, [config.rig.name, *config.bus.partners])
+    own = config.rig.name
+    _looks_on(subject, [own, replay_rig(own), *config.bus.partners])
     if ros_keys.in_rigs_router(config):
         _looks_on_in_ros(subject, config)
     return subject

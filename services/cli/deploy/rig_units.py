@@ -19,7 +19,10 @@ def master_units(config: RigConfig) -> list[str]:
     """Units of the master: what `rhot up` would run for the same file."""
     local = [camera for camera in config.camera if not camera.host]
     units = ["rhot-pi.target"] if local else []
-    units += ["rhot-router.service", "rhot-fusion.service", "rhot-viewer.service"]
+    # The recorder for the page, too, which starts, stops and replays recordings.
+    units += [
+        f"rhot-{name}.service" for name in ("router", "fusion", "viewer", "recorder")
+    ]
     units += [f"rhot-pi-tracker@{camera.name}.service" for camera in local]
     if config.has_depth:
         units.append("rhot-solver.service")
@@ -27,8 +30,6 @@ def master_units(config: RigConfig) -> list[str]:
         units.append("rhot-simulator.service")
     if config.object:
         units.append("rhot-object-tracker.service")
-    if config.recorder.autostart:
-        units.append("rhot-recorder.service")
     units += [f"rhot-bridge@{name}.service" for name in config.bridges.enabled]
     return units
 

@@ -52,8 +52,9 @@ def children_of(
         children.append(Child("openvr_bridge", service_argv("openvr_bridge", *common)))
     if viewer:
         children.append(Child("viewer", service_argv("viewer", *common)))
-    if config.recorder.autostart:
-        children.append(Child("recorder", service_argv("recorder", *common)))
+    # Without autostart for the page, which starts, stops and replays recordings.
+    if config.recorder.autostart or viewer:
+        children.append(Child("recorder", service_argv("recorder", *common, "--on-request")))
     if config.metrics.enabled:
         children.append(Child("metrics", service_argv("metrics", *common)))
     children += [

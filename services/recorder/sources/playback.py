@@ -31,6 +31,8 @@ State = Literal["playing", "paused", "ended"]
 _AHEAD = 512
 # Reading on may take so long (a chunk is unpacked in 1 ms): nothing must be due meanwhile.
 _READ_NS = 3_000_000
+# Who jumps while it is paused sees what is there: the messages of so long.
+_PEEK_NS = 100_000_000
 # Until somebody does something.
 _FOREVER_S = 3600.0
 
@@ -79,6 +81,8 @@ class Playback:
         self._records: Iterator[tuple[Record, Route]] | None = None
         self._changed = threading.Condition()
         self._jump_ns: int | None = self.window_ns[0]
+        # Up to here messages are sent although it is paused.
+        self._peek_ns = -1
         self._stopping = False
 
     @property
@@ -118,6 +122,7 @@ class Playback:
             self.position_ns = self._jump_ns
             if self.state == "ended":
                 self.state = "paused"
+            self._peek_ns = self._jump_ns + _PEEK_NS
             self._changed.notify_all()
 
     def stop(self) -> None:
@@ -195,17 +200,18 @@ class Playback:
         with self._changed:
             if self._jump_ns is not None or self._stopping:
                 return
-            if self.state == "paused":
+            paused = self.state == "paused"
+            if paused and record.log_time_ns > self._peek_ns:
                 self._changed.wait(_FOREVER_S)
                 return
             now_ns = time.monotonic_ns()
-            wait_ns = self._pace.due_ns(record.log_time_ns, now_ns) - now_ns
+            wait_ns = 0 if paused else self._pace.due_ns(record.log_time_ns, now_ns) - now_ns
             if wait_ns > 0 and not self._may_read(wait_ns):
                 self._changed.wait(wait_ns * 1e-9)
                 return
             if wait_ns <= 0:
                 self._ahead.popleft()
-                self.position_ns = record.log_time_ns
+                self.position_ns = self.position_ns if paused else record.log_time_ns
         if wait_ns > 0:
             self._read()
             # Others want the interpreter, too: without this they would wait up to 5 ms for it.

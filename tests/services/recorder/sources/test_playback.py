@@ -69,11 +69,14 @@ async def test_pause_jump_and_go_on(path: Path, payload: Callable[[int], bytes])
         start_ns = playback.summary.start_ns
         playback.seek(start_ns + 5_000_000_000)
         assert playback.position_ns == start_ns + 5_000_000_000
+        # What is there is shown, and no more.
+        await played.until(lambda: len(played.numbers) >= before + 11)
         await asyncio.sleep(0.05)
-        assert len(played.numbers) == before
+        assert played.numbers[before:] == list(range(500, 511))
+        assert playback.position_ns == start_ns + 5_000_000_000
         playback.play()
-        await played.until(lambda: len(played.numbers) > before + 2)
-        assert played.numbers[before : before + 3] == [500, 501, 502]
+        await played.until(lambda: len(played.numbers) > before + 12)
+        assert played.numbers[before + 11 : before + 13] == [511, 512]
         # Backwards, flat out: to the end.
         playback.seek(start_ns + 4_000_000_000)
         playback.set_rate(0.0)
