@@ -176,6 +176,9 @@ SIM_CLOCK = _query(
     Priority.DATA,
     "a simulated camera computer's clock; a query with a payload sets it",
 )
+SIM_STAGE = _query(
+    "sim/stage", s.SimStage, Priority.DATA, "what the simulator shows; a payload sets it"
+)
 
 # Pictures: only for who asks.
 PREVIEW: Topic[bytes] = Topic(
@@ -249,6 +252,9 @@ RECORDER = _query(
     "what the recorder does; a query with a RecorderRequest changes it",
 )
 RECORDINGS = _query("control/recordings", r.Recordings, Priority.DATA, "the recorder's files")
+CAPTION = _stream(
+    "control/caption", m.Caption, Rate.DEMAND, "what is happening, in words: a tour's captions"
+)
 CLOCK = _query("control/clock", m.ClockEcho, Priority.REAL_TIME, "the master's clock")
 HEALTH = Topic(
     "service/{service}/{instance}/health",
@@ -281,6 +287,7 @@ TOPICS: tuple[Topic, ...] = (
     CONTACTS,
     TRUTH,
     SIM_CLOCK,
+    SIM_STAGE,
     PREVIEW,
     FRAME,
     SIM_FRAME,
@@ -290,6 +297,7 @@ TOPICS: tuple[Topic, ...] = (
     SESSION,
     RECORDER,
     RECORDINGS,
+    CAPTION,
     CLOCK,
     HEALTH,
     ALIVE,

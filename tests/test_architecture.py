@@ -50,6 +50,7 @@ IMPURE_ROOMS = {
     "rhot/process",
     "services/pi_tracker/endpoints",
     "services/pi_tracker/sources",
+    "services/calibrator/endpoints",
     "services/object_tracker/drift.py",
     "services/object_tracker/sources",
     "services/bridges/endpoints",
@@ -62,6 +63,7 @@ IMPURE_ROOMS = {
     "services/viewer/pictures/feed.py",
     "services/viewer/server.py",
     "services/viewer/visits/visits.py",
+    "services/viewer/guide/captions.py",
     "rhot/watch/follow.py",
     "services/cli",
 }

@@ -230,6 +230,19 @@ class Session(Message, frozen=True, kw_only=True):
     sent_ns: Stamp = 0
 
 
+class Caption(Message, frozen=True, kw_only=True):
+    """What is happening, in words for who looks at the page; step of steps, both 0 outside a tour.
+
+    Sent once a second for as long as it holds.
+    """
+
+    title: Annotated[str, msgspec.Meta(max_length=100)]
+    text: Annotated[str, msgspec.Meta(max_length=600)]
+    step: Annotated[int, msgspec.Meta(ge=0, le=99)] = 0
+    steps: Annotated[int, msgspec.Meta(ge=0, le=99)] = 0
+    sent_ns: Stamp = 0
+
+
 class ClockEcho(Message, frozen=True, kw_only=True):
     """Answer to a clock query: the master's clock when it answered, and which master it is.
 

@@ -87,3 +87,23 @@ class SimClock(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """
 
     ahead_ns: Annotated[int, msgspec.Meta(ge=-_DAY_NS, le=_DAY_NS)]
+
+
+# Farther than half a turn is the same as less the other way round.
+_Degrees = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+
+
+class SimStage(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the simulator shows, and what has gone wrong with it: to be tried without any hardware.
+
+    scene is one of the catalogue's, "" the one of rig.toml. hidden are landmarks whose paint is
+    covered, as `right.index_tip`. turned_deg says how far cameras were turned about their own x
+    (down), y (right) and z after the calibration, which knows nothing of it. As a request: what
+    shall be.
+    """
+
+    scene: Annotated[str, msgspec.Meta(max_length=64)] = ""
+    hidden: Annotated[list[str], msgspec.Meta(max_length=64)] = msgspec.field(default_factory=list)
+    turned_deg: dict[Name, tuple[_Degrees, _Degrees, _Degrees]] = msgspec.field(
+        default_factory=dict
+    )

@@ -4,7 +4,8 @@ ground truth, in real time.
 Each camera runs at its own phase, in a thread of its own; a picture is published when a real one
 would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; the
 clock of a simulated camera computer is off by SimFrame.clock_skew_ns, and can be set
-(computer_clocks.py). Late: a camera that cannot keep up skips frames and counts them in health.
+(computer_clocks.py). Which scene is shown, covered paint and bumped cameras are set while it runs
+(stage.py). Late: a camera that cannot keep up skips frames and counts them in health.
 Uncalibrated: the service ends with the error that names the command. Nobody listens: it runs on.
 """
 
@@ -17,16 +18,17 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import cv2
+import msgspec
 
 from rhot import topics
 from rhot.files.config import RigConfig
-from rhot.messages.simulator import SimFrame
+from rhot.messages.simulator import SimFrame, SimStage
 from rhot.process.service import Service
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.computer_clocks import ComputerClocks
-from services.simulator.recorded_motion.scenes import live_scene
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
+from services.simulator.stage import Stage
 
 # From the last row's exposure to the picture in memory: the image processor of a Raspberry Pi.
 _PROCESSING_S = 3e-3
@@ -73,20 +75,24 @@ async def serve(service: Service) -> None:
     """Renders a virtual rig live: camera pictures, tracker poses and the ground truth."""
     cv2.setNumThreads(1)
     config = service.config
-    scene = live_scene(config)
+    stage = Stage(config)
     names = [c.name for c in config.camera if c.source == "simulator"]
     with ThreadPoolExecutor(max(1, len(names)), "camera") as threads:
         sources = [
-            await asyncio.get_running_loop().run_in_executor(threads, _compiled, scene, name)
+            await asyncio.get_running_loop().run_in_executor(
+                threads, _compiled, stage.seen_by(name), name
+            )
             for name in names
         ]
         clock, computers = SceneClock(), ComputerClocks(names)
+        service.bus.answer_requests(topics.SIM_STAGE, partial(_answer_stage, stage))
         async with asyncio.TaskGroup() as tasks:
             for source in sources:
-                tasks.create_task(_run_camera(service, source, clock, computers, threads))
-            tasks.create_task(_publish_truth(service, scene, clock))
+                camera = _LiveCamera(service, source, stage, threads)
+                tasks.create_task(_run_camera(camera, clock, computers))
+            tasks.create_task(_publish_truth(service, stage, clock))
             if config.objects.source == "simulator":
-                tasks.create_task(_publish_tracker_poses(service, scene, clock, config))
+                tasks.create_task(_publish_tracker_poses(service, stage, clock, config))
             service.ready()
 
 
@@ -97,15 +103,40 @@ def _compiled(scene: Scene, camera: str) -> FrameSource:
     return source
 
 
-async def _run_camera(
-    service: Service,
-    source: FrameSource,
-    clock: SceneClock,
-    computers: ComputerClocks,
-    threads: ThreadPoolExecutor,
-) -> None:
+async def _answer_stage(stage: Stage, payload: bytes) -> SimStage:
+    """What is shown, after the change that a request asks for."""
+    if payload:
+        # Where a hand takes an object is searched for: that takes longer than a frame.
+        await asyncio.to_thread(stage.set, msgspec.json.decode(payload, type=SimStage))
+    return stage.wanted
+
+
+class _LiveCamera:
+    """One camera's pictures, of what is on the stage at the time."""
+
+    def __init__(
+        self, service: Service, source: FrameSource, stage: Stage, threads: ThreadPoolExecutor
+    ) -> None:
+        self.service, self.source = service, source
+        self._stage, self._shown, self._threads = stage, stage.changes, threads
+
+    async def take(self, seq: int, start_ns: int) -> TakenFrame:
+        """Frame `seq`, rendered in a thread."""
+        return await asyncio.get_running_loop().run_in_executor(
+            self._threads, self._take, seq, start_ns
+        )
+
+    def _take(self, seq: int, start_ns: int) -> TakenFrame:
+        if self._shown != self._stage.changes:
+            self._shown = self._stage.changes
+            name = self.source.camera.name
+            self.source = FrameSource(self._stage.seen_by(name), name)
+        return self.source.take(seq, start_ns)
+
+
+async def _run_camera(live: _LiveCamera, clock: SceneClock, computers: ComputerClocks) -> None:
     """Render and publish the frames of one camera, for ever."""
-    loop = asyncio.get_running_loop()
+    service, source = live.service, live.source
     name, timing = source.camera.name, source.clock
     publisher = service.bus.publisher(topics.SIM_FRAME, camera=name)
     service.bus.answer_requests(topics.SIM_CLOCK, partial(computers.answer, name), camera=name)
@@ -122,7 +153,7 @@ async def _run_camera(
             values[f"{name}_skipped"] += skipped
             seq += skipped
         began_s, ahead_ns = clock.now_s(), computers.ahead_ns(name)
-        frame = await loop.run_in_executor(threads, source.take, seq, clock.start_ns())
+        frame = await live.take(seq, clock.start_ns())
         if frame.image is None:
             values[f"{name}_lost"] += 1
         else:
@@ -147,23 +178,23 @@ def _header(frame: TakenFrame, ahead_ns: int) -> SimFrame:
     )
 
 
-async def _publish_truth(service: Service, scene: Scene, clock: SceneClock) -> None:
+async def _publish_truth(service: Service, stage: Stage, clock: SceneClock) -> None:
     """The ground truth at every instant of the first camera."""
     publisher = service.bus.publisher(topics.TRUTH)
-    first = next(iter(scene.clocks.values()))
+    first = next(iter(stage.scene.clocks.values()))
     async for _, t_s in clock.ticks(first.period_s, first.phase_s):
-        publisher.put(scene.truth(t_s, clock.start_ns() + round(t_s * 1e9)))
+        publisher.put(stage.scene.truth(t_s, clock.start_ns() + round(t_s * 1e9)))
 
 
 async def _publish_tracker_poses(
-    service: Service, scene: Scene, clock: SceneClock, config: RigConfig
+    service: Service, stage: Stage, clock: SceneClock, config: RigConfig
 ) -> None:
     """The pose of every object's Vive tracker, at the rate of rig.toml."""
     publishers = [
-        service.bus.publisher(topics.OPENVR, serial=item.serial) for item in scene.objects
+        service.bus.publisher(topics.OPENVR, serial=item.serial) for item in stage.scene.objects
     ]
     async for seq, t_s in clock.ticks(1.0 / config.objects.rate_hz):
-        stamp_ns = clock.start_ns() + round(t_s * 1e9)
+        stamp_ns, scene = clock.start_ns() + round(t_s * 1e9), stage.scene
         for index, (item, publisher) in enumerate(
             zip(scene.objects, publishers, strict=True), start=1
         ):

@@ -8,37 +8,29 @@ error; Ctrl-C ends the collecting, and what was collected is used.
 from __future__ import annotations
 
 import asyncio
-import time
+import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
-import numpy as np
 import uvloop
 
-from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig
+from services.calibrator.endpoints.board_positions import BoardCollection, ask, ask_all, decoded
 from services.cli.router_session import endpoints_of, router_session
 from services.cli.terminal import Terminal
 from services.pi_tracker.image.frame import Frame
 
 if TYPE_CHECKING:
     from services.calibrator.board.board import Board
-    from services.calibrator.board.detect import Detection
-    from services.calibrator.board.live_selection import LiveSelection
 
-# A lossless 5 Mpx PNG takes a Pi 3 about a second to encode, and a slow network another one.
-_ANSWER_S = 5.0
 # Asked again this often, a fifth of a second later, then two: a router knows of a tracker that has
 # just come up by then.
 _ATTEMPTS, _RETRY_S = 3, 0.2
-# Without anything new for so long, nobody is there or the board cannot be seen.
-_PATIENCE_S = 120.0
-# Takes of a fast camera would otherwise saturate its Pi with encoding PNGs.
-_PAUSE_S = 0.1
 # Between two pictures of paint, so that noise, and a hand that nobody holds quite still, differ.
 _PAINT_PAUSE_S = 0.2
 
@@ -65,8 +57,8 @@ async def next_frames(bus: Bus, camera: str, count: int) -> list[Frame]:
     """
     frames: list[Frame] = []
     while len(frames) < count:
-        picture = (await _ask_all(bus, [camera]))[camera]
-        image = _decoded(camera, picture, cv2.IMREAD_COLOR)
+        picture = (await ask_all(bus, [camera]))[camera]
+        image = decoded(camera, picture, cv2.IMREAD_COLOR)
         size_px = (image.shape[1], image.shape[0])
         frames.append(Frame(camera, len(frames), 0, 0.0, size_px, image, "bgr"))
         await asyncio.sleep(_PAINT_PAUSE_S if len(frames) < count else 0.0)
@@ -89,7 +81,7 @@ async def _one_each(cameras: LiveCameras) -> dict[str, bytes]:
     async with router_session(cameras.rig.rig.name, cameras.endpoints) as bus:
         for attempt in range(_ATTEMPTS):
             await asyncio.sleep(_RETRY_S * attempt)
-            pictures |= await _ask(bus, [name for name in cameras.names if name not in pictures])
+            pictures |= await ask(bus, [name for name in cameras.names if name not in pictures])
             if len(pictures) == len(cameras.names):
                 break
     if not pictures:
@@ -98,33 +90,6 @@ async def _one_each(cameras: LiveCameras) -> dict[str, bytes]:
             "`rhot top` shows them"
         )
     return pictures
-
-
-async def _ask(bus: Bus, names: list[str]) -> dict[str, bytes]:
-    """One picture of every camera that answers, asked for at the same time."""
-    answers = await asyncio.gather(
-        *(bus.get(topics.FRAME, timeout_s=_ANSWER_S, camera=name) for name in names)
-    )
-    return {name: answer[0] for name, answer in zip(names, answers, strict=True) if answer}
-
-
-async def _ask_all(bus: Bus, names: list[str]) -> dict[str, bytes]:
-    """One picture of every camera; BusError if one does not answer."""
-    pictures = await _ask(bus, names)
-    silent = [name for name in names if name not in pictures]
-    if silent:
-        raise BusError(
-            f"camera {' and '.join(silent)} sends no picture; is its tracker running? "
-            "`rhot top` shows it"
-        )
-    return pictures
-
-
-def _decoded(name: str, picture: bytes, mode: int) -> np.ndarray:
-    image = cv2.imdecode(np.frombuffer(picture, dtype=np.uint8), mode)
-    if image is None:
-        raise BusError(f"camera {name!r} answered {len(picture)} bytes that are no picture")
-    return image
 
 
 def collect(cameras: LiveCameras, board: Board | None, square_m: float, count: int) -> Board:
@@ -143,9 +108,18 @@ def collect(cameras: LiveCameras, board: Board | None, square_m: float, count: i
         f"show the board to {' and '.join(names)} and hold it still; "
         f"pictures go to {cameras.folder}; Ctrl-C ends early"
     )
-    collection = _Collection(cameras.folder, names, square_m, count, teller)
+    numbers = itertools.count(_first_free(cameras.folder, names))
+
+    def keep(pictures: Mapping[str, bytes]) -> None:
+        number = next(numbers)
+        for name, picture in pictures.items():
+            (cameras.folder / f"{name}_{number:02d}.png").write_bytes(picture)
+
+    collection = BoardCollection(names, square_m, count, teller, keep)
     try:
-        uvloop.run(collection.run(board, cameras.rig.rig.name, cameras.endpoints))
+        uvloop.run(_run(collection, cameras, board))
+    except CalibrationError as error:
+        raise CalibrationError(f"{error}; the pictures so far are in {cameras.folder}") from None
     except KeyboardInterrupt:
         teller.line("ended early")
     finally:
@@ -155,88 +129,9 @@ def collect(cameras: LiveCameras, board: Board | None, square_m: float, count: i
     return collection.board
 
 
-class _Collection:
-    """One collecting of board positions, from the first picture to the last."""
-
-    def __init__(
-        self, folder: Path, names: list[str], square_m: float, count: int, teller: Terminal
-    ) -> None:
-        self.board: Board | None = None
-        self._folder, self._names, self._teller = folder, names, teller
-        self._square_m, self._count = square_m, count
-        self._next = _first_free(folder, names)
-        self._size: tuple[int, int] | None = None
-
-    async def run(self, board: Board | None, rig_name: str, endpoints: list[str]) -> None:
-        """Ask, compare, keep, until there are enough."""
-        from services.calibrator.board.live_selection import LiveSelection
-
-        async with router_session(rig_name, endpoints) as bus:
-            collector: LiveSelection | None = None
-            news_s = time.monotonic()
-            while collector is None or not collector.done:
-                pictures = await _ask_all(bus, self._names)
-                images = {
-                    name: await asyncio.to_thread(_decoded, name, picture, cv2.IMREAD_GRAYSCALE)
-                    for name, picture in pictures.items()
-                }
-                if collector is None:
-                    board = board or await asyncio.to_thread(self._counted, images)
-                    collector = LiveSelection(self._names, board, self._count) if board else None
-                if collector is not None and await self._offer(collector, images, pictures):
-                    news_s = time.monotonic()
-                if time.monotonic() - news_s > _PATIENCE_S:
-                    raise CalibrationError(self._given_up(collector))
-                await asyncio.sleep(_PAUSE_S)
-
-    async def _offer(
-        self, collector: LiveSelection, images: dict[str, np.ndarray], pictures: dict[str, bytes]
-    ) -> bool:
-        """Whether the position was kept."""
-        from services.calibrator.board.live_selection import Verdict
-
-        seen = {
-            name: await asyncio.to_thread(_detected, image, collector)
-            for name, image in images.items()
-        }
-        take = collector.offer(seen)
-        kept = take.verdict is Verdict.KEPT
-        if kept:
-            self.board = collector.board
-            self._keep(pictures)
-            self._teller.line(collector.text())
-        self._teller.status(collector.text(take))
-        return kept
-
-    def _counted(self, images: dict[str, np.ndarray]) -> Board | None:
-        from services.calibrator.board.board import Board
-        from services.calibrator.board.board_size import find_board_size
-
-        before, self._size = self._size, find_board_size(images.values())
-        # A board that is just coming into the picture is counted too small: two takes must agree.
-        if self._size is None or self._size != before:
-            self._teller.status("looking for the board: show all of it, and hold it still")
-            return None
-        self._teller.line(f"a board of {self._size[0]}x{self._size[1]} inner corners")
-        return Board(*self._size, self._square_m)
-
-    def _keep(self, pictures: dict[str, bytes]) -> None:
-        for name, picture in pictures.items():
-            (self._folder / f"{name}_{self._next:02d}.png").write_bytes(picture)
-        self._next += 1
-
-    def _given_up(self, collector: LiveSelection | None) -> str:
-        state = collector.text() if collector else "no board was seen"
-        return (
-            f"nothing new was shown for {_PATIENCE_S:.0f} s ({state}); "
-            f"the pictures so far are in {self._folder}"
-        )
-
-
-def _detected(image: np.ndarray, collector: LiveSelection) -> Detection | None:
-    from services.calibrator.board.detect import detect
-
-    return detect(image, collector.board, quick=True)
+async def _run(collection: BoardCollection, cameras: LiveCameras, board: Board | None) -> None:
+    async with router_session(cameras.rig.rig.name, cameras.endpoints) as bus:
+        await collection.run(bus, board)
 
 
 def _first_free(folder: Path, names: list[str]) -> int:

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Coroutine
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,13 +21,18 @@ import uvloop
 from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.errors import ConfigError
-from rhot.files.config import load_rig
+from rhot.files.config import RigConfig, load_rig
 from rhot.process.event_loop import cancelled_by, stop_on_signals
+from services.cli.demo.evidence import Evidence
 from services.cli.demo.metrics import DemoMetrics
+from services.cli.demo.narrator import Narrator
 from services.cli.demo.summary import Summary, summary_text
+from services.cli.demo.tour import SCENE as TOUR_SCENE
+from services.cli.demo.tour import STEPS, Tour, touring
 from services.cli.live.supervisor import Supervisor
 from services.cli.live.up import children_of
 from services.cli.live.working_copy import has_rig, working_copy
+from services.cli.option_groups import grouped
 from services.cli.options import VerboseOption
 from services.cli.terminal import Terminal
 
@@ -38,6 +44,26 @@ SCENE = "grab"
 _POLL_S = 0.25
 
 
+@dataclass(frozen=True)
+class Shown:
+    """For how long, where, and whether it is explained."""
+
+    tour: Annotated[
+        bool,
+        typer.Option(
+            "--tour",
+            help="explain what is seen, again and again: the hand, lost paint, a bumped camera, a "
+            "grasp; in the terminal and in the browser",
+        ),
+    ] = False
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary"),
+    ] = None
+    viewer: Annotated[bool, typer.Option(help="show the hand in a browser")] = True
+
+
+@grouped
 def demo(
     config: Annotated[
         Path | None,
@@ -55,28 +81,25 @@ def demo(
     scene: Annotated[
         str | None,
         typer.Option(
-            help="what the simulated hand does; `rhot simulate --list` names the scenes. "
-            f"Default: {SCENE}, where it takes a cup"
+            help="what the simulated hand does: pinch, fist, wave, piano, grasp; `rhot simulate "
+            "--list` names all. Default: grasp, where it takes a cup"
         ),
     ] = None,
-    seconds: Annotated[
-        float | None,
-        typer.Option(min=0.5, help="end by itself this long after the first pose, with a summary"),
-    ] = None,
-    viewer: Annotated[bool, typer.Option(help="show the hand in a browser")] = True,
+    *,
+    shown: Shown,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
     verbose: VerboseOption = False,
 ) -> None:
     """Run the whole rig, simulated: a hand that takes a cup, live in the browser."""
-    with _rig(config, folder, scene) as path:
+    with _rig(config, folder, scene, tour=shown.tour) as path:
         terminal = Terminal(verbose=verbose)
         if config is None:
             kept = "" if folder else "; removed at the end, --folder DIR keeps it"
             terminal.line(f"working folder {path.parent}{kept}")
-        summary = uvloop.run(_demo(path, seconds, viewer, terminal))
+        summary = uvloop.run(_demo(path, shown, terminal))
     if as_json:
         typer.echo(msgspec.json.encode(summary).decode())
-    elif seconds is not None or summary.poses:
+    elif shown.seconds is not None or summary.poses:
         typer.echo(summary_text(summary))
     if not summary.poses:
         typer.echo(
@@ -86,11 +109,15 @@ def demo(
 
 
 def _rig(
-    config: Path | None, folder: Path | None, scene: str | None
+    config: Path | None, folder: Path | None, scene: str | None, *, tour: bool
 ) -> contextlib.AbstractContextManager[Path]:
     """The rig.toml to run; raises ConfigError where options do not go together."""
+    if tour and (config or scene):
+        raise ConfigError(
+            "--tour shows rhot's own rig and scenes of its own: leave --config and --scene out"
+        )
     if config is None:
-        return working_copy(folder, _scene(scene, folder))
+        return working_copy(folder, _scene(TOUR_SCENE if tour and not folder else scene, folder))
     if folder is not None:
         raise ConfigError(
             "--folder is for rhot's own rig, --config for another one, which runs where it is: "
@@ -117,7 +144,7 @@ def _scene(wanted: str | None, folder: Path | None) -> str | None:
     return wanted
 
 
-async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Terminal) -> Summary:
+async def _demo(path: Path, shown: Shown, terminal: Terminal) -> Summary:
     stopping = stop_on_signals()
     config = load_rig(path)
     supervisor, metrics = Supervisor(terminal.log), DemoMetrics()
@@ -126,7 +153,7 @@ async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Termi
         async with asyncio.TaskGroup() as tasks:
             keepers = [
                 tasks.create_task(supervisor.keep_running(child))
-                for child in children_of(config, path, viewer=viewer, endpoint=[endpoint])
+                for child in children_of(config, path, viewer=shown.viewer, endpoint=[endpoint])
             ]
             terminal.line(
                 f"rig {config.rig.name!r}, scene {config.simulator.scene!r}, "
@@ -134,7 +161,7 @@ async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Termi
             )
             try:
                 async with open_bus(config.rig.name, [endpoint]) as bus:
-                    await _measure(bus, metrics, seconds, terminal)
+                    await _measure(bus, metrics, shown, terminal, config)
             finally:
                 for keeper in keepers:
                     keeper.cancel()
@@ -143,13 +170,17 @@ async def _demo(path: Path, seconds: float | None, viewer: bool, terminal: Termi
 
 
 async def _measure(
-    bus: Bus, metrics: DemoMetrics, seconds: float | None, terminal: Terminal
+    bus: Bus, metrics: DemoMetrics, shown: Shown, terminal: Terminal, config: RigConfig
 ) -> None:
     """Feed the metrics from the bus until the time is over."""
     async with asyncio.TaskGroup() as tasks:
-        subscribed = [tasks.create_task(one) for one in _subscribers(bus, metrics, terminal)]
-        await _until_done(metrics, seconds, terminal)
-        for task in subscribed:
+        besides = [*_subscribers(bus, metrics, terminal)]
+        if shown.tour:
+            narrator = Narrator(bus, terminal, STEPS)
+            besides.append(touring(Tour(bus, config, narrator, Evidence(), metrics)))
+        started = [tasks.create_task(one) for one in besides]
+        await _until_done(metrics, shown.seconds, terminal)
+        for task in started:
             task.cancel()
 
 

@@ -154,16 +154,21 @@ SCENES: dict[str, SceneSpec] = {
 }
 
 
+# Other words for the same scene.
+ALSO = {"grasp": "grab"}
+
+
 def scene_spec(name: str) -> SceneSpec:
     """The scene of that name.
 
     Raises ConfigError listing the valid names.
     """
+    name = ALSO.get(name, name)
     if name not in SCENES:
         near = difflib.get_close_matches(name, SCENES, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ConfigError(
-            f"no scene {name!r}; {hint}Valid: {', '.join(SCENES)}."
+            f"no scene {name!r}; {hint}Valid: {', '.join([*SCENES, *ALSO])}."
             " Set it in [simulator] of rig.toml or on the command line"
         )
     return SCENES[name]

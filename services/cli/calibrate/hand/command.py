@@ -20,10 +20,10 @@ from rhot.files.calibration import save
 from rhot.hand import DIGITS, HandName
 from rhot.hand_exercises import EXERCISE_S, EXERCISES
 from rhot.messages import HandPoints
+from services.calibrator.guided.hand_fitting import Wanted, from_either, from_exercises, from_motion
 from services.calibrator.hand.free_motion.frames import GOOD_SECONDS, MIN_SECONDS
 from services.cli.calibrate import options
 from services.cli.calibrate.hand.exercises import follow_exercises
-from services.cli.calibrate.hand.fitting import Wanted, from_either, from_exercises, from_motion
 from services.cli.calibrate.hand.recorded import recorded
 from services.cli.calibrate.hand.watch import watch_hand
 from services.cli.option_groups import grouped

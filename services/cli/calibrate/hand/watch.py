@@ -16,10 +16,10 @@ from rhot.client import RigClient
 from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
 from rhot.messages import HandPoints
+from services.calibrator.endpoints.hand_exercises import require_hand
+from services.calibrator.guided.hand_fitting import Wanted, from_motion
 from services.calibrator.output.hand_file import HandFile
 from services.calibrator.output.hand_report import proposal_text
-from services.cli.calibrate.hand.exercises import require_hand
-from services.cli.calibrate.hand.fitting import Wanted, from_motion
 from services.cli.router_session import router_session
 from services.cli.terminal import Terminal
 

@@ -18,8 +18,7 @@ import typer
 from rhot.errors import CalibrationError
 from rhot.files.calibration import ObjectPlace, Objects, load_objects, load_rig_cameras, save
 from rhot.files.config import RigConfig
-from services.cli.calibrate import options
-from services.cli.calibrate.objects.wanted import (
+from services.calibrator.objects.wanted import (
     Painted,
     Place,
     note_on_colors,
@@ -27,12 +26,13 @@ from services.cli.calibrate.objects.wanted import (
     places_of,
     same_place,
 )
+from services.cli.calibrate import options
 from services.cli.option_groups import grouped
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints
 
 if TYPE_CHECKING:
-    from services.cli.calibrate.objects.recording import Recorded
+    from services.calibrator.objects.recorded import Recorded
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Objects
 from rhot.geometry.camera import Camera
-from services.cli.calibrate.objects.recording import Recorded
-from services.cli.calibrate.objects.wanted import Painted
+from services.calibrator.objects.recorded import Recorded
+from services.calibrator.objects.wanted import Painted
 
 if TYPE_CHECKING:
     from services.object_tracker.monitors.drift_fit import DriftSamples

@@ -19,8 +19,8 @@ from rhot.bus.bus import Bus
 from rhot.errors import CalibrationError
 from rhot.geometry.camera import Camera
 from rhot.messages import MarkerFrame
-from services.cli.calibrate.objects.recording import Recorded
-from services.cli.calibrate.objects.wanted import Painted
+from services.calibrator.objects.recorded import Recorded
+from services.calibrator.objects.wanted import Painted
 from services.cli.router_session import router_session
 from services.cli.terminal import Terminal
 
@@ -74,12 +74,7 @@ def listen(session: Session, missing: Missing) -> Recorded:
 
 def enough_motion(recorded: Recorded, one: Painted, cameras: Mapping[str, Camera]) -> list[str]:
     """What a registration still lacks."""
-    from services.calibrator.objects.guidance import motion_still_missing
-    from services.calibrator.objects.tracker_path import tracker_path
-
-    seen = recorded.sightings(cameras, [one])[one.serial]
-    path = tracker_path(recorded.poses.get(one.serial, []))
-    return motion_still_missing(seen, path)
+    return recorded.still_missing(one, cameras)
 
 
 def nothing_more(recorded: Recorded, one: Painted, cameras: Mapping[str, Camera]) -> list[str]:

@@ -17,7 +17,7 @@ from rhot.bus.bus import open_bus
 from rhot.errors import BusError, CalibrationError
 from rhot.files.config import RigConfig, load_rig
 from services.calibrator.board.board import Board
-from services.cli.calibrate import live_pictures
+from services.calibrator.endpoints import board_positions
 from services.cli.calibrate.live_pictures import LiveCameras, collect, one_each
 from testing.synthetic_boards import BenchSetup
 
@@ -91,7 +91,7 @@ async def test_a_camera_that_is_silent_is_named(rig, router, shown, tmp_path):
 
 
 async def test_nobody_showing_anything_new_ends_it(rig, router, shown, tmp_path, monkeypatch):
-    monkeypatch.setattr(live_pictures, "_PATIENCE_S", 0.5)
+    monkeypatch.setattr(board_positions, "_PATIENCE_S", 0.5)
     async with cameras(router, {name: pictures[:1] for name, pictures in shown.items()}):
         with pytest.raises(CalibrationError, match="nothing new was shown") as ended:
             await asyncio.to_thread(

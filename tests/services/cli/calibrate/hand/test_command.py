@@ -21,9 +21,9 @@ from rhot.files.config import RigConfig
 from rhot.hand import default_hand
 from rhot.hand_exercises import EXERCISES
 from rhot.messages import HandPoints
+from services.calibrator.guided.hand_fitting import Wanted
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.calibrate.hand.command import lengths_of
-from services.cli.calibrate.hand.fitting import Wanted
 from services.cli.calibrate.hand.recorded import recorded
 from services.cli.calibrate.hand.watch import hand_in_use
 from services.cli.terminal import Terminal

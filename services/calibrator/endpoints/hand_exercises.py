@@ -1,0 +1,70 @@
+"""The exercises of a hand, live: a person is told what to do, and its points are kept."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from rhot import topics
+from rhot.bus.bus import Bus
+from rhot.errors import CalibrationError
+from rhot.files.config import RigConfig
+from rhot.hand import BASIC_LANDMARKS, HANDS, HandName
+from rhot.hand_exercises import CYCLE_S, EXERCISE_S, EXERCISES
+from rhot.messages import HandPoints
+
+# Time to read the first exercise and bring the hand into view.
+READY_S = 3.0
+# So long without a message from fusion nobody need go on.
+_SILENT_S = 5.0
+
+
+class Exercising(NamedTuple):
+    """How far a person is: number of the exercise, -1 before the first; landmarks not seen now."""
+
+    number: int
+    passed_s: float
+    missing: list[str]
+
+
+async def follow_exercises(
+    bus: Bus, which: HandName, tell: Callable[[Exercising], None]
+) -> list[HandPoints]:
+    """One pass through the exercises; `tell` hears of every message.
+
+    Raises CalibrationError if no points come.
+    """
+    points = bus.every(topics.POINTS, 256, hand=which)
+    messages: list[HandPoints] = []
+    try:
+        tell(Exercising(-1, 0.0, []))
+        await asyncio.sleep(READY_S)
+        began_s = time.monotonic()
+        while (passed_s := time.monotonic() - began_s) < CYCLE_S:
+            try:
+                message = await asyncio.wait_for(anext(points), _SILENT_S)
+            except TimeoutError:
+                raise CalibrationError(
+                    f"no points of the {which} hand for {_SILENT_S:.0f} s: is fusion running and "
+                    "the hand in view? `rhot top` shows it"
+                ) from None
+            messages.append(message)
+            number = min(int(passed_s // EXERCISE_S), len(EXERCISES) - 1)
+            tell(Exercising(number, passed_s, _missing(message)))
+    finally:
+        bus.close(points)
+    return messages
+
+
+def require_hand(rig: RigConfig, which: HandName) -> None:
+    """Raises CalibrationError if rig.toml has no such hand."""
+    if which not in rig.hand:
+        others = ", ".join(hand for hand in HANDS if hand in rig.hand) or "no hand"
+        raise CalibrationError(f"rig.toml has no [hand.{which}.markers]; it has {others}")
+
+
+def _missing(message: HandPoints) -> list[str]:
+    seen = {point.name for point in message.points if point.source == "measured"}
+    return [name for name in BASIC_LANDMARKS if name not in seen]
