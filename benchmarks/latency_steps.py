@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from latency_rig import Recording
 
-from rhot.hand import default_hand
+from rhot.hand import HandModel, HandName, default_hand
 from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.step import FusionStep
 from services.solver.maths.chains import hand_chains
@@ -33,7 +33,7 @@ def alone_us(recording: Recording) -> dict[str, float]:
 
     Processor time: what else this machine does is not counted.
     """
-    hands = {"right": default_hand("right")}
+    hands: dict[HandName, HandModel] = {"right": default_hand("right")}
     fusion = FusionStep(recording.rig.config(), recording.rig.rig(), hands)
     solver = SolverStep(recording.rig.config(), hands)
     times: dict[str, list[float]] = {}
@@ -50,9 +50,11 @@ def alone_us(recording: Recording) -> dict[str, float]:
     for frame, due in zip(recording.frames, recording.points, strict=True):
         taken = timed("decode_markers", decode_markers, msgspec.json.encode(frame))
         told = timed("fusion_silent" if due is None else "fusion_telling", fusion.step, taken)
+        timed("fusion_settle", fusion.settle)
         for points in told:
             heard = timed("decode_points", decode_points, timed("encode_points", encode, points))
             pose = timed("solver", solver.step, heard)
+            solver.challenge("right")
             if pose is not None:
                 timed("encode_pose", encode, pose)
                 fusion.note_pose(pose)

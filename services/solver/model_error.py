@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,9 +31,10 @@ from services.solver.maths.kinematics import digit_frames
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MAX_GAP_S
 from services.solver.whole_hand.landmarks import (
-    Landmark,
+    Landmarks,
     Observation,
     Observations,
+    Observed,
     observation_arrays,
 )
 from services.solver.whole_hand.motion_prior import UNKNOWNS
@@ -74,9 +74,7 @@ _EXACT = Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 class ModelError:
     """The errors of one hand's model, and what they have done to its pose."""
 
-    def __init__(
-        self, model: HandModel, chains: HandChains, landmarks: Mapping[str, Landmark]
-    ) -> None:
+    def __init__(self, model: HandModel, chains: HandChains, landmarks: Landmarks) -> None:
         """landmarks: all of the model (landmarks.hand_landmarks)."""
         spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
         paint = [spread.tip_paint_m if name in TIPS else spread.dab_m for name in landmarks]
@@ -85,17 +83,17 @@ class ModelError:
         self._sigmas = np.concatenate(
             [[spread.size], [spread.bone] * 15, [spread.root_m] * 15, np.ravel(paint)]
         )
+        self._known_wrong = bool(self._sigmas.any())
         self._S = np.zeros((UNKNOWNS, len(self._sigmas)))
         self._stamp_ns = 0
 
-    def widened(self, observed: Mapping[str, Observation]) -> dict[str, Observation]:
+    def widened(self, observed: Mapping[str, Observation]) -> Observed:
         """Landmarks known no better than the model knows where they sit."""
+        seen = Observed.of(observed)
         if self._landmark_m == 0.0:
-            return dict(observed)
-        return {
-            name: replace(seen, covariance_m2=seen.covariance_m2 + self._landmark_m**2 * np.eye(3))
-            for name, seen in observed.items()
-        }
+            return seen
+        wider_m2 = seen.covariances_m2 + self._landmark_m**2 * np.eye(3)
+        return Observed(seen.names, seen.points_m, wider_m2, seen.measured)
 
     def pose_covariance(
         self, stamp_ns: int, estimate: HandEstimate, observed: Mapping[str, Observation]
@@ -104,32 +102,53 @@ class ModelError:
 
         observed: the landmarks that it was fitted to, widened.
         """
-        covariance = _FIT_SHARE * estimate.covariance
-        if not self._sigmas.any():
-            return covariance
+        if not self._known_wrong:
+            return _FIT_SHARE * estimate.covariance
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
-        if 0.0 <= seconds <= MAX_GAP_S:
-            self._S[6:] *= math.exp(-seconds / _FORGET_S)
-        else:
-            self._S[:] = 0.0
-        observations = observation_arrays(self._landmarks, observed)
-        columns = np.array([self._column[name] for name in observed], dtype=np.int64)
-        H = np.zeros((3 * len(observed), UNKNOWNS))
-        J = np.zeros((3 * len(observed), len(self._sigmas)))
-        _fill_derivatives(
-            self._chains, observations, columns, estimate.rotation, estimate.angles_rad, (H, J)
+        is_gap = not 0.0 <= seconds <= MAX_GAP_S
+        seen = Observed.of(observed)
+        columns = np.array([self._column[name] for name in seen.names], dtype=np.int64)
+        return _considered(
+            self._chains,
+            observation_arrays(self._landmarks, seen),
+            columns,
+            (estimate.rotation, estimate.angles_rad, estimate.covariance),
+            (self._S, self._sigmas),
+            0.0 if is_gap else math.exp(-seconds / _FORGET_S),
         )
-        H, J = _whitened(observations.whitening, H), _whitened(observations.whitening, J)
-        self._S -= estimate.covariance @ (H.T @ (H @ self._S + J))
-        scaled = self._S * self._sigmas
-        return covariance + scaled @ scaled.T
 
 
-def _whitened(whitening: Array, derivatives: Array) -> Array:
-    """Derivatives (3 m, n) of m landmarks, in their standard deviations."""
-    m, n = len(whitening), derivatives.shape[1]
-    return np.asarray((whitening @ derivatives.reshape(m, 3, n)).reshape(3 * m, n))
+@njit(cache=True)
+def _considered(
+    chains: HandChains,
+    observations: Observations,
+    paint_columns: Integers,
+    estimate: tuple[Array, Array, Array],
+    errors: tuple[Array, Array],
+    keep: float,
+) -> Array:
+    """The covariance (26, 26) of a pose with what the model's errors add to it.
+
+    estimate: rotation (3, 3), angles (5, 4) and covariance (26, 26) of the fit. errors: S (26, b),
+    taken on to this message, and their standard deviations (b,). keep: how much of an old error's
+    effect on the angles is left, 0: of its effect on anything.
+    """
+    rotation, angles, covariance = estimate
+    S, sigmas = errors
+    if keep == 0.0:
+        S[:] = 0.0
+    S[6:] *= keep
+    H = np.zeros((3 * observations.joint.size, UNKNOWNS))
+    J = np.zeros((3 * observations.joint.size, sigmas.size))
+    _fill_derivatives(chains, observations, paint_columns, rotation, angles, (H, J))
+    for n in range(observations.joint.size):
+        rows = slice(3 * n, 3 * n + 3)
+        H[rows] = observations.whitening[n] @ H[rows]
+        J[rows] = observations.whitening[n] @ J[rows]
+    S -= covariance @ (H.T @ (H @ S + J))
+    scaled = S * sigmas
+    return _FIT_SHARE * covariance + scaled @ scaled.T
 
 
 @njit(cache=True)

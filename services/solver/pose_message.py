@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS, JOINT_INDEX, JOINTS
@@ -61,15 +63,16 @@ def hand_pose(
     """The message; fingers are already rounded and within limits."""
     positions = rounded(skeleton.positions_m)
     orientations = rounded(quaternions_from_rotations(skeleton.rotations))
+    parts = zip(JOINTS, positions, orientations, skeleton.radii_m, skeleton.sources, strict=True)
     joints = [
         HandJoint(
             name=name,
-            position_m=tuple(positions[joint]),
-            orientation_wxyz=tuple(orientations[joint]),
-            radius_m=skeleton.radii_m[joint],
-            source=skeleton.sources[joint],
+            position_m=tuple(position),
+            orientation_wxyz=tuple(orientation),
+            radius_m=radius_m,
+            source=source,
         )
-        for joint, name in enumerate(JOINTS)
+        for name, position, orientation, radius_m, source in parts
     ]
     wrist = joints[JOINT_INDEX["wrist"]]
     return HandPose(
@@ -114,11 +117,13 @@ def rounded_within_limits(angles: Array, limits: Array) -> Array:
 
     Rounding alone would cross a limit here and there.
     """
-    inside = np.clip(np.round(angles, _DECIMALS), limits[:, :, 0], limits[:, :, 1])
-    return inside + 0.0
+    inside = np.maximum(np.round(angles, _DECIMALS), limits[:, :, 0])
+    return np.minimum(inside, limits[:, :, 1]) + 0.0
 
 
-def joint_sources(measured: set[str], located: bool, digit_solved: list[bool]) -> list[JointSource]:
+def joint_sources(
+    measured: Collection[str], located: bool, digit_solved: list[bool]
+) -> list[JointSource]:
     """Of each joint: measured, solved or predicted.
 
     Measured: its landmark was seen; solved: landmarks fix it; predicted: only the priors do.
@@ -139,14 +144,27 @@ def pose_uncertainty(covariance: Array, limits: Array) -> PoseUncertainty:
 
     Half a turn and a metre say: unknown.
     """
-    variance = np.maximum(np.diag(covariance), 0.0)
-    movable = limits[:, :, 1] > limits[:, :, 0]
-    count = np.maximum(movable.sum(axis=1), 1)
-    angles = np.where(movable, variance[6:].reshape(5, 4), 0.0).sum(axis=1) / count
-    wrist_rad = math.sqrt(variance[:3].sum())
-    wrist_m = math.sqrt(variance[3:6].sum())
+    wrist_m, wrist_rad, *fingers_rad = _standard_deviations(covariance, limits).tolist()
     return PoseUncertainty(
         wrist_m=min(wrist_m, 1.0),
         wrist_rad=min(wrist_rad, math.pi),
-        fingers_rad=np.minimum(np.sqrt(angles), math.pi).tolist(),
+        fingers_rad=[min(sigma_rad, math.pi) for sigma_rad in fingers_rad],
     )
+
+
+@njit(cache=True)
+def _standard_deviations(covariance: Array, limits: Array) -> Array:
+    """Of the wrist's position and rotation, as lengths, and of each digit's angles (7,)."""
+    found = np.zeros(7)
+    for i in range(3):
+        found[0] += max(covariance[3 + i, 3 + i], 0.0)
+        found[1] += max(covariance[i, i], 0.0)
+    for row in range(5):
+        movable = 0
+        for j in range(4):
+            if limits[row, j, 1] > limits[row, j, 0]:
+                angle = 6 + 4 * row + j
+                movable += 1
+                found[2 + row] += max(covariance[angle, angle], 0.0)
+        found[2 + row] /= max(movable, 1)
+    return np.sqrt(found)

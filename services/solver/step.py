@@ -11,13 +11,14 @@ sigmas that say so (model_error.py). Absurd points are dropped (whole_hand/point
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 
 import numpy as np
 
 from rhot.files.config import RigConfig
-from rhot.hand import DIGITS, TIPS, HandModel, HandName, joint_radii_m
-from rhot.messages import HandPoints, HandPose
-from services.solver.finger.solve_fingers import FingerSolution, TipObservation, solve_fingers
+from rhot.hand import HandModel, HandName, joint_radii_m
+from rhot.messages import HandPoints, HandPose, JointSource
+from services.solver.finger.solve_fingers import FingerSolution, solve_fingers, tips_in_wrist
 from services.solver.maths.kinematics import hand_frames
 from services.solver.model_check import check_model
 from services.solver.model_error import ModelError
@@ -31,8 +32,11 @@ from services.solver.pose_message import (
 )
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandTracker
-from services.solver.whole_hand.landmarks import Observation, hand_landmarks
+from services.solver.whole_hand.landmarks import Observed, hand_landmarks
 from services.solver.whole_hand.point_check import usable_points
+
+# Sets of measured landmarks whose joints' sources are remembered: fingers come and go.
+_MAX_SETS = 256
 
 
 class SolverStep:
@@ -71,6 +75,8 @@ class _Hand:
         self._landmarks = hand_landmarks(model)
         self.tracker = HandTracker(model, self._landmarks)
         self._model_error = ModelError(model, self.tracker.chains, self._landmarks)
+        # By the landmarks that were measured.
+        self._known_sources: dict[frozenset[str], list[JointSource]] = {}
         self._radii: list[float] = rounded(joint_radii_m(model))
 
     def step(self, points: HandPoints) -> HandPose | None:
@@ -89,27 +95,25 @@ class _Hand:
             pose_uncertainty(covariance, limits),
         )
 
-    def _solve_fingers(
-        self, estimate: HandEstimate, observed: Mapping[str, Observation]
-    ) -> FingerSolution:
+    def _solve_fingers(self, estimate: HandEstimate, observed: Observed) -> FingerSolution:
         """The digits by the configured method, angles rounded as they go out."""
         chains = self.tracker.chains
-        tips = {
-            digit: _tip_in_wrist(estimate, observed[name])
-            for digit, name in zip(DIGITS, TIPS, strict=True)
-            if name in observed
-        }
+        tips = tips_in_wrist(
+            estimate.rotation,
+            estimate.position_m,
+            self._landmarks.places(observed.names).tip,
+            observed.points_m,
+            observed.covariances_m2,
+            observed.measured,
+        )
         found = solve_fingers(self._settings, chains, estimate.angles_rad, tips)
         angles = rounded_within_limits(found.angles_rad, chains.limits_rad)
         return FingerSolution(angles, found.residual_m, found.iterations, found.status)
 
     def _skeleton(
-        self, estimate: HandEstimate, fingers: FingerSolution, observed: Mapping[str, Observation]
+        self, estimate: HandEstimate, fingers: FingerSolution, observed: Observed
     ) -> Skeleton:
         """All joints at the estimate's wrist and the fingers' angles, and where each comes from."""
-        measured = {name for name, observation in observed.items() if observation.measured}
-        located = len(measured) >= MIN_LANDMARKS
-        solved = [any(self._landmarks[name].digit == row for name in measured) for row in range(5)]
         positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
         hand_frames(
             self.tracker.chains,
@@ -119,12 +123,16 @@ class _Hand:
             positions,
             rotations,
         )
-        sources = joint_sources(measured, located, solved)
-        return Skeleton(positions, rotations, self._radii, sources)
+        measured = frozenset(compress(observed.names, observed.measured.tolist()))
+        return Skeleton(positions, rotations, self._radii, self._sources(measured))
 
-
-def _tip_in_wrist(estimate: HandEstimate, observation: Observation) -> TipObservation:
-    """A painted tip in the wrist frame of an estimate."""
-    sigma = float(np.sqrt(np.trace(observation.covariance_m2) / 3.0))
-    p_wrist = estimate.rotation.T @ (observation.point_m - estimate.position_m)
-    return TipObservation(p_wrist, sigma, observation.measured)
+    def _sources(self, measured: frozenset[str]) -> list[JointSource]:
+        """Where each joint comes from; the same few sets of landmarks come again and again."""
+        known = self._known_sources.get(measured)
+        if known is None:
+            located = len(measured) >= MIN_LANDMARKS
+            digits = {self._landmarks[name].digit for name in measured}
+            known = joint_sources(measured, located, [row in digits for row in range(5)])
+            if len(self._known_sources) < _MAX_SETS:
+                self._known_sources[measured] = known
+        return known

@@ -161,7 +161,8 @@ def test_a_solver_method(module, monkeypatch):
     canonical = module.tip_position(chain, truth[1])
     side = np.array([chains.side, 1.0, 1.0])
     point = chains.base_m[1] + chains.base_rotation[1] @ (side * canonical)
-    tips = {"index": fingers.TipObservation(point, 1e-3, True)}
+    seen = np.array([0, fingers.MEASURED, 0, 0, 0])
+    tips = fingers.Tips(np.tile(point, (5, 1)), np.full(5, 1e-3), seen)
     start = np.tile([0.0, 0.3, 0.3, 0.2], (5, 1))
     settings = Solver(method="trust-region", tolerance_m=1e-5)
     found = fingers.solve_fingers(settings, chains, start, tips)

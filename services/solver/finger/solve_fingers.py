@@ -7,22 +7,28 @@ keeps the whole-hand estimate and is `predicted`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+from numba import njit
 
 from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import Array
-from rhot.hand import DIGITS
 from services.solver.finger import analytic, dls, dls_paper, fabrik, fabrik_paper
 from services.solver.finger.outcome import NOT_CONVERGED, SOLVED, UNREACHABLE
 from services.solver.finger.swing_limits import BOX
+from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import Chain, HandChains, canonical_from_wrist, digit_chain
 from services.solver.maths.joint_limits import clamp_to_limits
 from services.solver.maths.kinematics import tip_rotation
 
+Bools = npt.NDArray[np.bool_]
+# Of a tip: nobody saw it, fusion predicted it, a camera saw it.
+NOT_SEEN, PREDICTED, MEASURED = 0, 1, 2
 # Iterations, distance left (m), outcome.
 Ending = tuple[int, float, int]
 Status = Literal["solved", "unreachable", "not_converged", "predicted"]
@@ -43,13 +49,12 @@ _REACHED_SIGMAS = 3.0
 _MAX_RANGE_M = 1e3
 
 
-@dataclass(frozen=True)
-class TipObservation:
-    """A painted tip."""
+class Tips(NamedTuple):
+    """Painted tips of all digits, in the order of DIGITS."""
 
-    point_m: Array  # (3,) wrist frame
-    sigma_m: float  # one standard deviation
-    measured: bool  # whether a camera saw it; else fusion predicted it
+    points_m: Array  # (5, 3) wrist frame
+    sigma_m: Array  # (5,) one standard deviation
+    seen: Integers  # (5,) NOT_SEEN, or who saw it
 
 
 @dataclass(frozen=True)
@@ -62,18 +67,43 @@ class FingerSolution:
     status: list[Status]
 
 
+@njit(cache=True)
+def tips_in_wrist(
+    rotation: Array,
+    position_m: Array,
+    digits: Integers,
+    points_m: Array,
+    covariances_m2: Array,
+    measured: Bools,
+) -> Tips:
+    """The tips among m landmarks in the wrist frame of a pose.
+
+    rotation (3, 3) and position_m (3,) of the wrist; digits (m,): whose tip a landmark is, -1 of
+    the others; points_m (m, 3), covariances_m2 (m, 3, 3) and measured (m,) in the rig frame, as
+    landmarks.Observed has them.
+    """
+    tips = Tips(np.zeros((5, 3)), np.zeros(5), np.full(5, NOT_SEEN))
+    for n in range(digits.size):
+        row = digits[n]
+        if row >= 0:
+            tips.points_m[row] = rotation.T @ (points_m[n] - position_m)
+            variance = np.trace(covariances_m2[n]) / 3.0
+            tips.sigma_m[row] = math.sqrt(variance)
+            tips.seen[row] = MEASURED if measured[n] else PREDICTED
+    return tips
+
+
 def solve_fingers(
-    settings: Solver, chains: HandChains, start_rad: Array, tips: Mapping[str, TipObservation]
+    settings: Solver, chains: HandChains, start_rad: Array, tips: Tips
 ) -> FingerSolution:
-    """Bring the painted tips (by digit) to where they were seen.
+    """Bring the painted tips to where they were seen.
 
     Starts from the whole hand's angles start_rad (5, 4). Tips that no camera saw in this frame are
     solved for too, but called predicted. Points out of any camera's range are not tips.
     """
-    tips = {name: tip for name, tip in tips.items() if np.all(np.abs(tip.point_m) < _MAX_RANGE_M)}
     angles = start_rad.copy()
     clamp_to_limits(angles.reshape(-1), chains.limits_rad.reshape(-1, 2))
-    targets = _targets(chains, tips)
+    targets = _targets(chains.lengths_m, *tips)
     ends = np.zeros((5, 3))  # iterations, metres left, outcome
     if settings.method == "dls":
         dls.solve_digits(
@@ -82,29 +112,37 @@ def solve_fingers(
     else:
         for row in np.flatnonzero(targets.measured).tolist():
             ends[row] = _solve_digit(settings, chains, row, targets.points_m[row], angles[row])
+    used, left_m, outcomes = ends.T.tolist()
+    seen = (tips.seen * targets.measured).tolist()
     status = [
-        _status(tips.get(name), ends[row], settings.tolerance_m) for row, name in enumerate(DIGITS)
+        _status(*tip, settings.tolerance_m)
+        for tip in zip(seen, tips.sigma_m.tolist(), left_m, outcomes, strict=True)
     ]
-    iterations = [int(count) for count in ends[:, 0]]
-    return FingerSolution(angles, ends[:, 1].tolist(), iterations, status)
+    return FingerSolution(angles, left_m, [int(count) for count in used], status)
 
 
-def _targets(chains: HandChains, tips: Mapping[str, TipObservation]) -> dls.TipTargets:
-    """The tips as arrays, and how strongly each digit's angles stay near the whole hand's."""
-    points, measured, sigma = np.zeros((5, 3)), np.zeros(5, np.int64), np.zeros(5)
-    for row, name in enumerate(DIGITS):
-        if name in tips:
-            points[row], measured[row], sigma[row] = tips[name].point_m, 1, tips[name].sigma_m
-    lengths_m = np.maximum(chains.lengths_m.sum(axis=1), 1e-3)
-    return dls.TipTargets(points, measured, sigma / (_PRIOR_SIGMA_RAD * lengths_m))
+@njit(cache=True)
+def _targets(lengths_m: Array, points_m: Array, sigma_m: Array, seen: Integers) -> dls.TipTargets:
+    """The tips within range, and how strongly each digit's angles stay near the whole hand's."""
+    targets = dls.TipTargets(np.zeros((5, 3)), np.zeros(5, np.int64), np.zeros(5))
+    for row in range(5):
+        in_range = seen[row] != NOT_SEEN
+        for i in range(3):
+            in_range &= abs(points_m[row, i]) < _MAX_RANGE_M
+        if in_range:
+            targets.points_m[row] = points_m[row]
+            targets.measured[row] = 1
+            length_m = max(lengths_m[row, 0] + lengths_m[row, 1] + lengths_m[row, 2], 1e-3)
+            targets.prior_weight[row] = sigma_m[row] / (_PRIOR_SIGMA_RAD * length_m)
+    return targets
 
 
-def _status(tip: TipObservation | None, end: Array, tolerance_m: float) -> Status:
-    """What became of a digit; end (3,) is (iterations, metres left, outcome)."""
-    if tip is None or not tip.measured:
+def _status(seen: int, sigma_m: float, left_m: float, outcome: float, tolerance_m: float) -> Status:
+    """What became of a digit."""
+    if seen != MEASURED:
         return "predicted"
-    reached = end[1] <= max(tolerance_m, _REACHED_SIGMAS * tip.sigma_m)
-    return "solved" if reached else STATUS_OF[int(end[2])]
+    reached = left_m <= max(tolerance_m, _REACHED_SIGMAS * sigma_m)
+    return "solved" if reached else STATUS_OF[int(outcome)]
 
 
 def _solve_digit(settings: Solver, chains: HandChains, row: int, point: Array, q: Array) -> Ending:

@@ -24,6 +24,8 @@ from services.solver.whole_hand.landmarks import Observations
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior
 from services.solver.whole_hand.residuals import NormalEquations, Pose, normal_equations
 
+# Iterations of one update: 4 on average, 25 at worst on simulated hands; 30 are 0.2 ms.
+MAX_ITERATIONS = 30
 # Marquardt's factor: start, and how it moves; the usual values (Madsen, Nielsen & Tingleff 2004,
 # section 3.2) made bolder, as the previous pose is nearly always a good start.
 _DAMPING_START, _DAMPING_DOWN, _DAMPING_UP = 1e-5, 0.1, 8.0

@@ -23,25 +23,22 @@ import numpy as np
 from rhot.hand import TIPS, HandModel
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
-from services.solver.whole_hand.fit import fit
+from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.initialise import Hypothesis, initialise
 from services.solver.whole_hand.landmarks import (
-    Landmark,
+    Landmarks,
     Observation,
     Observations,
+    Observed,
     observation_arrays,
 )
 from services.solver.whole_hand.model_misfit import learned_misfit
-from services.solver.whole_hand.motion_prior import (
-    UNKNOWNS,
-    PosePrior,
-    predict,
-    uninformed_prior,
-)
+from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
+from services.solver.whole_hand.update import update
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -50,8 +47,6 @@ MAX_GAP_S = 1.0
 # A landmark less sure than that, the RMS of its axes, begins no hand: a hand's fingers are as long.
 # (Live rigs: the first message of one camera told 0.6 m, and the pose was 200 mm off.)
 _PLACED_SIGMA_M = 0.1
-# Iterations of one update: 4 on average, 25 at worst on simulated hands; 30 are 0.2 ms.
-MAX_ITERATIONS = 30
 # A fit whose squared distances exceed this per landmark coordinate is bad (expected: below 1).
 BAD_COST_PER_COORDINATE = 16.0
 # Updates between restarts, and while fits are bad: a restart takes 5 ms, i.e. 0.05 and 1.2 ms an
@@ -66,7 +61,7 @@ START_ODDS = -4.0
 class HandTracker:
     """Follows one hand; pure: time comes in as stamps."""
 
-    def __init__(self, model: HandModel, landmarks: Mapping[str, Landmark]) -> None:
+    def __init__(self, model: HandModel, landmarks: Landmarks) -> None:
         """landmarks: those of the model (landmarks.hand_landmarks)."""
         self.chains = hand_chains(model)
         self._posture = posture_prior(model)
@@ -89,6 +84,7 @@ class HandTracker:
         None while it has not been found.
         """
         self.challenge()
+        observed = Observed.of(observed)
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         if self._estimate is not None and self._is_lost(stamp_ns, seconds):
             self._estimate = None
@@ -104,7 +100,7 @@ class HandTracker:
             own = self._initialise(observations)
         else:
             own = self._follow(self._estimate, seconds, observations)
-            if self._restart_due(own, frozenset(observed)):
+            if self._restart_due(own, frozenset(observed.names)):
                 self._to_challenge = own, observations
         self._misfit_m2 = learned_misfit(self._misfit_m2, observations.whitening, own.cost, seconds)
         self._estimate, self._stamp_ns = own, stamp_ns
@@ -172,14 +168,15 @@ class HandTracker:
         self, last: HandEstimate, seconds: float, observations: Observations
     ) -> HandEstimate:
         """Predict from the last estimate and fit the observations."""
-        angles, information = predict(self._posture, last.angles_rad, last.covariance, seconds)
-        prior = PosePrior(last.rotation, last.position_m, angles, information)
-        limits = self.chains.limits_rad
-        start = np.clip(angles, limits[:, :, 0], limits[:, :, 1])
-        pose = Pose(last.rotation.copy(), last.position_m.copy(), start)
-        found = np.empty((UNKNOWNS, UNKNOWNS))
-        cost, used = fit(self.chains, observations, prior, pose, MAX_ITERATIONS, found)
-        return HandEstimate(*pose, spd_inverse(found), cost, used)
+        pose, covariance, cost, used = update(
+            self.chains,
+            self._posture,
+            observations,
+            Pose(last.rotation, last.position_m, last.angles_rad),
+            last.covariance,
+            seconds,
+        )
+        return HandEstimate(*pose, covariance, cost, used)
 
     def _restart_due(self, estimate: HandEstimate, names: frozenset[str]) -> bool:
         """Whether this estimate is to be compared with a restart."""

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.hand import JOINTS, HandModel, landmark_point
+from rhot.hand import JOINTS, TIPS, HandModel, landmark_point
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains, hand_chains
 from services.solver.maths.kinematics import hand_frames
+
+Bools = npt.NDArray[np.bool_]
+# Lists of names whose places are remembered: fingers come and go.
+_MAX_LISTS = 256
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,84 @@ class Observation:
     measured: bool  # whether cameras saw all of it; else fusion predicted some of it
 
 
+class Observed(Mapping[str, Observation]):
+    """Measured landmarks by name, kept as arrays: what every message brings."""
+
+    def __init__(
+        self, names: Sequence[str], points_m: Array, covariances_m2: Array, measured: Bools
+    ) -> None:
+        """points_m (m, 3), covariances_m2 (m, 3, 3), measured (m,): as in Observation."""
+        self.names = tuple(names)
+        self.points_m = points_m
+        self.covariances_m2 = covariances_m2
+        self.measured = measured
+
+    @classmethod
+    def of(cls, observed: Mapping[str, Observation]) -> Observed:
+        """The same landmarks as arrays."""
+        if isinstance(observed, Observed):
+            return observed
+        seen = observed.values()
+        return cls(
+            tuple(observed),
+            np.array([one.point_m for one in seen], dtype=np.float64).reshape(-1, 3),
+            np.array([one.covariance_m2 for one in seen], dtype=np.float64).reshape(-1, 3, 3),
+            np.array([one.measured for one in seen], dtype=np.bool_),
+        )
+
+    def __getitem__(self, name: str) -> Observation:
+        if name not in self.names:
+            raise KeyError(name)
+        n = self.names.index(name)
+        return Observation(self.points_m[n], self.covariances_m2[n], bool(self.measured[n]))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+class Places(NamedTuple):
+    """Where m landmarks sit, as arrays; the fields are those of Landmark."""
+
+    joint: Integers  # (m,)
+    digit: Integers  # (m,)
+    depth: Integers  # (m,)
+    offset_m: Array  # (m, 3)
+    reach_m: Array  # (m,)
+    tip: Integers  # (m,) row of the digit whose tip it is, -1 of other landmarks
+
+
+class Landmarks(dict[str, Landmark]):
+    """Every landmark that a hand's model has paint for, by name."""
+
+    def __init__(self, landmarks: Mapping[str, Landmark]) -> None:
+        super().__init__(landmarks)
+        self._places: dict[tuple[str, ...], Places] = {}
+
+    def places(self, names: tuple[str, ...]) -> Places:
+        """Where landmarks sit; the same few lists of names come again with every message."""
+        known = self._places.get(names)
+        if known is None:
+            known = self._placed(names)
+            # Names come from the network, in any order: the memory for them is bounded.
+            if len(self._places) < _MAX_LISTS:
+                self._places[names] = known
+        return known
+
+    def _placed(self, names: tuple[str, ...]) -> Places:
+        where = [self[name] for name in names]
+        return Places(
+            joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
+            digit=np.array([landmark.digit for landmark in where], dtype=np.int64),
+            depth=np.array([landmark.depth for landmark in where], dtype=np.int64),
+            offset_m=np.array([one.offset_m for one in where], dtype=np.float64).reshape(-1, 3),
+            reach_m=np.array([landmark.reach_m for landmark in where], dtype=np.float64),
+            tip=np.array([TIPS.index(n) if n in TIPS else -1 for n in names], dtype=np.int64),
+        )
+
+
 class Observations(NamedTuple):
     """m measured landmarks as arrays; the fields are those of Landmark and Observation.
 
@@ -51,16 +134,18 @@ class Observations(NamedTuple):
     whitening: Array  # (m, 3, 3) 1/m, lower triangles
 
 
-def hand_landmarks(model: HandModel) -> dict[str, Landmark]:
-    """Every landmark that the model has paint for, by name."""
+def hand_landmarks(model: HandModel) -> Landmarks:
+    """Every landmark that the model has paint for."""
     chains = hand_chains(model)
     # An open hand is at its longest.
     angles = np.clip(np.zeros((5, 4)), chains.limits_rad[:, :, 0], chains.limits_rad[:, :, 1])
     positions, rotations = frames_in_wrist(chains, angles)
-    return {
-        name: _landmark(model, name, landmark_point(model, name, positions, rotations))
-        for name in model.paint
-    }
+    return Landmarks(
+        {
+            name: _landmark(model, name, landmark_point(model, name, positions, rotations))
+            for name in model.paint
+        }
+    )
 
 
 def frames_in_wrist(chains: HandChains, angles: Array) -> tuple[Array, Array]:
@@ -74,24 +159,22 @@ def frames_in_wrist(chains: HandChains, angles: Array) -> tuple[Array, Array]:
 
 
 def observation_arrays(
-    landmarks: Mapping[str, Landmark],
-    observed: Mapping[str, Observation],
-    misfit_m: float = 0.0,
+    landmarks: Landmarks, observed: Mapping[str, Observation], misfit_m: float = 0.0
 ) -> Observations:
     """What was observed, by landmark, joined with where each landmark sits.
 
     misfit_m: one standard deviation along each axis of where the model puts a landmark, beside that
     of where it was seen.
     """
-    where = [landmarks[name] for name in observed]
-    covariances = [observation.covariance_m2 for observation in observed.values()]
+    seen = Observed.of(observed)
+    places = landmarks.places(seen.names)
     return Observations(
-        joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
-        digit=np.array([landmark.digit for landmark in where], dtype=np.int64),
-        depth=np.array([landmark.depth for landmark in where], dtype=np.int64),
-        offset_m=_rows([landmark.offset_m for landmark in where]),
-        point_m=_rows([observation.point_m for observation in observed.values()]),
-        whitening=_whitening(np.array(covariances).reshape(-1, 3, 3), misfit_m**2),
+        places.joint,
+        places.digit,
+        places.depth,
+        places.offset_m,
+        seen.points_m,
+        _whitening(seen.covariances_m2, misfit_m**2),
     )
 
 
@@ -128,8 +211,3 @@ def _whitening(covariances: Array, more_m2: float) -> Array:
         W[2, 1] = -e / (c * f)
         W[2, 0] = (b * e / c - d) / (a * f)
     return out
-
-
-def _rows(vectors: list[Array]) -> Array:
-    """(m, 3), also of none."""
-    return np.array(vectors, dtype=np.float64).reshape(-1, 3)

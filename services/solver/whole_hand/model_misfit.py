@@ -38,7 +38,7 @@ def learned_misfit(misfit_m2: float, whitening: Array, cost: float, seconds: flo
     if coordinates == 0:
         return misfit_m2
     # The harmonic mean: what is known badly (along one camera's ray) says nothing of the model.
-    variance_m2 = coordinates / float(np.sum(whitening**2))
+    variance_m2 = coordinates / float(np.vdot(whitening, whitening))
     ratio = min(cost / (_EXPECTED_COST * coordinates), _MAX_RATIO)
     target_m2 = misfit_m2 + (ratio - 1.0) * variance_m2
     time_s = _GROWTH_S if target_m2 > misfit_m2 else _FORGETTING_S

@@ -10,13 +10,13 @@ equations.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.messages import HandPoint, HandPoints
-from services.solver.whole_hand.landmarks import Landmark, Observation
+from services.solver.whole_hand.landmarks import Bools, Landmarks, Observed
 
 # No camera of this kind sees a finger tip 10 m away.
 _MAX_RANGE_M = 10.0
@@ -42,57 +42,136 @@ _VAGUE_SIGMAS = 2.0
 _REACH_MARGIN = 1.25
 
 
-def usable_points(points: HandPoints, landmarks: Mapping[str, Landmark]) -> dict[str, Observation]:
+# What a row of numbers begins with: sigmas along the axes, or a covariance.
+_SIGMAS, _COVARIANCE = 0.0, 1.0
+# Who saw a point, and what that makes of its sigmas: nobody's is multiplied.
+_MEASURED, _PREDICTED, _ONE_CAMERA = 0.0, 1.0, 2.0
+
+
+def usable_points(points: HandPoints, landmarks: Landmarks) -> Observed:
     """The points worth solving with, by landmark, in the order of the message."""
-    observed: dict[str, Observation] = {}
+    seen: dict[str, HandPoint] = {}
     for point in points.points:
-        if point.name in landmarks and point.name not in observed:
-            covariance = _covariance(point)
-            if covariance is not None:
-                position, measured = np.array(point.position_m), point.source == "measured"
-                observed[point.name] = Observation(position, covariance, measured)
-    return _reject_outliers(observed, landmarks)
+        # The first usable one of a name counts; nearly always there is one.
+        if point.name in landmarks and (
+            point.name not in seen or not _usable(_rows([seen[point.name]]))[1][0]
+        ):
+            seen[point.name] = point
+    rows = _rows(list(seen.values()))
+    covariances, usable = _usable(rows)
+    names, positions = tuple(seen), rows[:, :3].copy()
+    measured = rows[:, 10] == _MEASURED
+    if not usable.all():
+        names = tuple(name for name, good in zip(names, usable.tolist(), strict=True) if good)
+        positions, covariances, measured = positions[usable], covariances[usable], measured[usable]
+    return _without_outliers(Observed(names, positions, covariances, measured), landmarks)
 
 
-def _covariance(point: HandPoint) -> Array | None:
-    """What a point's error is believed to be (3, 3), m^2; None: nothing, or it is not plausible."""
-    values = point.covariance_m2 or (point.sigma_m[0], 0, 0, point.sigma_m[1], 0, point.sigma_m[2])
-    known = (*point.position_m, *values)
-    if not all(math.isfinite(v) and abs(v) <= _MAX_RANGE_M for v in known):
-        return None
-    if point.covariance_m2 is None:
-        sigmas, axes = np.array(point.sigma_m), np.eye(3)
+def _rows(points: list[HandPoint]) -> Array:
+    """Points as numbers (n, 11): position, six of the covariance or sigmas, and what they are."""
+    rows = []
+    for point in points:
+        kind, values = _COVARIANCE, point.covariance_m2
+        if values is None:
+            x, y, z = point.sigma_m
+            kind, values = _SIGMAS, (x, 0.0, 0.0, y, 0.0, z)
+        seen_by = _MEASURED
+        if point.source == "predicted":
+            seen_by = _ONE_CAMERA if len(point.cameras) == 1 else _PREDICTED
+        rows.append((*point.position_m, *values, kind, seen_by))
+    return np.array(rows, dtype=np.float64).reshape(-1, 11)
+
+
+@njit(cache=True)
+def _usable(rows: Array) -> tuple[Array, Bools]:
+    """What points' errors are believed to be (n, 3, 3), m^2, and whether (n,) that is plausible."""
+    covariances = np.zeros((rows.shape[0], 3, 3))
+    usable = np.zeros(rows.shape[0], dtype=np.bool_)
+    for n in range(rows.shape[0]):
+        in_range = True
+        for value in rows[n, :9]:
+            # Not true of what is not a number.
+            in_range &= abs(value) <= _MAX_RANGE_M
+        if in_range:
+            usable[n] = _believed(rows[n], covariances[n])
+    return covariances, usable
+
+
+@njit(cache=True)
+def _believed(row: Array, C: Array) -> bool:
+    """Fill C (3, 3) with a point's covariance as it is believed; False: nothing is."""
+    xx, xy, xz, yy, yz, zz = row[3:9]
+    if row[9] == _SIGMAS:
+        sigmas, axes = np.array([xx, yy, zz]), np.eye(3)
     else:
-        xx, xy, xz, yy, yz, zz = point.covariance_m2
-        variances, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        C[0, 0], C[1, 1], C[2, 2] = xx, yy, zz
+        C[0, 1] = C[1, 0] = xy
+        C[0, 2] = C[2, 0] = xz
+        C[1, 2] = C[2, 1] = yz
+        # Nearly always no sigma is out of range; then the axes need not be known.
+        if row[10] != _ONE_CAMERA and xx + yy + zz <= _MAX_SIGMA_M**2 and _above_least(C):
+            if row[10] == _PREDICTED:
+                C *= _PREDICTED_SIGMA_FACTOR**2
+            return True
+        variances, axes = np.linalg.eigh(C)
         if variances[0] < -(_MIN_SIGMA_M**2):
-            return None
+            return False
         sigmas = np.sqrt(np.maximum(variances, 0.0))
     if np.count_nonzero(sigmas <= _MAX_SIGMA_M) < 2:
-        return None
-    sigmas = np.clip(sigmas, _MIN_SIGMA_M, _MAX_RAY_SIGMA_M)
-    if point.source == "predicted":
-        if len(point.cameras) == 1:
-            sigmas[sigmas.argmax()] *= _RAY_SIGMA_FACTOR
-        else:
-            sigmas *= _PREDICTED_SIGMA_FACTOR
-    return axes * sigmas**2 @ axes.T
+        return False
+    for i in range(3):
+        sigmas[i] = min(max(sigmas[i], _MIN_SIGMA_M), _MAX_RAY_SIGMA_M)
+    if row[10] == _ONE_CAMERA:
+        sigmas[sigmas.argmax()] *= _RAY_SIGMA_FACTOR
+    elif row[10] == _PREDICTED:
+        sigmas *= _PREDICTED_SIGMA_FACTOR
+    for i in range(3):
+        for j in range(3):
+            C[i, j] = 0.0
+            for k in range(3):
+                C[i, j] += axes[i, k] * sigmas[k] ** 2 * axes[j, k]
+    return True
 
 
-def _reject_outliers(
-    observed: dict[str, Observation], landmarks: Mapping[str, Landmark]
-) -> dict[str, Observation]:
+@njit(cache=True)
+def _above_least(C: Array) -> bool:
+    """Whether every standard deviation of C (3, 3) is beyond the least: C less that is definite."""
+    least = _MIN_SIGMA_M**2
+    a, b, c = C[0, 0] - least, C[1, 1] - least, C[2, 2] - least
+    minor = a * b - C[0, 1] ** 2
+    determinant = (
+        a * (b * c - C[1, 2] ** 2)
+        - C[0, 1] * (C[0, 1] * c - C[1, 2] * C[0, 2])
+        + C[0, 2] * (C[0, 1] * C[1, 2] - b * C[0, 2])
+    )
+    return a > 0.0 and minor > 0.0 and determinant > 0.0
+
+
+def _without_outliers(seen: Observed, landmarks: Landmarks) -> Observed:
     """Drop, one at a time, the point that is further from most others than a hand is long."""
-    while len(observed) > 1:
-        names = list(observed)
-        points = np.array([observed[name].point_m for name in names])  # (m, 3)
-        reach = np.array([landmarks[name].reach_m for name in names])  # (m,)
-        vague = np.sqrt([np.trace(observed[name].covariance_m2) for name in names])  # (m,) sigmas
-        reach += _VAGUE_SIGMAS * vague
-        apart = np.linalg.norm(points[:, None] - points[None], axis=2)  # (m, m)
-        conflicts = (apart > _REACH_MARGIN * (reach[:, None] + reach[None])).sum(axis=1)
-        worst = int(conflicts.argmax())
-        if conflicts[worst] == 0:
+    while len(seen) > 1:
+        reach_m = landmarks.places(seen.names).reach_m
+        worst = _worst_outlier(seen.points_m, seen.covariances_m2, reach_m)
+        if worst < 0:
             break
-        observed = {name: observed[name] for name in names if name != names[worst]}
-    return observed
+        kept = np.arange(len(seen)) != worst
+        names = tuple(name for n, name in enumerate(seen.names) if n != worst)
+        seen = Observed(names, seen.points_m[kept], seen.covariances_m2[kept], seen.measured[kept])
+    return seen
+
+
+@njit(cache=True)
+def _worst_outlier(points: Array, covariances: Array, reach_m: Array) -> int:
+    """Which of points (m, 3) is too far from most others, -1 if none is from any."""
+    m = points.shape[0]
+    reach, conflicts = np.empty(m), np.zeros(m, np.int64)
+    for n in range(m):
+        trace = covariances[n, 0, 0] + covariances[n, 1, 1] + covariances[n, 2, 2]
+        reach[n] = reach_m[n] + _VAGUE_SIGMAS * math.sqrt(trace)
+        for k in range(n):
+            apart = points[n] - points[k]
+            if math.sqrt(apart @ apart) > _REACH_MARGIN * (reach[n] + reach[k]):
+                conflicts[n] += 1
+                conflicts[k] += 1
+    worst = int(conflicts.argmax())
+    return worst if conflicts[worst] > 0 else -1

@@ -15,12 +15,12 @@ from rhot.errors import CalibrationError
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import Array
-from rhot.hand import BASIC_LANDMARKS, DIGITS, JOINTS, HandModel, default_hand
+from rhot.hand import BASIC_LANDMARKS, JOINTS, HandModel, default_hand
 from rhot.messages import HandPoint, HandPoints
 from services.solver.finger import dls, dls_paper
 from services.solver.finger.dls_equations import COUPLED, tip_goal
 from services.solver.finger.outcome import SOLVED
-from services.solver.finger.solve_fingers import TipObservation, solve_fingers
+from services.solver.finger.solve_fingers import MEASURED, Tips, solve_fingers
 from services.solver.maths.box_qp import box_qp, workspace
 from services.solver.maths.chains import digit_chain, hand_chains
 from services.solver.maths.kinematics import tip_distance
@@ -61,16 +61,13 @@ def _inside(angles: Array) -> bool:
     st.sampled_from(METHODS),
 )
 def test_all_fingers(points: list, start: list[float], sigma: float, method: str) -> None:
-    tips = {
-        name: TipObservation(np.array(p), abs(sigma), True)
-        for name, p in zip(DIGITS, points, strict=True)
-    }
+    tips = Tips(np.array(points), np.full(5, abs(sigma)), np.full(5, MEASURED))
     found = solve_fingers(Solver(method=method), CHAINS, np.array(start).reshape(5, 4), tips)
     assert _inside(found.angles_rad)
     assert np.all(np.array(found.residual_m) < np.inf)
     assert max(found.iterations) <= 3 * Solver().max_iterations
-    for name, status in zip(DIGITS, found.status, strict=True):
-        assert status != "solved" or np.all(np.isfinite(tips[name].point_m))
+    for point, status in zip(tips.points_m, found.status, strict=True):
+        assert status != "solved" or np.all(np.isfinite(point))
 
 
 @few
