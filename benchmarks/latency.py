@@ -84,9 +84,9 @@ class Played:
     def play(self) -> None:
         """Put all frames at their pace, and a bare message after each that points are due with."""
         deadline_s = time.monotonic() + START_S
-        waiting = [*self._markers.values(), self._bare]
         # The stub says bool.
-        while not all(one.matching_status.matching for one in waiting):  # type: ignore[attr-defined]
+        waiting: list[Any] = [*self._markers.values(), self._bare]
+        while not all(one.matching_status.matching for one in waiting):
             if time.monotonic() > deadline_s:
                 raise SystemExit("fusion, the solver or a relay did not start")
             time.sleep(0.05)

@@ -11,9 +11,7 @@ def main() -> None:
         "serve_on_request",
         "record only what the page asks for, unless [recorder] autostart",
     )
-    command(
-        "recorder", "services.recorder.service", __doc__, variants={"on-request": on_request}
-    )
+    command("recorder", "services.recorder.service", __doc__, variants={"on-request": on_request})
 
 
 if __name__ == "__main__":

@@ -20,9 +20,7 @@ def master_units(config: RigConfig) -> list[str]:
     local = [camera for camera in config.camera if not camera.host]
     units = ["rhot-pi.target"] if local else []
     # The recorder for the page, too, which starts, stops and replays recordings.
-    units += [
-        f"rhot-{name}.service" for name in ("router", "fusion", "viewer", "recorder")
-    ]
+    units += [f"rhot-{name}.service" for name in ("router", "fusion", "viewer", "recorder")]
     units += [f"rhot-pi-tracker@{camera.name}.service" for camera in local]
     if config.has_depth:
         units.append("rhot-solver.service")

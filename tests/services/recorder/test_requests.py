@@ -91,7 +91,7 @@ async def test_a_recording_is_replayed_beside_the_live_rig(
 
         async def listen() -> None:
             async for sample in samples:
-                heard.append(sample.key)
+                heard.append(sample.key)  # noqa: PERF401 - it never ends
 
         task = asyncio.create_task(listen())
         state = await recorder.ask("open", name="a.mcap", rate=4.0, loop=True)
