@@ -126,7 +126,7 @@ async def test_nothing_is_done_while_nobody_looks(
             browser = await asyncio.to_thread(browse, int(service.values["port"]))
             await until(lambda: publisher.wanted)
             # Poses, points, objects, contacts, and health twice: rates, and what is wrong.
-            assert len(service.bus.streams) == 6
+            await until(lambda: len(service.bus.streams) == 6)
             await asyncio.to_thread(browser.close)
             await until(lambda: not publisher.wanted)
             assert service.bus.streams == []

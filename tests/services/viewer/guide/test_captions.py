@@ -10,6 +10,7 @@ import pytest
 
 from rhot import topics
 from rhot.bus.bus import open_bus
+from rhot.files.rig_tables import Viewer
 from rhot.messages import Caption
 from services.viewer.guide import captions
 from services.viewer.guide.captions import Captions
@@ -21,7 +22,7 @@ async def test_a_caption_is_shown_changed_and_taken_away(
 ) -> None:
     monkeypatch.setattr(captions, "_OVER_S", 1.0)
     async with open_bus("desk", [router]) as ours, open_bus("desk", [router]) as theirs:
-        with open_server("127.0.0.1", 0) as server:
+        with open_server(Viewer(port=0)) as server:
             browser = await asyncio.to_thread(browse, server.get_port())
             while not server.get_clients():
                 await asyncio.sleep(0.02)

@@ -10,26 +10,27 @@ import numpy as np
 import pytest
 
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import Viewer
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector
 from rhot.hand import JOINTS, default_hand, forward
 from rhot.messages import FingerAngles, HandPose
 from services.viewer.live.model import View, ViewModel
-from services.viewer.scene.layers import DEFAULT, LAYERS, switch
+from services.viewer.scene.layers import DEFAULT
 from services.viewer.scene.scene import LiveScene
 from services.viewer.scene.skin_shape import fit_skin
-from services.viewer.server import LoopbackServer, open_server
+from services.viewer.server import LoneServer, open_server
 
 STAMP_NS = 1_700_000_000_000_000_000
 
 
 @pytest.fixture
-def server() -> Iterator[LoopbackServer]:
-    with open_server("127.0.0.1", 0) as server:
+def server() -> Iterator[LoneServer]:
+    with open_server(Viewer(port=0)) as server:
         yield server
 
 
 @pytest.fixture
-def scene(server: LoopbackServer, config: RigConfig) -> LiveScene:
+def scene(server: LoneServer, config: RigConfig) -> LiveScene:
     return LiveScene(server, config, {}, {("right", "index_tip"): (0, 0, 255)}, {})
 
 
@@ -91,7 +92,7 @@ def until_joints(browser: Any, pose: HandPose) -> dict[tuple[str, str], Any]:
 
 
 def test_skin_joints_and_bones_of_a_picture_are_of_one_message(
-    server: LoopbackServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     """Also when views come much faster than pictures are sent: two hands, two hundred poses."""
     pairs = [(posed("right"), posed("left")) for _ in range(200)]
@@ -130,7 +131,7 @@ def _joints(pose: HandPose) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_what_has_not_changed_is_not_sent(
-    server: LoopbackServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     still, moving = posed("right"), [posed("left") for _ in range(3)]
     model = ViewModel()
@@ -149,7 +150,7 @@ def test_what_has_not_changed_is_not_sent(
 
 
 def test_a_layer_that_nobody_watches_is_not_sent_and_one_that_is_tells_of_limits(
-    server: LoopbackServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     poses = [posed() for _ in range(4)]
     scene.show(seen(poses[0]))
@@ -165,29 +166,8 @@ def test_a_layer_that_nobody_watches_is_not_sent_and_one_that_is_tells_of_limits
     assert ("/skin/right", "vertices") in changed
 
 
-def test_a_switch_changes_one_visitor_s_view_alone(
-    server: LoopbackServer, scene: LiveScene, browse: Callable
-) -> None:
-    first, second = browse(server.get_port()), browse(server.get_port())
-    for browser in (first, second):
-        for name, layer in LAYERS.items():
-            browser.wait_for("FrameMessage", name=f"/{name}", owner="")
-            if not layer.on:
-                browser.wait_for("SetSceneNodeVisibilityMessage", name=f"/{name}", visible=False)
-    first.forget()
-    second.forget()
-    mine = server.get_clients()[min(server.get_clients())]
-    switch(mine.scene, "trails", True)
-    switch(mine.scene, "skin", False)
-    first.wait_for("FrameMessage", name="/trails", owner=lambda owner: owner != "")
-    first.wait_for("SetSceneNodeVisibilityMessage", name="/skin", visible=False)
-    server.scene.add_label("/now", "now")
-    second.wait_for("LabelMessage", name="/now")
-    assert not second.heard("FrameMessage")
-
-
 def test_what_goes_wrong_in_a_drawing_is_told_to_who_shows(
-    server: LoopbackServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     scene.show(seen(posed()))
     browser = browse(server.get_port())
