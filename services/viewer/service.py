@@ -26,6 +26,7 @@ from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.calibration.page import CalibrationPage
 from services.viewer.live.model import ViewModel
+from services.viewer.panel.banner import Banner
 from services.viewer.panel.live_tab import LiveSection
 from services.viewer.pictures.feed import PictureFeed
 from services.viewer.scene.layers import LAYERS, LayerName
@@ -54,7 +55,7 @@ async def serve(service: Service) -> None:
     with open_server(config.viewer) as server:
         layers = {name: Layer(f"/{name}") for name in LAYERS}
         sections = [LiveSection(config, setup.notes, PictureFeed(service), layers)]
-        visits = Visits(server, sections)
+        visits = Visits(server, Banner, sections)
         scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
         calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
         service.values["port"] = server.get_port()

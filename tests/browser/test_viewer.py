@@ -243,7 +243,7 @@ def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
     assert np.abs(picture(page) - before).max() >= 60, "nothing moves"
     assert page.locator("table tr", has_text="index").inner_text().count("°") == 4
     moving_hand.set()
-    page.get_by_text("waiting for hand poses of the right hand").wait_for(timeout=DEADLINE_S * 1e3)
+    page.get_by_text("right hand: waiting for").wait_for(timeout=DEADLINE_S * 1e3)
     while blue_and_green(picture(page))[0].sum() > 300 and time.monotonic() < deadline:
         page.wait_for_timeout(200)
     assert blue_and_green(picture(page))[0].sum() <= 300, "a hand is drawn that is not there"
@@ -310,13 +310,13 @@ def test_a_fault_stands_at_the_top_with_what_to_do_until_it_is_over(
     in_background(publish)
     page = chromium.new_page(viewport={"width": 1200, "height": 750})
     page.goto(viewer)
-    told = page.get_by_text("fusion: <b>left</b> has moved")
+    told = page.get_by_text("<b>left</b> has moved (says fusion)")
     told.wait_for(timeout=DEADLINE_S * 1e3)
     panel = page.inner_text("body")
-    assert panel.index("has moved") < panel.index("waiting for hand poses of the right hand")
-    assert "run `rhot calibrate stereo`" in panel
+    assert panel.index("has moved") < panel.index("right hand: waiting for")
+    assert "run rhot calibrate stereo" in panel
     # The trackers of this rig do not run, which is nobody's own word.
-    page.get_by_text("the tracker of camera left is not running").wait_for(timeout=DEADLINE_S * 1e3)
+    page.get_by_text("programs of this rig do not run").wait_for(timeout=DEADLINE_S * 1e3)
     over.set()
     told.wait_for(state="hidden", timeout=DEADLINE_S * 1e3)
     page.close()

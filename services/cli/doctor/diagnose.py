@@ -7,6 +7,8 @@ dark also gives no markers, and only the first of these is the cause.
 from __future__ import annotations
 
 from rhot.faults import FAULTS
+from rhot.faults.way import MISSING as MISSING_CODES
+from rhot.faults.way import ONE_OF_EACH, SESSION, VIEWS
 from rhot.files.config import RigConfig
 from rhot.messages.health import Fault
 from rhot.watch.onlooker_faults import about, host_of
@@ -16,18 +18,10 @@ from services.cli.doctor.observations import Observations
 from services.cli.doctor.way_of_markers import CAMERA_CODES, camera_links, hand_links
 from services.cli.doctor.way_of_objects import OBJECT_CODES, object_links
 
-# Codes of fusion's of the cameras together.
-_OF_VIEWS = (
-    "camera_wrong_size",
-    "camera_moved",
-    "cameras_mirrored",
-    "camera_unknown",
-    "not_calibrated",
-)
 _BRIDGE = "openvr_bridge"
 # Judged by links of their own, before the cameras.
-_JUDGED = ("second_service", "second_clock", "session_stopped", "service_absent")
-_KNOWN = {*CAMERA_CODES, *_OF_VIEWS, *OBJECT_CODES, *_JUDGED, "service_gone", "service_silent"}
+_JUDGED = (*ONE_OF_EACH, *SESSION, *MISSING_CODES)
+_KNOWN = {*CAMERA_CODES, *VIEWS, *OBJECT_CODES, *_JUDGED}
 
 
 def diagnose(seen: Observations) -> list[Link]:
@@ -145,7 +139,7 @@ def _session(seen: Observations) -> Link:
 
 
 def _views(faults: list[Fault]) -> list[Link]:
-    found = from_faults("cameras together", [f for f in faults if f.code in _OF_VIEWS])
+    found = from_faults("cameras together", [f for f in faults if f.code in VIEWS])
     return [found or holds("cameras together", "their views fit the calibration")]
 
 

@@ -8,23 +8,10 @@ from typing import Literal
 import msgspec
 
 from rhot.faults import FAULTS
+from rhot.faults.way import RESULTS, SLOW, breaks
 from rhot.messages.health import Fault
 
 LinkState = Literal["ok", "worse", "broken"]
-
-# Warnings that explain why there is no pose, or not the pose one wants: they break their link.
-_EXPLAINS = {
-    "camera_saturated",
-    "camera_slow",
-    "color_drifted",
-    "marker_not_seen",
-    "session_stopped",
-    "camera_unknown",
-}
-# A slow camera makes poses late and few; it hides nothing that keeps them away.
-_SLOW = ("camera_slow", "stream_slow")
-# Seen from outside, of what other links are the reason for.
-_CONSEQUENCES = ("no_points", "no_pose", "pose_implausible")
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,7 +40,7 @@ def broken(name: str, code: str, text: str, action: str = "", subject: str = "")
 
 def from_faults(name: str, faults: Iterable[Fault]) -> Link | None:
     """A link of what services say of it: the worst fault, with a count of the others."""
-    found = sorted(faults, key=lambda f: (not breaks(f), f.code in _SLOW, f.since_ns))
+    found = sorted(faults, key=lambda f: (not breaks(f), f.code in SLOW, f.since_ns))
     if not found:
         return None
     worst = found[0]
@@ -75,16 +62,11 @@ def judged(name: str, faults: Iterable[Fault], observed: Link) -> Link:
     return told
 
 
-def breaks(fault: Fault) -> bool:
-    """Whether a fault breaks its link, rather than making it worse."""
-    return fault.severity == "error" or fault.code in _EXPLAINS
-
-
 def first_cause(links: Iterable[Link]) -> Link | None:
     """The first broken link: what comes after it may only follow from it.
 
     A slow camera is the cause only where nothing but its consequences is broken, too.
     """
     found = [link for link in links if link.state == "broken"]
-    strong = (link for link in found if link.code not in (*_SLOW, *_CONSEQUENCES))
+    strong = (link for link in found if link.code not in (*SLOW, *RESULTS))
     return next(strong, found[0] if found else None)

@@ -4,28 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from rhot.faults.way import CLOCK, COLORS, MARKERS, PICTURE
 from rhot.files.rig_tables import CameraTable
 from rhot.messages.health import Fault
 from rhot.watch.rig_state import RigState
 from services.cli.doctor.links import Link, broken, holds, judged
 from services.cli.doctor.observations import CameraSeen, HandSeen, Observations
 
-_PICTURE = (
-    "camera_dark",
-    "camera_frozen",
-    "camera_saturated",
-    "camera_slow",
-    "camera_silent",
-    "camera_automatic",
-    "camera_processing",
-    "camera_setting",
-    "camera_readout_unknown",
-    "camera_unsynced",
-    "source_lost",
-)
-_CLOCK = ("clock_unknown", "camera_clock_off", "camera_clock_aligned")
-_COLORS = ("colors_missing", "color_drifted")
-CAMERA_CODES = {*_PICTURE, *_CLOCK, *_COLORS, "marker_not_seen"}
+CAMERA_CODES = {*PICTURE, *CLOCK, *COLORS, *MARKERS}
 # As in rhot/bus/stats.py: one frame lost in five is where a user should look.
 _SLOW = 0.8
 # A colour in fewer than one of twenty pictures is not seen, whatever is found here and there.
@@ -47,10 +33,10 @@ def camera_links(seen: Observations, state: RigState, camera: CameraTable) -> li
 
     ranges = holds(f"colors of {name}", "every colour has a range")
     return [
-        judged(f"camera {name}", told(_PICTURE), _frames(seen, camera, frames)),
-        judged(f"clock of {name}", told(_CLOCK), _clock(name, frames)),
-        judged(ranges.name, told(_COLORS), ranges),
-        judged(f"markers of {name}", told(["marker_not_seen"]), _markers(name, frames, colors)),
+        judged(f"camera {name}", told(PICTURE), _frames(seen, camera, frames)),
+        judged(f"clock of {name}", told(CLOCK), _clock(name, frames)),
+        judged(ranges.name, told(COLORS), ranges),
+        judged(f"markers of {name}", told(MARKERS), _markers(name, frames, colors)),
     ]
 
 

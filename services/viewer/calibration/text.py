@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from services.viewer.calibration.model import ColorCalibration
-from services.viewer.panel.texts import text
+from services.viewer.panel.words import text
 
 _STYLE = "font-size:0.85em;line-height:1.4;padding:0 0.6em;"
 _RED, _GREEN, _AMBER = "#c0392b", "#1e8449", "#b9770e"

@@ -1,44 +1,76 @@
-"""What is wrong with the rig now, at the top of the page, and what to do. Pure."""
+"""What is wrong with the rig now, in plain words and with what to do. Pure.
+
+What something is to be done about stands first; what only follows from it is told apart, for who
+wants to know.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rhot.watch.causes import Cause
 from rhot.watch.rig_state import StandingFault
-from services.viewer.panel.texts import text
+from services.viewer.panel.words import sentence, service_words
 
-# More than fit above the switches of a small screen; the rest is counted.
-_MAX_FAULTS = 8
-_COLORS = {"error": "#c0392b", "warning": "#b9770e"}
+# Causes that fit above the tabs of a small screen; the rest is counted.
+_MAX_CAUSES = 3
+_MAX_FOLLOWING = 30
+_RED, _AMBER = "#c0392b", "#b9770e"
+_WORDS = {"error": ("problem", _RED), "warning": ("note", _AMBER)}
 _BOX = "font-size:0.85em;line-height:1.35;margin:0.3em 0.6em;padding:0.3em 0.5em;"
-_LONGEST = 300
 
 
-def faults(standing: Sequence[StandingFault], now_ns: int) -> str:
-    """The faults as HTML, errors first as they come; "" where there are none."""
-    shown = [_fault(one, now_ns) for one in standing[:_MAX_FAULTS]]
-    if len(standing) > _MAX_FAULTS:
-        more = len(standing) - _MAX_FAULTS
-        shown.append(f'<div style="{_BOX}">... and {more} more: `rhot top` lists all</div>')
+def banner(causes: Sequence[Cause], now_ns: int) -> str:
+    """The causes as HTML, worst first; "" where there are none."""
+    shown = [_card(cause, now_ns) for cause in causes[:_MAX_CAUSES]]
+    if len(causes) > _MAX_CAUSES:
+        more = len(causes) - _MAX_CAUSES
+        shown.append(f'<div style="{_BOX}">... and {more} more: <code>rhot top</code></div>')
     return "".join(shown)
 
 
-def _fault(one: StandingFault, now_ns: int) -> str:
-    fault = one.fault
-    color = _COLORS[fault.severity]
-    teller = f"{text(one.teller)}: " if one.teller else ""
+def following(causes: Sequence[Cause]) -> str:
+    """What follows from the causes that are shown, one line each; "" where nothing does."""
+    lines = [_line(one) for cause in causes[:_MAX_CAUSES] for one in cause.follows]
+    if not lines:
+        return ""
+    more = len(lines) - _MAX_FOLLOWING
+    shown = lines[:_MAX_FOLLOWING] + ([f"... and {more} more"] if more > 0 else [])
+    return f'<div style="{_BOX}">{"<br>".join(shown)}</div>'
+
+
+def headline(causes: Sequence[Cause]) -> str:
+    """`2 problems`, for where there is room for nothing else; "" where all is well."""
+    problems = sum(cause.fault.fault.severity == "error" for cause in causes)
+    count, word = (problems, "problem") if problems else (len(causes), "note")
+    return f"{count} {word}{'s' * (count > 1)}" if count else ""
+
+
+def _card(cause: Cause, now_ns: int) -> str:
+    fault = cause.fault.fault
+    word, color = _WORDS[fault.severity]
     return (
         f'<div style="{_BOX}border-left:4px solid {color}">'
-        f'<b style="color:{color}">{fault.severity}</b> {teller}{text(fault.text, _LONGEST)}'
-        f"{_since(fault.since_ns, now_ns)}<br>&rarr; {text(fault.action, _LONGEST)}"
-        f' <span style="opacity:0.6">[{text(fault.code)}]</span></div>'
+        f'<b style="color:{color}">{word}:</b> {_told(cause.fault)}'
+        f"{_since(fault.since_ns, now_ns)}<br>&rarr; {sentence(fault.action)}</div>"
     )
 
 
+def _line(one: StandingFault) -> str:
+    return f"&bull; {_told(one)} &rarr; {sentence(one.fault.action)}"
+
+
+def _told(one: StandingFault) -> str:
+    """The fault's text, and who says so."""
+    service, _, instance = one.teller.partition("/")
+    teller = sentence(service_words(service, instance or "main"), 80)
+    return sentence(one.fault.text) + (f" (says {teller})" if one.teller else "")
+
+
 def _since(since_ns: int, now_ns: int) -> str:
-    """How long it lasts; nothing where the sender's clock is no guide."""
+    """How long it lasts, in minutes; nothing where the sender's clock is no guide."""
     lasted_s = (now_ns - since_ns) * 1e-9
-    if not 1.0 <= lasted_s < 1e7:
+    if not 60.0 <= lasted_s < 1e7:
         return ""
-    words = f"{lasted_s:.0f} s" if lasted_s < 120 else f"{lasted_s / 60:.0f} min"
-    return f", for {words}"
+    minutes = lasted_s / 60.0
+    return f", for {minutes:.0f} min" if minutes < 120 else f", for {minutes / 60.0:.0f} hours"

@@ -13,7 +13,7 @@ import viser
 from rhot.files.config import RigConfig
 from rhot.hand import HandName
 from services.viewer.live.model import View
-from services.viewer.panel import fault_texts, texts
+from services.viewer.panel import texts
 from services.viewer.pictures.feed import PictureFeed
 from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.visits.layer import Layer
@@ -55,8 +55,6 @@ class LiveTab:
         gui = client.gui
         self._client, self._config, self._notes = client, config, notes
         self._feed, self._layers = feed, layers
-        # Above everything else, and not there while all is well.
-        self._faults = gui.add_html("", visible=False)
         self._status = gui.add_html(texts.status(config, _NOTHING, notes))
         gui.add_html(texts.legend())
         self._switches = {
@@ -77,16 +75,14 @@ class LiveTab:
         self._watched: dict[str, Callable[[], None]] = {}
         self._angles: dict[HandName, viser.GuiHtmlHandle] = {}
         for hand in config.hand:
-            with gui.add_folder(f"{hand} hand, degrees"):
+            with gui.add_folder(f"{hand} hand: bend of its joints, degrees"):
                 self._angles[hand] = gui.add_html("")
-        with gui.add_folder("rates", expand_by_default=False):
+        with gui.add_folder("programs and their rates", expand_by_default=False):
             self._rates = gui.add_html(texts.rates([]))
 
     def update(self, seen: Seen) -> None:
         """Bring the texts up to date, and watch the cameras that are chosen."""
         view = seen.view
-        self._faults.visible = bool(seen.faults)
-        self._faults.content = fault_texts.faults(seen.faults, seen.now_ns)
         self._status.content = texts.status(self._config, view, self._notes)
         self._rates.content = texts.rates(view.health)
         for hand, handle in self._angles.items():

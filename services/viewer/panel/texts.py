@@ -6,12 +6,10 @@ What is missing is said in words, with what to check.
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 
 import numpy as np
 
-from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
 from rhot.messages import HandPose
@@ -19,6 +17,7 @@ from rhot.messages.health import Health, StreamHealth
 from services.viewer.live.model import View
 from services.viewer.live.object_texts import object_lines
 from services.viewer.live.palette import SOURCE_RGB
+from services.viewer.panel.words import sentence, service_words, stream_words, text
 
 # Rows of the rates table: a rig of two Pis has some twenty streams.
 _MAX_ROWS = 60
@@ -27,18 +26,13 @@ _CELL = "padding:0 0.5em 0 0;text-align:right;white-space:nowrap"
 _LEFT = "padding:0 0.5em 0 0;text-align:left"
 
 
-def text(value: str, longest: int = 60) -> str:
-    """Any string, made harmless for a browser and shortened."""
-    return html.escape("".join(c for c in value if c.isprintable())[:longest])
-
-
 def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
     """What is tracked, what is waited for, and standing notes such as missing calibration."""
     lines = [_hand_line(hand, view) for hand in config.hand]
     if not config.hand:
         lines.append("no hand is configured: add [hand.right.markers] to rig.toml")
     lines += [text(line, 200) for line in object_lines(config, view)]
-    lines += [text(note, 200) for note in notes]
+    lines += [sentence(note, 200) for note in notes]
     return _box("<br>".join(lines))
 
 
@@ -48,21 +42,21 @@ def _hand_line(hand: HandName, view: View) -> str:
         after = "" if latency is None else f", {latency:.0f} ms after the light"
         return f"{hand} hand: tracked{after}"
     if any(of_hand == hand for of_hand, _ in view.points):
-        return f"{hand} hand: markers seen, waiting for poses ... (is rhot-solver running?)"
-    return f"waiting for hand poses of the {hand} hand ... ({_missing(view)})"
+        return f"{hand} hand: its markers are seen; waiting for the solver to pose it ..."
+    return f"{hand} hand: waiting for {_missing(view)} ..."
 
 
 def _missing(view: View) -> str:
-    """The first service on the way to a pose that is not heard."""
+    """What is waited for: the first program on the way to a pose that is not heard."""
     services = {health.service for health in view.health}
-    for needed, hint in (
-        ("pi_tracker", "no camera's tracker is heard"),
-        ("fusion", "rhot-fusion is not heard"),
-        ("solver", "rhot-solver is not heard"),
+    for needed, missing in (
+        ("pi_tracker", "a camera's tracker: none is heard"),
+        ("fusion", "fusion, which makes points of what cameras see"),
+        ("solver", "the solver, which makes a hand of points"),
     ):
         if needed not in services:
-            return hint
-    return "all services are heard: is the hand in view of two cameras?"
+            return missing
+    return "it: hold it into the view of two cameras"
 
 
 def legend() -> str:
@@ -76,8 +70,8 @@ def legend() -> str:
 
 
 def angles(pose: HandPose) -> str:
-    """Joint angles in degrees, one row a finger."""
-    rows = [_row(("", "abd", "cmc/mcp", "pip/mcp", "dip", "off"), head=True)]
+    """Joint angles in degrees, one row a finger; of the thumb its own joints from the wrist on."""
+    rows = [_row(("", "spread", "base", "middle", "tip", "misfit"), head=True)]
     for digit, names, finger in zip(DIGITS, DIGIT_ANGLES, pose.fingers, strict=True):
         degrees = [f"{_degrees(getattr(finger.angles_rad, name)):.0f}&deg;" for name in names]
         off = f"{min(finger.residual_m * 1e3, 999.0):.1f} mm" if finger.status != "solved" else ""
@@ -88,23 +82,22 @@ def angles(pose: HandPose) -> str:
 
 def no_angles() -> str:
     """What stands in place of the angles while no hand is tracked."""
-    return _box("waiting for hand poses ...")
+    return _box("nothing to show while no hand is tracked")
 
 
 def rates(health: Sequence[Health]) -> str:
     """Every stream's rate against what is expected, and each service's last error."""
     if not health:
         return _box("waiting for the services' health ...")
-    rows = [_row(("stream", "Hz", "of", "ms", "lost"), head=True)]
+    rows = [_row(("", "a second", "of", "ms old", "lost"), head=True)]
     for beat in health:
-        name = f"{beat.service}/{beat.instance}"
+        name = text(service_words(beat.service, beat.instance))
         cpu = f"{min(beat.cpu_percent, 9999.0):.0f} % of a core"
-        rows.append(f'<tr><td colspan="5"><b>{text(name)}</b> {cpu}</td></tr>')
+        rows.append(f'<tr><td colspan="5"><b>{name}</b> {cpu}</td></tr>')
         rows += [_stream(stream) for stream in beat.streams]
         if beat.last_error:
-            rows.append(
-                f'<tr><td colspan="5" style="color:#c0392b">{text(beat.last_error, 120)}</td></tr>'
-            )
+            told = sentence(beat.last_error, 120)
+            rows.append(f'<tr><td colspan="5" style="color:#c0392b">{told}</td></tr>')
     more = (
         f"<tr><td>... and {len(rows) - _MAX_ROWS} more</td></tr>" if len(rows) > _MAX_ROWS else ""
     )
@@ -112,8 +105,6 @@ def rates(health: Sequence[Health]) -> str:
 
 
 def _stream(stream: StreamHealth) -> str:
-    topic = topics.find(stream.key)
-    short = stream.key.split("/", 2)[-1] if topic or "*" in stream.key else stream.key
     arrow = "&rarr;" if stream.direction == "out" else "&larr;"
     rate = f"{min(stream.rate_hz, 99999.0):.1f}"
     shown = rate if stream.ok else f'<span style="color:#c0392b">{rate}</span>'
@@ -122,7 +113,7 @@ def _stream(stream: StreamHealth) -> str:
     lost = stream.dropped + stream.rejected
     return _row(
         (
-            f"{arrow} {text(short, 40)}",
+            f"{arrow} {text(stream_words(stream.key), 40)}",
             shown,
             expected,
             latency,

@@ -7,7 +7,7 @@ visitors share.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -53,3 +53,7 @@ class Section(Protocol):
         viser calls what is registered with on_click() and on_update() from threads of its own: hand
         over with loop.call_soon_threadsafe().
         """
+
+
+# Makes what stands above one visitor's tabs.
+Head = Callable[[viser.ClientHandle], OpenSection]

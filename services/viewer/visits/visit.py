@@ -1,4 +1,4 @@
-"""One visitor's page: a tab for each section, in the visitor's own controls."""
+"""One visitor's page: a head, and below it a tab for each section, in his own controls."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import viser
 
-from services.viewer.visits.section import Section, Seen
+from services.viewer.visits.section import Head, Section, Seen
 
 # A row of the rates' table fits; at 1280 pixels the scene has two thirds of the window.
 _PANEL_PX = 400.0
@@ -15,12 +15,12 @@ _PANEL_PX = 400.0
 class Visit:
     """A browser that looks, with everything that only it sees."""
 
-    def __init__(self, client: viser.ClientHandle, sections: Sequence[Section]) -> None:
+    def __init__(self, client: viser.ClientHandle, head: Head, sections: Sequence[Section]) -> None:
         self.client = client
-        self._open = []
         # Beside the scene and not over it. A phone has it as a sheet at the bottom anyway.
         client.gui.main_panel.dock_right()
         client.gui.main_panel.set_width(_PANEL_PX)
+        self._open = [head(client)]
         tabs = client.gui.add_tab_group()
         for section in sections:
             with (tab := tabs.add_tab(section.title)):

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import viser
 
-from services.viewer.visits.section import Section, Seen
+from services.viewer.visits.section import Head, Section, Seen
 from services.viewer.visits.visit import Visit
 
 T = TypeVar("T")
@@ -21,9 +21,9 @@ T = TypeVar("T")
 class Visits:
     """All visits of one server; `anybody` is set while there is one. Made on the service's loop."""
 
-    def __init__(self, server: viser.ViserServer, sections: Sequence[Section]) -> None:
+    def __init__(self, server: viser.ViserServer, head: Head, sections: Sequence[Section]) -> None:
         self.anybody = asyncio.Event()
-        self._sections = sections
+        self._head, self._sections = head, sections
         self._visits: dict[int, Visit] = {}
         self._loop = asyncio.get_running_loop()
         server.on_client_connect(self._connected)
@@ -57,7 +57,7 @@ class Visits:
             self._loop.call_soon_threadsafe(function, argument)
 
     def _open(self, client: viser.ClientHandle) -> None:
-        self._visits[client.client_id] = Visit(client, self._sections)
+        self._visits[client.client_id] = Visit(client, self._head, self._sections)
         self.anybody.set()
 
     def _close(self, client_id: int) -> None:

@@ -1,45 +1,57 @@
-"""What is wrong stands at the top of the page, with what to do, and harmless."""
+"""What is wrong stands above all, its reason first, with what to do, plain and harmless."""
 
 from __future__ import annotations
 
+from rhot.watch.causes import causes
 from rhot.watch.rig_state import StandingFault
-from services.viewer.panel.fault_texts import faults
+from services.viewer.panel.fault_texts import banner, following, headline
 from testing.sample_health import NOW_NS, fault
 
 EVIL = '<script>alert("x")</script><img src=x onerror=alert(1)>\x1b[2J'
 
 
-def standing(*found):
-    return [StandingFault(teller="fusion", fault=one) for one in found]
+def found(*faults, teller="fusion"):
+    return causes([StandingFault(teller=teller, fault=one) for one in faults])
 
 
 def test_nothing_is_said_while_all_is_well():
-    assert faults([], NOW_NS) == ""
+    assert banner([], NOW_NS) == following([]) == headline([]) == ""
 
 
 def test_what_since_when_and_what_to_do():
-    said = faults(standing(fault("camera_moved", "left has moved", "left", since_s=75)), NOW_NS)
-    assert "error" in said
-    assert "fusion: left has moved, for 75 s" in said
-    assert "rhot calibrate stereo" in said
-    assert "[camera_moved]" in said
-    assert "for 5 min" in faults(standing(fault("event", since_s=300)), NOW_NS)
+    said = banner(found(fault("camera_moved", "left has moved", "left", since_s=125)), NOW_NS)
+    assert "problem:" in said
+    assert "left has moved (says fusion), for 2 min" in said
+    assert "<code>rhot calibrate stereo</code>" in said
+    assert "camera_moved" not in said
     # A sender's clock that is ahead says nothing of how long it lasts.
-    assert (
-        "for" not in faults(standing(fault("disk_low", "low", since_s=-60)), NOW_NS).split("→")[0]
+    assert ", for" not in banner(found(fault("disk_low", "low", since_s=-60)), NOW_NS)
+    assert "for 3 hours" in banner(found(fault("event", since_s=10800)), NOW_NS)
+
+
+def test_what_follows_is_told_apart():
+    both = found(
+        fault("stream_slow", "rhot/sim/hand/*/points: 0.0 Hz received of 30.0 expected"),
+        fault("camera_moved", "left has moved", "left"),
     )
+    assert "0.0 Hz" not in banner(both, NOW_NS)
+    assert "points of the hands: 0.0 Hz received" in following(both)
+    assert "rhot/sim" not in following(both)
+    assert headline(both) == "1 problem"
+    assert headline(found(fault("disk_low"), fault("computer_hot"))) == "2 notes"
 
 
 def test_strangers_cannot_write_html():
-    evil = [
-        StandingFault(teller=EVIL, fault=fault("event", EVIL, EVIL)),
-    ]
-    said = faults(evil, NOW_NS)
-    assert "<script" not in said
-    assert "<img" not in said
-    assert "\x1b" not in said
+    evil = [StandingFault(teller=EVIL, fault=fault("event", EVIL, EVIL))]
+    follower = StandingFault(teller=EVIL, fault=fault("no_pose", EVIL))
+    for said in (banner(causes(evil), NOW_NS), following(causes([*evil, follower]))):
+        assert "<script" not in said
+        assert "<img" not in said
+        assert "\x1b" not in said
 
 
 def test_what_is_too_much_is_counted():
-    said = faults(standing(*(fault("event", str(n)) for n in range(30))), NOW_NS)
-    assert "22 more" in said
+    many = found(*(fault("event", str(n)) for n in range(30)))
+    assert "27 more" in banner(many, NOW_NS)
+    slow = found(fault("camera_moved"), *(fault("stream_slow", str(n)) for n in range(60)))
+    assert "30 more" in following(slow)

@@ -51,8 +51,12 @@ class NotingTab:
 
 async def test_every_browser_has_its_own_tabs(browse: Callable[..., Any]) -> None:
     notes: list[str] = []
+
+    def head(client: Any) -> NotingTab:
+        return Noting("Head", notes).open(client, None)
+
     with open_server(Viewer(port=0)) as server:
-        visits = Visits(server, [Noting("Live", notes), Noting("Recording", notes)])
+        visits = Visits(server, head, [Noting("Live", notes), Noting("Recording", notes)])
         assert not visits.anybody.is_set()
         first = await asyncio.to_thread(browse, server.get_port())
         await asyncio.wait_for(visits.anybody.wait(), DEADLINE_S)
@@ -79,7 +83,12 @@ async def test_every_browser_has_its_own_tabs(browse: Callable[..., Any]) -> Non
         visits.close()
         assert not visits.anybody.is_set()
     assert sorted(notes) == sorted(
-        2 * [f"{name} {what}" for name in ("Live", "Recording") for what in ("opened", "closed")]
+        2
+        * [
+            f"{name} {what}"
+            for name in ("Head", "Live", "Recording")
+            for what in ("opened", "closed")
+        ]
     )
 
 

@@ -1,0 +1,48 @@
+"""Above a visitor's tabs: what is wrong with the rig and what to do; nothing while all is well."""
+
+from __future__ import annotations
+
+import viser
+
+from rhot.watch.causes import causes
+from services.viewer.panel import fault_texts
+from services.viewer.visits.section import Seen
+
+
+class Banner:
+    """The causes of what is wrong; what follows from them is in a folder, closed at first."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._client = client
+        self._causes = client.gui.add_html("", visible=False)
+        self._folder = client.gui.add_folder(
+            "what follows from it", expand_by_default=False, visible=False
+        )
+        with self._folder:
+            self._follows = client.gui.add_html("")
+        self._label = ""
+
+    def update(self, seen: Seen) -> None:
+        """Bring it up to date."""
+        found = causes(seen.faults)
+        self._causes.visible = bool(found)
+        self._causes.content = fault_texts.banner(found, seen.now_ns)
+        follows = fault_texts.following(found)
+        self._folder.visible = bool(follows)
+        self._follows.content = follows
+        self._show_label(fault_texts.headline(found) or _hands(seen))
+
+    def close(self) -> None:
+        """Nothing is left behind."""
+
+    def _show_label(self, words: str) -> None:
+        """The panel's own line: all that a phone shows of it at first."""
+        label = f"rhot: {words}" if words else "rhot"
+        if label != self._label:
+            self._label = label
+            self._client.gui.set_panel_label(label)
+
+
+def _hands(seen: Seen) -> str:
+    hands = [f"{hand} hand" for hand in seen.view.hands]
+    return f"{' and '.join(hands)} tracked" if hands else "no hand in view"
