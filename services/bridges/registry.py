@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rhot.errors import ConfigError
 
-BRIDGES: tuple[str, ...] = ("vmc", "monado", "foxglove", "ros2", "websocket")
+BRIDGES: tuple[str, ...] = ("vmc", "monado", "foxglove", "ros2", "websocket", "opengloves")
 
 
 def module_of(name: str) -> str:
