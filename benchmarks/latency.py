@@ -84,9 +84,8 @@ class Played:
     def play(self) -> None:
         """Put all frames at their pace, and a bare message after each that points are due with."""
         deadline_s = time.monotonic() + START_S
-        # The stub says bool.
-        waiting: list[Any] = [*self._markers.values(), self._bare]
-        while not all(one.matching_status.matching for one in waiting):
+        waiting = [*self._markers.values(), self._bare]
+        while not all(_is_heard(one) for one in waiting):
             if time.monotonic() > deadline_s:
                 raise SystemExit("fusion, the solver or a relay did not start")
             time.sleep(0.05)
@@ -149,6 +148,11 @@ class Played:
                 parts.append(np.diff([put_ns, points_ns, pose.sent_ns, received_ns]) * 1e-3)
         names = ("put_to_points_us", "points_to_pose_us", "pose_to_here_us")
         return dict(zip(names, np.median(parts, axis=0).tolist(), strict=True))
+
+
+def _is_heard(publisher: zenoh.Publisher) -> bool:
+    # The stub says bool.
+    return bool(publisher.matching_status.matching)  # type: ignore[attr-defined]
 
 
 def sleep_until(instant_s: float) -> None:

@@ -23,30 +23,26 @@ from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
-from rhot.messages import HandPoint, HandPoints, HandPose, MarkerFrame, PointSource
+from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.alignment.clock_alignment import ClockAlignment
 from services.fusion.arrays import Bools
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
 from services.fusion.joint.estimator import JointMethod
 from services.fusion.kalman.estimator import KalmanMethod
-from services.fusion.method import Estimates, Method
+from services.fusion.method import Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
 from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import coherent, hand_reach_m
+from services.fusion.output.hand_points import PointMessages, usable_points
 from services.fusion.output.hidden_paint import HiddenPaint
-from services.fusion.output.paint_to_bone import PaintToBone
+from services.fusion.output.paint_to_bone import Directions, PaintToBone
 from services.fusion.output.pose_feedback import PoseFeedback
 from services.fusion.output.schedule import OutputSchedule
 from services.fusion.output.systematic_error import SystematicError
 from services.fusion.paired.estimator import PairedMethod
 
-# Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
-# arm's length.
-_DIGITS = 6
-# Covariances to as many digits as sigmas' squares need.
-_COVARIANCE_DIGITS = 13
 # Reasons and cameras for which rejected frames are counted apart: a rig has four reasons for each
 # of some cameras.
 _MAX_REJECTED = 64
@@ -79,7 +75,8 @@ class FusionStep:
         self._reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
-        self._poses = PoseFeedback()
+        self._poses: PoseFeedback[Directions] = PoseFeedback()
+        self._messages = PointMessages(self._landmarks, [one.name for one in self._cameras])
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         centres = np.array([camera.centre_rig for camera in self._cameras])
         self._hidden = HiddenPaint(centres, self._paint.round)
@@ -176,7 +173,7 @@ class FusionStep:
         (output/pose_feedback.py), whenever it comes.
         """
         if pose.hand in self._rows:
-            self._poses.add(pose)
+            self._poses.add(self._paint.directions(pose))
 
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
@@ -208,29 +205,24 @@ class FusionStep:
 
     def _points_at(self, instant_ns: int) -> list[HandPoints]:
         """One message per hand for an instant (master clock)."""
-        for pose in self._poses.take(instant_ns):
-            self._paint.note_pose(pose)
+        for told in self._poses.take(instant_ns):
+            self._paint.note(told)
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
         positions, covariances = self._paint.correct(
             estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
         )
         # Rows of landmarks that were not found hold no place.
         self._hidden.note_places(np.where(estimates.found[:, None], positions, np.nan))
-        covariances = covariances + self._systematic.covariances(
+        covariances += self._systematic.covariances(
             positions, estimates.seen_by, self._hidden.sigmas
         )
-        variances = np.einsum("nii->ni", covariances)  # (L, 3)
-        sigmas = np.sqrt(np.maximum(variances, 0.0))
-        usable = estimates.found & np.isfinite(positions).all(axis=1)
-        usable &= np.isfinite(sigmas).all(axis=1)
+        usable = usable_points(positions, covariances, estimates.found)
         kept = self._coherent(positions, covariances, usable, estimates.detected)
         stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
         messages = []
         for hand, rows in self._rows.items():
-            points = [
-                self._point(row, positions[row], covariances[row], estimates)
-                for row in rows[kept[rows]].tolist()
-            ]
+            told_rows = rows[kept[rows]].tolist()
+            points = self._messages.of(told_rows, positions, covariances, estimates)
             messages.append(HandPoints(hand=hand, seq=self._seq, stamp_ns=stamp_ns, points=points))
         self._seq += 1
         return messages
@@ -250,27 +242,6 @@ class FusionStep:
             )
         self.method.counts.incoherent += int(np.count_nonzero(usable & ~kept))
         return kept
-
-    def _point(
-        self, row: int, position: Array, covariance: Array, estimates: Estimates
-    ) -> HandPoint:
-        """A landmark's message: its position (3,) and covariance (3, 3)."""
-        x, y, z = (round(value, _DIGITS) for value in position.tolist())
-        sigmas = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
-        sx, sy, sz = (max(round(value, _DIGITS), 10.0**-_DIGITS) for value in sigmas)
-        xx, xy, xz, yy, yz, zz = (
-            round(value, _COVARIANCE_DIGITS) for value in covariance[np.triu_indices(3)].tolist()
-        )
-        seen_by = zip(self._cameras, estimates.seen_by[row].tolist(), strict=True)
-        source: PointSource = "measured" if estimates.measured[row] else "predicted"
-        return HandPoint(
-            name=self._landmarks[row].name,
-            position_m=(x, y, z),
-            sigma_m=(sx, sy, sz),
-            cameras=[camera.name for camera, seen in seen_by if seen],
-            source=source,
-            covariance_m2=(xx, xy, xz, yy, yz, zz),
-        )
 
 
 def _check(

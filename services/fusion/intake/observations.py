@@ -95,25 +95,29 @@ class ObservationBuilder:
         if not 0 <= instant_ns <= _STAMP_MAX:
             return FrameRejection.IMPLAUSIBLE_STAMP
         best = self._best_markers(frame, camera)
-        landmarks = np.array(sorted(best), dtype=np.int64)
-        markers = [best[landmark] for landmark in landmarks.tolist()]
-        pixels = np.array([(marker.x_px, marker.y_px) for marker in markers]).reshape(-1, 2)
-        sigmas_px = np.array(
-            [min(max(marker.sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for marker in markers]
-        )
-        areas_px2 = np.array([marker.area_px for marker in markers])
+        landmarks = sorted(best)
+        markers = [best[landmark] for landmark in landmarks]
+        pixels = np.array([(one.x_px, one.y_px) for one in markers]).reshape(-1, 2)
         rays, scale, valid = undistort(camera, pixels)
+        sigmas_px = [min(max(one.sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for one in markers]
+        columns = (
+            np.array(landmarks, dtype=np.int64),
+            (pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9,
+            rays,
+            np.array(sigmas_px) * scale,
+            np.array([one.area_px for one in markers]) * scale**2,
+        )
+        used = len(landmarks)
+        if not valid.all():
+            columns = tuple(column[valid] for column in columns)  # type: ignore[assignment]
+            used = int(np.count_nonzero(valid))
         return View(
-            camera=index,
-            instant_ns=instant_ns,
-            landmarks=landmarks[valid],
-            delay_s=((pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9)[valid],
-            rays=rays[valid],
-            sigmas=(sigmas_px * scale)[valid],
-            areas=(areas_px2 * scale**2)[valid],
+            index,
+            instant_ns,
+            *columns,
             clock_offset_ns=frame.clock_offset_ns,
             clock_sigma_s=clock_sigma_s(frame.clock_sigma_ns),
-            ignored=self._count_of_hands(frame) - int(np.count_nonzero(valid)),
+            ignored=self._count_of_hands(frame) - used,
         )
 
     def _count_of_hands(self, frame: MarkerFrame) -> int:

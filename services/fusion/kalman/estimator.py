@@ -29,6 +29,7 @@ from services.fusion.kalman.frame_update import (
 )
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
 from services.fusion.kalman.one_camera import LastLocated
+from services.fusion.kalman.recent_observations import alone_before, largest_sigmas, sights
 from services.fusion.kalman.rest.rest_mixing import mix_rest
 from services.fusion.kalman.smoother import smooth_all
 from services.fusion.kalman.track_history import start_track
@@ -128,8 +129,10 @@ class KalmanMethod:
         otherwise).
         """
         recent = self._state.recent
-        fresh = times_s[:, None] - recent.accepted_s[view.landmarks] <= self._hold_s  # (n, C)
-        return np.asarray(~fresh[:, view.camera] & (fresh.sum(axis=1) == 1))
+        found: Bools = alone_before(
+            recent.accepted_s, view.landmarks, view.camera, times_s, self._hold_s
+        )
+        return found
 
     def _is_contradicted(self, landmark: int) -> bool:
         """Whether two cameras see a landmark, and its track has accepted nothing lately.
@@ -202,32 +205,43 @@ class KalmanMethod:
         covs = np.zeros((landmarks, 6, 6))
         found = smooth_all(history, time_s, MODELS, means, covs)
         mix_rest(rest, time_s, found, means, covs)
-        found &= np.isfinite(means).all(axis=1)
         seen_since_s = SEEN_FRAMES * self._periods_s  # (C,)
-        seen_by = time_s - recent.accepted_s <= seen_since_s  # (L, C)
-        measured = seen_by.sum(axis=1) >= 2
+        seen_by, measured, detected, alone = sights(
+            recent.accepted_s, recent.observed_s, time_s, seen_since_s
+        )
+        largest_sigma = largest_sigmas(means, covs, found)
         self._located.note(found & measured, means[:, :3], time_s)
-        for row in np.flatnonzero(found & (seen_by.sum(axis=1) == 1)).tolist():
-            estimate = means[row, :3], covs[row, :3, :3]
-            centre = self._centres_rig[int(seen_by[row].argmax())]
-            told = self._located.told(row, time_s, estimate, centre)
-            if told is not None:
-                means[row, :3], covs[row, :3, :3] = told
-        largest_sigma = np.sqrt(covs[:, [0, 1, 2], [0, 1, 2]].max(axis=1))
-        for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
-            # The middle one of three: the larger one across the ray.
-            if seen_by[row].any():
-                largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
+        if not measured.all():
+            self._tell_alone(time_s, found & alone, seen_by, (means, covs, largest_sigma))
+            for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
+                # The middle one of three: the larger one across the ray.
+                if seen_by[row].any():
+                    largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
         found &= (largest_sigma > 0.0) & (largest_sigma <= SHOW_SIGMA_M)
-        detected_by = time_s - recent.observed_s <= seen_since_s
         return Estimates(
             found=found,
             positions_m=means[:, :3],
             covariances_m2=covs[:, :3, :3],
             seen_by=seen_by,
             measured=measured,
-            detected=detected_by.sum(axis=1) >= 2,
+            detected=detected,
         )
+
+    def _tell_alone(
+        self, time_s: float, alone: Bools, seen_by: Bools, told: tuple[Array, Array, Array]
+    ) -> None:
+        """What one camera sees alone (L,), by where two saw it last (one_camera.py).
+
+        told: means (L, 6), covariances (L, 6, 6) and largest sigmas (L,), changed in place.
+        """
+        means, covs, largest_sigma = told
+        for row in np.flatnonzero(alone).tolist():
+            estimate = means[row, :3], covs[row, :3, :3]
+            centre = self._centres_rig[int(seen_by[row].argmax())]
+            by_one = self._located.told(row, time_s, estimate, centre)
+            if by_one is not None:
+                means[row, :3], covs[row, :3, :3] = by_one
+                largest_sigma[row] = np.sqrt(covs[row, [0, 1, 2], [0, 1, 2]].max())
 
     def rest_probabilities(self) -> Array:
         """How likely each landmark (L,) rests in its hand, 0 to 1; rest/."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools
 
 # How far a hand's distance changes, 1 sigma: as fast as this at first, never more than so far.
 # Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s, stop and go at 14 m/s^2),
@@ -29,7 +30,7 @@ class LastLocated:
         self._positions = np.full((landmarks, 3), np.nan)
         self._times_s = np.full(landmarks, -np.inf)
 
-    def note(self, located: Array, positions_m: Array, time_s: float) -> None:
+    def note(self, located: Bools, positions_m: Array, time_s: float) -> None:
         """Positions (L, 3) of landmarks that two cameras see (L,)."""
         self._positions[located] = positions_m[located]
         self._times_s[located] = time_s

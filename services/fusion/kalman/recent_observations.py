@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.arrays import Ints
+from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.frame_rays import FrameRays
 
 # Observations of each camera that are kept for starting a track: half a second at 30 fps, so that a
@@ -54,3 +54,43 @@ def remember(recent: RecentObservations, frame: FrameRays) -> None:
         recent.observed_s[landmark, camera] = max(
             recent.observed_s[landmark, camera], frame.times_s[n]
         )
+
+
+@njit(cache=True)
+def alone_before(
+    accepted_s: Array, landmarks: Ints, camera: int, times_s: Array, hold_s: float
+) -> Bools:
+    """Which of a camera's observations (n,) are of landmarks that another one saw alone for hold_s.
+
+    accepted_s (L, C); landmarks and times_s (n,) of the observations.
+    """
+    alone = np.zeros(landmarks.size, dtype=np.bool_)
+    for n in range(landmarks.size):
+        fresh = times_s[n] - accepted_s[landmarks[n]] <= hold_s  # (C,)
+        alone[n] = not fresh[camera] and np.count_nonzero(fresh) == 1
+    return alone
+
+
+@njit(cache=True)
+def sights(
+    accepted_s: Array, observed_s: Array, time_s: float, since_s: Array
+) -> tuple[Bools, Bools, Bools, Bools]:
+    """Who sees landmarks at an instant, by observations that are not older than since_s (C,).
+
+    Which cameras do (L, C); whether two or more do, two or more detect something of its colour, and
+    whether one does alone, (L,) each.
+    """
+    seen_by = time_s - accepted_s <= since_s
+    detected_by = time_s - observed_s <= since_s
+    seen, detected = seen_by.sum(axis=1), detected_by.sum(axis=1)
+    return seen_by, seen >= 2, detected >= 2, seen == 1
+
+
+@njit(cache=True)
+def largest_sigmas(means: Array, covs: Array, found: Bools) -> Array:
+    """The largest sigma of each position (L,); what is not a number is not found (L,) any more."""
+    largest = np.zeros(found.size)
+    for row in range(found.size):
+        found[row] &= np.isfinite(means[row]).all()
+        largest[row] = np.sqrt(max(covs[row, 0, 0], covs[row, 1, 1], covs[row, 2, 2]))
+    return largest

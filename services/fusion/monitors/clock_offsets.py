@@ -94,6 +94,8 @@ class ClockOffsetEstimator:
         self._moved = MovedCameraMonitor(len(self._pairs))
         self._late_s = np.zeros(cameras)  # (C,)
         self._cov = np.diag(np.full(cameras, CLOCK_SIGMA_MAX_S**2))  # (C, C)
+        # By camera: what _of() says of it until something is learned.
+        self._known: dict[int, tuple[float, float]] = {}
 
     @property
     def epipolar_px(self) -> float:
@@ -168,12 +170,15 @@ class ClockOffsetEstimator:
             self._cov[c, :] = 0.0
             self._cov[:, c] = 0.0
             self._cov[c, c] = sigma_s**2
+            self._known.clear()
         self._announced[c] = (view.clock_offset_ns, sigma_s)
         return self._of(c)
 
     def _of(self, camera: int) -> tuple[float, float]:
         """A camera's clock error, and the sigma of that for pairing."""
-        return float(self._late_s[camera]), self._pairing_sigma_s(camera)
+        if camera not in self._known:
+            self._known[camera] = float(self._late_s[camera]), self._pairing_sigma_s(camera)
+        return self._known[camera]
 
     def _update_pair(self, index: int, cameras: tuple[int, int], newest_s: float) -> None:
         """Compare the newest heights of all landmarks in two cameras, and find the clocks anew."""
@@ -257,6 +262,7 @@ class ClockOffsetEstimator:
             weighted += difference * shift_s / variance
         self._cov = np.linalg.inv(information)
         self._late_s = np.clip(self._cov @ weighted, -bounds_s, bounds_s)
+        self._known.clear()
 
     def _pairing_sigma_s(self, camera: int) -> float:
         """Uncertainty of a camera's clock against the others'.

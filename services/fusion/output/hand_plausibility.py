@@ -8,7 +8,10 @@ left out. If less than half of the markers that two cameras detect remain, all a
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import LANDMARKS, HandModel, forward, landmark_point
@@ -38,11 +41,25 @@ def coherent(
     detected (n,) are the markers that two cameras detect. One or two points cannot be judged: they
     are kept.
     """
-    if np.count_nonzero(found) >= 3:
-        middle = np.median(positions_m[found], axis=0)
-        sigmas = np.sqrt(np.maximum(np.einsum("nii->n", covariances_m2), 0.0))
-        distances = np.linalg.norm(positions_m - middle, axis=1)
-        found = found & (distances <= _MARGIN * reach_m + _SIGMAS * sigmas)
-    if 2 * np.count_nonzero(found) < np.count_nonzero(detected):
-        return np.zeros_like(found)
-    return found
+    kept: Bools = _coherent(positions_m, covariances_m2, found, detected, reach_m)
+    return kept
+
+
+@njit(cache=True)
+def _coherent(
+    positions: Array, covariances: Array, found: Bools, detected: Bools, reach_m: float
+) -> Bools:
+    kept = found.copy()
+    rows = np.flatnonzero(found)
+    if rows.size >= 3:
+        middle = np.empty(3)
+        for i in range(3):
+            middle[i] = np.median(positions[rows, i])
+        for row in rows:
+            variance = covariances[row, 0, 0] + covariances[row, 1, 1] + covariances[row, 2, 2]
+            off = positions[row] - middle
+            distance = math.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2)
+            kept[row] = distance <= _MARGIN * reach_m + _SIGMAS * math.sqrt(max(variance, 0.0))
+    if 2 * np.count_nonzero(kept) < np.count_nonzero(detected):
+        kept[:] = False
+    return kept

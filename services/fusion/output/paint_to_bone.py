@@ -26,15 +26,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, rotation_from_quaternion
 from rhot.hand import HandModel, HandName
 from rhot.messages import HandPose
-from services.fusion.arrays import Bools
-from services.fusion.geometry.projection import extrinsics
+from services.fusion.arrays import Bools, Ints
+from services.fusion.geometry.projection import Extrinsics, extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.paint_centroid import expected_shift, shift_table
 
@@ -72,6 +74,16 @@ def dab_sag_m(radius_m: float, limb_m: float) -> float:
     return limb_m - math.sqrt(limb_m**2 - radius_m**2) if limb_m > radius_m else 0.0
 
 
+class Directions(NamedTuple):
+    """Where the fingers of a hand point, and the skin under its dabs, as a pose says."""
+
+    hand: HandName
+    stamp_ns: int
+    rows: Ints  # (n,) landmarks
+    directions: Array  # (n, 3)
+    sigmas_rad: Array  # (n,)
+
+
 class PaintToBone:
     """What is known of the paint of every landmark, and of the way the fingers point."""
 
@@ -105,10 +117,12 @@ class PaintToBone:
                 for dab_m, limb_m in zip(self._dabs_m, limbs_m, strict=True)
             ]
         )
-        self._tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
-        self._radius_sds = [
-            _RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks
-        ]
+        self._tables = np.array(
+            [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
+        ).reshape(len(paints), -1)
+        self._radius_sds = np.array(
+            [_RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks]
+        )
         self._extrinsics = extrinsics(cameras)
         # The middle of the cameras, which stands for all of them.
         self._viewpoint_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
@@ -120,13 +134,14 @@ class PaintToBone:
         self._direction_sigmas = np.zeros(len(self._landmarks))
         self._stamps_ns = [-_POSE_AGE_NS - 1] * len(self._landmarks)
 
-    def note_pose(self, pose: HandPose) -> None:
-        """Remember a solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
+    def directions(self, pose: HandPose) -> Directions:
+        """A solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
         joints = {joint.name: joint for joint in pose.joints if joint.source != "predicted"}
         sigmas = {
             f"{finger.name}_tip": _direction_sigma(pose.wrist_sigma_rad, finger.sigma_rad)
             for finger in pose.fingers
         }
+        rows, directions, sigmas_rad = [], [], []
         for row, landmark in enumerate(self._landmarks):
             joint = joints.get(landmark.name)
             if landmark.hand != pose.hand or joint is None or not self.extended[row]:
@@ -135,9 +150,23 @@ class PaintToBone:
             if 0.4 < np.abs(quaternion).max() < 1.1:
                 R = rotation_from_quaternion(quaternion)
                 is_tip = self._radii_m[row] > 0.0
-                self._directions[row] = -R[:, 2] if is_tip else R @ self._normals[row]
-                self._direction_sigmas[row] = sigmas.get(landmark.name, 0.0)
-                self._stamps_ns[row] = pose.stamp_ns
+                rows.append(row)
+                directions.append(-R[:, 2] if is_tip else R @ self._normals[row])
+                sigmas_rad.append(sigmas.get(landmark.name, 0.0))
+        return Directions(
+            pose.hand,
+            pose.stamp_ns,
+            np.array(rows, dtype=np.int64),
+            np.array(directions).reshape(-1, 3),
+            np.array(sigmas_rad),
+        )
+
+    def note(self, told: Directions) -> None:
+        """Remember a solved hand's directions."""
+        self._directions[told.rows] = told.directions
+        self._direction_sigmas[told.rows] = told.sigmas_rad
+        for row in told.rows.tolist():
+            self._stamps_ns[row] = told.stamp_ns
 
     def correct(
         self, positions_m: Array, covariances_m2: Array, seen_by: Bools, instant_ns: int
@@ -146,48 +175,73 @@ class PaintToBone:
 
         seen_by (L, C) tells which cameras located them.
         """
-        rays = positions_m - self._viewpoint_rig
-        rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)  # (L, 3) away
-        # Skin that a camera sees faces it, more or less.
-        positions = positions_m - self._sags_m[:, None] * rays
-        sigmas = np.tile(SIGMA_UNKNOWN, (len(positions), 1))  # (L, 2) along and across, in radii
-        shift, shift_covariance, covariances = np.empty(3), np.empty((3, 3)), covariances_m2.copy()
-        for row, stamp_ns in enumerate(self._stamps_ns):
-            if abs(instant_ns - stamp_ns) > _POSE_AGE_NS:
-                continue
-            if self._radii_m[row] == 0.0:
-                positions[row] = positions_m[row] + self._sags_m[row] * self._directions[row]
-                continue
-            if self._tip_shift(row, positions_m[row], seen_by[row], shift, shift_covariance):
+        positions, covariances = positions_m.copy(), covariances_m2.copy()
+        ages_ns = [abs(instant_ns - stamp_ns) for stamp_ns in self._stamps_ns]
+        _correct(
+            positions,
+            covariances,
+            seen_by,
+            np.array([age_ns <= _POSE_AGE_NS for age_ns in ages_ns]),
+            (self._radii_m, self._dabs_m, self._sags_m),
+            (self._tables, self._directions, self._direction_sigmas, self._radius_sds),
+            self._extrinsics,
+            self._viewpoint_rig,
+        )
+        return positions, covariances
+
+
+@njit(cache=True)
+def _correct(
+    positions: Array,
+    covariances: Array,
+    seen_by: Bools,
+    told: Bools,
+    sizes: tuple[Array, Array, Array],
+    fingers: tuple[Array, Array, Array, Array],
+    cameras: Extrinsics,
+    viewpoint: Array,
+) -> None:
+    """PaintToBone.correct in place; told (L,): a pose says where a landmark's finger points.
+
+    sizes: radii of tips, diameters of dabs and how deep their middles lie, (L,) each. fingers:
+    tables (L, 61) of paint_centroid, directions (L, 3), their sigmas and those of radii (L,).
+    """
+    radii, dabs, sags = sizes
+    tables, directions, direction_sigmas, radius_sds = fingers
+    shift, shift_covariance = np.empty(3), np.empty((3, 3))
+    for row in range(positions.shape[0]):
+        ray = positions[row] - viewpoint  # away
+        ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
+        along, across = SIGMA_UNKNOWN  # in radii
+        if not told[row]:
+            # Skin that a camera sees faces it, more or less.
+            positions[row] -= sags[row] * ray
+        elif radii[row] == 0.0:
+            positions[row] += sags[row] * directions[row]
+        else:
+            # A tip, whose middle has no depth under it.
+            finger = directions[row], direction_sigmas[row], radius_sds[row]
+            chosen = _locating(cameras, seen_by[row])
+            if expected_shift(tables[row], positions[row], finger, chosen, shift, shift_covariance):
                 positions[row] -= shift
                 covariances[row] += shift_covariance
-                sigmas[row] = _tip_sigmas(float(rays[row] @ self._directions[row]))
-        return positions, covariances + self._paint_covariances(sigmas, rays)
+                along, across = _tip_sigmas(ray @ directions[row])
+        dab = (SIGMA_DAB * dabs[row]) ** 2
+        along = (along * radii[row]) ** 2 + dab
+        across = (across * radii[row]) ** 2 + dab
+        for i in range(3):
+            for j in range(3):
+                both = ray[i] * ray[j]
+                covariances[row, i, j] += along * both + across * ((1.0 if i == j else 0.0) - both)
 
-    def _tip_shift(
-        self, row: int, position_m: Array, seen_by: Bools, shift: Array, covariance: Array
-    ) -> bool:
-        """The located centroid of a tip minus the landmark (3,), and its covariance (3, 3).
 
-        By a pose's direction. False if the cameras cannot locate it.
-        """
-        cameras = seen_by if np.count_nonzero(seen_by) >= 2 else np.ones_like(seen_by)
-        chosen = self._extrinsics.of(np.flatnonzero(cameras))
-        finger = (
-            self._directions[row],
-            float(self._direction_sigmas[row]),
-            self._radius_sds[row],
-        )
-        return expected_shift(self._tables[row], position_m, finger, chosen, shift, covariance)
-
-    def _paint_covariances(self, sigmas: Array, rays: Array) -> Array:
-        """Covariances (L, 3, 3) by sigmas (L, 2) along and across the viewing rays (L, 3)."""
-        along = rays[:, :, None] * rays[:, None, :]  # (L, 3, 3)
-        across = np.eye(3) - along
-        tip_variances = (sigmas * self._radii_m[:, None]) ** 2  # (L, 2)
-        dab_variances = (SIGMA_DAB * self._dabs_m[:, None]) ** 2  # (L, 1)
-        variances = tip_variances + dab_variances
-        return variances[:, 0, None, None] * along + variances[:, 1, None, None] * across
+@njit(cache=True)
+def _locating(cameras: Extrinsics, seen_by: Bools) -> Extrinsics:
+    """The cameras that locate a landmark: those that see it (C,), all where less than two do."""
+    if np.count_nonzero(seen_by) < 2:
+        return cameras
+    chosen = np.flatnonzero(seen_by)
+    return Extrinsics(cameras.R[chosen], cameras.t[chosen])
 
 
 def _direction_sigma(wrist_rad: float | None, finger_rad: float | None) -> float:
@@ -201,12 +255,13 @@ def _direction_sigma(wrist_rad: float | None, finger_rad: float | None) -> float
     return math.hypot(wrist_rad / math.sqrt(3.0), finger_rad)
 
 
-def _tip_sigmas(cosine: float) -> list[float]:
+@njit(cache=True)
+def _tip_sigmas(cosine: float) -> tuple[float, float]:
     """Sigmas along and across the viewing ray, in radii, of a tip whose direction is known.
 
     cosine: of the angle between finger and viewing ray.
     """
-    return [
-        float(np.hypot(side, end * cosine**power))
-        for side, end, power in zip(SIGMA_SIDE, SIGMA_END, _END_POWER, strict=True)
-    ]
+    return (
+        math.hypot(SIGMA_SIDE[0], SIGMA_END[0] * cosine ** _END_POWER[0]),
+        math.hypot(SIGMA_SIDE[1], SIGMA_END[1] * cosine ** _END_POWER[1]),
+    )

@@ -10,8 +10,9 @@ network take no longer than that.
 from __future__ import annotations
 
 from bisect import insort
+from typing import Generic, Protocol, TypeVar
 
-from rhot.messages import HandPose
+from rhot.hand import HandName
 
 # A pose counts for points this much later than its own. From points to pose and back takes 2 to 3
 # ms between real processes (median; 10 to 80 at most on two cores that eight others use too). At
@@ -23,7 +24,20 @@ POSE_DELAY_NS = 25_000_000
 _WAITING = 64
 
 
-class PoseFeedback:
+class Told(Protocol):
+    """A pose, or what is needed of one."""
+
+    @property
+    def hand(self) -> HandName: ...
+
+    @property
+    def stamp_ns(self) -> int: ...
+
+
+T = TypeVar("T", bound=Told)
+
+
+class PoseFeedback(Generic[T]):
     """The poses that have come, and do not count yet.
 
     late counts those that came after points which they should have counted for: these rest on an
@@ -32,10 +46,10 @@ class PoseFeedback:
 
     def __init__(self) -> None:
         self.late = 0
-        self._waiting: list[HandPose] = []
+        self._waiting: list[T] = []
         self._newest_ns: int | None = None
 
-    def add(self, pose: HandPose) -> None:
+    def add(self, pose: T) -> None:
         """A pose has come, at whatever time."""
         if self._newest_ns is not None and pose.stamp_ns + POSE_DELAY_NS <= self._newest_ns:
             self.late += 1
@@ -43,7 +57,7 @@ class PoseFeedback:
         # The farthest in the future.
         del self._waiting[_WAITING:]
 
-    def take(self, instant_ns: int) -> list[HandPose]:
+    def take(self, instant_ns: int) -> list[T]:
         """The poses that count from now on, as points of this instant are due; oldest first."""
         self._newest_ns = instant_ns
         count = sum(pose.stamp_ns + POSE_DELAY_NS <= instant_ns for pose in self._waiting)
@@ -56,5 +70,5 @@ class PoseFeedback:
         self._newest_ns = None
 
 
-def _order(pose: HandPose) -> tuple[int, str]:
+def _order(pose: Told) -> tuple[int, str]:
     return pose.stamp_ns, pose.hand

@@ -133,7 +133,7 @@ def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
 
 
 def test_a_pose_corrects_tips_while_it_is_fresh(paint):
-    paint.note_pose(pose(10**18, TOWARDS))
+    paint.note(paint.directions(pose(10**18, TOWARDS)))
     positions, covariances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18 + 33_000_000)
     # The palm side of the wrist, -y of its frame, turned with the hand.
     np.testing.assert_allclose(
@@ -155,7 +155,7 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
     for angle in (0.0, 0.5, 1.5):
         turn = rotation_from_vector([angle, 0.0, 0.0])
         wxyz = tuple(quaternion_from_rotation(turn).tolist())
-        paint.note_pose(pose(10**18, wxyz, sigma_rad=0.03))
+        paint.note(paint.directions(pose(10**18, wxyz, sigma_rad=0.03)))
         sigmas_mm.append(
             1e3 * np.sqrt(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1, [1, 2], [1, 2]])
         )
@@ -171,8 +171,8 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
     "wxyz", [(0.0, 0.0, 0.0, 0.0), (1e300, 1.0, 0.0, 0.0), (1e-9, 0.0, 0.0, 0.0)]
 )
 def test_absurd_or_predicted_poses_are_ignored(paint, wxyz):
-    paint.note_pose(pose(10**18, wxyz))
-    paint.note_pose(pose(10**18, TOWARDS, source="predicted"))
+    paint.note(paint.directions(pose(10**18, wxyz)))
+    paint.note(paint.directions(pose(10**18, TOWARDS, source="predicted")))
     assert is_untouched(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
 
 
@@ -180,7 +180,7 @@ def depth_sigmas_m(origin: str, sigma_rad: float | None) -> tuple[float, float]:
     """Along x and z, of a tip that points at the cameras, tilted by half a radian."""
     model = msgspec.structs.replace(default_hand("right"), origin=origin)
     paint = PaintToBone(LANDMARKS, {"right": model}, tuple(SyntheticRig().rig().values()))
-    paint.note_pose(pose(10**18, TOWARDS, sigma_rad=sigma_rad))
+    paint.note(paint.directions(pose(10**18, TOWARDS, sigma_rad=sigma_rad)))
     variances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1]
     return float(np.sqrt(variances[0, 0])), float(np.sqrt(variances[2, 2]))
 
@@ -207,7 +207,7 @@ def test_sigmas_hold_a_direction_that_is_off(random_fingers):
         away = rotation_between(np.array([0.0, 0.0, -1.0]), off @ direction)
         # A digit's angles share the blame with the wrist.
         told = pose(10**18, tuple(quaternion_from_rotation(away).tolist()), sigma_rad=0.15)
-        paint.note_pose(told)
+        paint.note(paint.directions(told))
         places, covariances = paint.correct(
             np.array([POSITIONS[0], located]), COVARIANCES, BOTH, 10**18
         )
