@@ -18,22 +18,24 @@ Rgb = tuple[int, int, int]
 # Okabe and Ito's palette).
 SOURCE_RGB: dict[JointSource, Rgb] = {
     "measured": (0, 158, 115),
-    "solved": (60, 120, 225),
+    "solved": (25, 90, 255),
     "predicted": (230, 159, 0),
 }
 UNKNOWN: Rgb = (150, 150, 150)
 # A finger tip that touches is lit; no source and no paint has this colour.
 TOUCH: Rgb = (255, 214, 10)
+# An object that is touched: between its own green and that light.
+TOUCHED: Rgb = (150, 205, 40)
 # Where it touches: seen on the object as on the finger.
 CONTACT: Rgb = (255, 50, 50)
 TRACKER: Rgb = (45, 45, 50)
 # A joint that can bend no further: no other thing of the scene is purple.
 LIMIT: Rgb = (190, 50, 160)
 # Thin lines, and what they fade into: the page's own background.
-LINE: Rgb = (120, 120, 125)
+LINE: Rgb = (75, 75, 85)
 BACKGROUND: Rgb = (250, 250, 250)
 # A skin that is nobody's: light enough for joints to be seen beneath it.
-SKIN: Rgb = (214, 190, 174)
+SKIN: Rgb = (196, 146, 118)
 # Paints by the names people use in rig.toml, calibrated or not.
 _NAMED: dict[str, Rgb] = {
     "red": (220, 40, 40),

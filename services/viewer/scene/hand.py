@@ -20,14 +20,17 @@ from services.viewer.scene.shapes import (
     unit_cylinder,
     unit_sphere,
 )
+from services.viewer.scene.spheres import place, put, reveal
 
 # Joints at their full skin radius would hide the bones, and fill the skin; with these shares of it,
 # all three are seen.
 _JOINT_SHARE, _BONE_SHARE = 0.6, 0.32
+# Joints inside the palm have thick skin, and would be one lump.
+_MAX_JOINT_M, _MAX_BONE_M = 0.0062, 0.0034
 # Sources from most to least certain: a bone is as certain as its worse end.
 _SOURCES = tuple(SOURCE_RGB)
 # Lines of limits, and those of limits that are reached.
-_THIN_M, _THICK_M = 0.0005, 0.0016
+_THIN_M, _THICK_M = 0.0007, 0.0018
 _NOTHING = np.zeros((1, 2, 3))
 _PALETTE = np.array([SOURCE_RGB[source] for source in _SOURCES], dtype=np.uint8)
 
@@ -55,22 +58,27 @@ class Stick:
 
     def show(self, view: HandView | None) -> None:
         """Draw a pose; None hides it."""
-        self._joints.visible = self._bones.visible = view is not None
+        reveal(self._joints, view is not None)
+        reveal(self._bones, view is not None)
         if view is None:
             return
-        uncertainty = np.array([_SOURCES.index(source) for source in view.sources])
-        self._joints.batched_positions = f32(view.positions_m)
-        self._joints.batched_scales = f32(
-            np.repeat(_JOINT_SHARE * view.radii_m[:, None], 3, axis=1)
-        )
-        self._joints.batched_colors = _PALETTE[uncertainty]
+        place(self._joints, view.positions_m, np.minimum(_JOINT_SHARE * view.radii_m, _MAX_JOINT_M))
         start, end = BONES.T
         middle, wxyz, length = cylinders(view.positions_m[start], view.positions_m[end])
-        radius = _BONE_SHARE * np.minimum(view.radii_m[start], view.radii_m[end])
-        self._bones.batched_positions = f32(middle)
-        self._bones.batched_wxyzs = f32(wxyz)
-        self._bones.batched_scales = f32(np.stack([radius, radius, length], axis=1))
-        self._bones.batched_colors = _PALETTE[np.maximum(uncertainty[start], uncertainty[end])]
+        radius = np.minimum(view.radii_m[start], view.radii_m[end])
+        radius = np.minimum(_BONE_SHARE * radius, _MAX_BONE_M)
+        # To the micrometre: a bone is as long in each picture.
+        scales = np.stack([radius, radius, length], axis=1).round(6)
+        put(
+            self._bones,
+            batched_positions=f32(middle),
+            batched_wxyzs=f32(wxyz),
+            batched_scales=f32(scales),
+        )
+        uncertainty = np.array([_SOURCES.index(source) for source in view.sources])
+        put(self._joints, batched_colors=_PALETTE[uncertainty])
+        worse = np.maximum(uncertainty[start], uncertainty[end])
+        put(self._bones, batched_colors=_PALETTE[worse])
 
 
 class Limits:
@@ -85,14 +93,14 @@ class Limits:
 
     def show(self, view: HandView | None) -> None:
         """About the joints of a pose; None hides them."""
-        self._all.visible = view is not None
+        reveal(self._all, view is not None)
         if view is None:
             return
         lines_m, reached = self._limits.lines(
             view.positions_m, view.rotations, view.pose.angles_rad
         )
         self._all.points = f32(lines_m)
-        self._reached.visible = bool(reached.any())
+        reveal(self._reached, bool(reached.any()))
         if reached.any():
             self._reached.points = f32(lines_m[reached])
 
@@ -107,7 +115,7 @@ class Trails:
 
     def show(self, trail: Sequence[Array]) -> None:
         """Tips (n, 5, 3), oldest first; fewer than two hide them."""
-        self._lines.visible = len(trail) > 1
+        reveal(self._lines, len(trail) > 1)
         if len(trail) > 1:
             lines_m, colors = fading_lines(np.array(trail), BACKGROUND, LINE)
             self._lines.points, self._lines.colors = f32(lines_m), colors

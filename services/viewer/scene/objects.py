@@ -23,12 +23,14 @@ from rhot.geometry.transforms import (
 )
 from services.viewer.live.model import ObjectView
 from services.viewer.live.object_texts import label
-from services.viewer.live.palette import SOURCE_RGB, TOUCH, TRACKER
+from services.viewer.live.palette import SOURCE_RGB, TOUCHED, TRACKER
 from services.viewer.scene.object_looks import ObjectLook
+from services.viewer.scene.spheres import reveal
 
 # Fingers behind an object, and contacts on its far side, stay in sight.
 _OPACITY, _FAINT = 0.55, 0.2
-_AXES_M = 0.05
+# Which way it is turned, seen at a second look.
+_AXES_M, _AXES_RADIUS_M = 0.03, 0.0008
 # Radius and height of the disc that stands for a tracker: half as large as one (71 x 79 x 44 mm),
 # which would hide a cup and the hand at it.
 _PUCK_M = (0.019, 0.022)
@@ -59,23 +61,29 @@ class _Object:
 
     def __init__(self, scene: viser.SceneApi, name: str, look: ObjectLook) -> None:
         path = f"/objects/{name}"
-        self._frame = scene.add_frame(path, axes_length=_AXES_M, axes_radius=0.0014)
+        self._frame = scene.add_frame(path, axes_length=_AXES_M, axes_radius=_AXES_RADIUS_M)
         self._body: Any = _body(scene, f"{path}/shape", look)
         if look.place is not None:
             _puck(scene, f"{path}/tracker", look.place)
         # Above the object, not across it: y is down in a camera's frame.
         self._label = scene.add_label(f"{path}/name", name, anchor="bottom-center")
+        self._looks: tuple[str, bool, bool] | None = None
 
     def show(self, view: ObjectView | None, touched: bool) -> None:
-        self._frame.visible = view is not None and view.drawn
+        reveal(self._frame, view is not None and view.drawn)
         if view is None or not view.drawn:
             return
         self._frame.position = view.position_m
         self._frame.wxyz = view.orientation_wxyz
+        # Found out here, which viser takes longer for.
+        looks = (label(view), view.certain, touched)
+        if looks == self._looks:
+            return
+        self._looks = looks
         self._label.text = label(view)
         if self._body is not None:
             source = SOURCE_RGB["measured" if view.certain else "predicted"]
-            self._body.color = TOUCH if touched else source
+            self._body.color = TOUCHED if touched else source
             self._body.opacity = _OPACITY if view.certain else _FAINT
 
 

@@ -9,19 +9,45 @@ import viser
 
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
-from rhot.geometry.transforms import apply, quaternion_from_rotation
+from rhot.geometry.transforms import Array, apply, quaternion_from_rotation
 
-# What the viewer looks at first, in the first camera's frame: hands work half a metre in front of
-# the cameras (RHOT section 6).
-_LOOK_AT_CAMERA = np.array([0.09, 0.02, 0.48])
-# From behind and above the cameras, to the right: the hand in the middle, its fingers apart, the
-# frusta still in view.
-_VIEWPOINT_CAMERA = np.array([0.36, -0.36, -0.26])
+# Where hands work, in the first camera's frame: half a metre in front (RHOT section 6).
+_HANDS_CAMERA = np.array([0.0, 0.0, 0.5])
+# One looks from behind and above the cameras, from the right: fingers apart, not one behind the
+# other.
+_AHEAD = np.array([-0.31, 0.437, 0.85])
 _FOV_RAD = float(np.deg2rad(34.0))
+# What the picture is to hold about the hands, in metres: one hand with an object beside it, or
+# both. A phone is held upright, and has no more than its width for them.
+_HEIGHT_M, _HEIGHT_OF_TWO_M = 0.40, 0.50
+_WIDTH_M, _WIDTH_OF_TWO_M = 0.30, 0.46
+# The panel covers the right of a wide page and the lower half of an upright one: the hands are
+# shown so much further left, or up, in shares of the width and of the height.
+_LEFT_OF_PANEL, _ABOVE_PANEL = 0.17, 0.21
+_USUAL_ASPECT = 1.6
 # A desk is some 20 cm under the cameras.
 _GRID_CAMERA = np.array([0.0, 0.2, 0.5])
 # In a world frame the desk is at z = 0.
 _ON_DESK = np.array([1.0, 1.0, 0.0])
+
+
+def first_view(aspect: float, hands: int) -> tuple[Array, Array]:
+    """Where one looks from first, and at what; (3,) each, in the first camera's frame.
+
+    aspect is the page's width over its height, hands how many there are to be seen.
+    """
+    ahead = _AHEAD / np.linalg.norm(_AHEAD)
+    right = np.cross(ahead, [0.0, -1.0, 0.0])
+    right /= np.linalg.norm(right)
+    down = np.cross(ahead, right)
+    two = hands > 1
+    if aspect >= 1.0:
+        height = _HEIGHT_OF_TWO_M if two else _HEIGHT_M
+        look_at = _HANDS_CAMERA + _LEFT_OF_PANEL * aspect * height * right
+    else:
+        height = (_WIDTH_OF_TWO_M if two else _WIDTH_M) / max(aspect, 0.2)
+        look_at = _HANDS_CAMERA + _ABOVE_PANEL * height * down
+    return look_at - 0.5 * height / np.tan(0.5 * _FOV_RAD) * ahead, look_at
 
 
 def add_room(server: viser.ViserServer, config: RigConfig, cameras: Mapping[str, Camera]) -> None:
@@ -46,9 +72,19 @@ def add_room(server: viser.ViserServer, config: RigConfig, cameras: Mapping[str,
         position=apply(T_rig_from_camera, _GRID_CAMERA) * (1.0 if world is None else _ON_DESK),
     )
     scene.add_frame("/rig", axes_length=0.04, axes_radius=0.0012)
-    server.initial_camera.position = apply(T_rig_from_camera, _VIEWPOINT_CAMERA)
-    server.initial_camera.look_at = apply(T_rig_from_camera, _LOOK_AT_CAMERA)
+    viewpoint, look_at = first_view(_USUAL_ASPECT, len(config.hand))
+    server.initial_camera.position = apply(T_rig_from_camera, viewpoint)
+    server.initial_camera.look_at = apply(T_rig_from_camera, look_at)
     server.initial_camera.fov = _FOV_RAD
+
+    # A coroutine: viser runs it before it tells of the next visitor.
+    async def connected(client: viser.ClientHandle) -> None:
+        if client.camera.aspect < 1.0:
+            viewpoint, look_at = first_view(client.camera.aspect, len(config.hand))
+            client.camera.position = apply(T_rig_from_camera, viewpoint)
+            client.camera.look_at = apply(T_rig_from_camera, look_at)
+
+    server.on_client_connect(connected)
     for camera in cameras.values():
         _add_frustum(scene, camera)
 

@@ -59,7 +59,7 @@ class LiveScene:
         models: Mapping[HandName, HandModel] | None = None,
     ) -> None:
         self._scene = server.scene
-        self._atomic = server.atomic
+        self._atomic, self._flush = server.atomic, server.flush
         self._loop = server.get_event_loop()
         self._paints = paints
         self._models = models or {}
@@ -103,6 +103,8 @@ class LiveScene:
                 self._draw_markers(hand, view, layers)
             self._objects.show(view.objects, {touch.object for touch in view.touches})
             self._touches.show(view)
+        # viser would wait a sixtieth of a second for more.
+        self._flush()
 
     def _draw_hand(self, name: HandName, view: View, layers: Layers) -> None:
         if name not in self._hands:

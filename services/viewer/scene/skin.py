@@ -18,8 +18,9 @@ from rhot.hand import HandName
 from services.viewer.live.model import HandView
 from services.viewer.live.palette import SKIN, TOUCH
 from services.viewer.scene.skin_shape import LitSkin, SkinShape, fit_skin
+from services.viewer.scene.spheres import put, reveal
 
-_OPACITY, _LIT_OPACITY = 0.5, 0.65
+_OPACITY, _LIT_OPACITY = 0.26, 0.6
 _PAINT: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
 
 
@@ -39,7 +40,7 @@ class Skin:
         if view is None:
             for mesh in (self._mesh, self._lit_mesh):
                 if mesh is not None:
-                    mesh.visible = False
+                    reveal(mesh, False)
             return
         joints = view.positions_m, view.rotations
         if self._shape is None or not self._shape.fits(*joints):
@@ -49,8 +50,8 @@ class Skin:
             self._mesh = self._scene.add_mesh_simple(
                 self._path, vertices, self._shape.faces, color=SKIN, opacity=_OPACITY, **_PAINT
             )
-        self._mesh.vertices = vertices
-        self._mesh.visible = True
+        put(self._mesh, vertices=vertices)
+        reveal(self._mesh, True)
         self._light(self._shape, view, touching)
 
     def _light(self, shape: SkinShape, view: HandView, touching: Set[str]) -> None:
@@ -69,6 +70,6 @@ class Skin:
                     opacity=_LIT_OPACITY,
                     **_PAINT,
                 )
-            self._lit_mesh.vertices, self._lit_mesh.faces = vertices, self._lit.faces
+            put(self._lit_mesh, vertices=vertices, faces=self._lit.faces)
         if self._lit_mesh is not None:
-            self._lit_mesh.visible = shown
+            reveal(self._lit_mesh, shown)

@@ -105,15 +105,20 @@ def fit_skin(hand: HandName, positions_m: Array, rotations: Array) -> SkinShape:
     joints, weights = _WITHOUT_TIPS[mesh.joints[kept]], mesh.weights[kept]
     owner = joints[np.arange(len(joints)), np.argmax(weights, axis=1)]
     local = _stretched(mesh, bones_m, _in_joints(mesh, vertices, joints), joints, owner)
-    raised = _OVER_SKIN_M * _normals(vertices, faces)  # (n, 3)
-    raised = np.einsum("nkij,nj->nki", mesh.inverse_bind[joints, :3, :3], raised)
+    normals = np.einsum(
+        "nkij,nj->nki", mesh.inverse_bind[joints, :3, :3], _normals(vertices, faces)
+    )
+    back = normals[np.arange(len(joints)), np.argmax(weights, axis=1), 1] > 0.0
+    parts = _PART_OF_JOINT[owner]
+    # The palm is the palm's side of the hand: its back touches nothing.
+    parts[back & (parts == PARTS.index("palm"))] = -1
     return SkinShape(
         bones_m=bones_m,
         turns=mesh.fit(positions_m, rotations).turns,
         blend=_blend(joints, weights, local),
-        over=_blend(joints, weights, local + raised),
+        over=_blend(joints, weights, local + _OVER_SKIN_M * normals),
         faces=faces,
-        parts=_PART_OF_JOINT[owner],
+        parts=parts,
     )
 
 
@@ -194,7 +199,7 @@ def _part_of(joint: str) -> int:
     digit, _, bone = joint.partition("_")
     if bone in ("distal", "tip"):
         return PARTS.index(digit)
-    palm = joint == "wrist" or (bone == "metacarpal" and digit in DIGITS[1:])
+    palm = bone == "metacarpal" and digit in DIGITS[1:]
     return PARTS.index("palm") if palm else -1
 
 

@@ -9,7 +9,7 @@ from rhot.hand import JOINT_INDEX, HandName
 from rhot.messages.objects import HandPart
 from services.viewer.live.model import View
 from services.viewer.live.palette import CONTACT, TOUCH
-from services.viewer.scene.spheres import HIDDEN_M, add_spheres, place
+from services.viewer.scene.spheres import HIDDEN_M, add_spheres, place, reveal
 
 # Two hands with five tips and a palm each, as many as a message may hold for one object.
 _SLOTS = 12
@@ -58,7 +58,7 @@ def _show(
 ) -> None:
     """Spheres at positions; the first of them where there are more than slots."""
     count = min(len(positions_m), _SLOTS)
-    handle.visible = count > 0
+    reveal(handle, count > 0)
     if not count:
         return
     where, radii = np.zeros((_SLOTS, 3)), np.full(_SLOTS, HIDDEN_M)
