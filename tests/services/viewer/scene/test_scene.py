@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+import viser
 
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Viewer
@@ -18,19 +19,19 @@ from services.viewer.live.model import View, ViewModel
 from services.viewer.scene.layers import DEFAULT
 from services.viewer.scene.scene import LiveScene
 from services.viewer.scene.skin_shape import fit_skin
-from services.viewer.server import LoneServer, open_server
+from services.viewer.server import open_server
 
 STAMP_NS = 1_700_000_000_000_000_000
 
 
 @pytest.fixture
-def server() -> Iterator[LoneServer]:
+def server() -> Iterator[viser.ViserServer]:
     with open_server(Viewer(port=0)) as server:
         yield server
 
 
 @pytest.fixture
-def scene(server: LoneServer, config: RigConfig) -> LiveScene:
+def scene(server: viser.ViserServer, config: RigConfig) -> LiveScene:
     return LiveScene(server, config, {}, {("right", "index_tip"): (0, 0, 255)}, {})
 
 
@@ -92,7 +93,7 @@ def until_joints(browser: Any, pose: HandPose) -> dict[tuple[str, str], Any]:
 
 
 def test_skin_joints_and_bones_of_a_picture_are_of_one_message(
-    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: viser.ViserServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     """Also when views come much faster than pictures are sent: two hands, two hundred poses."""
     pairs = [(posed("right"), posed("left")) for _ in range(200)]
@@ -131,7 +132,7 @@ def _joints(pose: HandPose) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_what_has_not_changed_is_not_sent(
-    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: viser.ViserServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     still, moving = posed("right"), [posed("left") for _ in range(3)]
     model = ViewModel()
@@ -150,7 +151,7 @@ def test_what_has_not_changed_is_not_sent(
 
 
 def test_a_layer_that_nobody_watches_is_not_sent_and_one_that_is_tells_of_limits(
-    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: viser.ViserServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     poses = [posed() for _ in range(4)]
     scene.show(seen(poses[0]))
@@ -167,7 +168,7 @@ def test_a_layer_that_nobody_watches_is_not_sent_and_one_that_is_tells_of_limits
 
 
 def test_what_goes_wrong_in_a_drawing_is_told_to_who_shows(
-    server: LoneServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
+    server: viser.ViserServer, scene: LiveScene, browse: Callable, posed: Callable[..., HandPose]
 ) -> None:
     scene.show(seen(posed()))
     browser = browse(server.get_port())
