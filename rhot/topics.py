@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 import rhot.messages as m
+import rhot.messages.calibration as g
 import rhot.messages.camera as c
 import rhot.messages.health as h
 import rhot.messages.objects as o
@@ -136,6 +137,9 @@ FIT = _query(
     Priority.BACKGROUND,
     "ranges fitted to the patches of a FitRequest",
 )
+CALIBRATE = _query(
+    "control/calibrate", g.CalibrationState, Priority.DATA, "guided calibration; a payload orders"
+)
 
 # The rig as a whole.
 SESSION = Topic(
@@ -197,6 +201,7 @@ TOPICS: tuple[Topic, ...] = (
     EXPOSURE,
     FIT,
     SESSION,
+    CALIBRATE,
     RECORDER,
     RECORDINGS,
     CAPTION,

@@ -9,6 +9,7 @@ import msgspec
 from msgspec import inspect
 
 import rhot.messages
+import rhot.messages.calibration
 import rhot.messages.camera
 import rhot.messages.health
 import rhot.messages.objects
@@ -28,6 +29,7 @@ _MODULES = (
     rhot.messages.objects,
     rhot.messages.health,
     rhot.messages.camera,
+    rhot.messages.calibration,
     rhot.messages.simulator,
 )
 

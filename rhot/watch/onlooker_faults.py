@@ -22,6 +22,7 @@ _ABOUT = {
     "openvr_bridge": "the bridge to SteamVR",
     "simulator": "the simulator",
     "viewer": "the viewer",
+    "calibrator": "the calibrator",
     "recorder": "the recorder",
     "metrics": "the metrics for Prometheus",
 }

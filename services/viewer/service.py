@@ -13,6 +13,7 @@ import logging
 import socket
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rhot import clock, topics
@@ -24,7 +25,8 @@ from rhot.process.service import Service
 from rhot.topics import Topic
 from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
-from services.viewer.calibration.page import CalibrationPage
+from services.viewer.guide.captions import Captions
+from services.viewer.guide.section import GuideSection
 from services.viewer.live.model import ViewModel
 from services.viewer.panel.banner import Banner
 from services.viewer.panel.live_tab import LiveSection
@@ -34,13 +36,23 @@ from services.viewer.scene.scene import LiveScene
 from services.viewer.server import open_server
 from services.viewer.setup import read_setup
 from services.viewer.visits.layer import Layer
-from services.viewer.visits.section import Seen
+from services.viewer.visits.section import Section, Seen
 from services.viewer.visits.visits import Visits
 
 log = logging.getLogger("rhot.viewer")
 
 # Texts are read, not watched; switches may take as long to act.
 _TEXT_S = 0.2
+
+
+@dataclass(frozen=True)
+class _Page:
+    """What is shown: to each visitor his own tabs, to all one scene and its captions."""
+
+    visits: Visits
+    scene: LiveScene
+    layers: Mapping[LayerName, Layer]
+    captions: Captions
 
 
 async def serve(service: Service) -> None:
@@ -54,26 +66,27 @@ async def serve(service: Service) -> None:
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer) as server:
         layers = {name: Layer(f"/{name}") for name in LAYERS}
-        sections = [LiveSection(config, setup.notes, PictureFeed(service), layers)]
-        visits = Visits(server, Banner, sections)
-        scene = LiveScene(server, config, setup.cameras, setup.paints, setup.looks)
-        calibrating = service.tasks.create_task(CalibrationPage(service, server).run())
+        live = LiveSection(config, setup.notes, PictureFeed(service), layers)
+        sections: list[Section] = [live, GuideSection(service)]
+        page = _Page(
+            Visits(server, Banner, sections),
+            LiveScene(server, config, setup.cameras, setup.paints, setup.looks),
+            layers,
+            Captions(server),
+        )
         service.values["port"] = server.get_port()
         address = page_address(config.viewer, server.get_port(), socket.gethostname())
         log.info("live view at %s", address)
         service.ready()
         try:
             while True:
-                await visits.anybody.wait()
-                await _show_live(service, visits, scene, layers)
+                await page.visits.anybody.wait()
+                await _show_live(service, page)
         finally:
-            calibrating.cancel()
-            visits.close()
+            page.visits.close()
 
 
-async def _show_live(
-    service: Service, visits: Visits, scene: LiveScene, layers: Mapping[LayerName, Layer]
-) -> None:
+async def _show_live(service: Service, page: _Page) -> None:
     """Subscribe and draw for as long as a browser is connected."""
     rig = RigMonitor(service.config, clock.now_ns())
     model = ViewModel()
@@ -82,15 +95,16 @@ async def _show_live(
             tasks.create_task(_follow(service.bus, topic, take))
             for topic, take in _handlers(model, service.config)
         ]
+        followers.append(tasks.create_task(page.captions.follow(service.bus)))
         text_due_s = due_s = 0.0
-        while visits.anybody.is_set():
+        while page.visits.anybody.is_set():
             now_s = time.monotonic()
             view = model.view(now_s)
-            scene.show(view, {name for name, layer in layers.items() if layer.wanted})
+            page.scene.show(view, {name for name, layer in page.layers.items() if layer.wanted})
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
                 now_ns = clock.now_ns()
-                visits.update(Seen(view, rig.state(now_ns).faults, now_s, now_ns))
+                page.visits.update(Seen(view, rig.state(now_ns).faults, now_s, now_ns))
             # By the clock: what drawing takes is not added to each picture's time.
             due_s = max(due_s, now_s) + 1.0 / service.config.viewer.rate_hz
             await asyncio.sleep(due_s - time.monotonic())

@@ -163,17 +163,13 @@ def until(page: Any, condition: Any) -> Any:
     return found
 
 
-def open_calibration(page: Any, url: str) -> Any:
-    """Show the picture to click; returns its switch."""
+def open_colours(page: Any, url: str) -> None:
+    """Show the picture to click: the second step of the tab."""
     page.goto(url)
-    page.get_by_text("calibrate colours").wait_for(**WAIT)
-    switch = page.get_by_label("show picture")
-    # Folders are drawn open before they are closed.
-    until(page, lambda: not switch.is_visible())
-    page.get_by_text("calibrate colours").click()
-    switch.wait_for(**WAIT)
-    switch.click()
-    return switch
+    tab = page.get_by_role("tab", name="Calibration")
+    tab.wait_for(**WAIT)
+    tab.click()
+    page.get_by_role("button", name="next").click()
 
 
 def click_markers(page: Any) -> tuple[float, float]:
@@ -208,7 +204,7 @@ def test_from_the_first_click_to_applied_ranges(
     page = chromium.new_page(viewport={"width": 1200, "height": 800})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    switch = open_calibration(page, page_url)
+    open_colours(page, page_url)
     page.get_by_text("click the middle of the blue marker").wait_for(**WAIT)
     page.get_by_text("still missing: blue, green").wait_for(**WAIT)
     apply = page.get_by_role("button", name="apply")
@@ -243,7 +239,7 @@ def test_from_the_first_click_to_applied_ranges(
     assert by_hand.inputs["by_hand"] == ["green"]
 
     # And back to the rig.
-    switch.click()
+    page.get_by_role("button", name="back").click()
     until(page, lambda: where(page, "green") is None)
     assert errors == []
     page.close()

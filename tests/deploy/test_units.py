@@ -56,6 +56,7 @@ def test_every_service_of_the_rig_has_a_unit():
         "rhot-solver.service",
         "rhot-object-tracker.service",
         "rhot-viewer.service",
+        "rhot-calibrator.service",
         "rhot-recorder.service",
         "rhot-simulator.service",
         "rhot-bridge@.service",

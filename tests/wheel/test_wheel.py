@@ -23,6 +23,7 @@ ENTRY_POINTS = (
     "rhot-openvr-bridge",
     "rhot-simulator",
     "rhot-viewer",
+    "rhot-calibrator",
     "rhot-recorder",
     "rhot-metrics",
     "rhot-bridge",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -41,8 +40,9 @@ async def follow_exercises(
     try:
         tell(Exercising(-1, 0.0, []))
         await asyncio.sleep(READY_S)
-        began_s = time.monotonic()
-        while (passed_s := time.monotonic() - began_s) < CYCLE_S:
+        passed_s = 0.0
+        # By the hand's own time, from its first point on: a recording must hold all of them.
+        while passed_s <= CYCLE_S:
             try:
                 message = await asyncio.wait_for(anext(points), _SILENT_S)
             except TimeoutError:
@@ -51,6 +51,7 @@ async def follow_exercises(
                     "the hand in view? `rhot top` shows it"
                 ) from None
             messages.append(message)
+            passed_s = 1e-9 * (message.stamp_ns - messages[0].stamp_ns)
             number = min(int(passed_s // EXERCISE_S), len(EXERCISES) - 1)
             tell(Exercising(number, passed_s, _missing(message)))
     finally:

@@ -143,7 +143,7 @@ def colors(
     if not pointing:
         raise CalibrationError(
             "nothing is pointed at; give --box, --click or --auto, or use the page of rhot-viewer "
-            "(calibrate colours)"
+            "(tab Calibration, step Colours)"
         )
     request = Request(name, pointing, out, picture, dry_run, as_json)
     if video is not None:

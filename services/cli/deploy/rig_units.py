@@ -19,8 +19,9 @@ def master_units(config: RigConfig) -> list[str]:
     """Units of the master: what `rhot up` would run for the same file."""
     local = [camera for camera in config.camera if not camera.host]
     units = ["rhot-pi.target"] if local else []
-    # The recorder for the page, too, which starts, stops and replays recordings.
-    units += [f"rhot-{name}.service" for name in ("router", "fusion", "viewer", "recorder")]
+    # For the page: the recorder starts, stops and replays recordings, the calibrator calibrates.
+    always = ("router", "fusion", "viewer", "calibrator", "recorder")
+    units += [f"rhot-{name}.service" for name in always]
     units += [f"rhot-pi-tracker@{camera.name}.service" for camera in local]
     if config.has_depth:
         units.append("rhot-solver.service")

@@ -52,6 +52,8 @@ def children_of(
         children.append(Child("openvr_bridge", service_argv("openvr_bridge", *common)))
     if viewer:
         children.append(Child("viewer", service_argv("viewer", *common)))
+        # For the page's guided calibration; idle until somebody starts a step.
+        children.append(Child("calibrator", service_argv("calibrator", *common)))
     # Without autostart for the page, which starts, stops and replays recordings.
     if config.recorder.autostart or viewer:
         children.append(Child("recorder", service_argv("recorder", *common, "--on-request")))

@@ -1,36 +1,30 @@
-"""The controls of the calibration page, and its picture as a plane in the 3D scene that can be
-clicked, zoomed and panned.
+"""The controls of the colours' calibration for one visitor, and the picture that is clicked.
 
-The plane is far away from the rig, and the browsers' cameras are moved there and back: so nothing
-of the rig is in the way of a click. viser calls back from threads of its own; whatever a person
-does becomes a UserAction, handed to `report`.
+The picture is the background of the visitor's view: flat, whichever way the view is turned. The
+visitor's camera is far away from the rig meanwhile, so that nothing of it is in the way of a click.
+viser calls back from threads of its own; whatever a person does becomes a UserAction, handed to
+`report`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
 import viser
 
 from rhot.files.config import RigConfig
 from rhot.messages.camera import ColorRange
 from services.viewer.calibration.picture import Image
+from services.viewer.calibration.placing import Place, placed
 
-# Middle of the plane in the rig frame, and its height; the rig is around the origin.
-_PLANE = np.array([0.0, 0.0, 300.0])
-_HEIGHT = 1.0
-# The panel floats over the right side of the window, this wide (control_width "large"); the picture
-# is centred in the rest.
-_PANEL_PX, _FILL = 400.0, 0.94
+# Where a visitor looks from and to while he sees a picture: the rig, around the origin, is behind
+# the horizon.
+_AWAY, _LOOK_AT = (0.0, 0.0, 998.0), (0.0, 0.0, 1000.0)
 _JPEG_QUALITY = 90
 
-ActionKind = Literal[
-    "open", "close", "camera", "color", "click", "undo", "reset", "auto", "edit", "masks", "apply"
-]
+ActionKind = Literal["camera", "color", "click", "undo", "reset", "auto", "edit", "masks", "apply"]
 _BUTTONS: dict[str, ActionKind] = {
     "take back": "undo",
     "start over": "reset",
@@ -48,30 +42,23 @@ class UserAction:
 
 
 class CalibrationControls:
-    """Folder "calibrate colours" of one viewer, shared by all browsers."""
+    """Camera, colour, texts, buttons and sliders; hidden until they are shown."""
 
     def __init__(
-        self, server: viser.ViserServer, config: RigConfig, report: Callable[[UserAction], object]
+        self, client: viser.ClientHandle, config: RigConfig, report: Callable[[UserAction], object]
     ) -> None:
-        self._server, self._report_action = server, report
-        self._up = (0.0, -1.0, 0.0) if config.rig.world is None else (0.0, 0.0, 1.0)
-        self._plane: viser.ImageHandle | None = None
-        self._aspect = 4.0 / 3.0
-        with server.gui.add_folder("calibrate colours", expand_by_default=False):
-            self._add_buttons(server.gui, [camera.name for camera in config.camera])
-            self._add_sliders(server.gui)
+        self._client, self._report_action = client, report
+        self.is_open = False
+        self._place: Place | None = None
+        # Where the visitor looked from before.
+        self._before: tuple[Any, Any, Any] | None = None
+        self._add_buttons(client.gui, [camera.name for camera in config.camera])
+        self._add_sliders(client.gui)
         self._listen()
         self._show_or_hide()
-        server.on_client_connect(self._client_connected)
 
     def _add_buttons(self, gui: viser.GuiApi, cameras: list[str]) -> None:
         """Everything but the sliders."""
-        self._open = gui.add_checkbox(
-            "show picture",
-            False,
-            disabled=not cameras,
-            hint="pictures are sent only while this is on",
-        )
         self._camera = gui.add_dropdown("camera", tuple(cameras) or ("none",))
         self._color = gui.add_dropdown("colour", ("green",))
         self._to_do = gui.add_html("")
@@ -79,7 +66,7 @@ class CalibrationControls:
             "clicks", tuple(_BUTTONS), hint="the last click, every click, no clicks"
         )
         self._report = gui.add_html("")
-        self._apply = gui.add_button("apply", disabled=True)
+        self._apply = gui.add_button("apply", disabled=True, color="green")
         self._status = gui.add_html("")
         self._hold = gui.add_checkbox(
             "hold picture", False, hint="for hands that cannot be held still"
@@ -107,18 +94,14 @@ class CalibrationControls:
             slider.on_update(self._reporting("edit"))
         self._masks.on_update(self._reporting("masks"))
         self._clicks.on_click(self._button_pressed)
-        self._open.on_update(self._switched)
+        self._client.scene.on_click()(self._clicked)
 
     def _show_or_hide(self) -> None:
-        """All controls while the picture is shown, otherwise its switch alone."""
+        """All controls, or none."""
         buttons = (self._camera, self._color, self._clicks, self._apply, self._hold, self._masks)
         texts = (self._to_do, self._report, self._status)
         for handle in (*buttons, *texts, *self._sliders):
             handle.visible = self.is_open
-
-    @property
-    def is_open(self) -> bool:
-        return bool(self._open.value)
 
     @property
     def camera(self) -> str:
@@ -156,22 +139,25 @@ class CalibrationControls:
     def _button_pressed(self, event: Any) -> None:
         self._report_action(UserAction(_BUTTONS[event.target.value]))
 
-    def _switched(self, event: Any) -> None:
+    def open(self) -> None:
+        """Show the controls; the picture follows."""
+        self.is_open = True
         self._show_or_hide()
-        if event.client is None:
-            return
-        for client in self._server.get_clients().values():
-            self._look_at_picture(client) if self.is_open else self._look_at_rig(client)
-        self._report_action(UserAction("open" if self.is_open else "close"))
-
-    async def _client_connected(self, client: viser.ClientHandle) -> None:
-        if self.is_open:
-            self._look_at_picture(client)
+        camera = self._client.camera
+        self._before = (camera.up_direction, camera.position, camera.look_at)
+        with self._client.atomic():
+            camera.position, camera.look_at = _AWAY, _LOOK_AT
 
     def close(self) -> None:
-        """Switch off, as the last browser has gone."""
-        _set(self._open, False)
-        _set(self._hold, False)
+        """Hide everything, and bring the visitor back to where he was."""
+        self.is_open = False
+        self._show_or_hide()
+        self.hide()
+        if self._before is not None:
+            camera = self._client.camera
+            with self._client.atomic():
+                camera.up_direction, camera.position, camera.look_at = self._before
+            self._before = None
 
     def set_texts(self, to_do: str, report: str, status: str, *, can_apply: bool) -> None:
         """Bring the texts up to date."""
@@ -190,65 +176,20 @@ class CalibrationControls:
         _set(self._value, (span.hsv_low[2], max(span.hsv_low[2], span.hsv_high[2])))
 
     def show(self, rgb: Image) -> None:
-        """Show a picture (h, w, 3)."""
-        aspect = rgb.shape[1] / rgb.shape[0]
-        if self._plane is not None and abs(aspect - self._aspect) <= 1e-6:
-            self._plane.image = rgb
-            return
-        self.hide()
-        self._aspect = aspect
-        self._plane = self._server.scene.add_image(
-            "/calibrate",
-            rgb,
-            aspect * _HEIGHT,
-            _HEIGHT,
-            format="jpeg",
-            jpeg_quality=_JPEG_QUALITY,
-            position=_PLANE,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        self._plane.on_click(self._clicked)
-        for client in self._server.get_clients().values():
-            self._look_at_picture(client)
+        """Show a picture (h, w, 3), as large as fits beside the panel."""
+        camera = self._client.camera
+        canvas, self._place = placed(rgb, (camera.image_width, camera.image_height))
+        self._client.scene.set_background_image(canvas, format="jpeg", jpeg_quality=_JPEG_QUALITY)
 
     def hide(self) -> None:
         """Take the picture away."""
-        if self._plane is not None:
-            self._plane.remove()
-            self._plane = None
+        if self._place is not None:
+            self._place = None
+            self._client.scene.set_background_image(None)
 
-    async def _clicked(self, event: Any) -> None:
-        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        if abs(direction[2]) < 1e-9:
-            return
-        hit = origin + direction * ((_PLANE[2] - origin[2]) / direction[2]) - _PLANE
-        x = float(hit[0] / (self._aspect * _HEIGHT)) + 0.5
-        y = float(hit[1] / _HEIGHT) + 0.5
-        self._report_action(UserAction("click", x, y))
-
-    def _look_at_picture(self, client: viser.ClientHandle) -> None:
-        """Move a browser's camera in front of the picture, as large as fits beside the panel."""
-        camera = client.camera
-        width = max(float(camera.image_width), 480.0)
-        height = max(float(camera.image_height), 320.0)
-        free = max(width - _PANEL_PX, 0.4 * width)
-        px_per_m = _FILL * min(height / _HEIGHT, free / (self._aspect * _HEIGHT))
-        distance = height / px_per_m / (2.0 * math.tan(camera.fov / 2.0))
-        # The middle of what the panel leaves free is left of the window's middle.
-        aside = np.array([(width - free) / 2.0 / px_per_m, 0.0, 0.0])
-        with client.atomic():
-            camera.up_direction = (0.0, -1.0, 0.0)
-            camera.position = tuple(_PLANE + aside - np.array([0.0, 0.0, distance]))
-            camera.look_at = tuple(_PLANE + aside)
-
-    def _look_at_rig(self, client: viser.ClientHandle) -> None:
-        """Move a browser's camera back to where it was at first."""
-        first = self._server.initial_camera
-        with client.atomic():
-            client.camera.up_direction = self._up
-            client.camera.position = first.position
-            client.camera.look_at = first.look_at
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
+        if self._place is not None:
+            self._report_action(UserAction("click", *self._place.in_picture(*event.screen_pos)))
 
 
 def _set(handle: Any, value: Any) -> None:

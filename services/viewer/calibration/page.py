@@ -1,7 +1,7 @@
-"""The calibration page: pictures from a camera's tracker, clicks to it, fitted colour ranges back,
-which a button applies.
+"""The colours of the guided calibration, for one visitor: pictures from a camera's tracker, clicks
+to it, fitted colour ranges back, which a button applies.
 
-Pictures are requested only while the page shows one, so cameras work no more than before. If a
+Pictures are requested only while a visitor looks at one, so cameras work no more than before. If a
 tracker does not answer, the page says so and asks again; what it refuses is shown in its words.
 """
 
@@ -33,16 +33,16 @@ _FIT_S = 15.0
 _SHOWN_AFTER_S = 0.1
 
 
-class CalibrationPage:
-    """The state of the page, shared by all browsers; `run` keeps it up to date."""
+class ColourStep:
+    """One visitor's calibration of colours; a task keeps it up to date while it is shown."""
 
-    def __init__(self, service: Service, server: viser.ViserServer) -> None:
-        self._service, self._server = service, server
+    def __init__(self, service: Service, client: viser.ClientHandle) -> None:
+        self._service = service
         self._client = RigClient(service.bus)
         self._actions: asyncio.Queue[UserAction] = asyncio.Queue()
         loop = asyncio.get_running_loop()
         self._controls = CalibrationControls(
-            server,
+            client,
             service.config,
             lambda action: loop.call_soon_threadsafe(self._actions.put_nowait, action),
         )
@@ -53,17 +53,34 @@ class CalibrationPage:
         # Cameras whose colours were applied from here.
         self._done: set[str] = set()
 
-    async def run(self) -> None:
-        """Handle what people do and fetch pictures, for ever."""
+        self._running: asyncio.Task[None] | None = None
+
+    def show(self, visible: bool) -> None:
+        """Begin with the colours, or leave them."""
+        if visible == (self._running is not None):
+            return
+        if visible:
+            self._controls.open()
+            self._running = self._service.tasks.create_task(self._run())
+        else:
+            self.close()
+            self._controls.close()
+
+    def close(self) -> None:
+        """Nobody looks any more."""
+        if self._running is not None:
+            self._running.cancel()
+            self._running = None
+        self._pictures.clear()
+
+    async def _run(self) -> None:
+        """Handle what the person does and fetch pictures, for ever."""
+        await self._start()
         due_s = 0.0
         while True:
-            wait_s = max(0.0, due_s - time.monotonic()) if self._controls.is_open else None
-            action = await self._next_action(wait_s)
+            action = await self._next_action(max(0.0, due_s - time.monotonic()))
             if action is not None:
                 await self._handle(action)
-            elif not self._server.get_clients():
-                self._controls.close()
-                self._stop()
             else:
                 due_s = time.monotonic() + _PICTURE_S
                 if not self._controls.held or not self._pictures:
@@ -79,10 +96,8 @@ class CalibrationPage:
 
     async def _handle(self, action: UserAction) -> None:
         match action.kind:
-            case "open" | "camera":
+            case "camera":
                 await self._start()
-            case "close":
-                self._stop()
             case "color":
                 self._chosen = self._controls.color
                 self._show_chosen()
@@ -104,8 +119,6 @@ class CalibrationPage:
 
     async def _start(self) -> None:
         """Another camera, or the same one again: begin with the ranges applied there."""
-        if not self._controls.is_open:
-            return
         self._calibration = ColorCalibration(self._controls.camera, self._service.config.colors)
         self._pictures.clear()
         await self._ask_applied()
@@ -118,23 +131,19 @@ class CalibrationPage:
         except RhotError as error:
             self._calibration.error = str(error)
 
-    def _stop(self) -> None:
-        self._pictures.clear()
-        self._controls.hide()
-
     async def _fetch_picture(self) -> None:
         """Get one picture of the camera and show it."""
         answers = await self._service.bus.get(
             topics.FRAME, timeout_s=2.0, camera=self._calibration.camera
         )
         image = await asyncio.to_thread(decoded, answers[0]) if answers else None
-        if image is None or not self._controls.is_open:
+        if image is None:
             return
         self._pictures = [*self._pictures[-1:], (picture_name(answers[0]), image, time.monotonic())]
         self._draw()
 
     def _draw(self) -> None:
-        if not self._pictures or not self._controls.is_open:
+        if not self._pictures:
             return
         name, image, _ = self._pictures[-1]
         ranges = self._calibration.ranges
@@ -201,9 +210,6 @@ class CalibrationPage:
         )
 
     def _update_texts(self) -> None:
-        if not self._controls.is_open:
-            self._controls.set_texts("", "", "", can_apply=False)
-            return
         calibration = self._calibration
         self._controls.set_texts(
             text.to_do(calibration, self._chosen, pictures=bool(self._pictures)),

@@ -34,9 +34,7 @@ def to_do(calibration: ColorCalibration, chosen: str, *, pictures: bool) -> str:
     if calibration.error:
         lines.append(_colored(calibration.error, _RED))
     lines.append(_next_step(calibration, chosen, complete=len(done) == len(calibration.names)))
-    lines.append(
-        f"{len(done)} of {len(calibration.names)} colours clicked. Drag turns, the wheel zooms."
-    )
+    lines.append(f"{len(done)} of {len(calibration.names)} colours clicked.")
     return _box("<br>".join(lines))
 
 
@@ -49,7 +47,7 @@ def _next_step(calibration: ColorCalibration, chosen: str, *, complete: bool) ->
     if complete and calibration.next_camera:
         return f"This camera is done. Now <b>camera {text(calibration.next_camera)}</b>."
     if complete:
-        return "This camera is done. Untick <i>show picture</i> to see the hand."
+        return "This camera is done: go on with the next step."
     clicks = sum(click.color == chosen for click in calibration.clicks)
     if clicks:
         return (

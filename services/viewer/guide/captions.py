@@ -27,14 +27,17 @@ class Captions:
     async def follow(self, bus: Bus) -> None:
         """Show captions as they come, for ever."""
         captions = bus.latest(topics.CAPTION)
-        while True:
-            try:
-                async with asyncio.timeout(_OVER_S if self._shown else None):
-                    caption = await anext(captions)
-            except TimeoutError:
-                self._take_away()
-            else:
-                self._show(caption)
+        try:
+            while True:
+                try:
+                    async with asyncio.timeout(_OVER_S if self._shown else None):
+                        caption = await anext(captions)
+                except TimeoutError:
+                    self._take_away()
+                else:
+                    self._show(caption)
+        finally:
+            bus.close(captions)
 
     def _show(self, caption: Caption) -> None:
         number = f"{caption.step}/{caption.steps}  " if caption.steps else ""

@@ -124,8 +124,8 @@ async def test_nothing_is_done_while_nobody_looks(
         for _ in range(2):
             browser = await asyncio.to_thread(browse, int(service.values["port"]))
             await until(lambda: publisher.wanted)
-            # Poses, points, objects, contacts, and health twice: rates, and what is wrong.
-            await until(lambda: len(service.bus.streams) == 6)
+            # Poses, points, objects, contacts, captions, and health twice: rates, what is wrong.
+            await until(lambda: len(service.bus.streams) == 7)
             await asyncio.to_thread(browser.close)
             await until(lambda: not publisher.wanted)
             assert service.bus.streams == []

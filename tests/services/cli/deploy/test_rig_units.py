@@ -70,6 +70,7 @@ def test_install_sh_gets_lines(tmp_path):
         "rhot-router.service",
         "rhot-fusion.service",
         "rhot-viewer.service",
+        "rhot-calibrator.service",
         "rhot-recorder.service",
     ]
     assert asked("check", path).stdout == ""

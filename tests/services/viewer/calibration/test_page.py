@@ -17,10 +17,10 @@ from rhot import topics
 from rhot.files.config import RigConfig
 from rhot.messages.camera import ColorRange, Colors, FitRequest, FitResult, Patch, picture_name
 from rhot.process.service import Service
+from services.viewer.calibration.placing import placed
 from services.viewer.service import serve
 
 GREEN = ColorRange(hsv_low=(50, 100, 40), hsv_high=(70, 255, 255))
-PLANE_Z = 300.0
 
 
 class Tracker:
@@ -80,19 +80,24 @@ class Page:
         )
         return str(message["updates"]["content"])
 
+    async def shows_picture(self) -> None:
+        await asyncio.to_thread(
+            self.browser.wait_for, "BackgroundImageMessage", rgb_data=lambda data: data is not None
+        )
+
     def click_picture(self, x: float, y: float) -> None:
-        """x, y from 0 to 1, of a picture twice as high as wide is 4:3."""
-        at = ((x - 0.5) * 4.0 / 3.0, y - 0.5, PLANE_Z - 2.0)
+        """x, y from 0 to 1, of a 4:3 picture in a window of the size that browsers begin with."""
+        _, place = placed(np.zeros((48, 64, 3), np.uint8), (100, 100))
+        at = (place.left + x * place.width, place.top + y * place.height)
         self.browser._send(
-            _messages.SceneNodeClickMessage(
-                "/calibrate", None, at, (0.0, 0.0, 1.0), (0.5, 0.5), None
-            )
+            _messages.ScenePointerMessage("click", (0, 0, 0), (0, 0, 1), (at,), None)
         )
 
 
 async def open_page(service: Service, browse: Callable[..., Any]) -> Page:
     page = Page(await asyncio.to_thread(browse, int(service.values["port"])))
-    page.browser.click(await page.uuid("GuiCheckboxMessage", "show picture"), True)
+    choice = await page.uuid("GuiDropdownMessage", "step")
+    page.browser._send(_messages.GuiUpdateMessage(choice, {"value": "Colours"}))
     return page
 
 
@@ -104,7 +109,7 @@ async def test_a_click_is_fitted_shown_and_applied(
         await until(lambda: service.state == "running")
         assert tracker.pictures_asked == 0
         page = await open_page(service, browse)
-        await asyncio.to_thread(page.browser.wait_for, "ImageMessage", name="/calibrate")
+        await page.shows_picture()
         await page.says("click the middle of the blue marker")
         page.click_picture(0.25, 0.5)
         report = await page.says("mind")
@@ -132,7 +137,7 @@ async def test_what_the_tracker_says_of_a_bad_click_is_shown_and_forgotten(
         tracker.refuses = "that is <grey>"
         await until(lambda: service.state == "running")
         page = await open_page(service, browse)
-        await asyncio.to_thread(page.browser.wait_for, "ImageMessage", name="/calibrate")
+        await page.shows_picture()
         page.click_picture(0.5, 0.5)
         assert "that is &lt;grey&gt;" in await page.says("that is")
         await page.says("0 of 2 colours clicked")

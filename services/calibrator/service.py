@@ -1,0 +1,24 @@
+"""The calibrator: what `rhot calibrate` does with a running rig, asked for by the page.
+
+It does nothing until somebody starts a step, does one at a time, and writes files only when
+somebody says so. What goes wrong is told to who asks, and ends the step, never the service.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from rhot import topics
+from rhot.process.service import Service
+from services.calibrator.endpoints.guide import Guide
+
+
+async def serve(service: Service) -> None:
+    """Answers who wants to calibrate."""
+    guide = Guide(service.bus, service.config)
+    service.bus.answer_requests(topics.CALIBRATE, guide.answer)
+    service.ready()
+    try:
+        await asyncio.Event().wait()
+    finally:
+        guide.close()
