@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Protocol
 
 from rhot.files.calibration import ColorRange
 from services.pi_tracker.image.frame import Frame
 from studies.grasp.measure.dots.finder import DotJoints
 from studies.grasp.measure.edges.finder import EdgeFinder
+from studies.grasp.measure.edges.paper import PaperFinder
 from studies.grasp.measure.gaps import bridged
 from studies.grasp.measure.joints import Place, Seen, fingers_in
 from studies.grasp.measure.pictures import Pictures, corrected_seeds
@@ -32,25 +34,43 @@ def see(
 
     advance is called after each. Raises CaptureError of seeds or pictures that will not do.
     """
-    finders: list[Finder] = []
-    seen: list[Seen] = []
-    for frame in pictures.frames():
-        if not finders:
-            check_seeds(seeds, frame.size_px, method)
-            corrected = corrected_seeds(seeds, pictures.lens)
-            finders = _finders(frame, corrected, method, color)
-        seen.append(_together([finder.find(frame) for finder in finders]))
-        advance()
+    frames = _checked(pictures, seeds, method, advance)
+    first = next(frames, None)
+    if first is None:
+        return []
+    corrected = corrected_seeds(seeds, pictures.lens)
+    whole = chain([first], frames)
+    if method == "edges":
+        return _by_outline(whole, corrected)
+    finders = _finders(first, corrected, method, color)
+    seen = [_together([finder.find(frame) for finder in finders]) for frame in whole]
     return bridged(seen) if method == "dots" else seen
+
+
+def _checked(
+    pictures: Pictures, seeds: Seeds, method: Method, advance: Callable[[], None]
+) -> Iterator[Frame]:
+    """The frames, counted; seeds are checked with the first."""
+    for number, frame in enumerate(pictures.frames()):
+        if number == 0:
+            check_seeds(seeds, frame.size_px, method)
+        yield frame
+        advance()
+
+
+def _by_outline(frames: Iterable[Frame], seeds: Seeds) -> list[Seen]:
+    """What all pictures together show."""
+    finders = [EdgeFinder(finger, seeds) for finger in fingers_in(list(seeds))]
+    for frame in frames:
+        for finder in finders:
+            finder.look(frame)
+    return [_together(one) for one in zip(*(finder.seen() for finder in finders), strict=True)]
 
 
 def _finders(first: Frame, seeds: Seeds, method: Method, color: ColorRange | None) -> list[Finder]:
     if method == "dots":
         return [DotJoints(first, seeds, color)]
-    return [
-        EdgeFinder(finger, seeds, paper=method == "edges-paper")
-        for finger in fingers_in(list(seeds))
-    ]
+    return [PaperFinder(finger, seeds) for finger in fingers_in(list(seeds))]
 
 
 def _together(seen: Sequence[Seen]) -> Seen:

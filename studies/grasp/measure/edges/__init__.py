@@ -1,3 +1,3 @@
-"""A plain finger's joints from its edges, the paper's way (section 4), carried from picture to
-picture by a chain of links with an outline.
+"""A plain finger's joints: by its outline and its skin over all pictures (finder.py), and the
+paper's way (section 4, paper.py), from regions between lines along its edges.
 """

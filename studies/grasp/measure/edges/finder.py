@@ -1,185 +1,147 @@
-"""A plain finger's joints, picture after picture. Pure; pictures come in their order.
+"""A plain finger's joints by its outline and its skin. Pure; pictures come in their order.
 
-In the first one a person says where the joints are; the outline is learned there (outline.py), and
-laid into each later picture from where it was before (fit.py).
+In the first one a person says where the joints are; the silhouette learned there (learn.py) is
+followed through the pictures (follow.py), and when all were seen, they are adjusted together
+(adjust.py).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from rhot.errors import CaptureError
-from services.pi_tracker.image.frame import Frame, Image
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import bgr_image
-from studies.grasp.measure.edges.fit import Chain, Fitted, Outline, fit, joints_of
-from studies.grasp.measure.edges.outline import (
-    Link,
-    first_widths,
-    frame_of,
-    learn_link,
-    links_of,
-    refined_widths,
-    tip_end,
-)
-from studies.grasp.measure.edges.regions import centroids
+from studies.grasp.measure.edges.adjust import Adjusted, Clicks, adjust
+from studies.grasp.measure.edges.contrast import colours_of
+from studies.grasp.measure.edges.follow import Followed, Follower
+from studies.grasp.measure.edges.learn import Learnt, learn, learn_base, widths_beside
+from studies.grasp.measure.edges.outline import Link, frame_of
 from studies.grasp.measure.edges.segments import Array, edges_near
-from studies.grasp.measure.joints import B1, B2, Finger, Place, Seen
-from studies.grasp.measure.joints import joints_of as names_of
+from studies.grasp.measure.edges.silhouette import joints_at
+from studies.grasp.measure.joints import B1, B2, Finger, Place, Seen, joints_of
 from studies.grasp.measure.seeds import Seeds
 
 # Beside a phalanx, outlines are looked for up to this share of its length, when they are learned.
 _LEARN_REACH = 0.8
-# Rounds in which widths are learned.
-_ROUNDS = 4
-# Later, up to so many half widths: the outline, and what moves within a picture.
-_REACH_WIDTHS = 2.6
-# A phalanx of which less of both sides is seen than this, on average, was not measured.
-_LEAST_COVER = 0.25
 # The back of the hand: its outline may be further from the base line than this link is long.
 _WIDEST_BASE = 1.5
-# A turn goes on as it was, less a little: fingers that stop are as many as those that go on.
-_MOMENTUM = 0.7
+# A phalanx of which less than this of both sides is supported by edges was not measured; from
+# _WELL on it is as well seen as it gets (one side is folded away where a finger is bent).
+_LEAST_SUPPORT, _WELL = 0.15, 0.5
+
+
+class _Instant(NamedTuple):
+    """What a picture is told by."""
+
+    frame: int
+    time_s: float
+    size_px: tuple[int, int]
 
 
 class EdgeFinder:
     """One finger."""
 
-    def __init__(self, finger: Finger, seeds: Seeds, *, paper: bool = False) -> None:
-        """paper: joints are the centroids of the paper's regions, not the chain's."""
-        self._paper = paper
-        self._names = list(names_of(finger).values())
-        self._base_names = (f"{finger}_{B1}", f"{finger}_{B2}")
-        self._seeds = seeds
-        self._outline: Outline | None = None
-        self._chain = Chain(np.zeros(2), np.zeros(3))
-        self._velocity = np.zeros(3)
-        self._side = 1
-        # B1 and B2 in the base link's frame: along it from the MCP joint, and across.
-        self._base_points = np.zeros((2, 2))
+    def __init__(self, finger: Finger, seeds: Seeds) -> None:
+        self._names = list(joints_of(finger).values())
+        self._base_names = [f"{finger}_{B1}", f"{finger}_{B2}"]
+        joints = np.array([seeds[name] for name in self._names])  # (4, 2)
+        has_base = set(self._base_names) <= set(seeds)
+        base = np.array([seeds[name] for name in self._base_names]) if has_base else None
+        self._clicks = Clicks(joints, base)
+        self._follower: Follower | None = None
+        self._followed: list[Followed] = []
+        self._instants: list[_Instant] = []
 
-    def find(self, frame: Frame) -> Seen:
-        """The joints of one picture, and why others are missing."""
-        grey = cv2.cvtColor(bgr_image(frame), cv2.COLOR_BGR2GRAY)
-        if self._outline is None:
-            self._outline = self._learn(grey)
-        outline = self._outline
-        predicted = Chain(self._chain.mcp, self._chain.directions + _MOMENTUM * self._velocity)
-        edges = edges_near(grey, self._path(outline, predicted), _REACH_WIDTHS * self._width)
-        fitted = fit(edges, outline, predicted, self._side)
-        self._velocity = fitted.chain.directions - self._chain.directions
-        self._chain = fitted.chain
-        seen = self._seen(frame, outline, fitted)
-        return self._at_centroids(seen, centroids(edges, outline, fitted)) if self._paper else seen
+    def look(self, frame: Frame) -> None:
+        """The next picture. Raises CaptureError of seeds that are not on a finger in the first."""
+        image = bgr_image(frame)
+        if self._follower is None:
+            self._follower = Follower(self._learnt(image), base=self._clicks.base is not None)
+        self._followed.append(self._follower.follow(image))
+        self._instants.append(_Instant(frame.seq, 1e-9 * frame.stamp_ns, frame.size_px))
 
-    def _learn(self, grey: Image) -> Outline:
-        """Raises CaptureError where the seeds are not on a finger."""
-        joints = np.array([self._seeds[name] for name in self._names])  # (4, 2)
+    def seen(self) -> list[Seen]:
+        """The joints of all pictures, and why others are missing."""
+        if self._follower is None:
+            return []
+        found = adjust(self._follower.shape, self._followed, self._clicks)
+        return [self._told(found, number) for number in range(len(self._instants))]
+
+    def _learnt(self, image: np.ndarray) -> Learnt:
+        grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        joints = self._clicks.joints
         reach = _LEARN_REACH * float(np.median(np.hypot(*np.diff(joints, axis=0).T)))
         edges = edges_near(grey, joints, reach)
-        lengths = np.hypot(*np.diff(joints, axis=0).T)
-        if lengths.min() < 3.0:
-            raise CaptureError("seeds: two joints are at the same place; each has its own")
-        directions = np.unwrap([np.arctan2(*(joints[k + 1] - joints[k])[::-1]) for k in range(3)])
-        self._side = 1 if directions[2] >= directions[0] else -1
-        chain = Chain(joints[0], directions)
-        widths = first_widths(edges, joints, self._names)
-        for _ in range(_ROUNDS):
-            widths = refined_widths(edges, joints, widths)
-        links = links_of(widths, lengths.tolist())
-        end = tip_end(edges, joints[2], joints[3], links[2])
-        self._width = max(link.width for link in links)
-        base = self._learn_base(grey, joints[0])
-        if base is not None:
-            b1, b2 = (np.array(self._seeds[name]) for name in self._base_names)
-            u, n, _ = frame_of(b1, b2)
-            turn = np.arctan2(u[1], u[0])
-            chain = Chain(chain.mcp, np.unwrap([turn, *chain.directions]))
-            self._base_points = np.array(
-                [[(b - joints[0]) @ u, (b - joints[0]) @ n] for b in (b1, b2)]
-            )
-        self._chain, self._velocity = chain, np.zeros(len(chain.directions))
-        return Outline(base, links, end)
+        widths = widths_beside(edges, joints, self._names)
+        base = None if self._clicks.base is None else self._base(grey, joints, self._clicks.base)
+        return learn(colours_of(image), edges, joints, widths, base)
 
-    def _learn_base(self, grey: Image, mcp: Array) -> Link | None:
-        """The back of the hand beside the base line; None where no seeds say where that is."""
-        if not set(self._base_names) <= set(self._seeds):
-            return None
-        b1, b2 = (np.array(self._seeds[name]) for name in self._base_names)
+    def _base(self, grey: np.ndarray, joints: Array, clicked: Array) -> tuple[Array, Link]:
+        """Where the back of the hand begins, and its outline up to the MCP joint."""
+        b1, b2 = clicked
         u, _, length = frame_of(b1, b2)
-        edges = edges_near(grey, np.array([b1, b2]), _WIDEST_BASE * length)
         # A link that ends at the MCP joint, parallel to the base line, as far back as B1.
-        start = mcp - u * max(float((mcp - b1) @ u), length)
-        link = learn_link(edges, start, mcp, _WIDEST_BASE)
-        if link.sides == (None, None):
+        start = joints[0] - u * max(float((joints[0] - b1) @ u), length)
+        edges = edges_near(grey, np.array([b1, b2]), _WIDEST_BASE * length)
+        steps = joints[[1, 3]] - joints[[0, 2]]
+        bend = steps[0, 0] * steps[1, 1] - steps[0, 1] * steps[1, 0]
+        link = learn_base(edges, start, joints[0], _WIDEST_BASE, 1 if bend >= 0.0 else -1)
+        if link is None:
             raise CaptureError(
                 f"seeds {' and '.join(self._base_names)}: no outline of the hand runs along the "
                 "line between them; put them on the back of the hand, or give --base x1,y1,x2,y2"
             )
-        # The back of the hand, where it is seen: on the other side fingers move.
-        left, right = link.sides
-        back, palm = (left, right) if self._side > 0 else (right, left)
-        own = back or palm
-        return Link(link.length, (left, None) if own is left else (None, right))
+        return start, link
 
-    def _path(self, outline: Outline, chain: Chain) -> Array:
-        """The points of the chain, base first, near which edges are searched."""
-        joints = joints_of(outline, chain)
-        if outline.base is None:
-            return joints
-        turn = chain.directions[0]
-        start = joints[0] - outline.base.length * np.array([np.cos(turn), np.sin(turn)])
-        return np.concatenate([start[None], joints])
-
-    def _seen(self, frame: Frame, outline: Outline, fitted: Fitted) -> Seen:
-        """What was measured, as places with their sigmas."""
-        joints = joints_of(outline, fitted.chain)
-        first = len(outline.links) - 3
-        cover = fitted.cover.mean(axis=1)
+    def _told(self, found: Adjusted, number: int) -> Seen:
+        """One picture's places with their sigmas."""
+        instant, pose = self._instants[number], found.poses[number]
+        joints = joints_at(pose, found.shape.lengths)
+        support = found.support[number].mean(axis=1)
         places: dict[str, Place] = {}
         lost: dict[str, str] = {}
-        for number, name in enumerate(self._names):
-            beside = [k for k in (number - 1, number) if 0 <= k < 3]
-            seen = float(np.min(cover[[first + k for k in beside]]))
-            x, y = joints[number].tolist()
-            if not (0 <= x < frame.size_px[0] and 0 <= y < frame.size_px[1]):
+        for joint, name in enumerate(self._names):
+            beside = [phalanx for phalanx in (joint, joint + 1) if 1 <= phalanx <= 3]
+            share = float(support[beside].min())
+            x, y = joints[joint].tolist()
+            if not (0 <= x < instant.size_px[0] and 0 <= y < instant.size_px[1]):
                 lost[name] = "out of view"
-            elif seen < _LEAST_COVER:
-                lost[name] = f"its outline is hidden ({100 * seen:.0f} % seen)"
+            elif share < _LEAST_SUPPORT:
+                lost[name] = f"its outline is hidden ({100 * share:.0f} % seen)"
             else:
-                sigma = _sigma(outline, fitted, number)
-                places[name] = Place(x, y, sigma, min(1.0, seen / 0.7))
-        if first:
-            turn = fitted.chain.directions[0]
-            u, n = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-            for name, (along, across) in zip(self._base_names, self._base_points, strict=True):
-                x, y = (joints[0] + along * u + across * n).tolist()
-                places[name] = Place(x, y, _sigma(outline, fitted, 0), 1.0)
-        return Seen(frame.seq, 1e-9 * frame.stamp_ns, places, lost)
+                sigma = _sigma(found, number, joint)
+                places[name] = Place(x, y, sigma, min(1.0, share / _WELL))
+        if self._clicks.base is not None:
+            places |= self._base_places(found, number, self._clicks.base)
+        return Seen(instant.frame, instant.time_s, places, lost)
 
-    def _at_centroids(self, seen: Seen, found: list[Array | None]) -> Seen:
-        """The same joints at the centroids of A1 to A4 (regions.py)."""
-        places, lost = dict(seen.places), dict(seen.lost)
-        for name, centroid in zip(self._names, found, strict=True):
-            place = places.pop(name, None)
-            if place is None:
-                continue
-            if centroid is None:
-                lost[name] = "no polygon of lines: only one side is seen"
-                continue
-            x, y = centroid.tolist()
-            places[name] = place._replace(x_px=x, y_px=y)
-        return seen._replace(places=places, lost=lost)
+    def _base_places(self, found: Adjusted, number: int, base: Array) -> dict[str, Place]:
+        """B1 and B2, which move with the back of the hand."""
+        first, now = found.poses[0], found.poses[number]
+        offsets = base - first[:2]
+        along = offsets @ np.array([np.cos(first[2]), np.sin(first[2])])
+        across = float((offsets @ np.array([-np.sin(first[2]), np.cos(first[2])])).mean())
+        across = 0.0 if self._clicks.through else across
+        c, s = np.cos(now[2]), np.sin(now[2])
+        sigma = _sigma(found, number, 0)
+        return {
+            name: Place(
+                float(now[0] + at * c - across * s), float(now[1] + at * s + across * c), sigma
+            )
+            for name, at in zip(self._base_names, along, strict=True)
+        }
 
 
-def _sigma(outline: Outline, fitted: Fitted, joint: int) -> float:
-    """Of a joint's coordinates, px: the covariance of the chain, carried to it."""
-    k = len(outline.links)
-    J = np.zeros((2, 2 + k))
-    J[:, :2] = np.eye(2)
-    for phalanx in range(joint):
-        turn = fitted.chain.directions[k - 3 + phalanx]
-        length = outline.phalanges[phalanx].length
-        J[:, 2 + k - 3 + phalanx] = length * np.array([-np.sin(turn), np.cos(turn)])
-    cov = J @ fitted.cov @ J.T
-    return float(np.sqrt(0.5 * np.trace(cov)))
+def _sigma(found: Adjusted, picture: int, joint: int) -> float:
+    """Of a joint's coordinates, px: the covariance of the pose, carried to it."""
+    by_pose = np.zeros((2, found.poses.shape[1]))
+    by_pose[:, :2] = np.eye(2)
+    for bone in range(joint):
+        turn = found.poses[picture, 3 + bone]
+        by_pose[:, 3 + bone] = found.shape.lengths[bone] * np.array([-np.sin(turn), np.cos(turn)])
+    covariance = by_pose @ found.covariances[picture] @ by_pose.T
+    return float(np.sqrt(0.5 * np.trace(covariance)))
