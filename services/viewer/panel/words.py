@@ -18,6 +18,7 @@ _STREAMS: dict[str, tuple[str, str]] = {
     topics.OPENVR_EVENT.template: ("events of SteamVR", "events of SteamVR"),
     topics.OBJECT.template: ("pose of {object}", "poses of the objects"),
     topics.CONTACTS.template: ("touches of {object}", "touches of the objects"),
+    topics.CAPTION.template: ("what a tour explains", "what a tour explains"),
     topics.TRUTH.template: ("the simulator's truth", "the simulator's truth"),
     topics.PREVIEW.template: ("pictures of camera {camera}", "pictures of the cameras"),
     topics.SIM_FRAME.template: ("simulated pictures of {camera}", "simulated pictures"),
