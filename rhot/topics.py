@@ -91,7 +91,7 @@ PREVIEW: Topic[bytes] = Topic(
     Rate.DEMAND,
     Priority.BACKGROUND,
     recorded=False,
-    about="JPEG, published while somebody subscribes",
+    about="JPEG, published while somebody subscribes; SeenInPicture in the attachment",
     media_type="image/jpeg",
     max_bytes=4_000_000,
     # A subscription to rhot/** must not make cameras encode pictures.

@@ -12,12 +12,13 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from rhot.messages import Message, Name, Stamp
+from rhot.messages import Marker, Message, Name, Stamp
 
 Hue = Annotated[int, msgspec.Meta(ge=0, le=179)]
 Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
 Pixel = Annotated[float, msgspec.Meta(ge=-65536.0, le=65536.0)]
 WholePixel = Annotated[int, msgspec.Meta(ge=-65536, le=65536)]
+Size = Annotated[int, msgspec.Meta(ge=1, le=65536)]
 # Longer than any camera's frame; a gain of 64 is more than sensors have.
 Microseconds = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 Gain = Annotated[float, msgspec.Meta(ge=0.0, le=64.0)]
@@ -79,6 +80,21 @@ class ExposureControl(Message, frozen=True, kw_only=True):
     adjustable: bool = True
     note: str = ""
     changed_ns: Stamp = 0
+
+
+class SeenInPicture(Message, frozen=True, kw_only=True):
+    """What a tracker saw in a preview: the attachment of that very JPEG.
+
+    looked_for are the colours that it looks for: those without a marker are lost, or not in view.
+    searched_px is the rectangle that was searched (left, top, right, bottom), None where no single
+    one was. Without a running session nothing is looked for, and previews have no attachment.
+    """
+
+    stamp_ns: Stamp
+    size_px: tuple[Size, Size]
+    markers: Annotated[list[Marker], msgspec.Meta(max_length=256)]
+    looked_for: Annotated[list[Name], msgspec.Meta(max_length=256)]
+    searched_px: tuple[WholePixel, WholePixel, WholePixel, WholePixel] | None = None
 
 
 class PointedAt(Message, frozen=True, kw_only=True):

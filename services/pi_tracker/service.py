@@ -96,15 +96,17 @@ class CameraService:
         A picture that comes again is not measured again.
         """
         now_ns = time.monotonic_ns()
+        seen = None
         if self._monitor.is_new(frame, now_ns) and running:
             found = self._track(frame)
+            seen = self._tracker.seen(found)
             self._seen = len(found.markers)
             self._faults.markers = int(self._service.values["markers"])
             self._service.values["skipped_frames"] = source.dropped
             self._service.values["rejected_frames"] = source.rejected
             self._watch_drift(frame, found)
         self._monitor.watch(frame, self._seen if running else 0, now_ns)
-        self._pictures.show(frame, now_ns)
+        self._pictures.show(frame, now_ns, seen)
 
     def _track(self, frame: Frame) -> MarkerFrame:
         offset = self.offset.at(frame.stamp_ns)

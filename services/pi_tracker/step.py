@@ -15,6 +15,7 @@ import cv2
 from rhot.files.calibration import Colors, Lens
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker, MarkerFrame
+from rhot.messages.camera import SeenInPicture
 from services.pi_tracker.detect.color_table import ColorTable, compile_colors
 from services.pi_tracker.detect.marker_finder import MarkerFinder
 from services.pi_tracker.detect.paper_finder import PaperFinder
@@ -87,6 +88,19 @@ class TrackerStep:
     def notes(self) -> list[str]:
         """What a person should know of how the dots of one colour were told apart."""
         return [note for finder in self._dots.values() for note in finder.tracker.notes]
+
+    def seen(self, found: MarkerFrame) -> SeenInPicture:
+        """What people are told of the picture that the last step was made of."""
+        # Of a picture that was rectified first, a rectangle is none any more.
+        finder = self._finder if self._rectifier is None else None
+        return SeenInPicture(
+            stamp_ns=found.stamp_ns,
+            size_px=found.size_px,
+            markers=found.markers,
+            looked_for=[name for name in self._color_names if name not in self._names]
+            + [marker for names in self._names.values() for marker in names.values()],
+            searched_px=finder.searched_px if isinstance(finder, MarkerFinder) else None,
+        )
 
     def step(self, frame: Frame, clock_offset_ns: int = 0, clock_sigma_ns: int = -1) -> MarkerFrame:
         """Find the markers of one frame.

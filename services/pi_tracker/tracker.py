@@ -13,6 +13,7 @@ from rhot.files.calibration import Colors, load_lens
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from rhot.messages import MarkerFrame
+from rhot.messages.camera import SeenInPicture
 from services.pi_tracker.colors.light_drift import Drifted, DriftMonitor
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
@@ -69,6 +70,10 @@ class CameraTracker:
     def step(self, frame: Frame, offset: Offset) -> MarkerFrame:
         """The markers of one frame; offset is that of the camera's clock."""
         return self._step.step(frame, offset.offset_ns, offset.sigma_ns)
+
+    def seen(self, found: MarkerFrame) -> SeenInPicture:
+        """What people are told of the picture of the last step, and of nothing else."""
+        return self._step.seen(found)
 
     @property
     def times_ms(self) -> dict[str, float]:

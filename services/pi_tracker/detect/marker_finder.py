@@ -67,6 +67,12 @@ class MarkerFinder:
         self._markers_rect: Rect | None = None
         self._margin_px = settings.roi_margin_px
 
+    @property
+    def searched_px(self) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of what was searched in the last image, in its pixels."""
+        left, top, right, bottom = self._searched
+        return 2 * left, 2 * top, 2 * right, 2 * bottom
+
     def find(self, frame: Frame) -> list[Marker]:
         """Markers of one image, at most one per colour."""
         image = picture(frame)

@@ -12,6 +12,7 @@ import cv2
 
 from rhot import topics
 from rhot.bus.bus import Bus
+from rhot.messages.camera import SeenInPicture
 from services.pi_tracker.endpoints.shared_answer import SharedAnswer
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.yuv_planes import bgr_image
@@ -54,8 +55,8 @@ class Preview:
         # A coroutine function, so that it runs on the event loop.
         bus.answer(topics.FRAME, self._answer, camera=camera)
 
-    def show(self, frame: Frame, now_ns: int) -> None:
-        """Remember the frame; send it if a preview is wanted and due."""
+    def show(self, frame: Frame, now_ns: int, seen: SeenInPicture | None = None) -> None:
+        """Remember the frame; send it, with what was seen in it, if a preview is wanted and due."""
         self._last = frame
         # A clock that was set back counts as due.
         if (
@@ -66,11 +67,11 @@ class Preview:
             return
         self._busy = True
         self._sent_ns = now_ns
-        self._tasks.create_task(self._send(frame))
+        self._tasks.create_task(self._send(frame, seen))
 
-    async def _send(self, frame: Frame) -> None:
+    async def _send(self, frame: Frame, seen: SeenInPicture | None) -> None:
         try:
-            self._publisher.put_bytes(await asyncio.to_thread(jpeg, frame))
+            self._publisher.put_bytes(await asyncio.to_thread(jpeg, frame), attachment=seen)
         finally:
             self._busy = False
 

@@ -12,10 +12,12 @@ import viser
 
 from rhot.files.config import RigConfig
 from rhot.hand import HandName
+from rhot.messages.camera import SeenInPicture
 from services.viewer.live.model import View
 from services.viewer.panel import texts
-from services.viewer.pictures.feed import PictureFeed
 from services.viewer.scene.layers import LAYERS, LayerName
+from services.viewer.pictures.feed import PictureFeed, Take
+from services.viewer.pictures.marks import Marks
 from services.viewer.visits.layer import Layer
 from services.viewer.visits.section import Seen
 
@@ -116,10 +118,13 @@ class LiveTab:
                 self._watched.pop(camera)()
                 handle.content = texts.preview(camera, None)
 
-    def _showing(self, camera: str) -> Callable[[bytes, bytes], None]:
-        def show(jpeg: bytes, _sent_with: bytes) -> None:
+    def _showing(self, camera: str) -> Take:
+        marks = Marks()
+
+        def show(jpeg: bytes, seen: SeenInPicture | None) -> None:
             picture = base64.b64encode(jpeg).decode()
-            self._previews[camera].content = texts.preview(camera, picture)
+            over = "" if seen is None else marks.svg(seen)
+            self._previews[camera].content = texts.preview(camera, picture, over)
 
         return show
 

@@ -23,6 +23,8 @@ from services.viewer.panel.words import sentence, service_words, stream_words, t
 _MAX_ROWS = 60
 _STYLE = "font-size:0.8em;line-height:1.35;padding:0 0.6em;"
 _CELL = "padding:0 0.5em 0 0;text-align:right;white-space:nowrap"
+_MARKS = '<span style="opacity:0.7">circle: found; dashed circle: lost, where it was last; blue \
+box: where it is looked for</span>'
 _LEFT = "padding:0 0.5em 0 0;text-align:left"
 
 
@@ -122,12 +124,17 @@ def _stream(stream: StreamHealth) -> str:
     )
 
 
-def preview(camera: str, jpeg_base64: str | None) -> str:
-    """One camera's picture, or that it is waited for."""
+def preview(camera: str, jpeg_base64: str | None, marks: str = "") -> str:
+    """One camera's picture with marks over it (SVG, made here), or that it is waited for."""
     if jpeg_base64 is None:
         return _box(f"waiting for the picture of {text(camera)} ...")
     source = f"data:image/jpeg;base64,{jpeg_base64}"
-    return _box(f'{text(camera)}<br><img style="width:100%" src="{source}" alt="{text(camera)}">')
+    # Decoded before it is shown: no white between two pictures.
+    picture = f'<img style="width:100%;display:block" decoding="sync" src="{source}" alt="">'
+    return _box(
+        f'{text(camera)}<div style="position:relative">{picture}{marks}</div>'
+        + (_MARKS if marks else "")
+    )
 
 
 def _degrees(angle_rad: float) -> float:

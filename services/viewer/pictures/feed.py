@@ -1,7 +1,8 @@
 """Camera pictures for the visitors who want them, and for nobody else.
 
 A camera is subscribed to while at least one visitor shows it: it encodes none otherwise. What is no
-JPEG is counted as an error and shown to nobody.
+JPEG is counted as an error and shown to nobody; what goes with a picture and is not what it should
+be is counted, too, and the picture shown without.
 """
 
 from __future__ import annotations
@@ -9,15 +10,20 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+import msgspec
+
 from rhot import topics
+from rhot.errors import UNDECODABLE
+from rhot.messages.camera import SeenInPicture
 from rhot.process.service import Service
 
 # JPEG files begin with this; other bytes are not sent to a browser.
 _JPEG = b"\xff\xd8\xff"
 # One being shown and the next; more would only be older.
 _QUEUE = 2
-# Called with a JPEG and what its camera sends with it.
-Take = Callable[[bytes, bytes], None]
+# Called with a JPEG and what its tracker saw in it, None where it does not say.
+Take = Callable[[bytes, SeenInPicture | None], None]
+_SEEN = msgspec.json.Decoder(SeenInPicture)
 
 
 class PictureFeed:
@@ -49,7 +55,17 @@ class PictureFeed:
                 if not sample.payload.startswith(_JPEG):
                     self._service.error(f"{sample.key} carries no JPEG")
                     continue
+                seen = self._decoded(sample.key, sample.attachment)
                 for take in list(self._takers[camera]):
-                    take(sample.payload, sample.attachment)
+                    take(sample.payload, seen)
         finally:
             self._service.bus.close(samples)
+
+    def _decoded(self, key: str, attachment: bytes) -> SeenInPicture | None:
+        if not attachment:
+            return None
+        try:
+            return _SEEN.decode(attachment)
+        except UNDECODABLE as error:
+            self._service.error(f"what goes with {key} cannot be read: {error}")
+            return None

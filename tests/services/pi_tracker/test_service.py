@@ -18,6 +18,7 @@ from rhot.files.calibration import save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, HandTable, ObjectTable, RigTable
 from rhot.messages import Session
+from rhot.messages.camera import SeenInPicture
 from rhot.messages.simulator import SimFrame
 from rhot.process.service import Service
 from services.pi_tracker.endpoints import preview
@@ -166,6 +167,7 @@ async def test_pictures_for_who_asks(config, router, rig):
             await asyncio.wait([task], timeout=0.05)
         shown = cv2.imdecode(np.frombuffer(task.result().payload, np.uint8), cv2.IMREAD_COLOR)
         assert shown.shape == (SIZE[1], SIZE[0], 3)
+        assert task.result().attachment == b"", "without a session nothing is looked for"
         (lossless,) = await other.get(topics.FRAME, 2.0, camera="left")
         picture = cv2.imdecode(np.frombuffer(lossless, np.uint8), cv2.IMREAD_COLOR)
         assert np.array_equal(picture, cv2.cvtColor(rig._frame.image, cv2.COLOR_YUV2BGR_I420))
@@ -203,6 +205,9 @@ async def test_who_subscribes_to_everything_gets_json_and_makes_nobody_encode(
                 rig.shoot()
                 await asyncio.wait([task], timeout=0.05)
             assert task.result().key == "rhot-picture/test/camera/left/preview"
+            seen = msgspec.json.decode(task.result().attachment, type=SeenInPicture)
+            assert seen.size_px == SIZE
+            assert {one.color for one in seen.markers} <= set(seen.looked_for) == {"green", "blue"}
             assert encoded
             beat.cancel()
         everything.undeclare()

@@ -56,6 +56,22 @@ def test_markers_are_where_the_paint_is(moving, colors, layout, method, toleranc
             assert marker.quality > 0.5
 
 
+def test_people_are_told_what_is_looked_for_and_where(moving, colors):
+    step = tracker(colors)
+    told = [step.seen(step.step(frame)) for frame, _ in moving(count=8)]
+    assert all(one.looked_for == ["green", "blue", "magenta"] for one in told)
+    # The first frames are searched everywhere, to learn the background.
+    assert told[0].searched_px == (0, 0, *SIZE)
+    left, top, right, bottom = told[-1].searched_px
+    assert (right - left) * (bottom - top) < 0.5 * SIZE[0] * SIZE[1]
+    assert len(told[-1].markers) == 3
+    for marker in told[-1].markers:
+        assert left < marker.x_px < right
+        assert top < marker.y_px < bottom
+    other = tracker(colors, method="paper")
+    assert other.seen(other.step(next(moving())[0])).searched_px is None
+
+
 @pytest.mark.parametrize("noise_levels", [2.0, 5.0])
 def test_both_ranges_of_a_pi_give_the_same_markers(studio, tip, colors, noise_levels):
     """The same scene with the same noise, as YUV420 in limited and in full range."""

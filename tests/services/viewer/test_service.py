@@ -6,16 +6,29 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
 import pytest
 
 from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
+from rhot.messages.camera import SeenInPicture
 from services.viewer.service import serve
 
 Make = Callable[..., Any]
 Message = tuple[str, dict[str, Any]]
 HELD = ("thumb", "index")
+SEEN = SeenInPicture(
+    stamp_ns=1, size_px=(640, 480), markers=[], looked_for=["green"], searched_px=None
+)
+
+
+class MarkerNoMore(msgspec.Struct):
+    """What goes with a picture, and is not what it should be."""
+
+    markers: str
+
+
 JPEG = b"\xff\xd8\xff\xe0picture"
 
 
@@ -155,8 +168,10 @@ async def test_pictures_are_asked_for_by_who_looks_and_shown_to_nobody_else(
         other.click(choices[1]["uuid"], "right")
 
         def send() -> None:
-            left.put_bytes(JPEG)
+            left.put_bytes(JPEG, SEEN)
+            bus.put_raw(left.key, JPEG)
             right.put_bytes(b"<script>")
+            right.put_bytes(JPEG, MarkerNoMore(markers="<script>"))
 
         with sending(send):
             shown = await asyncio.to_thread(
@@ -164,9 +179,14 @@ async def test_pictures_are_asked_for_by_who_looks_and_shown_to_nobody_else(
                 "GuiUpdateMessage",
                 updates=lambda u: "data:image/jpeg" in u.get("content", ""),
             )
-            assert "left<br>" in shown["updates"]["content"]
+            assert "left<div" in shown["updates"]["content"]
+            await asyncio.to_thread(
+                looks.wait_for,
+                "GuiUpdateMessage",
+                updates=lambda u: "green</text></svg>" in u.get("content", ""),
+            )
             await until(lambda: service.errors >= 2)
-        assert "no JPEG" in service.last_error
+        assert "no JPEG" in service.last_error or "cannot be read" in service.last_error
         # All that the other was told until now: nothing of the first one's pictures.
         other.click(choices[1]["uuid"], "none")
         await asyncio.to_thread(
