@@ -31,6 +31,8 @@ from services.viewer.live.model import ViewModel
 from services.viewer.panel.banner import Banner
 from services.viewer.panel.live_tab import LiveSection
 from services.viewer.pictures.feed import PictureFeed
+from services.viewer.plots.history import History
+from services.viewer.plots.section import PlotsSection
 from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.scene.scene import LiveScene
 from services.viewer.server import open_server
@@ -52,6 +54,7 @@ class _Page:
     visits: Visits
     scene: LiveScene
     layers: Mapping[LayerName, Layer]
+    history: History
     captions: Captions
 
 
@@ -67,11 +70,13 @@ async def serve(service: Service) -> None:
     with open_server(config.viewer) as server:
         layers = {name: Layer(f"/{name}") for name in LAYERS}
         live = LiveSection(config, setup.notes, PictureFeed(service), layers)
-        sections: list[Section] = [live, GuideSection(service)]
+        history = History(config)
+        sections: list[Section] = [live, PlotsSection(config, history), GuideSection(service)]
         page = _Page(
             Visits(server, Banner, sections),
             LiveScene(server, config, setup.cameras, setup.paints, setup.looks),
             layers,
+            history,
             Captions(server),
         )
         service.values["port"] = server.get_port()
@@ -101,6 +106,7 @@ async def _show_live(service: Service, page: _Page) -> None:
             now_s = time.monotonic()
             view = model.view(now_s)
             page.scene.show(view, {name for name, layer in page.layers.items() if layer.wanted})
+            page.history.take(view, now_s)
             if now_s >= text_due_s:
                 text_due_s = now_s + _TEXT_S
                 now_ns = clock.now_ns()

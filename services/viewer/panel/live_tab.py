@@ -15,9 +15,9 @@ from rhot.hand import HandName
 from rhot.messages.camera import SeenInPicture
 from services.viewer.live.model import View
 from services.viewer.panel import texts
-from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.pictures.feed import PictureFeed, Take
 from services.viewer.pictures.marks import Marks
+from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.visits.layer import Layer
 from services.viewer.visits.section import Seen
 

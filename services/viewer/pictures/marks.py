@@ -15,7 +15,7 @@ from rhot.messages.camera import SeenInPicture
 _LOST_NS = 5_000_000_000
 # A marker's circle is three sigma, and at least this share of the picture's width: sigma is
 # hundredths of a pixel.
-_SIGMAS, _MIN_RADIUS = 3.0, 0.012
+_SIGMAS, _MIN_RADIUS = 3.0, 0.018
 # Letters and lines, as shares of the picture's width: readable where it is 350 pixels wide.
 _LETTER, _LINE = 1.0 / 26.0, 1.0 / 320.0
 _WHITE, _LOST, _SEARCHED = "#ffffff", "#ffb000", "#7fd4ff"
