@@ -151,12 +151,8 @@ SESSION = Topic(
     recorded=True,
     about="the start broadcast",
 )
-RECORDER = _query(
-    "control/recorder",
-    r.RecorderState,
-    Priority.DATA,
-    "what the recorder does; a query with a RecorderRequest changes it",
-)
+_RECORDER = "what the recorder does; a query with a RecorderRequest changes it"
+RECORDER = _query("control/recorder", r.RecorderState, Priority.DATA, _RECORDER)
 RECORDINGS = _query("control/recordings", r.Recordings, Priority.DATA, "the recorder's files")
 CAPTION = _stream(
     "control/caption", m.Caption, Rate.DEMAND, "what is happening, in words: a tour's captions"

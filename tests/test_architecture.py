@@ -70,6 +70,10 @@ IMPURE_ROOMS = {
     "services/viewer/pictures/feed.py",
     "services/viewer/server.py",
     "services/viewer/visits/visits.py",
+    "services/viewer/recording/link.py",
+    "services/viewer/recording/replay_page.py",
+    "services/viewer/recording/section.py",
+    "services/recorder/endpoints",
     "rhot/watch/follow.py",
     "services/cli",
 }

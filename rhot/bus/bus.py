@@ -281,8 +281,8 @@ class Bus:
         which is nothing for the event loop: call it in a thread.
         """
         full = zenoh.CongestionControl.BLOCK if wait else zenoh.CongestionControl.DROP
-        now = not wait  # else Zenoh would gather messages for a millisecond
-        self._session.put(key, payload, encoding=encoding, congestion_control=full, express=now)
+        # Express: else Zenoh gathers messages for a millisecond.
+        self._session.put(key, payload, encoding=encoding, congestion_control=full, express=True)
 
     def close(self, one: Subscription[Any] | RawSubscription | AliveWatch | Publisher[Any]) -> None:
         """End one subscription or publisher before the session ends; its stream leaves health."""

@@ -28,6 +28,8 @@ from services.recorder.writer import MIN_FREE_BYTES, RecordingWriter, check_spac
 
 # A calibration file is some kB; a file larger than this is none.
 _MAX_ATTACHMENT_BYTES = 1_000_000
+# A scanned cup of 50 000 triangles has 2.5 MB; readers take no record beyond 16 MB.
+_MAX_MESH_BYTES = 8_000_000
 # So often a session may start or stop in so long: people need seconds for each, and a program gone
 # mad must not open hundreds of files.
 _CHANGES, _WITHIN_NS = 8, 60_000_000_000
@@ -65,7 +67,7 @@ def _free_path(folder: Path, stem: str) -> Path:
 
 
 def attachments(config: RigConfig) -> dict[str, bytes]:
-    """The rig's configuration as JSON and its calibration files, by name.
+    """The rig's configuration as JSON, its calibration files and the meshes of objects, by name.
 
     A recording cannot be understood later without them.
     """
@@ -78,6 +80,19 @@ def attachments(config: RigConfig) -> dict[str, bytes]:
                 files[f"calibration/{path.name}"] = path.read_bytes()
         except OSError:
             # A calibration that cannot be read is missing in the rig, too.
+            continue
+    return files | _meshes(config)
+
+
+def _meshes(config: RigConfig) -> dict[str, bytes]:
+    """The mesh files of objects, by the object's name: whoever plays the recording has none."""
+    files = {}
+    for table in config.object:
+        path = Path(config.folder) / table.mesh
+        try:
+            if table.mesh and path.stat().st_size <= _MAX_MESH_BYTES:
+                files[f"meshes/{table.name}{path.suffix.lower()}"] = path.read_bytes()
+        except OSError:
             continue
     return files
 

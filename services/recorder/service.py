@@ -20,11 +20,11 @@ from rhot.messages import Session
 from rhot.messages.recording import RecorderState, replay_rig
 from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
-from services.recorder.deck import Deck
-from services.recorder.library import Library
+from services.recorder.endpoints.deck import Deck
+from services.recorder.endpoints.library import Library
+from services.recorder.endpoints.requests import Requests
 from services.recorder.recorder import Recorder, recorded_topics
 from services.recorder.recover import recover, truncated_recordings
-from services.recorder.requests import Requests
 
 # Samples of a topic that wait while a chunk is compressed and written (some ms): ten seconds of a
 # camera, and no memory to speak of.

@@ -35,6 +35,8 @@ _END_CHUNK = "_Writer__finalize_chunk"
 COMPANION = "companion-of"
 # A rig has some dozen keys; MCAP has room for 65,535. Names come from the network.
 MAX_CHANNELS = 4096
+# What attachments are.
+_MEDIA = {".json": "application/json", ".glb": "model/gltf-binary", ".stl": "model/stl"}
 # Room left for the system and for finishing the file: its index is some 100 bytes a chunk, 1 MB for
 # 20 hours.
 MIN_FREE_BYTES = 50_000_000
@@ -77,7 +79,8 @@ class RecordingWriter:
             self._writer.start(profile=PROFILE, library=f"rhot {version}".strip())
             self._writer.add_metadata("rhot", {"rig": rig, "version": version})
             for name, data in attachments.items():
-                self._writer.add_attachment(0, 0, name, "application/json", data)
+                media = _MEDIA.get(Path(name).suffix, "application/octet-stream")
+                self._writer.add_attachment(0, 0, name, media, data)
             self._file.flush()
         except OSError as error:
             _close(self._file)

@@ -33,6 +33,9 @@ from services.viewer.panel.live_tab import LiveSection
 from services.viewer.pictures.feed import PictureFeed
 from services.viewer.plots.history import History
 from services.viewer.plots.section import PlotsSection
+from services.viewer.recording.link import RecorderLink
+from services.viewer.recording.replay_page import INSTANCE, ReplayPage
+from services.viewer.recording.section import RecordingSection
 from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.scene.scene import LiveScene
 from services.viewer.server import open_server
@@ -56,10 +59,29 @@ class _Page:
     layers: Mapping[LayerName, Layer]
     history: History
     captions: Captions
+    # Tells what is stale: while a replay is paused, its time stands still.
+    clock_s: Callable[[], float]
 
 
 async def serve(service: Service) -> None:
     """Shows the rig live at http://127.0.0.1:8080 (or [viewer] port)."""
+    link = RecorderLink(service.bus)
+    replay = ReplayPage(service, link, lambda page: _show(page, link, lambda: ""))
+    for running in (link.run(), replay.run()):
+        service.tasks.create_task(running)
+
+    def replay_address() -> str:
+        return _address(service, replay.port) if replay.port else ""
+
+    await _show(service, link, replay_address)
+
+
+def _address(service: Service, port: int) -> str:
+    return page_address(service.config.viewer, port, socket.gethostname())
+
+
+async def _show(service: Service, link: RecorderLink, replay_address: Callable[[], str]) -> None:
+    """One page, for ever: of the rig, or of what is replayed under another name."""
     config = service.config
     # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
     names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
@@ -69,19 +91,24 @@ async def serve(service: Service) -> None:
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with open_server(config.viewer) as server:
         layers = {name: Layer(f"/{name}") for name in LAYERS}
-        live = LiveSection(config, setup.notes, PictureFeed(service), layers)
         history = History(config)
-        sections: list[Section] = [live, PlotsSection(config, history), GuideSection(service)]
+        sections: list[Section] = [
+            LiveSection(config, setup.notes, PictureFeed(service), layers),
+            PlotsSection(config, history),
+            RecordingSection(link, config.rig.name, replay_address),
+        ]
+        # Nobody answers for cameras of what is replayed.
+        sections += [] if _replays(service) else [GuideSection(service)]
         page = _Page(
             Visits(server, Banner, sections),
             LiveScene(server, config, setup.cameras, setup.paints, setup.looks),
             layers,
             history,
             Captions(server),
+            link.now_s if _replays(service) else time.monotonic,
         )
         service.values["port"] = server.get_port()
-        address = page_address(config.viewer, server.get_port(), socket.gethostname())
-        log.info("live view at %s", address)
+        log.info("live view at %s", _address(service, server.get_port()))
         service.ready()
         try:
             while True:
@@ -91,6 +118,10 @@ async def serve(service: Service) -> None:
             page.visits.close()
 
 
+def _replays(service: Service) -> bool:
+    return service.instance == INSTANCE
+
+
 async def _show_live(service: Service, page: _Page) -> None:
     """Subscribe and draw for as long as a browser is connected."""
     rig = RigMonitor(service.config, clock.now_ns())
@@ -98,31 +129,34 @@ async def _show_live(service: Service, page: _Page) -> None:
     async with watching(service.bus, rig), asyncio.TaskGroup() as tasks:
         followers = [
             tasks.create_task(_follow(service.bus, topic, take))
-            for topic, take in _handlers(model, service.config)
+            for topic, take in _handlers(model, service.config, page.clock_s)
         ]
         followers.append(tasks.create_task(page.captions.follow(service.bus)))
         text_due_s = due_s = 0.0
         while page.visits.anybody.is_set():
-            now_s = time.monotonic()
+            now_s, tick_s = page.clock_s(), time.monotonic()
             view = model.view(now_s)
             page.scene.show(view, {name for name, layer in page.layers.items() if layer.wanted})
             page.history.take(view, now_s)
-            if now_s >= text_due_s:
-                text_due_s = now_s + _TEXT_S
+            if tick_s >= text_due_s:
+                text_due_s = tick_s + _TEXT_S
                 now_ns = clock.now_ns()
-                page.visits.update(Seen(view, rig.state(now_ns).faults, now_s, now_ns))
+                faults = rig.state(now_ns).faults
+                if _replays(service):
+                    # Services that were not recorded are not missed.
+                    faults = [one for one in faults if one.teller]
+                page.visits.update(Seen(view, faults, now_s, now_ns))
             # By the clock: what drawing takes is not added to each picture's time.
-            due_s = max(due_s, now_s) + 1.0 / service.config.viewer.rate_hz
+            due_s = max(due_s, tick_s) + 1.0 / service.config.viewer.rate_hz
             await asyncio.sleep(due_s - time.monotonic())
         for follower in followers:
             follower.cancel()
 
 
 def _handlers(
-    model: ViewModel, config: RigConfig
+    model: ViewModel, config: RigConfig, now_s: Callable[[], float]
 ) -> list[tuple[Topic[Any], Callable[[Any], None]]]:
     """What is subscribed to, and who takes it."""
-    now_s = time.monotonic
     handlers: list[tuple[Topic[Any], Callable[[Any], None]]] = [
         (topics.POSE, lambda message: model.pose(message, now_s(), clock.now_ns())),
         (topics.POINTS, lambda message: model.points(message, now_s())),

@@ -11,6 +11,7 @@ import typer
 import uvloop
 
 from rhot.bus.bus import Bus
+from rhot.errors import ConfigError
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from services.cli.options import ConnectOption
 from services.cli.router_session import rig_and_endpoints, router_session
@@ -22,6 +23,19 @@ from services.recorder.sources.playback import Playback, check_names
 from services.recorder.sources.replay import publishing
 
 _STATUS_PERIOD_S = 0.2
+
+
+FromOption = Annotated[
+    float | None,
+    typer.Option("--from", metavar="SECONDS", help="begin here; negative: so long before the end"),
+]
+ToOption = Annotated[
+    float | None, typer.Option("--to", metavar="SECONDS", help="end here; likewise")
+]
+ViewOption = Annotated[
+    bool,
+    typer.Option("--view", help="show it on the page: needs no rig, and goes on until Ctrl-C"),
+]
 
 
 @dataclass(frozen=True)
@@ -48,21 +62,15 @@ def replay(
     loop: Annotated[
         bool, typer.Option("--loop", help="begin again at the end, until Ctrl-C")
     ] = False,
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from", metavar="SECONDS", help="begin here; negative: so long before the end"
-        ),
-    ] = None,
-    to_s: Annotated[
-        float | None, typer.Option("--to", metavar="SECONDS", help="end here; likewise")
-    ] = None,
+    from_s: FromOption = None,
+    to_s: ToOption = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
             help="a topic to replay, e.g. camera/markers; may be given again; default: all"
         ),
     ] = None,
+    view: ViewOption = False,
     info: Annotated[bool, typer.Option("--info", help="show what is in the file and end")] = False,
     recover: Annotated[
         bool,
@@ -81,6 +89,9 @@ def replay(
         typer.echo(_text(file, summary))
         return
     check_names(only or ())
+    if view:
+        _view(file, rate, loop, window(summary, from_s, to_s), config or connect or only)
+        return
     how = _How(rate, loop, only or [], window(summary, from_s, to_s))
     count = uvloop.run(_replay(file, how, config, connect))
     typer.echo(f"replayed {count} messages")
@@ -103,11 +114,22 @@ async def _replay(file: Path, how: _How, config: Path | None, connect: str | Non
     return sent
 
 
+def _view(file: Path, rate: float, loop: bool, window_ns: tuple[int, int], others: object) -> None:
+    if others:
+        raise ConfigError("--view has a router and a rig of its own: leave --config, --connect out")
+    if rate == 0.0:
+        raise ConfigError("--view needs a --rate above 0: nobody sees what is played flat out")
+    # Not above: the page's neighbours take long to import.
+    from services.cli.record.view import view
+
+    uvloop.run(view(file, rate, loop, window_ns))
+
+
 def _playback(bus: Bus, file: Path, how: _How) -> Playback:
     return Playback(
         file,
         bus.rig,
-        publishing(bus, patient=not 0.0 < how.rate <= 1.0),
+        publishing(bus, patient=True),
         rate=how.rate,
         loop=how.loop,
         only=how.only,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,13 @@ from rhot import topics
 from rhot.errors import UNDECODABLE, CaptureError, ConfigError, DiskFullError, RhotError, writing
 from rhot.files.capture import Capture
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import ObjectTable
 from rhot.messages import MarkerFrame
 from rhot.messages.objects import OpenVrPose
 from services.cli.recorded.messages import arrivals
 
+# Folders of a capture that a recording keeps, and which files are in them.
+_FOLDERS = {"calibration": (".json",), "meshes": (".glb", ".stl")}
 # What a capture without pictures is made of.
 _STREAMS: dict[topics.Topic[Any], type[Any]] = {
     topics.MARKERS: MarkerFrame,
@@ -89,7 +92,7 @@ def unpacking(path: Path) -> Iterator[Path]:
 
 
 def unpack_rig(path: Path, capture: Capture) -> str:
-    """rig.toml and calibration that the recorder kept; the rig's name."""
+    """rig.toml, calibration and meshes that the recorder kept; the rig's name."""
     # Not above: the package mcap and the simulator's files are not needed for folders.
     from services.recorder.reader import read_attachments
     from services.simulator.files.rig_toml import rig_toml
@@ -101,18 +104,31 @@ def unpack_rig(path: Path, capture: Capture) -> str:
         raise CaptureError(f"{path}: holds no config.json: it is no recording of a rig") from None
     except UNDECODABLE as error:
         raise CaptureError(f"{path}: its config.json is damaged: {error}") from None
+    _unpack_files(kept, capture.folder)
     config = msgspec.structs.replace(
-        config, rig=msgspec.structs.replace(config.rig, calibration="calibration")
+        config,
+        rig=msgspec.structs.replace(config.rig, calibration="calibration"),
+        object=[_with_own_mesh(table, kept) for table in config.object],
     )
-    (capture.folder / "calibration").mkdir(parents=True)
-    for name, data in kept.items():
-        folder, _, file = name.partition("/")
-        # Names come from a file that anybody may have written.
-        if folder == "calibration" and file == Path(file).name and file.endswith(".json"):
-            (capture.folder / "calibration" / file).write_bytes(data)
     try:
         text = rig_toml(config, f"from {path.name}")
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{path}: its configuration cannot be written: {error}") from None
     capture.rig_toml.write_text(text, encoding="utf-8")
     return config.rig.name
+
+
+def _unpack_files(kept: Mapping[str, bytes], where: Path) -> None:
+    for folder, endings in _FOLDERS.items():
+        (where / folder).mkdir(parents=True)
+        for name, data in kept.items():
+            inside, _, file = name.partition("/")
+            # Names come from a file that anybody may have written.
+            if inside == folder and file == Path(file).name and file.endswith(endings):
+                (where / folder / file).write_bytes(data)
+
+
+def _with_own_mesh(table: ObjectTable, kept: Mapping[str, bytes]) -> ObjectTable:
+    """The table with its mesh where it was unpacked; as it is where none was kept."""
+    name = f"meshes/{table.name}{Path(table.mesh).suffix.lower()}"
+    return msgspec.structs.replace(table, mesh=name) if table.mesh and name in kept else table

@@ -26,7 +26,7 @@ async def replay(
     ever. only keeps the named topics (`camera/markers`; empty: all), window_ns what arrived then.
     report is called with each record once it is sent, in the player's thread. Raises CaptureError.
     """
-    publish = publishing(bus, patient=not 0.0 < rate <= 1.0)
+    publish = publishing(bus, patient=True)
     playback = Playback(
         path, bus.rig, publish, rate=rate, loop=loop, only=only, window_ns=window_ns, report=report
     )
@@ -36,8 +36,9 @@ async def replay(
 def publishing(bus: Bus, *, patient: bool) -> Publish:
     """What a Playback publishes with.
 
-    patient: faster than life it is perhaps faster than a busy router forwards: the line is waited
-    for, and nothing is lost. Else a line that is full loses messages, as it does live ones.
+    patient: a line that is full is waited for, and nothing is lost (15 of 2944 messages at 1x on a
+    machine that was four times overloaded; the plain way as many). Else it loses messages, as it
+    does live ones, and holds nobody up.
     """
 
     def publish(key: str, payload: bytes, encoding: str) -> None:

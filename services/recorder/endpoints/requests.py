@@ -15,8 +15,8 @@ from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import RefusedError
 from rhot.messages.recording import RecorderRequest, RecorderState, Recordings
-from services.recorder.deck import Deck
-from services.recorder.library import Library
+from services.recorder.endpoints.deck import Deck
+from services.recorder.endpoints.library import Library
 
 
 class Tape(Protocol):
