@@ -85,6 +85,7 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
     config = service.config
     # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
     names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
+    names += [f"hand.{hand}.json" for hand in config.hand]
     files = [config.calibration_dir / name for name in names]
     setup = load_and_watch(service, files, lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
@@ -101,7 +102,7 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
         sections += [] if _replays(service) else [GuideSection(service)]
         page = _Page(
             Visits(server, Banner, sections),
-            LiveScene(server, config, setup.cameras, setup.paints, setup.looks),
+            LiveScene(server, config, setup.cameras, setup.paints, setup.looks, setup.models),
             layers,
             history,
             Captions(server),

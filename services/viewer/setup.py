@@ -16,12 +16,13 @@ from rhot.files.calibration import (
     Colors,
     ObjectPlace,
     load_colors,
+    load_hand,
     load_objects,
     load_rig_cameras,
 )
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
-from rhot.hand import HandName
+from rhot.hand import HandModel, HandName
 from services.viewer.live.palette import Rgb, paint_rgb
 from services.viewer.scene.object_looks import ObjectLook, read_mesh
 
@@ -34,6 +35,8 @@ class Setup:
     paints: dict[tuple[HandName, str], Rgb]
     looks: dict[str, ObjectLook]
     notes: list[str]
+    # Of each hand, for the limits of its joints: as measured, or of the tables.
+    models: dict[HandName, HandModel]
 
 
 def read_setup(config: RigConfig) -> Setup:
@@ -56,7 +59,18 @@ def read_setup(config: RigConfig) -> Setup:
         for hand, markers in config.hand.items()
         for landmark, color in markers.markers.items()
     }
-    return Setup(cameras, paints, _looks(config, notes), notes)
+    return Setup(cameras, paints, _looks(config, notes), notes, _models(config, notes))
+
+
+def _models(config: RigConfig, notes: list[str]) -> dict[HandName, HandModel]:
+    """Each hand's model; notes of files that cannot be read are added."""
+    models = {}
+    for hand in config.hand:
+        try:
+            models[hand] = load_hand(config.calibration_dir, hand)
+        except CalibrationError as error:
+            notes.append(f"the limits of the {hand} hand are an average's: {_short(error, config)}")
+    return models
 
 
 def _looks(config: RigConfig, notes: list[str]) -> dict[str, ObjectLook]:

@@ -30,7 +30,7 @@ _MAX_JOINT_M, _MAX_BONE_M = 0.0062, 0.0034
 # Sources from most to least certain: a bone is as certain as its worse end.
 _SOURCES = tuple(SOURCE_RGB)
 # Lines of limits, and those of limits that are reached.
-_THIN_M, _THICK_M = 0.0007, 0.0018
+_THIN_M, _THICK_M = 0.0007, 0.0024
 _NOTHING = np.zeros((1, 2, 3))
 _PALETTE = np.array([SOURCE_RGB[source] for source in _SOURCES], dtype=np.uint8)
 

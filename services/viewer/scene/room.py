@@ -21,10 +21,11 @@ _FOV_RAD = float(np.deg2rad(34.0))
 # both. A phone is held upright, and has no more than its width for them.
 _HEIGHT_M, _HEIGHT_OF_TWO_M = 0.40, 0.50
 _WIDTH_M, _WIDTH_OF_TWO_M = 0.30, 0.46
-# The panel covers the right of a wide page and the lower half of an upright one: the hands are
-# shown so much further left, or up, in shares of the width and of the height.
-_LEFT_OF_PANEL, _ABOVE_PANEL = 0.17, 0.21
-_USUAL_ASPECT = 1.6
+# Objects lie to the right of a hand, and an upright page's panel covers its lower half when it is
+# open: hands are shown so much further left, or up, in shares of the width and of the height.
+_LEFT, _ABOVE_PANEL = 0.08, 0.21
+# A page of 1280x800 with the panel beside the scene.
+_USUAL_ASPECT = 1.1
 # A desk is some 20 cm under the cameras.
 _GRID_CAMERA = np.array([0.0, 0.2, 0.5])
 # In a world frame the desk is at z = 0.
@@ -34,7 +35,7 @@ _ON_DESK = np.array([1.0, 1.0, 0.0])
 def first_view(aspect: float, hands: int) -> tuple[Array, Array]:
     """Where one looks from first, and at what; (3,) each, in the first camera's frame.
 
-    aspect is the page's width over its height, hands how many there are to be seen.
+    aspect is the scene's width over its height, hands how many there are to be seen.
     """
     ahead = _AHEAD / np.linalg.norm(_AHEAD)
     right = np.cross(ahead, [0.0, -1.0, 0.0])
@@ -43,7 +44,7 @@ def first_view(aspect: float, hands: int) -> tuple[Array, Array]:
     two = hands > 1
     if aspect >= 1.0:
         height = _HEIGHT_OF_TWO_M if two else _HEIGHT_M
-        look_at = _HANDS_CAMERA + _LEFT_OF_PANEL * aspect * height * right
+        look_at = _HANDS_CAMERA + _LEFT * aspect * height * right
     else:
         height = (_WIDTH_OF_TWO_M if two else _WIDTH_M) / max(aspect, 0.2)
         look_at = _HANDS_CAMERA + _ABOVE_PANEL * height * down
@@ -79,7 +80,7 @@ def add_room(server: viser.ViserServer, config: RigConfig, cameras: Mapping[str,
 
     # A coroutine: viser runs it before it tells of the next visitor.
     async def connected(client: viser.ClientHandle) -> None:
-        if client.camera.aspect < 1.0:
+        if client.camera.aspect < 0.8 * _USUAL_ASPECT:
             viewpoint, look_at = first_view(client.camera.aspect, len(config.hand))
             client.camera.position = apply(T_rig_from_camera, viewpoint)
             client.camera.look_at = apply(T_rig_from_camera, look_at)

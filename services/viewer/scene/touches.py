@@ -14,7 +14,7 @@ from services.viewer.scene.spheres import HIDDEN_M, add_spheres, place, reveal
 # Two hands with five tips and a palm each, as many as a message may hold for one object.
 _SLOTS = 12
 # A halo goes round the joint at a tip and is seen through, so that its colour stays.
-_HALO_M, _HALO_OPACITY = 0.0105, 0.45
+_HALO_M, _HALO_OPACITY = 0.0095, 0.35
 _PALM_HALO_M = 0.022
 _MARK_M = 0.0042
 

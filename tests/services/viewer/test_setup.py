@@ -11,6 +11,7 @@ import trimesh
 from rhot.files.calibration import ColorRange, Colors, ObjectPlace, Objects, save
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import ObjectTable
+from rhot.hand import default_hand
 from services.viewer.live.palette import UNKNOWN, paint_rgb
 from services.viewer.setup import read_setup
 
@@ -87,3 +88,20 @@ def test_looks_have_shape_mesh_and_tracker_and_a_broken_mesh_is_told(
     assert setup.looks["blob"].mesh is None
     (told,) = [note for note in setup.notes if "blob" in note]
     assert told.startswith("object blob is drawn as axes: broken.glb: cannot be read")
+
+
+def test_limits_are_the_person_s_and_a_broken_file_is_told(
+    config: RigConfig, tmp_path: Path
+) -> None:
+    here = msgspec.structs.replace(config, folder=str(tmp_path))
+    here.calibration_dir.mkdir()
+    path = here.calibration_dir / "hand.right.json"
+    mine = default_hand("right", 0.9)
+    save(path, mine)
+    assert read_setup(here).models["right"].lengths_m.tolist() == mine.lengths_m.tolist()
+    path.write_text("{broken")
+    setup = read_setup(here)
+    assert setup.models == {}
+    assert any(
+        "limits of the right hand are an average's: hand.right.json" in n for n in setup.notes
+    )
