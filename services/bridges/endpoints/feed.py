@@ -9,6 +9,7 @@ import time
 from rhot import topics
 from rhot.process.service import Service
 from services.bridges.pacing import Frame, Newest, Pacer
+from services.bridges.screening import hand_is_plausible, object_is_plausible
 
 # Without anything new a frame comes all the same, so often: losing a hand is told, and programs
 # that watch for a sign of life get one.
@@ -43,10 +44,16 @@ class Feed:
 
     async def _take_hands(self) -> None:
         async for pose in self._poses:
+            if not hand_is_plausible(pose):
+                self._poses.stats.rejected += 1
+                continue
             self._newest.hand(pose, time.monotonic())
             self._woken.set()
 
     async def _take_objects(self) -> None:
         async for pose in self._objects:
+            if not object_is_plausible(pose):
+                self._objects.stats.rejected += 1
+                continue
             self._newest.object(pose, time.monotonic())
             self._woken.set()

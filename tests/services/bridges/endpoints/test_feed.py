@@ -56,3 +56,30 @@ async def test_the_newest_is_sent_to_who_is_slow(running, sending):
                 await asyncio.sleep(0.05)
     steps = [b - a for a, b in itertools.pairwise(seen) if b != a]
     assert min(steps) > 5
+
+
+async def test_what_no_hand_can_be_is_rejected_and_counted(running, sending):
+    seen: list[tuple[float, ...]] = []
+
+    async def serve(service):
+        feed = Feed(service, 240.0)
+        service.ready()
+        async for frame in feed:
+            seen.extend(pose.wrist.position_m for pose in frame.hands.values())
+
+    async with running("bridge", serve, RigConfig(), instance="vmc") as (service, bus):
+        good = random_pose("left", 1)
+        wrist = msgspec.structs.replace(good.wrist, position_m=(1e300, 0.0, 0.0))
+        bad = msgspec.structs.replace(good, wrist=wrist)
+        publisher = bus.publisher(topics.POSE, hand="left")
+        while service.state != "running":
+            await asyncio.sleep(0.01)
+        (stats,) = [one for one in service.bus.streams if one.topic is topics.POSE]
+        with sending(lambda: publisher.put(bad)):
+            while stats.rejected < 3:
+                await asyncio.sleep(0.01)
+        assert seen == []
+        with sending(lambda: publisher.put(good)):
+            while not seen:
+                await asyncio.sleep(0.01)
+    assert set(seen) == {good.wrist.position_m}
