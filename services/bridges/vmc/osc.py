@@ -13,35 +13,47 @@ of two hands has 3 kB.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import struct
+from collections.abc import Iterable
+from functools import cache
 
-from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
-from pythonosc.osc_message import OscMessage
-from pythonosc.osc_message_builder import OscMessageBuilder
+from pythonosc.parsing.osc_types import (
+    IMMEDIATELY,
+    write_date,
+    write_float,
+    write_int,
+    write_string,
+)
 
 from rhot.files.bridge_tables import Vmc
 from rhot.geometry.quaternions import Quat, Vec3
-from rhot.geometry.transforms import rotation_from_quaternion
 from services.bridges.pacing import Frame
 from services.bridges.placement import Placement
 from services.bridges.vmc.skeleton import BonePose, finger_bones, hand_bone
 
+_BUNDLE = write_string("#bundle") + write_date(IMMEDIATELY)
+_SEVEN = struct.Struct(">7f")
+
 
 def bundle(frame: Frame, table: Vmc, placement: Placement) -> bytes:
-    """The frame's datagram."""
-    builder = OscBundleBuilder(IMMEDIATELY)
+    """The frame's datagram.
+
+    From python-osc's parts and not by its builders, which read again all that they have written:
+    the bytes are the same, and two hands cost a tenth of that.
+    """
+    parts = [_BUNDLE]
     for message in _messages(frame, table, placement):
-        builder.add_content(message)
-    return bytes(builder.build().dgram)
+        parts += (write_int(len(message)), message)
+    return b"".join(parts)
 
 
-def _messages(frame: Frame, table: Vmc, placement: Placement) -> Iterable[OscMessage]:
-    yield _message("/VMC/Ext/OK", "i", [int(bool(frame.hands))])
-    yield _message("/VMC/Ext/T", "f", [frame.time_s])
+def _messages(frame: Frame, table: Vmc, placement: Placement) -> Iterable[bytes]:
+    yield _head("/VMC/Ext/OK", "i") + write_int(int(bool(frame.hands)))
+    yield _head("/VMC/Ext/T", "f") + write_float(frame.time_s)
     for hand, pose in frame.hands.items():
         wrist = placement.orientation(pose.wrist.orientation_wxyz)
         if table.hand_bones:
-            yield _pose("/VMC/Ext/Bone/Pos", hand_bone(hand, rotation_from_quaternion(wrist)))
+            yield _pose("/VMC/Ext/Bone/Pos", hand_bone(hand, wrist))
         for one in finger_bones(pose):
             yield _pose("/VMC/Ext/Bone/Pos", one)
         if table.trackers:
@@ -52,17 +64,16 @@ def _messages(frame: Frame, table: Vmc, placement: Placement) -> Iterable[OscMes
             yield _tracker(name, placement.point(item.position_m), orientation)
 
 
-def _tracker(name: str, position_m: Vec3, orientation_wxyz: Quat) -> OscMessage:
+def _tracker(name: str, position_m: Vec3, orientation_wxyz: Quat) -> bytes:
     (x, y, z), (w, i, j, k) = position_m, orientation_wxyz
     return _pose("/VMC/Ext/Tra/Pos", BonePose(name, (x, y, -z), (-i, -j, k, w)))
 
 
-def _pose(address: str, one: BonePose) -> OscMessage:
-    return _message(address, "sfffffff", [one.name, *one.position_m, *one.rotation_xyzw])
+def _pose(address: str, one: BonePose) -> bytes:
+    numbers = _SEVEN.pack(*one.position_m, *one.rotation_xyzw)
+    return _head(address, "sfffffff") + write_string(one.name) + numbers
 
 
-def _message(address: str, types: str, values: Sequence[str | int | float]) -> OscMessage:
-    builder = OscMessageBuilder(address)
-    for kind, value in zip(types, values, strict=True):
-        builder.add_arg(value, kind)
-    return builder.build()
+@cache
+def _head(address: str, types: str) -> bytes:
+    return bytes(write_string(address) + write_string(f",{types}"))

@@ -14,16 +14,17 @@ metacarpals do not exist in Unity; the thumb's is its ThumbProximal.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-import numpy as np
-
-from rhot.geometry.transforms import (
-    Array,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-    rotation_x,
-    rotation_y,
+from rhot.geometry.quaternions import (
+    Quat,
+    Vec3,
+    conjugate,
+    from_vector,
+    multiply,
+    normalized,
+    rotate,
 )
 from rhot.hand import CHAIN_JOINTS, HandName
 from rhot.messages import HandPose
@@ -34,11 +35,16 @@ BONES = tuple(
     for digit in ("Thumb", "Index", "Middle", "Ring", "Little")
 )
 # From the wrist frame (-z along the fingers, +y out of the back of the hand) to the avatar's axes
-# in T-pose, right-handed with y up and z backward; (3, 3).
-T_POSE: dict[HandName, Array] = {"left": rotation_y(np.pi / 2), "right": rotation_y(-np.pi / 2)}
+# in T-pose, right-handed with y up and z backward.
+T_POSE: dict[HandName, Quat] = {
+    "left": from_vector(0.0, math.pi / 2, 0.0),
+    "right": from_vector(0.0, -math.pi / 2, 0.0),
+}
 # From the elbow to the wrist in T-pose, for the bone of the hand: .146 of a stature of 1.75 m
 # (Drillis and Contini, 1966).
 _FOREARM_M = 0.255
+_STRAIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
+_JOINTS: list[list[int]] = CHAIN_JOINTS[:, :3].tolist()
 
 
 class BonePose(NamedTuple):
@@ -52,41 +58,42 @@ class BonePose(NamedTuple):
 def finger_bones(pose: HandPose) -> list[BonePose]:
     """The 15 bones of a hand's fingers, parents before their children."""
     side = "Left" if pose.hand == "left" else "Right"
-    to_avatar = T_POSE[pose.hand]
-    wrist = rotation_from_quaternion(pose.wrist.orientation_wxyz)
     # From the rig to the avatar's axes at a hand that rests.
-    turn = to_avatar @ wrist.T
-    positions = (pose.positions_m - pose.wrist.position_m) @ turn.T
+    turn = multiply(T_POSE[pose.hand], conjugate(pose.wrist.orientation_wxyz))
     bones = []
-    for names, joints, angles in zip(BONES, CHAIN_JOINTS, pose.angles_rad, strict=True):
-        axes = [turn @ rotation_from_quaternion(pose.joints[j].orientation_wxyz) for j in joints]
-        rest = axes[0] @ _turned_back(angles, pose.hand)
-        parent, origin = np.eye(3), np.zeros(3)
-        for name, joint, own in zip(names, joints, axes, strict=False):
-            rotation = own @ rest.T
-            offset = parent.T @ (positions[joint] - origin)
-            bones.append(bone(f"{side}{name}", offset, parent.T @ rotation))
-            parent, origin = rotation, positions[joint]
+    for names, joints, finger in zip(BONES, _JOINTS, pose.fingers, strict=True):
+        axes = [multiply(turn, pose.joints[j].orientation_wxyz) for j in joints]
+        abduction, flexion, *_ = finger.model_angles_rad
+        rest = multiply(axes[0], _turned_back(abduction, flexion, pose.hand))
+        parent, origin = _STRAIGHT, pose.wrist.position_m
+        for name, joint, own in zip(names, joints, axes, strict=True):
+            rotation, to_parent = multiply(own, conjugate(rest)), conjugate(parent)
+            position = pose.joints[joint].position_m
+            step = rotate(turn, _difference(position, origin))
+            local = normalized(multiply(to_parent, rotation))
+            bones.append(_bone(f"{side}{name}", rotate(to_parent, step), local))
+            parent, origin = rotation, position
     return bones
 
 
-def hand_bone(hand: HandName, wrist_rotation: Array) -> BonePose:
-    """The hand itself, on an arm in T-pose; wrist_rotation (3, 3) in the program's space, y up."""
-    side = "Left" if hand == "left" else "Right"
-    to_avatar = T_POSE[hand]
-    elbow_to_wrist = to_avatar @ np.array([0.0, 0.0, -_FOREARM_M])
-    return bone(f"{side}Hand", elbow_to_wrist, wrist_rotation @ to_avatar.T)
+def hand_bone(hand: HandName, wrist_wxyz: Quat) -> BonePose:
+    """The hand itself, on an arm in T-pose; wrist_wxyz in the program's space, y up."""
+    elbow_to_wrist = rotate(T_POSE[hand], (0.0, 0.0, -_FOREARM_M))
+    turn = normalized(multiply(wrist_wxyz, conjugate(T_POSE[hand])))
+    return _bone(f"{'Left' if hand == 'left' else 'Right'}Hand", elbow_to_wrist, turn)
 
 
-def bone(name: str, position_m: Array, rotation: Array) -> BonePose:
+def _bone(name: str, position_m: Vec3, rotation_wxyz: Quat) -> BonePose:
     """The same in Unity's axes: z, and with it the sense of turns about x and y, changes sign."""
-    w, x, y, z = quaternion_from_rotation(rotation).tolist()
-    right, up, back = position_m.tolist()
+    (right, up, back), (w, x, y, z) = position_m, rotation_wxyz
     return BonePose(name, (right, up, -back), (-x, -y, z, w))
 
 
-def _turned_back(angles_rad: Array, hand: HandName) -> Array:
+def _turned_back(abduction: float, flexion: float, hand: HandName) -> Quat:
     """From a digit's first bone as it is turned by its first two angles to where these are zero."""
-    abduction, flexion = angles_rad[0], angles_rad[1]
     side = 1.0 if hand == "right" else -1.0
-    return rotation_x(flexion) @ rotation_y(-side * abduction)
+    return multiply(from_vector(flexion, 0.0, 0.0), from_vector(0.0, -side * abduction, 0.0))
+
+
+def _difference(a: Vec3, b: Vec3) -> Vec3:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

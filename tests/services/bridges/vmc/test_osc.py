@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pythonosc.osc_bundle import OscBundle
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message_builder import OscMessageBuilder
 
 from rhot.files.bridge_tables import Vmc
 from rhot.geometry.transforms import rotation_from_quaternion
@@ -33,6 +35,18 @@ def test_a_frame_has_what_is_asked_for():
         "RightHand",
     }
     assert decoded(Frame(0.0, {}, {}), Vmc()) == [("/VMC/Ext/OK", 0), ("/VMC/Ext/T", 0.0)]
+
+
+def test_the_bytes_are_those_of_python_oscs_own_builders():
+    hands = {"left": random_pose("left", 1), "right": random_pose("right", 2)}
+    datagram = bundle(Frame(1.5, hands, {"cup": object_pose("cup")}), Vmc(), placement_of(Vmc()))
+    builder = OscBundleBuilder(IMMEDIATELY)
+    for one in OscBundle(datagram):
+        message = OscMessageBuilder(one.address)
+        for value in one.params:
+            message.add_arg(value)
+        builder.add_content(message.build())
+    assert builder.build().dgram == datagram
 
 
 def test_a_tracker_is_where_rig_toml_places_the_rig():

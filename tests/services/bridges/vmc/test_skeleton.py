@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rhot.geometry.transforms import rotation_from_vector
+from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector
 from rhot.hand import CHAIN_JOINTS, HANDS, default_hand
 from services.bridges.vmc.skeleton import BONES, finger_bones, hand_bone
 from testing.sample_hands import hand_pose, random_pose
@@ -92,8 +92,7 @@ def test_forward_kinematics_of_what_is_sent_gives_our_joints(hand, seed):
     pose = random_pose(hand, seed)
     bones = iter(finger_bones(pose))
     # The hand bone's own pose, from what hand_bone says of an arm in T-pose.
-    wrist = Rotation.from_quat(np.roll(pose.wrist.orientation_wxyz, -1)).as_matrix()
-    root = hand_bone(hand, wrist).rotation_xyzw
+    root = hand_bone(hand, pose.wrist.orientation_wxyz).rotation_xyzw
     flip = np.diag([1.0, 1.0, -1.0])
     origin = flip @ pose.wrist.position_m
     flexed = default_hand(hand)
@@ -117,6 +116,6 @@ def test_the_hand_bone_is_identity_in_t_pose(hand):
     # The wrist's -z along the arm, its y up: what the T-pose is in OpenXR's axes.
     back, up = -FINGERS[hand], np.array([0.0, 1.0, 0.0])
     wrist = np.stack([np.cross(up, back), up, back], axis=1)
-    bone = hand_bone(hand, wrist)
+    bone = hand_bone(hand, tuple(quaternion_from_rotation(wrist)))
     assert bone.rotation_xyzw == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-9)
     assert np.array(bone.position_m) @ FINGERS[hand] == pytest.approx(0.255)
