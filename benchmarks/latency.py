@@ -29,6 +29,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import zenoh
+from latency_relay import NUMBER_BYTES
 from latency_rig import BARE_KEYS, RIG, Recording, record, running
 from latency_steps import alone_us
 
@@ -52,14 +53,12 @@ class Played:
         self._session = zenoh.open(client_config([endpoint]))
         self.put_ns: dict[int, int] = {}  # by stamp of the points that are due with it
         self.bare_put_ns: list[int] = []
-        self.bare_ns: list[int] = []
+        self.bare_ns: list[tuple[int, int]] = []
         self.pose_ns: list[tuple[int, bytes]] = []
         self.points: list[bytes] = []
         pose_key = topics.POSE.key(RIG, hand="right")
         self._session.declare_subscriber(pose_key, self._on_pose)
-        self._session.declare_subscriber(
-            BARE_KEYS[2], lambda _: self.bare_ns.append(time.time_ns())
-        )
+        self._session.declare_subscriber(BARE_KEYS[2], self._on_bare)
         if points:
             self._session.declare_subscriber(
                 topics.POINTS.key(RIG, hand="right"),
@@ -80,6 +79,10 @@ class Played:
 
     def _on_pose(self, sample: zenoh.Sample) -> None:
         self.pose_ns.append((time.time_ns(), sample.payload.to_bytes()))
+
+    def _on_bare(self, sample: zenoh.Sample) -> None:
+        number = int.from_bytes(sample.payload.to_bytes()[:NUMBER_BYTES])
+        self.bare_ns.append((time.time_ns(), number))
 
     def play(self) -> None:
         """Put all frames at their pace, and a bare message after each that points are due with."""
@@ -103,8 +106,9 @@ class Played:
             self._markers[frame.camera].put(payload)
             if points is not None:
                 sleep_until(stamp_ns * 1e-9 + TRACKER_S + half_s)
+                numbered = len(self.bare_put_ns).to_bytes(NUMBER_BYTES) + bare
                 self.bare_put_ns.append(time.time_ns())
-                self._bare.put(bare)
+                self._bare.put(numbered)
         time.sleep(0.5)
         self._session.close()
 
@@ -117,9 +121,9 @@ class Played:
             if put_ns >= first_ns:
                 ours.append((received_ns - put_ns) * 1e-6)
         bare = [
-            (end - begin) * 1e-6
-            for begin, end in zip(self.bare_put_ns, self.bare_ns, strict=True)
-            if begin >= first_ns
+            (received_ns - self.bare_put_ns[number]) * 1e-6
+            for received_ns, number in self.bare_ns
+            if self.bare_put_ns[number] >= first_ns
         ]
         due = sum(put_ns >= first_ns for put_ns in self.put_ns.values())
         return {"ours": quantiles(ours), "bare": quantiles(bare), "poses": len(ours), "due": due}

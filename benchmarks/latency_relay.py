@@ -14,6 +14,9 @@ import zenoh
 
 from rhot.bus.zenoh_config import client_config
 
+# Each message begins with its number, which goes along: one may be lost.
+NUMBER_BYTES = 8
+
 
 def main() -> None:
     """Relay until stdin ends."""
@@ -26,7 +29,9 @@ def main() -> None:
             congestion_control=zenoh.CongestionControl.DROP,
             express=True,
         )
-        session.declare_subscriber(key_in, lambda _: publisher.put(payload))
+        session.declare_subscriber(
+            key_in, lambda sample: publisher.put(sample.payload.to_bytes()[:NUMBER_BYTES] + payload)
+        )
         print("ready", flush=True)
         sys.stdin.read()
 

@@ -56,6 +56,7 @@ class Buffer(Generic[S]):
         self._closed = False
         self._waiter: asyncio.Future[None] | None = None
         self._burst = 0
+        self._consume: Callable[[S], None] | None = None
         self._entity: Undeclarable | None = None
 
     @property
@@ -113,8 +114,40 @@ class Buffer(Generic[S]):
             return item
 
     def _wake(self) -> None:
-        if self._waiter is not None and not self._waiter.done():
+        if self._consume is not None:
+            self._consume_some()
+        elif self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
+
+    def _consume_some(self) -> None:
+        for _ in range(_BURST):
+            if self._consume is None or (item := self._pop()) is None:
+                return
+            self._consume(item)
+        # More may wait; others' turn first.
+        self._loop.call_soon(self._wake)
+
+    async def each(self, consume: Callable[[S], None]) -> None:
+        """Call consume with every item, in the event loop, until closed; what it raises is raised.
+
+        As a loop over take(), without waking a task for each item.
+        """
+        self._waiter = ended = self._loop.create_future()
+
+        def take(item: S) -> None:
+            try:
+                consume(item)
+            except Exception as error:
+                self._consume = None
+                if not ended.done():
+                    ended.set_exception(error)
+
+        self._consume = take
+        try:
+            self._wake()
+            await ended
+        finally:
+            self._consume = None
 
     async def take(self) -> S:
         """The next item; raises StopAsyncIteration once closed."""
@@ -132,7 +165,7 @@ class Buffer(Generic[S]):
 
     def undeclare(self) -> None:
         """End the subscription and every iteration over it."""
-        self._closed = True
+        self._closed, self._consume = True, None
         self._wake()
         if self._entity is not None:
             self._entity.undeclare()

@@ -18,7 +18,7 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
-from rhot.messages import ClockEcho
+from rhot.messages import ClockEcho, MarkerFrame
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
@@ -49,12 +49,15 @@ async def serve(service: Service) -> None:
     health = HealthFigures(step, service.values, time.monotonic())
     service.tasks.create_task(_look_every_second(service, step, health, state))
     service.ready()
-    async for frame in frames:
+
+    def take(frame: MarkerFrame) -> None:
         began_s = time.perf_counter()
         for points in step.step(frame):
             publishers[points.hand].put(points)
         step.settle()
         health.note_frame(time.perf_counter() - began_s)
+
+    await frames.each(take)
 
 
 async def _look_every_second(

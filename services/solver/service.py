@@ -72,13 +72,23 @@ async def _solve_hand(
     poses: Publisher[HandPose],
 ) -> None:
     """Solve one hand's points as they come, for ever."""
-    mean_ms, loop = 0.0, asyncio.get_running_loop()
-    async for message in points:
+    mean_ms = 0.0
+
+    def take(message: HandPoints) -> None:
+        nonlocal mean_ms
         start_s = time.perf_counter()
         pose = step.step(message)
-        mean_ms += _MEAN_WEIGHT * ((time.perf_counter() - start_s) * 1e3 - mean_ms)
-        service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
+        took_ms = (time.perf_counter() - start_s) * 1e3
         if pose is not None:
             poses.put(pose)
+        mean_ms += _MEAN_WEIGHT * (took_ms - mean_ms)
+        service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
         if step.challenge_due(hand):
-            loop.call_later(_CHALLENGE_S, step.challenge, hand)
+            service.tasks.create_task(_challenge(step, hand))
+
+    await points.each(take)
+
+
+async def _challenge(step: SolverStep, hand: HandName) -> None:
+    await asyncio.sleep(_CHALLENGE_S)
+    step.challenge(hand)

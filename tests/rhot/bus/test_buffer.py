@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from rhot.bus.buffer import MAX_BYTES, Buffer
 
 
@@ -52,3 +54,28 @@ async def test_a_renewed_key_counts_its_new_size():
     assert buffer.waiting_bytes == 20
     await buffer.take()
     assert buffer.waiting_bytes == 0
+
+
+async def test_each_item_is_given_to_a_function_in_order_until_the_end():
+    buffer: Buffer[int] = Buffer(asyncio.get_running_loop(), 100)
+    taken: list[int] = []
+    buffer.push("k", 0)  # came before anybody asked
+    consuming = asyncio.create_task(buffer.each(taken.append))
+    await asyncio.sleep(0)
+    assert taken == [0]
+    for n in range(1, 100):
+        buffer.push("k", n)
+    while len(taken) < 100:
+        await asyncio.sleep(0)
+    assert taken == list(range(100))
+    buffer.undeclare()
+    await consuming
+
+
+async def test_what_a_function_raises_ends_the_wait_and_leaves_the_rest():
+    buffer: Buffer[int] = Buffer(asyncio.get_running_loop(), 10)
+    for n in (1, 0, 2):
+        buffer.push("k", n)
+    with pytest.raises(ZeroDivisionError):
+        await buffer.each(lambda n: 1 // n)
+    assert await buffer.take() == 2
