@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rhot.errors import ConfigError
 
-BRIDGES: tuple[str, ...] = ("vmc", "monado", "foxglove", "ros2", "websocket", "opengloves")
+BRIDGES: tuple[str, ...] = ("vmc", "monado", "foxglove", "ros2", "websocket", "opengloves", "webxr")
 
 
 def module_of(name: str) -> str:
