@@ -47,7 +47,7 @@ def _next_step(calibration: ColorCalibration, chosen: str, *, complete: bool) ->
     if complete and calibration.next_camera:
         return f"This camera is done. Now <b>camera {text(calibration.next_camera)}</b>."
     if complete:
-        return "This camera is done: go on with the next step."
+        return "This camera is done. Go on with the next step."
     clicks = sum(click.color == chosen for click in calibration.clicks)
     if clicks:
         return (

@@ -55,6 +55,8 @@ class GuideTab:
         self._measured = CalibratorStep(service.config, section.link, client)
         self._folder = section.folder
         self._shown: Step | None = None
+        # A page that opens while something is measured, or again after new files, shows that step.
+        self._joined = False
         self._choice.on_update(on_loop(lambda _: self._show()))
         self._way.on_click(on_loop(self._went))
         section.link.watch()
@@ -62,6 +64,7 @@ class GuideTab:
 
     def update(self, seen: Seen) -> None:
         """Bring everything up to date."""
+        self._join()
         step = self._step
         done = {one.name: self._folder.done(one) for one in self._section.steps}
         _set(self._overview, texts.overview(self._section.steps, done, step.name))
@@ -92,12 +95,26 @@ class GuideTab:
         self._colours.show(step.name == "colours")
         self._measured.show(_measurable(step))
 
+    def _join(self) -> None:
+        state = self._section.link.state
+        if self._joined or state is None:
+            return
+        self._joined = True
+        if state.order is not None and state.phase != "idle":
+            self._choose(state.order.step)
+
+    def _choose(self, name: str) -> None:
+        choice: Any = self._choice  # its value is set from here, which its type forbids
+        for step in self._section.steps:
+            if step.name == name:
+                choice.value = step.title
+        self._show()
+
     def _went(self, event: Any) -> None:
+        self._joined = True
         steps, to = self._section.steps, 1 if event.target.value == _NEXT else -1
         at = min(max(steps.index(self._step) + to, 0), len(steps) - 1)
-        choice: Any = self._choice  # its value is set from here, which its type forbids
-        choice.value = steps[at].title
-        self._show()
+        self._choose(steps[at].name)
 
 
 def _measurable(step: Step) -> Step | None:

@@ -114,7 +114,7 @@ def test_the_page_says_what_comes_next(calibration: ColorCalibration) -> None:
     assert "This camera is done. Now <b>camera right</b>" in says("cyan")
     assert text.status(calibration).count("03:04:05<") == 1
     calibration.next_camera = ""
-    assert "go on with the next step" in says("cyan")
+    assert "Go on with the next step" in says("cyan")
 
 
 def test_texts_escape_and_survive_whatever_the_network_says(calibration: ColorCalibration) -> None:

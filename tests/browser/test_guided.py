@@ -1,0 +1,123 @@
+"""A guided calibration in a real browser, from the first picture of a board to the saved lens: real
+viewer and calibrator processes, and a camera that shows rendered boards.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import cv2
+import pytest
+import zenoh
+
+from rhot import topics
+from rhot.bus.bus import client_config
+from rhot.files.calibration import load_lens
+from testing.synthetic_boards import BenchSetup
+
+pytestmark = pytest.mark.browser
+WAIT = {"timeout": 120e3}
+POSITIONS = 14
+InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
+RIG = """
+[rig]
+name = "desk"
+[[camera]]
+name = "left"
+[viewer]
+port = 0
+"""
+
+
+@pytest.fixture
+def board_shown(router: str, in_background: InBackground) -> None:
+    """A camera before which somebody holds a board, elsewhere after each four pictures."""
+    setup = BenchSetup(
+        positions=POSITIONS, size_px=(320, 240), focal_px=263.0, distortion=(0.0,) * 5
+    )
+    bench = setup.bench()
+    camera = bench.cameras[0]
+    pictures = [
+        cv2.imencode(".png", bench.picture(camera, key))[1].tobytes() for key in bench.poses
+    ]
+    asked = 0
+
+    def answer(query: zenoh.Query) -> None:
+        nonlocal asked
+        asked += 1
+        with query:
+            key = topics.FRAME.key("desk", camera="left")
+            query.reply(key, pictures[min((asked - 1) // 4, POSITIONS - 1)])
+
+    def show(stop: threading.Event) -> None:
+        with zenoh.open(client_config([router])) as session:
+            session.declare_queryable(topics.FRAME.key("desk", camera="left"), answer)
+            stop.wait()
+
+    in_background(show)
+
+
+@pytest.fixture
+def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
+    """A viewer and a calibrator of a rig that was never calibrated; the page's address."""
+    (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    common = ["--config", str(tmp_path / "rig.toml"), "--connect", router]
+    with ExitStack() as stack:
+        processes = []
+        for name in ("calibrator", "viewer"):
+            process = subprocess.Popen(
+                [sys.executable, "-m", f"services.{name}", *common],
+                stdout=subprocess.PIPE,
+                text=True,
+                cwd=repository,
+                env=environment,
+            )
+            processes.append(stack.enter_context(process))
+        output = processes[1].stdout
+        assert output is not None
+        line = next(line for line in output if "live view at" in line)
+        yield line.split("live view at ")[1].strip()
+        for process in processes:
+            process.terminate()
+            assert process.stdout is not None
+            process.stdout.read()
+    # The viewer ends by itself with the new lens, to be started again; perhaps just now.
+    assert processes[0].returncode == 0
+
+
+def test_a_lens_is_calibrated_from_start_to_saved(
+    chromium: Any, page_url: str, board_shown: None, tmp_path: Path
+) -> None:
+    page = chromium.new_page(viewport={"width": 1280, "height": 800})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(page_url)
+    page.get_by_role("tab", name="Calibration").click(**WAIT)
+    page.get_by_text("0 of 3 steps done").wait_for(**WAIT)
+    for _ in range(2):
+        page.get_by_role("button", name="next").click(**WAIT)
+    page.get_by_text("Show the printed chessboard to one camera").wait_for(**WAIT)
+    positions = page.get_by_label("positions")
+    positions.fill("7")
+    positions.press("Enter")
+    page.get_by_role("button", name="Start").click(**WAIT)
+    page.get_by_text("7/7 positions").or_(page.get_by_text("compared with each other")).or_(
+        page.get_by_text("error of pictures that were left out")
+    ).first.wait_for(**WAIT)
+    page.get_by_text("error of pictures that were left out").wait_for(**WAIT)
+    assert page.locator("table tr", has_text="pictures used").inner_text().split()[-1] == "7"
+    assert not (tmp_path / "calibration" / "left.lens.json").exists()
+    page.get_by_role("button", name="Save").click(**WAIT)
+    page.get_by_text("1 of 3 steps done").or_(page.get_by_text("Saved:")).first.wait_for(**WAIT)
+    made = load_lens(tmp_path / "calibration", "left")
+    assert made.matrix[0][0] == pytest.approx(263.0, rel=0.03)
+    assert errors == []
+    page.close()
