@@ -16,7 +16,7 @@ twice = $(BIN)/pytest $(1); code=$$?; \
 # Commands of a virtual environment that the user has activated must not leak into ours.
 unexport PYTHONPATH PYTHONHOME
 
-.PHONY: demo test check bench soak format docs figures clean system install browser wheel test-field test-system wheels test-arm64
+.PHONY: demo test check bench soak format docs picture figures clean system install browser wheel test-field test-system wheels test-arm64
 
 demo: $(STAMP)
 	$(BIN)/rhot demo $(ARGS)
@@ -76,6 +76,12 @@ test-system: $(STAMP)
 # The generated reference pages, and the tables of figures from docs/figures/*.json.
 docs: $(STAMP)
 	$(BIN)/python -m docs.generate
+
+# docs/demo.png, which README opens with: the page of the demo while the hand holds the cup.
+picture: $(STAMP)
+	@command -v chromium >/dev/null || { echo "Chromium is missing: sudo apt install chromium"; exit 1; }
+	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[browser]'
+	$(BIN)/python -m docs.generate.demo_picture
 
 # Runs the benchmarks that the pages quote (docs/notes/README.md), then renders the pages.
 figures: $(STAMP)
