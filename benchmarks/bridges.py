@@ -1,12 +1,12 @@
 """What bridges cost the rig: the latency of hand/pose at another subscriber, with and without them.
 
-    python benchmarks/bridges.py [--rounds N] [--seconds S] [--json FILE]
+    python benchmarks/bridges.py [--bridges NAME ...] [--rounds N] [--seconds S] [--json FILE]
 
 Two hands and an object at 60 Hz go through a router in a process of its own. Each round measures,
 in another order each time and with processes started anew,
     none       no bridge runs
-    onlookers  three plain subscribers do nothing with what comes: what any program costs
-    running    the bridges to VMC, OpenGloves and Monado run, and a program takes what they send
+    onlookers  as many plain subscribers do nothing with what comes: what any program costs
+    running    the bridges (--bridges) run, and a program takes what they send
     stopped    the same, and that program is stopped (SIGSTOP): its sockets are there, nobody reads
 The last two take turns every half second, so that they differ in nothing else. Printed are medians
 over the rounds of p50 and p99, of their ratios to `none` and to `running` of the same round, and
@@ -27,6 +27,7 @@ import socket
 import statistics
 import sys
 import tempfile
+import threading
 import time
 from asyncio.subprocess import DEVNULL, PIPE
 from collections.abc import AsyncIterator, Sequence
@@ -34,13 +35,17 @@ from pathlib import Path
 from typing import Any
 
 import uvloop
+import zenoh
+from websockets.sync.client import connect
 
 from rhot import topics
-from rhot.bus.bus import Bus, open_bus
+from rhot.bus.bus import Bus, client_config, open_bus
 from rhot.hand import HANDS
 from testing.sample_hands import object_pose, random_pose
 
-BRIDGES = ("vmc", "opengloves", "monado")
+BRIDGES = ("vmc", "opengloves", "monado", "websocket", "foxglove", "ros2")
+# To these the program connects; the others send to it.
+SERVERS = ("websocket", "foxglove", "ros2")
 BLOCKS = ("none", "onlookers", "bridges")
 STATES = ("none", "onlookers", "running", "stopped")
 RATE_HZ, SETTLE_S = 60.0, 0.7
@@ -70,11 +75,39 @@ asyncio.run(look())
 """
 
 
-def consume() -> None:
+def connect_to(name: str, port: int, endpoint: str) -> None:
+    """Take what a bridge tells who connects, as soon as it is there."""
+    if name == "ros2":
+        session = zenoh.open(client_config([endpoint]))
+        session.declare_subscriber("0/**", lambda sample: sample.payload.to_bytes())
+        threading.Event().wait()
+    spoken: Any = ["foxglove.sdk.v1"] if name == "foxglove" else None
+    while True:
+        with (
+            contextlib.suppress(OSError),
+            connect(f"ws://127.0.0.1:{port}", subprotocols=spoken) as link,
+        ):
+            for text in link:
+                told = json.loads(text).get("channels", ()) if isinstance(text, str) else ()
+                wanted = [{"id": one["id"], "channelId": one["id"]} for one in told]
+                if wanted:
+                    link.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+        time.sleep(0.05)
+
+
+def consume(names: Sequence[str], endpoint: str) -> None:
     """A program with a port for each bridge, which takes what comes."""
     selector = selectors.DefaultSelector()
     ports = []
-    for name in BRIDGES:
+    for name in names:
+        if name in SERVERS:
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                ports.append(probe.getsockname()[1])
+            threading.Thread(
+                target=connect_to, args=(name, ports[-1], endpoint), daemon=True
+            ).start()
+            continue
         kind = socket.SOCK_STREAM if name == "monado" else socket.SOCK_DGRAM
         ear = socket.socket(socket.AF_INET, kind)
         ear.bind(("127.0.0.1", 0))
@@ -110,20 +143,22 @@ async def process(*command: str, says: bool = False) -> AsyncIterator[tuple[int,
 
 @contextlib.asynccontextmanager
 async def company(
-    block: str, bus: Bus, endpoint: str, folder: Path
+    block: str, names: Sequence[str], bus: Bus, endpoint: str, folder: Path
 ) -> AsyncIterator[tuple[list[int], int]]:
     """Pids of who listens to the rig, once all do, and of the program behind the bridges or 0."""
     async with contextlib.AsyncExitStack() as stack:
         if block == "none":
             yield [], 0
             return
-        consumer, line = await stack.enter_async_context(process(__file__, "--consume", says=True))
+        own = (__file__, "--consume", endpoint, "--bridges", *names)
+        consumer, line = await stack.enter_async_context(process(*own, says=True))
         tables = [f'[bus]\nconnect = ["{endpoint}"]']
-        for name, port in zip(BRIDGES, line.split(), strict=True):
-            tables.append(f"[bridges.{name}]\nenabled = true\nport = {port}")
+        for name, port in zip(names, line.split(), strict=True):
+            at = "" if name == "ros2" else f"port = {port}"
+            tables.append(f"[bridges.{name}]\nenabled = true\n{at}")
         (folder / "rig.toml").write_text("\n".join(tables))
         watch, alive, pids = bus.watch_alive(), set(), []
-        for name in BRIDGES:
+        for name in names:
             command = ("-c", ONLOOKER, endpoint, name)
             if block == "bridges":
                 options = ("--config", str(folder / "rig.toml"), "--instance", name)
@@ -131,7 +166,7 @@ async def company(
             pid, _ = await stack.enter_async_context(process(*command))
             pids.append(pid)
         async with asyncio.timeout(60.0):
-            while alive != set(BRIDGES):
+            while alive != set(names):
                 change = await anext(watch)
                 if change.service == "bridge" and change.alive:
                     alive.add(change.instance)
@@ -182,7 +217,9 @@ async def latencies_ms(bus: Bus, seconds: float, consumer: int) -> tuple[list[fl
     return tuple(map(sorted, found[: 1 + bool(consumer)]))
 
 
-async def measure(rounds: int, seconds: float) -> list[dict[str, dict[str, float]]]:
+async def measure(
+    names: Sequence[str], rounds: int, seconds: float
+) -> list[dict[str, dict[str, float]]]:
     """Of each round: p50_ms, p99_ms and cpu_percent of each state."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -198,7 +235,10 @@ async def measure(rounds: int, seconds: float) -> list[dict[str, dict[str, float
                 result: dict[str, dict[str, float]] = {}
                 for k in range(len(BLOCKS)):
                     block = BLOCKS[(k + number) % len(BLOCKS)]
-                    async with company(block, onlooker, endpoint, Path(folder)) as (pids, consumer):
+                    async with company(block, names, onlooker, endpoint, Path(folder)) as (
+                        pids,
+                        consumer,
+                    ):
                         before_s, begin_s = sum(map(cpu_s, pids)), time.monotonic()
                         found = await latencies_ms(bus, seconds * (1 + bool(consumer)), consumer)
                         used_s = sum(map(cpu_s, pids)) - before_s
@@ -233,12 +273,13 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--seconds", type=float, default=3.0, help="of each state in each round")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--consume", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--bridges", nargs="+", choices=BRIDGES, default=list(BRIDGES[:3]))
+    parser.add_argument("--consume", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.consume:
-        consume()
+        consume(options.bridges, options.consume)
         return
-    found = summary(uvloop.run(measure(options.rounds, options.seconds)))
+    found = summary(uvloop.run(measure(options.bridges, options.rounds, options.seconds)))
     columns = ["p50_ms", "p99_ms", "p50_to_none", "p99_to_none", "p50_to_running", "p99_to_running"]
     print(
         f"{'':<10}" + "".join(f"{name.replace('_', ' '):>16}" for name in (*columns, "cpu_percent"))

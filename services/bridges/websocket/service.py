@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from typing import Any
 
 from rhot import topics
 from rhot.process.service import Service, rhot_version
 from rhot.topics import Topic
+from services.bridges.screening import hand_is_plausible, object_is_plausible
 from services.bridges.websocket.door import Door
 from services.bridges.websocket.protocol import frame, hello
 from services.bridges.websocket.server import WebServer
@@ -19,6 +21,10 @@ from services.bridges.websocket.server import WebServer
 log = logging.getLogger("rhot.bridge")
 
 _TABLE = "bridges.websocket"
+_PLAUSIBLE: dict[Topic[Any], Callable[[Any], bool]] = {
+    topics.POSE: hand_is_plausible,
+    topics.OBJECT: object_is_plausible,
+}
 
 
 async def serve(service: Service) -> None:
@@ -55,6 +61,9 @@ async def _follow(service: Service, server: WebServer, topic: Topic[Any]) -> Non
     subscription = service.bus.latest(topic)
     try:
         async for message in subscription:
+            if topic in _PLAUSIBLE and not _PLAUSIBLE[topic](message):
+                subscription.stats.rejected += 1
+                continue
             names = {field: getattr(message, field) for field in topic.fields}
             told = topic.template.format(**names)
             server.put(told, frame(told, message))

@@ -24,8 +24,10 @@ function childOf(joint, joints) {
 }
 
 export class Hand {
-  constructor(name, group, changed) {
+  // joints: the names of a pose's joints, in its order; group: what the hand hangs on.
+  constructor(name, joints, group, changed) {
     this.name = name;
+    this.joints = joints;
     this.mesh = null;
     this.seen = false;
     new GLTFLoader().load(`xr/${name}.glb`, (file) => {
@@ -58,8 +60,8 @@ export class Hand {
     if (this.mesh === null) return;
     this.root.visible = this.seen;
     if (!this.seen) return;
-    const joints = new Map(pose.joints.map((joint) => [joint.name, joint]));
-    const names = pose.joints.map((joint) => joint.name).filter((name) => name !== "palm");
+    const joints = new Map(pose.joints.map((joint, k) => [this.joints[k], joint]));
+    const names = this.joints.filter((name) => name !== "palm");
     let ours = 0;
     let meshes = 0;
     let turn = new Quaternion();

@@ -107,7 +107,8 @@ class Page {
   #meet(hello) {
     if (!this.alignment.done) this.view.place(hello.floor_from_rig.length ? hello.floor_from_rig : IDENTITY);
     for (const name of hello.hands) {
-      if (!this.hands.has(name)) this.hands.set(name, new Hand(name, this.view.rig, () => this.view.changed()));
+      if (this.hands.has(name)) continue;
+      this.hands.set(name, new Hand(name, hello.joints, this.view.rig, () => this.view.changed()));
     }
     for (const one of this.objects.values()) one.dispose();
     this.objects = new Map(

@@ -17,12 +17,14 @@ from rhot import topics
 from rhot.errors import BusError
 from rhot.files.bridge_tables import Bridges, WebSocket
 from rhot.files.config import RigConfig, load_rig
-from rhot.messages import HandPose
+from rhot.messages import HandPose, WristPose
 from rhot.messages.objects import ObjectPose
 from services.bridges.websocket.door import Door
 from services.bridges.websocket.server import WebServer
 from services.bridges.websocket.service import serve
 from testing.sample_hands import object_pose, random_pose
+
+FAR = WristPose(position_m=(1e300, 0.0, 0.0), orientation_wxyz=(0.0, 0.0, 0.0, 0.0))
 
 
 @pytest.fixture
@@ -100,12 +102,15 @@ async def test_hostile_clients_close_their_own_connection_alone(running, sending
                 for origin, path in (("https://evil.example", "/"), (None, "/secret")):
                     with pytest.raises(InvalidStatus):
                         await connect(address + path, origin=origin)
+                # On the bus: a hand that nobody can draw, and nobody gets.
+                hands.put(msgspec.structs.replace(random_pose("right", 1), wrist=FAR))
                 # What is no HTTP at all, and a handshake that never ends.
                 for garbage in (b"\x16\x03\x01" + b"\xff" * 500, b"GET / HTTP/1.1\r\nHost: "):
                     with socket.create_connection(("127.0.0.1", port)) as raw:
                         raw.sendall(garbage)
                 for _ in range(5):
-                    await next_of(good, "hand/right/pose")
+                    told = await next_of(good, "hand/right/pose")
+                    assert told["wrist"]["position_m"][0] != FAR.position_m[0]
 
 
 async def test_who_is_slow_gets_fewer_and_the_newest():
