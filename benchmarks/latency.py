@@ -1,12 +1,12 @@
 """From a marker to a pose through real processes, beside as many hops of bare Zenoh.
 
-    python benchmarks/latency.py [--seconds 20] [--rates 30 60 90] [--json FILE]
+    python benchmarks/latency.py [--seconds 10] [--rates 30 60 90] [--json FILE]
 
 rhot-fusion and rhot-solver, a router, and two relays that do nothing but put a payload of the same
 size, each a process of its own. Two cameras' frames are put at the pace of their stamps, and half
 way to the next frame a bare message takes as many hops: whatever else this machine does, it does to
-both. Latencies from the put of the frame that points become due with (a replay of the same frames
-tells which) to the callback that has the pose:
+both. Latencies from the put of the frame whose instant the pose is of (fusion's lag is 0) to the
+callback that has the pose:
     latency_ratio_p50   median of ours over the median of bare Zenoh, at 60 fps
     latency_p99_ms      of ours, at 60 fps
 Where the time goes: `sent_ns` of points and poses splits it, in a run of its own, as whoever
@@ -35,7 +35,7 @@ from latency_steps import alone_us
 
 from rhot import topics
 from rhot.bus.zenoh_config import client_config
-from rhot.messages import HandPoints, HandPose
+from rhot.messages import HandPoints, HandPose, MarkerFrame
 
 MAIN_FPS = 60.0
 # From mid-exposure to the tracker's put: readout and the tracker's step.
@@ -51,7 +51,8 @@ class Played:
     def __init__(self, endpoint: str, recording: Recording, *, points: bool) -> None:
         self._recording = recording
         self._session = zenoh.open(client_config([endpoint]))
-        self.put_ns: dict[int, int] = {}  # by stamp of the points that are due with it
+        self.put_ns: dict[int, int] = {}  # by the frame's instant, which points due with it have
+        self.due_ns: list[int] = []  # when frames were put that points are due with
         self.bare_put_ns: list[int] = []
         self.bare_ns: list[tuple[int, int]] = []
         self.pose_ns: list[tuple[int, bytes]] = []
@@ -101,8 +102,9 @@ class Played:
             sleep_until(stamp_ns * 1e-9 + TRACKER_S)
             message = msgspec.structs.replace(frame, stamp_ns=stamp_ns, sent_ns=time.time_ns())
             payload = msgspec.json.encode(message)
+            self.put_ns[instant_ns(message)] = time.time_ns()
             if points is not None:
-                self.put_ns[points.stamp_ns + shift_ns] = time.time_ns()
+                self.due_ns.append(time.time_ns())
             self._markers[frame.camera].put(payload)
             if points is not None:
                 sleep_until(stamp_ns * 1e-9 + TRACKER_S + half_s)
@@ -125,13 +127,13 @@ class Played:
             for received_ns, number in self.bare_ns
             if self.bare_put_ns[number] >= first_ns
         ]
-        due = sum(put_ns >= first_ns for put_ns in self.put_ns.values())
+        due = sum(put_ns >= first_ns for put_ns in self.due_ns)
         return {"ours": quantiles(ours), "bare": quantiles(bare), "poses": len(ours), "due": due}
 
     def _due_with(self, pose: HandPose) -> int:
         """When the frame was put that a pose was due with; 0 if none was.
 
-        Its stamp is off by nanoseconds where the present is another epoch than the recording's.
+        Its stamp is off by what fusion has learned of that camera's clock.
         """
         stamps_ns = np.array(list(self.put_ns))
         nearest = int(np.abs(stamps_ns - pose.stamp_ns).argmin())
@@ -152,6 +154,12 @@ class Played:
                 parts.append(np.diff([put_ns, points_ns, pose.sent_ns, received_ns]) * 1e-3)
         names = ("put_to_points_us", "points_to_pose_us", "pose_to_here_us")
         return dict(zip(names, np.median(parts, axis=0).tolist(), strict=True))
+
+
+def instant_ns(frame: MarkerFrame) -> int:
+    """The frame's own instant, that of its middle row."""
+    middle_ns = round(0.5 * (frame.size_px[1] - 1) * frame.row_time_ns)
+    return frame.stamp_ns + middle_ns - frame.clock_offset_ns
 
 
 def _is_heard(publisher: zenoh.Publisher) -> bool:
@@ -179,6 +187,7 @@ def measure(fps: float, seconds: float) -> dict[str, Any]:
     if fps == MAIN_FPS:
         found["split"] = played(recording, points=True).split_us()
         found["alone"] = alone_us(recording)
+        found["stages_us"] = dict(stages(found))
     return found
 
 
@@ -198,15 +207,15 @@ def stages(found: dict[str, Any]) -> list[tuple[str, float]]:
     solver = alone["encode_points"] + alone["decode_points"] + alone["solver"]
     return [
         ("three hops of bare Zenoh", 3.0 * hop),
-        ("fusion: decode markers", alone["decode_markers"]),
-        ("fusion: step that tells points", alone["fusion_telling"]),
-        ("fusion: wake up, and the rest", split["put_to_points_us"] - hop - fusion),
-        ("fusion: encode points", alone["encode_points"]),
-        ("solver: decode points", alone["decode_points"]),
-        ("solver: step", alone["solver"]),
-        ("solver: wake up, and the rest", split["points_to_pose_us"] - hop - solver),
-        ("solver: encode the pose", alone["encode_pose"]),
-        ("pose here: the rest", split["pose_to_here_us"] - hop - alone["encode_pose"]),
+        ("fusion, decode markers", alone["decode_markers"]),
+        ("fusion, step that tells points", alone["fusion_telling"]),
+        ("fusion, wake up, and the rest", split["put_to_points_us"] - hop - fusion),
+        ("fusion, encode points", alone["encode_points"]),
+        ("solver, decode points", alone["decode_points"]),
+        ("solver, step", alone["solver"]),
+        ("solver, wake up, and the rest", split["points_to_pose_us"] - hop - solver),
+        ("solver, encode the pose", alone["encode_pose"]),
+        ("pose here, the rest", split["pose_to_here_us"] - hop - alone["encode_pose"]),
     ]
 
 
@@ -222,16 +231,16 @@ def print_table(results: dict[float, dict[str, Any]]) -> None:
     for found in results.values():
         if "split" in found:
             print("\nwhere the median goes at 60 fps, us")
-            for name, value in stages(found):
+            for name, value in found["stages_us"].items():
                 print(f"  {name:<34} {value:7.0f}")
             alone = found["alone"]
-            print(f"  {'fusion: step that tells none':<34} {alone['fusion_silent']:7.0f}")
+            print(f"  {'fusion, step that tells none':<34} {alone['fusion_silent']:7.0f}")
 
 
 def main() -> None:
     """Measure all rates and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--rates", type=float, nargs="+", default=[30.0, MAIN_FPS, 90.0])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()

@@ -72,6 +72,7 @@ RUNS = {
         6,
     ),
     "held_out": _script("held_out", "", "--family skin", 8),
+    "latency": _script("latency", "", "--seconds 2 --rates 60", 2.5),
     "objects_grasp_pictures": _script(
         "objects_grasp_pictures", "--passes 6", "--hands 1 --passes 1", 10
     ),

@@ -15,8 +15,6 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.geometry.projection import extrinsics
-from services.fusion.output.paint_centroid import expected_shift, shift_table
 from services.fusion.step import FusionStep
 
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
@@ -39,11 +37,6 @@ def warm_up(
         for n, camera in enumerate(cameras.values()):
             stamp_ns = 10**18 + round((seq + 0.3 * n) * 1e9 / 30.0)
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, config.colors)))
-    # What only a pose from the solver would call.
-    table = shift_table(0.007, 0.014)
-    finger = np.array([0.0, -1.0, 0.0]), 0.1, 0.1
-    chosen = extrinsics(tuple(cameras.values()))
-    expected_shift(table, point.copy(), finger, chosen, np.zeros(3), np.zeros((3, 3)))
     return messages + len(step.flush())
 
 

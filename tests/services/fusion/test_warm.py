@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from services.fusion.kalman import frame_update, smoother, track_history
+from services.fusion.kalman import frame_update, recent_observations, smoother, track_history
 from services.fusion.kalman.rest import rest_mixing
-from services.fusion.output import paint_centroid
+from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
     frame_update.update_frame,
     frame_update.drop_lost_tracks,
+    recent_observations.alone_before,
+    recent_observations.sights,
+    recent_observations.largest_sigmas,
     rest_mixing.mix_rest,
     smoother.smooth_all,
     track_history.start_track,
+    paint_to_bone._correct,
+    hand_plausibility._coherent,
+    hand_points._usable,
+    hand_points._rounded,
 )
 
 
 def test_warming_up_exercises_the_whole_of_fusion():
     setup = SyntheticRig(cameras=3)
     assert warm_up(setup.config(), setup.rig(), point_hands()) == 8
-    for compiled in (*LIVE, paint_centroid.expected_shift, paint_centroid._fill_table):
+    for compiled in LIVE:
         assert compiled.signatures, compiled
 
 
