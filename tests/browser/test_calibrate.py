@@ -169,7 +169,7 @@ def open_colours(page: Any, url: str) -> None:
     tab = page.get_by_role("tab", name="Calibration")
     tab.wait_for(**WAIT)
     tab.click()
-    page.get_by_role("button", name="next").click()
+    page.get_by_role("button", name="next", exact=True).click()
 
 
 def click_markers(page: Any) -> tuple[float, float]:
@@ -239,7 +239,7 @@ def test_from_the_first_click_to_applied_ranges(
     assert by_hand.inputs["by_hand"] == ["green"]
 
     # And back to the rig.
-    page.get_by_role("button", name="back").click()
+    page.get_by_role("button", name="back", exact=True).click()
     until(page, lambda: where(page, "green") is None)
     assert errors == []
     page.close()

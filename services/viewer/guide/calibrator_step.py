@@ -59,6 +59,14 @@ class CalibratorStep:
         self._step = step
         self.update()
 
+    @property
+    def working(self) -> bool:
+        """Whether the step that is shown is measured now."""
+        state, step = self._link.state, self._step
+        if state is None or state.order is None or step is None:
+            return False
+        return state.order.step == step.name and state.phase in _WORKING
+
     def update(self) -> None:
         """Bring everything up to date with what the calibrator says."""
         step, state = self._step, self._link.state

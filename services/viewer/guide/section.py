@@ -72,6 +72,11 @@ class GuideTab:
             self._exposure.update(seen)
         elif step.name in OF_THE_CALIBRATOR:
             self._measured.update()
+        # Who follows what to do now needs no more than that; on a phone there is no room for more.
+        alone = step.name in OF_THE_CALIBRATOR and self._measured.working
+        for handle in (self._overview, self._text):
+            if handle.visible == alone:
+                handle.visible = not alone
 
     def close(self) -> None:
         """The visitor has gone; what the calibrator does goes on."""
