@@ -23,7 +23,7 @@ _HEIGHT_M, _HEIGHT_OF_TWO_M = 0.40, 0.50
 _WIDTH_M, _WIDTH_OF_TWO_M = 0.30, 0.46
 # Objects lie to the right of a hand, and an upright page's panel covers its lower half when it is
 # open: hands are shown so much further left, or up, in shares of the width and of the height.
-_LEFT, _ABOVE_PANEL = 0.08, 0.21
+_LEFT, _ABOVE_PANEL = 0.08, 0.17
 # A page of 1280x800 with the panel beside the scene.
 _USUAL_ASPECT = 1.1
 # A desk is some 20 cm under the cameras.
