@@ -203,12 +203,14 @@ def holding(router: str, rig: RigConfig, in_background: InBackground) -> threadi
 
 
 def picture(page: Any) -> np.ndarray:
-    """The page as (h, w, 3), without the panel on its right and the notice on its left."""
+    """The scene as (h, w, 3): the page without the panel on its right, the notice wiped out."""
     image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     pixels = np.array(
         image.open(BytesIO(page.screenshot(timeout=DEADLINE_S * 1e3))).convert("RGB")
     ).astype(int)
-    return pixels[:, int(0.27 * pixels.shape[1]) : int(0.65 * pixels.shape[1])]
+    height, width, _ = pixels.shape
+    pixels[: int(0.25 * height), : int(0.27 * width)] = 255
+    return pixels[:, : int(0.65 * width)]
 
 
 def blue_and_green(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
