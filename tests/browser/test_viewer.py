@@ -237,7 +237,7 @@ def test_a_moving_hand_is_seen_in_the_middle_and_its_angles_are_told(
     assert blue.sum() >= 1500, "no hand is drawn"
     assert green.sum() >= 200, "neither measured joints nor the cup are drawn"
     rows, columns = np.nonzero(blue)
-    assert 0.25 < rows.mean() / blue.shape[0] < 0.65
+    assert 0.1 < rows.mean() / blue.shape[0] < 0.65
     assert 0.25 < columns.mean() / blue.shape[1] < 0.75
     before = picture(page)
     while np.abs(picture(page) - before).max() < 60 and time.monotonic() < deadline:
@@ -275,9 +275,10 @@ def test_touching_tips_are_lit_for_as_long_as_they_touch(
 def test_an_upright_phone_says_who_holds_the_cup_and_when_it_is_gone(
     chromium: Any, viewer: str, moving_hand: threading.Event, holding: threading.Event
 ) -> None:
-    """Its panel covers most of the scene."""
     page = chromium.new_page(viewport={"width": 390, "height": 844})
     page.goto(viewer)
+    # The sheet of controls is closed at first: the screen is the hand's.
+    page.get_by_text("rhot: ").first.click(timeout=DEADLINE_S * 1e3)
     told = page.get_by_text(HELD_TEXT)
     told.wait_for(timeout=DEADLINE_S * 1e3)
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
