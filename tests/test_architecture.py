@@ -58,8 +58,6 @@ IMPURE_ROOMS = {
     "services/bridges/websocket/server.py",
     "services/openvr_bridge/endpoints",
     "services/openvr_bridge/sources",
-    "services/recorder/deck.py",
-    "services/recorder/requests.py",
     "services/recorder/sources",
     "services/viewer/calibration/page.py",
     "services/viewer/guide/callbacks.py",

@@ -21,6 +21,8 @@ from rhot.errors import CaptureError, DiskFullError, disk_full
 from rhot.messages.json_schema import json_schema
 from rhot.topics import Topic
 from services.recorder.schemas import SCHEMA_ENCODING, schema_name
+from services.recorder.foxglove.scene import Drawn, scene_of, schema
+
 
 # The MCAP profile by which readers know a recording of rhot.
 PROFILE = "rhot"
@@ -64,6 +66,7 @@ class RecordingWriter:
         self._channels: dict[str, int] = {}
         # Time of the first message of the chunk that is being filled.
         self._chunk_ns: int | None = None
+        self._scene = scene_of(attachments or {})
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             check_space(path.parent)
@@ -107,16 +110,32 @@ class RecordingWriter:
             self._writer.add_message(
                 channel, log_time_ns, payload, log_time_ns, self.messages & 0xFFFFFFFF
             )
+            if self._scene is not None:
+                for drawn in self._scene.of(topic, payload):
+                    self._draw(drawn, log_time_ns)
         except OSError as error:
             raise _failed(self.path, error) from None
         self.messages += 1
         self.bytes += len(payload)
 
+    def _draw(self, drawn: Drawn, log_time_ns: int) -> None:
+        """What Foxglove and Rerun draw of a message, beside it."""
+        channel = self._channels.get(drawn.channel)
+        if channel is None:
+            if drawn.schema not in self._schemas:
+                self._schemas[drawn.schema] = self._writer.register_schema(
+                    drawn.schema, "protobuf", schema(drawn.schema)
+                )
+            self._channels[drawn.channel] = channel = self._writer.register_channel(
+                drawn.channel, "protobuf", self._schemas[drawn.schema], {COMPANION: "rhot"}
+            )
+        self._writer.add_message(channel, log_time_ns, drawn.data, log_time_ns)
+
     def _channel(self, topic: Topic, key: str) -> int:
         name = schema_name(topic)
         if topic.message is not None and name not in self._schemas:
-            schema = json_schema(topic.message)
-            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, schema)
+            data = json_schema(topic.message)
+            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, data)
         encoding = "json" if name else topic.media_type
         self._channels[key] = self._writer.register_channel(
             key, encoding, self._schemas.get(name, 0), {"encoding": topic.encoding}

@@ -116,6 +116,7 @@ def test_a_person_records_and_replays(services: str, rig: Path, router: str, chr
     with live.expect_popup() as opened:
         live.get_by_role("link", name="See it").click()
     replay = opened.value
+    replay.set_default_timeout(DEADLINE_S * 1e3)
     replay.get_by_role("tab", name="Recording").click()
     replay.get_by_role("button", name="Pause").click()
     shows(replay, "paused")
