@@ -20,9 +20,8 @@ from mcap.writer import CompressionType, Writer
 from rhot.errors import CaptureError, DiskFullError, disk_full
 from rhot.messages.json_schema import json_schema
 from rhot.topics import Topic
-from services.recorder.schemas import SCHEMA_ENCODING, schema_name
 from services.recorder.foxglove.scene import Drawn, scene_of, schema
-
+from services.recorder.schemas import SCHEMA_ENCODING, schema_name
 
 # The MCAP profile by which readers know a recording of rhot.
 PROFILE = "rhot"
