@@ -44,7 +44,8 @@ async def test_a_flood_leaves_the_loop_its_turns() -> None:
 
     async def others() -> None:
         nonlocal turns
-        while turns < 20:
+        # The child needs a while to begin.
+        while turns < 20 or not child.last_words:
             turns += 1
             await asyncio.sleep(0.001)
 
@@ -61,7 +62,7 @@ async def test_a_flood_leaves_the_loop_its_turns() -> None:
         reader.cancel()
         await asyncio.gather(reader, return_exceptions=True)
         assert await child.stop() == "was ended by SIGTERM"
-    assert turns == 20
+    assert turns >= 20
     assert set(child.last_words) == {"y"}
 
 
