@@ -13,6 +13,7 @@ import rhot.messages.calibration
 import rhot.messages.camera
 import rhot.messages.health
 import rhot.messages.objects
+import rhot.messages.recording
 import rhot.messages.simulator
 from docs.generate.markdown import generated_from, paragraphs, table, wrapped
 from docs.generate.type_words import default_of, in_words
@@ -30,6 +31,7 @@ _MODULES = (
     rhot.messages.health,
     rhot.messages.camera,
     rhot.messages.calibration,
+    rhot.messages.recording,
     rhot.messages.simulator,
 )
 
