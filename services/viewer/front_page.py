@@ -1,8 +1,9 @@
 """The HTML that viser's client is served in, as the page of a rig. Pure.
 
-viser's own says "Viser" on the browser's tab, and its sheet of controls on a phone is as narrow as
-a desktop's and open at first, over the hand. What stands in place of its title changes that, and
-headers let the browser load and ask nothing from anywhere else.
+viser's own says "Viser" on the browser's tab, its notices lie where the fingers are, and its sheet
+of controls on a phone is as narrow as a desktop's and open at first, over the hand. What stands in
+place of its title changes that, and headers let the browser load and ask nothing from anywhere
+else.
 """
 
 from __future__ import annotations
@@ -19,8 +20,13 @@ _ICON = (
 _TITLE, _VISERS_ICON = "<title>Viser</title>", re.compile(r'<link\s+rel="icon"\s[^>]*>')
 # Below this width viser shows its controls as a sheet at the bottom (its theme's breakpoint xs).
 _PHONE = "(max-width: 36em)"
-# The sheet: as wide as the screen, at most half as high, so that the hand stays in view.
+# Notices, as of a browser without a graphics card: in the lower corner, below the hand, above a
+# phone's closed sheet and under its open one. The sheet: as wide as the screen, at most half as
+# high, so that the hand stays in view.
 _STYLE = """
+.mantine-Notifications-root[data-position^="top"] {
+  top: auto !important; bottom: 4em !important; z-index: 5 !important;
+}
 @media PHONE {
   .mantine-ScrollArea-root[style*="position: fixed"],
   .mantine-Paper-root[style*="position: fixed"] {

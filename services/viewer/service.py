@@ -29,6 +29,7 @@ from services.viewer.guide.captions import Captions
 from services.viewer.guide.section import GuideSection
 from services.viewer.live.model import ViewModel
 from services.viewer.panel.banner import Banner
+from services.viewer.panel.fault_texts import starting
 from services.viewer.panel.live_tab import LiveSection
 from services.viewer.pictures.feed import PictureFeed
 from services.viewer.plots.history import History
@@ -142,11 +143,12 @@ async def _show_live(service: Service, page: _Page) -> None:
             if tick_s >= text_due_s:
                 text_due_s = tick_s + _TEXT_S
                 now_ns = clock.now_ns()
-                faults = rig.state(now_ns).faults
+                state = rig.state(now_ns)
+                faults, waits = state.faults, starting(state.services)
                 if _replays(service):
                     # Services that were not recorded are not missed.
                     faults = [one for one in faults if one.teller]
-                page.visits.update(Seen(view, faults, now_s, now_ns))
+                page.visits.update(Seen(view, faults, now_s, now_ns, waits))
             # By the clock: what drawing takes is not added to each picture's time.
             due_s = max(due_s, tick_s) + 1.0 / service.config.viewer.rate_hz
             await asyncio.sleep(due_s - time.monotonic())

@@ -24,13 +24,16 @@ class Banner:
 
     def update(self, seen: Seen) -> None:
         """Bring it up to date."""
-        found = causes(seen.faults)
-        self._causes.visible = bool(found)
-        self._causes.content = fault_texts.banner(found, seen.now_ns)
+        faults = fault_texts.of_no_start(seen.faults) if seen.starting else seen.faults
+        found = causes(faults)
+        wait = fault_texts.wait(seen.starting) if seen.starting else ""
+        self._causes.visible = bool(wait or found)
+        self._causes.content = wait + fault_texts.banner(found, seen.now_ns)
         follows = fault_texts.following(found)
         self._folder.visible = bool(follows)
         self._follows.content = follows
-        self._show_label(fault_texts.headline(found) or _hands(seen))
+        at_rest = "starting ..." if seen.starting else _hands(seen)
+        self._show_label(fault_texts.headline(found) or at_rest)
 
     def close(self) -> None:
         """Nothing is left behind."""

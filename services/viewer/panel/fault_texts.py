@@ -8,16 +8,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rhot.faults.way import FOLLOWING, SLOW
 from rhot.watch.causes import Cause
-from rhot.watch.rig_state import StandingFault
+from rhot.watch.rig_state import ServiceRow, StandingFault
 from services.viewer.panel.words import sentence, service_words
 
 # Causes that fit above the tabs of a small screen; the rest is counted.
 _MAX_CAUSES = 3
 _MAX_FOLLOWING = 30
-_RED, _AMBER = "#c0392b", "#b9770e"
+# Preparing takes seconds, and 100 s of a processor's time once for each release of rhot, when numba
+# compiles; who takes longer is not starting, but stuck.
+_STARTING_S = 240.0
+_RED, _AMBER, _BLUE = "#c0392b", "#b9770e", "#0072b2"
 _WORDS = {"error": ("problem", _RED), "warning": ("note", _AMBER)}
 _BOX = "font-size:0.85em;line-height:1.35;margin:0.3em 0.6em;padding:0.3em 0.5em;"
+
+
+def starting(rows: Sequence[ServiceRow]) -> list[str]:
+    """The programs that prepare themselves, in words: nothing comes of them yet."""
+    return [
+        service_words(row.service, row.instance)
+        for row in rows
+        if row.health is not None and row.state == "starting" and row.health.uptime_s < _STARTING_S
+    ]
+
+
+def of_no_start(faults: Sequence[StandingFault]) -> list[StandingFault]:
+    """The faults that do not merely follow from programs that are starting."""
+    return [one for one in faults if one.fault.code not in {*FOLLOWING, *SLOW}]
+
+
+def wait(names: Sequence[str]) -> str:
+    """That programs are starting, as HTML."""
+    told = ", ".join(sentence(name, 80) for name in names[:_MAX_CAUSES])
+    more = f" and {len(names) - _MAX_CAUSES} more" if len(names) > _MAX_CAUSES else ""
+    return (
+        f'<div style="{_BOX}border-left:4px solid {_BLUE}"><b style="color:{_BLUE}">starting:</b> '
+        f"{told}{more}<br>The first start on a computer takes up to two minutes.</div>"
+    )
 
 
 def banner(causes: Sequence[Cause], now_ns: int) -> str:

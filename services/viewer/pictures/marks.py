@@ -18,6 +18,8 @@ _LOST_NS = 5_000_000_000
 _SIGMAS, _MIN_RADIUS = 3.0, 0.018
 # Letters and lines, as shares of the picture's width: readable where it is 350 pixels wide.
 _LETTER, _LINE = 1.0 / 26.0, 1.0 / 320.0
+# A letter's breadth for its height, the mean of a sans-serif's small letters.
+_BROAD = 0.58
 _WHITE, _LOST, _SEARCHED = "#ffffff", "#ffb000", "#7fd4ff"
 # Names of colours that are not in view, before they are counted.
 _MAX_NAMES = 6
@@ -43,10 +45,14 @@ class Marks:
         }
         self._last = {**kept, **found}
         lost = [one for color, (_, one) in kept.items() if color not in found]
+        names = _Names(width)
         drawn = [
             *_region(seen),
-            *(_circle(one, width, one.color, _WHITE, dashed=False) for one in inside),
-            *(_circle(one, width, f"{one.color}: lost", _LOST, dashed=True) for one in lost),
+            *(_circle(one, width, _WHITE, dashed=False) for one in inside),
+            *(_circle(one, width, _LOST, dashed=True) for one in lost),
+            # Names over all rings, and each beside those before it: fingers come close together.
+            *(names.of(one, one.color, _WHITE) for one in inside),
+            *(names.of(one, f"{one.color}: lost", _LOST) for one in lost),
             _caption(seen, set(self._last)),
         ]
         return (
@@ -83,18 +89,58 @@ def _whole(seen: SeenInPicture) -> bool:
     return left <= 0 and top <= 0 and right >= width - 1 and bottom >= height - 1
 
 
-def _circle(marker: Marker, width: int, words: str, color: str, *, dashed: bool) -> str:
-    # Pixel centres are whole numbers, SVG's are halves.
-    x, y = marker.x_px + 0.5, marker.y_px + 0.5
-    radius = min(max(_SIGMAS * marker.sigma_px, _MIN_RADIUS * width), 0.1 * width)
+def _circle(marker: Marker, width: int, color: str, *, dashed: bool) -> str:
+    x, y, radius = _ring(marker, width)
     dash = f' stroke-dasharray="{2 * _LINE * width:.1f}"' if dashed else ""
     ring = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"'
     # Black below white: seen on any paint.
     return (
         f'{ring} stroke="#000" stroke-width="{2.5 * _LINE * width:.2f}" opacity="0.6"/>'
         f'{ring} stroke="{color}"{dash}/>'
-        + _words(x, y - 1.4 * radius, words, color, width, anchor=_anchor(x, width))
     )
+
+
+def _ring(marker: Marker, width: int) -> tuple[float, float, float]:
+    """Centre and radius; pixel centres are whole numbers, SVG's are halves."""
+    radius = min(max(_SIGMAS * marker.sigma_px, _MIN_RADIUS * width), 0.1 * width)
+    return marker.x_px + 0.5, marker.y_px + 0.5, radius
+
+
+class _Names:
+    """Places the names of one picture's markers where none covers another."""
+
+    def __init__(self, width: int) -> None:
+        self._width, self._letter = width, _LETTER * width
+        # Left, top, right and bottom of each.
+        self._taken: list[tuple[float, ...]] = []
+
+    def of(self, marker: Marker, words: str, color: str) -> str:
+        """A name above its ring; beside or below it where there is no room."""
+        x, y, radius = _ring(marker, self._width)
+        beside, middle = 1.5 * radius, y + 0.35 * self._letter
+        places = (
+            (x, y - 1.4 * radius, _anchor(x, self._width)),
+            (x + beside, middle, "start"),
+            (x - beside, middle, "end"),
+            (x, y + 1.3 * radius + self._letter, _anchor(x, self._width)),
+        )
+        place = next((one for one in places if self._is_free(self._box(*one, words))), places[0])
+        self._taken.append(self._box(*place, words))
+        return _words(*place[:2], words, color, self._width, anchor=place[2])
+
+    def _box(self, x: float, y: float, anchor: str, words: str) -> tuple[float, ...]:
+        long = _BROAD * self._letter * len(words)
+        left = x - long * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+        bottom = max(y, self._letter)
+        return left, bottom - self._letter, left + long, bottom
+
+    def _is_free(self, box: tuple[float, ...]) -> bool:
+        left, top, right, bottom = box
+        apart = (
+            right <= one[0] or one[2] <= left or bottom <= one[1] or one[3] <= top
+            for one in self._taken
+        )
+        return left >= 0.0 and right <= self._width and all(apart)
 
 
 def _anchor(x: float, width: int) -> str:

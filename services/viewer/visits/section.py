@@ -19,12 +19,16 @@ from services.viewer.live.model import View
 
 @dataclass(frozen=True)
 class Seen:
-    """The rig at one instant: now_s is monotonic, now_ns is CLOCK_REALTIME."""
+    """The rig at one instant: now_s is monotonic, now_ns is CLOCK_REALTIME.
+
+    starting has the programs that prepare themselves, as a person calls them.
+    """
 
     view: View
     faults: Sequence[StandingFault]
     now_s: float
     now_ns: int
+    starting: Sequence[str] = ()
 
 
 class OpenSection(Protocol):

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from rhot.watch.causes import causes
-from rhot.watch.rig_state import StandingFault
-from services.viewer.panel.fault_texts import banner, following, headline
-from testing.sample_health import NOW_NS, fault
+from rhot.watch.rig_state import ServiceRow, StandingFault
+from services.viewer.panel.fault_texts import (
+    banner,
+    following,
+    headline,
+    of_no_start,
+    starting,
+    wait,
+)
+from testing.sample_health import NOW_NS, beat, fault
 
 EVIL = '<script>alert("x")</script><img src=x onerror=alert(1)>\x1b[2J'
 
@@ -55,3 +62,25 @@ def test_what_is_too_much_is_counted():
     assert "27 more" in banner(many, NOW_NS)
     slow = found(fault("camera_moved"), *(fault("stream_slow", str(n)) for n in range(60)))
     assert "30 more" in following(slow)
+
+
+def test_while_programs_start_nobody_is_told_what_merely_follows():
+    rows = [
+        ServiceRow(service=name, instance="main", state=state, health=health)
+        for name, state, health in (
+            ("fusion", "starting", beat("fusion", state="starting")),
+            ("solver", "starting", beat("solver", state="starting", uptime_s=900.0)),
+            ("simulator", "running", beat("simulator")),
+            ("object_tracker", "absent", None),
+        )
+    ]
+    # Who prepares itself for a quarter of an hour is stuck, and what follows from it is told.
+    assert starting(rows) == ["fusion"]
+    assert "fusion" in wait(starting(rows))
+    assert "2 more" in wait(["a", "b", "c", "d", "e"])
+    standing = [
+        StandingFault(teller="fusion", fault=fault(code))
+        for code in ("stream_slow", "session_stopped", "clock_unknown", "camera_moved")
+    ]
+    assert [one.fault.code for one in of_no_start(standing)] == ["camera_moved"]
+    assert "<script" not in wait([EVIL])

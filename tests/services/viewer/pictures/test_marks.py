@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from xml.etree import ElementTree
 
@@ -73,3 +74,22 @@ def test_much_is_counted() -> None:
     many = [f"c{n}" for n in range(256)]
     svg = Marks().svg(seen(looked_for=many))
     assert words(svg) == ["not in view: c0, c1, c2, c3, c4, c5 and 250 more"]
+
+
+def test_no_name_covers_another() -> None:
+    # Finger tips of a hand that holds something, as far apart as its dots.
+    near = [marker(f"colour{n}", 300.0 + 8.0 * n, 200.0 + 6.0 * n) for n in range(4)]
+    svg = Marks().svg(seen(*near, looked_for=[one.color for one in near]))
+    boxes = []
+    for text in ElementTree.fromstring(svg).iter("text"):
+        if not text.text:
+            continue
+        letter = 640 / 26
+        long = 0.5 * letter * len(text.text)
+        x, y = float(text.get("x", 0)), float(text.get("y", 0))
+        left = x - long * {"start": 0.0, "middle": 0.5, "end": 1.0}[text.get("text-anchor", "")]
+        boxes.append((left, y - letter, left + long, y))
+    assert len(boxes) == 4
+    for one, other in itertools.combinations(boxes, 2):
+        apart = one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+        assert apart, (one, other)
