@@ -195,7 +195,7 @@ def main() -> None:
         f"  {'core: router fusion solver':>17} {'us/frame':>8} {'MB':>4} {'MB/rig':>7} "
         f"{'offered':>7}"
     )
-    results = []
+    results: dict[str, dict[str, dict[str, dict[str, float]]]] = {}
     for fps in options.fps:
         recording = record(fps, options.seconds + WARM_S)
         for routers in options.routers:
@@ -208,7 +208,8 @@ def main() -> None:
                 more = max(rigs - first[0], 1)
                 found["mb_per_rig"] = (found["memory_mb"] - first[1]) / more
                 print(show(fps, routers, rigs, found), flush=True)
-                results.append({"fps": fps, "routers": routers, "rigs": rigs, **found})
+                of_fps = results.setdefault(f"fps_{fps:.0f}", {})
+                of_fps.setdefault(f"routers_{routers}", {})[f"rigs_{rigs}"] = found
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 

@@ -80,6 +80,9 @@ RUNS = {
     "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
     "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
+    "scale": _script(
+        "scale", "--rigs 1 16 32 64 --routers 1", "--rigs 1 --fps 30 --routers 1 --seconds 2", 5
+    ),
     "scenes": _script("scenes", "", "--seconds 1", 9),
     "solver": _script("solver", "", "--quick", 1.5),
     "solver_markers": _script("solver_markers", "", None, 0.6),
