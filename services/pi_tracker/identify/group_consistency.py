@@ -9,7 +9,7 @@ prior wins.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from services.pi_tracker.image.blob import Blob
 
@@ -22,8 +22,7 @@ _SIZE_RATIO = 4.0
 _PRIOR_WEIGHT = 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
+class Candidate(NamedTuple):
     """A blob with its prior, 0..1: what its own track says of it.
 
     whole_px2 is the area to compare with other markers, where another occludes part of it; 0: its

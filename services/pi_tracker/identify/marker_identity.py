@@ -8,8 +8,9 @@ missing rather than guessed. Static background is removed before (background.py)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
 from statistics import median
+from typing import NamedTuple
 
 from services.pi_tracker.identify.blob_shape import may_be_rim, touch
 from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
@@ -46,8 +47,7 @@ _STATIONARY_FRAMES = 4
 _RIM_FACTOR = 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class Association:
+class Association(NamedTuple):
     """The blob that is a colour's marker.
 
     certainty, 0..1, falls where a second blob is nearly as good; consistency, 0..1, where it is far
@@ -134,12 +134,11 @@ class MarkerIdentity:
         )
 
     def _note_touching(self, associated: list[Association | None]) -> None:
-        rects = [None if one is None else one.blob.rect for one in associated]
-        for color, rect in enumerate(rects):
-            self._touched[color] = rect is not None and any(
-                other is not None and number != color and touch(rect, other)
-                for number, other in enumerate(rects)
-            )
+        self._touched = [False] * len(associated)
+        seen = [(color, one.blob.rect) for color, one in enumerate(associated) if one is not None]
+        for (color, rect), (other, other_rect) in itertools.combinations(seen, 2):
+            if touch(rect, other_rect):
+                self._touched[color] = self._touched[other] = True
 
     def _coast_unseen(self, associated: list[Association | None], stamp_ns: int) -> None:
         """Move the tracks that are not seen by the median motion of those that are."""
