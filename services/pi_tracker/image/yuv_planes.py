@@ -49,7 +49,7 @@ class Picture(Protocol):
         """
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        """Copy a rectangle into the top left of buffers.
+        """Copy a rectangle into buffers of its size.
 
         luma (2h, 2w) of every pixel, chroma u, v (2, h, w) of every cell.
         """
@@ -75,9 +75,8 @@ class _PlanarPicture:
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         x0, y0, x1, y1 = rect
-        w, h = x1 - x0, y1 - y0
-        luma[: 2 * h, : 2 * w] = _pixels(self._y, rect)
-        chroma[:, :h, :w] = self._chroma[:, y0:y1, x0:x1]
+        luma[:] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
+        chroma[:] = self._chroma[:, y0:y1, x0:x1]
 
 
 class _FullRangePicture:
@@ -93,10 +92,8 @@ class _FullRangePicture:
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         self._planes.copy_to(rect, luma, chroma)
-        x0, y0, x1, y1 = rect
-        w, h = x1 - x0, y1 - y0
-        luma[: 2 * h, : 2 * w] = cv2.LUT(luma[: 2 * h, : 2 * w], _LIMITED_LUMA)
-        chroma[:, :h, :w] = _LIMITED_CHROMA[chroma[:, :h, :w]]
+        luma[:] = _LIMITED_LUMA[luma]
+        chroma[:] = _LIMITED_CHROMA[chroma]
 
 
 class _BgrPicture:
@@ -111,11 +108,9 @@ class _BgrPicture:
         return cv2.transform(bgr, _LUMA), cv2.transform(bgr, _CHROMA)
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        x0, y0, x1, y1 = rect
-        w, h = x1 - x0, y1 - y0
         bgr = _pixels(self._image, rect)
-        luma[: 2 * h, : 2 * w] = cv2.transform(bgr, _LUMA)
-        chroma[:, :h, :w] = cv2.split(cv2.transform(_cell_means(bgr), _CHROMA))
+        luma[:] = cv2.transform(bgr, _LUMA)
+        chroma[:] = cv2.split(cv2.transform(_cell_means(bgr), _CHROMA))
 
 
 def picture(frame: Frame) -> Picture:

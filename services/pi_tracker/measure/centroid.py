@@ -29,6 +29,7 @@ from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture
 from services.pi_tracker.measure.blob_tiles import (
+    GAP,
     Tiles,
     as_plane,
     cells_from_pixels,
@@ -91,7 +92,7 @@ class _TileMoments(NamedTuple):
 
     weights: list[list[float]]  # (2, 2) raw moments of the pixels' weights
     variances: list[list[float]]  # (3, 3) of the variances of the cells that noise can move
-    edge_px2: float  # area of the pixels whose weight is neither 0 nor 1
+    edge_cells: float  # as many cells as have weights that are neither 0 nor 1
     contrast: float
 
 
@@ -113,18 +114,53 @@ def _size(blob: Blob) -> int:
 
 
 def _measure(tiles: Tiles, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-    reach = np.bitwise_and(_dilated(tiles.mask), tiles.inside)
-    mixture = _two_round_mixture(tiles, reach)
+    masks = _Masks.of(tiles)
+    mixture = _two_round_mixture(tiles, masks)
     paint = mixture.fraction(noise)
-    weight = _pixel_weights(tiles, paint, reach)
+    weight = _pixel_weights(tiles, paint, masks.reach)
     # Where clipping holds the weight at 0 or 1, noise does not move it.
-    edge = cells_from_pixels(np.ceil(weight) - np.floor(weight))
-    weights = raw_moments(weight, 1).swapaxes(0, 1).tolist()
-    variances = raw_moments(edge * paint.variance, 2).swapaxes(0, 1).tolist()
-    edge_px2 = (4.0 * raw_moments(edge, 0).ravel()).tolist()
-    contrast = mixture.contrast().tolist()
-    moments = map(_TileMoments, weights, variances, edge_px2, contrast)
-    return [_centroid(tiles, k, blobs[k], of_blob) for k, of_blob in enumerate(moments)]
+    partly = np.ceil(weight)
+    partly -= np.floor(weight)
+    edge = cells_from_pixels(partly)
+    moments = zip(
+        raw_moments(weight, 1).tolist(),
+        raw_moments(edge * paint.variance, 2).tolist(),
+        raw_moments(edge, 0).ravel().tolist(),
+        mixture.contrast(),
+        strict=True,
+    )
+    return [
+        _centroid(tiles, k, blobs[k], _TileMoments(*of_blob)) for k, of_blob in enumerate(moments)
+    ]
+
+
+class _Masks(NamedTuple):
+    """Cells about the blobs, 0/1; (h, n, w) each."""
+
+    reach: Image  # a cell larger than the blob: what may have any weight
+    # float32 (2, h, n, w), of background and of paint: what may be pure, and what the mask takes
+    # for pure.
+    may_be_pure: Image
+    pure_by_mask: Image
+
+    @classmethod
+    def of(cls, tiles: Tiles) -> _Masks:
+        h, n, w = tiles.mask.shape
+        masks = np.empty((4, h, n, w), np.uint8)
+        reach = _dilated(tiles.mask)
+        masks[0] = band = _dilated(reach)
+        masks[1] = tiles.mask
+        np.bitwise_xor(band, reach, out=masks[2])
+        core = cv2.erode(
+            as_plane(tiles.mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        masks[3] = core.reshape(h, n, w)
+        pure = masks.astype(np.float32)
+        core_cells = raw_moments(pure[3], 0)
+        if core_cells.min() < _MIN_CORE_CELLS:
+            few = core_cells.ravel() < _MIN_CORE_CELLS
+            pure[3][:, few] = pure[1][:, few]
+        return cls(reach, pure[:2], pure[2:])
 
 
 def _pixel_weights(tiles: Tiles, paint: PaintFraction, reach: Image) -> Image:
@@ -135,45 +171,37 @@ def _pixel_weights(tiles: Tiles, paint: PaintFraction, reach: Image) -> Image:
     h, n, w = paint.fraction.shape
     # Not clipped yet, a pixel's weight is ramp[0] + ramp[1] times its luma.
     ramp = np.empty((h, 2, n, w), np.float32)
-    np.multiply(paint.by_luma, _SLOPE, out=ramp[:, 1])
-    fraction = paint.fraction * _SLOPE
-    fraction += 0.5 - 0.5 * _SLOPE
-    np.subtract(fraction, ramp[:, 1] * tiles.cells[0], out=ramp[:, 0])
+    slope = np.multiply(paint.by_luma, _SLOPE, out=ramp[:, 1])
+    constant = paint.fraction * _SLOPE
+    constant += 0.5 - 0.5 * _SLOPE
+    np.subtract(constant, slope * tiles.cells[0], out=ramp[:, 0])
     ramp = pixels_from_cells(ramp)
     weight = ramp[:, 1] * tiles.luma
     weight += ramp[:, 0]
     most = pixels_from_cells(reach.astype(np.float32), cv2.INTER_NEAREST)
     np.minimum(weight, most, out=weight)
-    np.maximum(weight, 0.0, out=weight)
-    return weight
+    return np.maximum(weight, 0.0, out=weight)
 
 
-def _two_round_mixture(tiles: Tiles, reach: Image) -> Mixture:
+def _two_round_mixture(tiles: Tiles, masks: _Masks) -> Mixture:
     """Paint and background of every cell.
 
     First pure cells are as the mask has them, then as the paint fraction that follows says.
     """
     light = LinearLight(tiles.cells)
-    # Of background and of paint: cells that may be pure, and those that the mask takes for pure.
-    may_be_pure, pure_by_mask = np.empty((2, 2, *reach.shape), np.float32)
-    band = np.bitwise_and(_dilated(reach), tiles.inside)
-    may_be_pure[0], may_be_pure[1] = band, tiles.mask
-    core = cv2.erode(as_plane(tiles.mask), _SQUARE, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    pure_by_mask[0], pure_by_mask[1] = np.bitwise_xor(band, reach), core.reshape(reach.shape)
-    few = raw_moments(pure_by_mask[1], 0).ravel() < _MIN_CORE_CELLS
-    if few.any():
-        pure_by_mask[1][:, few] = may_be_pure[1][:, few]
-    fraction = Mixture(light, pure_by_mask, rough=True).shade_free_fraction()
+    fraction = Mixture(light, masks.pure_by_mask, rough=True).shade_free_fraction()
     pure = fraction * _PURE_FACTOR[:, None, None, None]
     pure += _PURE_OFFSET[:, None, None, None]
-    np.minimum(pure, may_be_pure, out=pure)
-    pure_by_mask *= _MASK_ONLY_WEIGHT
-    np.maximum(pure, pure_by_mask, out=pure)
+    np.minimum(pure, masks.may_be_pure, out=pure)
+    np.maximum(pure, masks.pure_by_mask * _MASK_ONLY_WEIGHT, out=pure)
     return Mixture(light, pure)
 
 
 def _dilated(masks: Image) -> Image:
-    return cv2.dilate(as_plane(masks), _SQUARE).reshape(masks.shape)
+    """Masks one cell larger, where the image does not end."""
+    dilated = cv2.dilate(as_plane(masks), _SQUARE).reshape(masks.shape)
+    dilated[:, :, -GAP:] = 0
+    return dilated
 
 
 def _centroid(tiles: Tiles, k: int, blob: Blob, moments: _TileMoments) -> Centroid:
@@ -184,7 +212,7 @@ def _centroid(tiles: Tiles, k: int, blob: Blob, moments: _TileMoments) -> Centro
         return Centroid(blob.x_px, blob.y_px, blob.area_px, _LOST_SIGMA_PX, 0.0)
     x, y = m[0][1] / area, m[1][0] / area
     noise_px = noise_sigma_px(moments.variances, area, x, y, _SLOPE)
-    sigma = math.hypot(noise_px, misfit_sigma_px(moments.edge_px2, area))
+    sigma = math.hypot(noise_px, misfit_sigma_px(4.0 * moments.edge_cells, area))
     left, top, right, bottom = blob.rect
     # A disc fills pi / 4 of its box.
     fill = blob.cells / (0.7 * (right - left) * (bottom - top))

@@ -19,6 +19,8 @@ components, 1985). Pure.
 
 from __future__ import annotations
 
+import functools
+import math
 from typing import NamedTuple
 
 import cv2
@@ -26,7 +28,7 @@ import numpy as np
 
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
-from services.pi_tracker.measure.blob_tiles import as_plane, column_weights, tile_sums
+from services.pi_tracker.measure.blob_tiles import GAP, powers
 
 # BT.601 in limited range: Y - 16, U - 128, V - 128 to R, G, B in 0..255. Rounded to three digits,
 # unlike image/hue.py: measured figures are with these.
@@ -44,7 +46,7 @@ _POWER_SLOPES = 1.5 * _YUV_FROM_POWER.T
 # The background of a cell is that of its direct neighbours (Gaussian of so many cells). Its paint's
 # luma, which falls off across a finger, is the mean of 3 x 3 cells, its colour that of 5 x 5: with
 # 3 there is more noise, with all of a large marker's cells its highlight.
-_BLUR_CELLS = 0.6
+_BLUR = cv2.getGaussianKernel(3, 0.6, cv2.CV_32F)
 _ROW3, _ROW5 = np.full(3, 1 / 3, np.float32), np.full(5, 1 / 5, np.float32)
 # Weight of the mean of all pure cells beside that of near ones: nothing where there are any,
 # everything where there are none.
@@ -62,19 +64,20 @@ class LinearLight:
 
     def __init__(self, cells: Image) -> None:
         """Decodes cells of the camera: Y - 16, U - 128, V - 128 and 1, float32 (4, h, n, w)."""
-        rgb = _RGB1 @ cells.reshape(4, -1)
+        rgb = np.dot(_RGB1, cells.reshape(4, -1))
         # Noise may be negative.
-        root = np.sqrt(np.abs(rgb))
+        root = np.abs(rgb)
+        np.sqrt(root, out=root)
         rgb *= root
-        self.cells = np.asarray(_YUV1_FROM_POWER @ rgb).reshape(cells.shape)
+        self.cells = np.dot(_YUV1_FROM_POWER, rgb).reshape(cells.shape)
         self.rows = np.ascontiguousarray(self.cells.swapaxes(0, 1))
         self._root = root[:3]
 
     def derivative_by_encoded(self, slopes: Image) -> Image:
         """Chain rule: derivatives (3, h, n, w) by Y, U, V of light, as those by Y, U, V encoded."""
-        by_rgb = _POWER_SLOPES @ slopes.reshape(3, -1)
+        by_rgb = np.dot(_POWER_SLOPES, slopes.reshape(3, -1))
         by_rgb *= self._root
-        return np.asarray(_RGB.T @ by_rgb).reshape(slopes.shape)
+        return np.dot(_RGB.T, by_rgb).reshape(slopes.shape)
 
 
 class PaintFraction(NamedTuple):
@@ -95,12 +98,24 @@ class Mixture:
         """
         self._light = light
         known, self._means = _weighted_cells(light.rows, pure)
-        s, self._y_b = _chromaticity_and_luma(_blur(known[0]))
-        d, self._y_p = _chromaticity_and_luma(_mean5x5(known[1]))
+        _, h, _, n, w = known.shape
+        planes = known.reshape(2, h, 4 * n * w)
+        # Y, U, V and weight in windows about every cell, of background and of paint.
+        near = np.empty_like(planes)
+        _filtered(planes[0], _BLUR, near[0])
+        _filtered(planes[1], _ROW5, near[1])
+        by_channel = near.reshape(2, h, 4, n * w)
+        luma = np.maximum(by_channel[:, :, 0], by_channel[:, :, 3])
+        chroma = np.empty((2, 2, h, n * w), np.float32)
+        np.divide(by_channel[:, :, 1:3].swapaxes(1, 2), luma[:, None], out=chroma)
+        luma /= by_channel[:, :, 3]
         if not rough:
-            luma_and_weight = _mean3x3(known[1][:, ::3])  # (h, 2, n, w)
-            weight = luma_and_weight[:, 1]
-            self._y_p = np.maximum(luma_and_weight[:, 0], weight) / weight
+            luma_and_weight = known[1, :, ::3].reshape(h, 2 * n * w)
+            nearest = _filtered(luma_and_weight, _ROW3).reshape(h, 2, n * w)
+            np.maximum(nearest[:, 0], nearest[:, 1], out=luma[1])
+            luma[1] /= nearest[:, 1]
+        self._y_b, self._y_p = luma.reshape(2, h, n, w)
+        s, d = chroma.reshape(2, 2, h, n, w)
         d -= s
         norm = d * d
         norm[0] += norm[1]
@@ -151,30 +166,22 @@ class Mixture:
         variance += squares[0] * noise.luma**2
         return PaintFraction(fraction, slopes[0], variance)
 
-    def contrast(self) -> Image:
-        """Distance of the paint's mean chroma per luma from the background's, in light; (n,)."""
-        around, paint = self._means[:, 1:3] / np.maximum(self._means[:, :1], _DARKEST)
-        return np.hypot(*(paint - around))
+    def contrast(self) -> list[float]:
+        """Distance of the paint's mean chroma per luma from the background's, in light; of each."""
+        # Of as few numbers, Python's arithmetic takes half as long as numpy's.
+        return [
+            math.hypot(
+                u / max(y, _DARKEST) - u_b / max(y_b, _DARKEST),
+                v / max(y, _DARKEST) - v_b / max(y_b, _DARKEST),
+            )
+            for y_b, u_b, v_b, y, u, v in self._means[:, :3].reshape(6, -1).T.tolist()
+        ]
 
 
-def _blur(image: Image) -> Image:
-    plane = cv2.GaussianBlur(as_plane(image), (3, 3), _BLUR_CELLS, borderType=cv2.BORDER_CONSTANT)
-    return plane.reshape(image.shape)
-
-
-def _mean3x3(image: Image) -> Image:
-    return _mean(image, _ROW3)
-
-
-def _mean5x5(image: Image) -> Image:
-    return _mean(image, _ROW5)
-
-
-def _mean(image: Image, row: Image) -> Image:
-    # Not cv2.blur, whose running sums leave rounding errors where there is next to nothing: weights
-    # would not stay above 0.
-    plane = cv2.sepFilter2D(as_plane(image), -1, row, row, borderType=cv2.BORDER_CONSTANT)
-    return plane.reshape(image.shape)
+def _filtered(plane: Image, row: Image, into: Image | None = None) -> Image:
+    # Not cv2.GaussianBlur, which takes half as long again; nor cv2.blur, whose running sums leave
+    # rounding errors where there is next to nothing: weights would not stay above 0.
+    return cv2.sepFilter2D(plane, -1, row, row, into, borderType=cv2.BORDER_CONSTANT)
 
 
 def _weighted_cells(rows: Image, weights: Image) -> tuple[Image, Image]:
@@ -185,25 +192,21 @@ def _weighted_cells(rows: Image, weights: Image) -> tuple[Image, Image]:
     """
     h, c, n, w = rows.shape
     known = rows * weights[:, :, None]
-    mean = tile_sums(known)
+    runs = known.reshape(2, h, c * n * w)
+    sums = np.matmul(powers(h, 0).T, runs)
+    mean = np.asarray(sums.reshape(2, c, n, w) @ powers(w, 0)[:, 0])
     mean /= np.maximum(mean[:, 3:], 1e-6)
     mean[:, 3] = 1.0
-    # Nothing between tiles, so that windows do not reach the next tile. In runs as long as rows:
-    # half the time of short ones.
-    runs = known.reshape(2, h, c * n * w)
-    faint_mean = (_FALLBACK_WEIGHT * mean)[..., None] * column_weights(w)
-    runs += faint_mean.reshape(2, 1, c * n * w)
+    # In runs as long as rows: half the time of short ones.
+    runs += (mean[..., None] * _faint(w)).reshape(2, 1, c * n * w)
     return known, mean
 
 
-def _chromaticity_and_luma(filtered: Image) -> tuple[Image, Image]:
-    """Chroma per luma (2, h, n, w) and luma (h, n, w) of filtered pure cells.
+@functools.lru_cache(maxsize=256)
+def _faint(width: int) -> Image:
+    """_FALLBACK_WEIGHT for a tile's columns, next to nothing for the gap at its end; (w,).
 
-    filtered (h, 4, n, w) has the window's sums of Y, U, V and weight.
+    So windows do not reach the next tile, and no sum is 0 there.
     """
-    h, _, n, w = filtered.shape
-    luma = np.maximum(filtered[:, 0], filtered[:, 3])
-    chroma = np.empty((2, h, n, w), np.float32)
-    np.divide(filtered[:, 1:3].swapaxes(0, 1), luma, out=chroma)
-    luma /= filtered[:, 3]
-    return chroma, luma
+    weights = np.repeat(np.array([1.0, 1e-6], np.float32), (width - GAP, GAP))
+    return _FALLBACK_WEIGHT * weights

@@ -26,11 +26,9 @@ def test_bgr_and_i420_agree(studio, tip):
     for image in (planar, packed):
         for every, third in zip(image.cells(rect), image.cells(rect, 3), strict=True):
             assert np.array_equal(every[::3], third)
-    buffers = [(np.zeros((50, 44), np.uint8), np.zeros((2, 25, 22), np.uint8)) for _ in range(2)]
+    buffers = [(np.zeros((44, 40), np.uint8), np.zeros((2, 22, 20), np.uint8)) for _ in range(2)]
     for image, (luma, chroma) in zip((planar, packed), buffers, strict=True):
         image.copy_to(rect, luma, chroma)
-        assert not luma[44:].any()
-        assert not luma[:, 40:].any()
     assert np.abs(buffers[0][0].astype(int) - buffers[1][0]).max() <= 1
     assert np.abs(buffers[0][1].astype(int) - buffers[1][1]).max() <= 1
 
@@ -47,10 +45,8 @@ def test_full_range_means_the_same_as_limited_range(studio, tip):
         assert np.abs(a.astype(int) - b.astype(int)).max() <= 1
     copies = []
     for frame in (limited, full):
-        luma, chroma = np.zeros((70, 70), np.uint8), np.zeros((2, 35, 35), np.uint8)
+        luma, chroma = np.zeros((64, 64), np.uint8), np.zeros((2, 32, 32), np.uint8)
         picture(frame).copy_to(rect, luma, chroma)
-        assert not luma[64:].any()
-        assert not chroma[:, 32:].any()
         copies.append((luma.astype(int), chroma.astype(int)))
     assert np.abs(copies[0][0] - copies[1][0]).max() <= 1
     assert np.abs(copies[0][1] - copies[1][1]).max() <= 1

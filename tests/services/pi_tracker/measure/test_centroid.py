@@ -142,3 +142,16 @@ def test_blobs_measured_together_are_measured_as_if_alone(studio, tip, detector,
     for together, blob in zip(centroids(image, blobs, noise), blobs, strict=True):
         (alone,) = centroids(image, [blob], noise)
         assert together == pytest.approx(alone, abs=1e-3)
+
+
+def test_a_blob_at_the_left_edge_leaves_its_neighbour_in_the_stack_alone(
+    studio, tip, detector, noise
+):
+    """Tiles lie side by side: what a mask at the edge gains must not count in the tile before."""
+    frame, _ = studio.frame([tip("green", 40.0, 32.0), tip("blue", 1.0, 32.0)], sigma=0.0)
+    image = picture(frame)
+    blobs = {detector.names[blob.color]: blob for blob in detector.detect(image, whole(image.size))}
+    inner, cut = blobs["green"], blobs["blue"]
+    assert cut.rect[0] == 0
+    alone, (beside, _) = (centroids(image, of, noise) for of in ([inner], [inner, cut]))
+    assert beside == pytest.approx(alone[0], abs=1e-5)
