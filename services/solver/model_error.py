@@ -10,6 +10,9 @@ they are not estimated, but their effect S = d(pose error)/d(b) is carried along
 
 H and J the derivatives of the landmarks by pose and by b, R the landmarks' covariance. S B S' is
 what they add to the pose's covariance, B the covariance of b. Limits of joints are not considered.
+R is the fit's own, with the misfit that it learned: with a smaller one P H' R^-1 H exceeds what P
+allows, and S grows without end where it should die away. Huber's weights and a rival's share of P
+do the same for some messages, so the gain is held to that bound (`_consistent_share`).
 Two cures go with that: landmarks are told to the fit no more precisely than the model is
 (`widened`), and a hand that was measured has small errors, one that is known exactly none.
 """
@@ -35,7 +38,6 @@ from services.solver.whole_hand.landmarks import (
     Observation,
     Observations,
     Observed,
-    observation_arrays,
 )
 from services.solver.whole_hand.motion_prior import UNKNOWNS
 
@@ -44,6 +46,8 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS
 _SIZE, _BONES, _ROOTS, _PAINT = 0, 1, 16, 31
 # Time in which what an old error did to the angles is forgotten, between the motion prior's two.
 _FORGET_S = 0.4
+# Eigenvalues this much above 1 are rounding: covariances of 26 unknowns are inverted to about 1e-9.
+_ROUNDING = 1e-6
 # Share of the fit's own covariance that is published: its prior allows for more postures than a
 # hand takes. On fourteen rendered captures of hands that were known exactly, squared errors over
 # variances were .47 (wrist), .28 (orientation), .33 (fingers) with all of it.
@@ -78,7 +82,7 @@ class ModelError:
         """landmarks: all of the model (landmarks.hand_landmarks)."""
         spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
         paint = [spread.tip_paint_m if name in TIPS else spread.dab_m for name in landmarks]
-        self._chains, self._landmarks, self._landmark_m = chains, landmarks, spread.landmark_m
+        self._chains, self._landmark_m = chains, spread.landmark_m
         self._column = {name: _PAINT + 3 * n for n, name in enumerate(landmarks)}
         self._sigmas = np.concatenate(
             [[spread.size], [spread.bone] * 15, [spread.root_m] * 15, np.ravel(paint)]
@@ -95,23 +99,26 @@ class ModelError:
         wider_m2 = seen.covariances_m2 + self._landmark_m**2 * np.eye(3)
         return Observed(seen.names, seen.points_m, wider_m2, seen.measured)
 
-    def pose_covariance(
-        self, stamp_ns: int, estimate: HandEstimate, observed: Mapping[str, Observation]
+    def pose_variances(
+        self,
+        stamp_ns: int,
+        estimate: HandEstimate,
+        names: tuple[str, ...],
+        observations: Observations,
     ) -> Array:
-        """The covariance (26, 26) of an estimate's rotation, position and angles (rad, m).
+        """The variances (26,) of an estimate's rotation, position and angles (rad^2, m^2).
 
-        observed: the landmarks that it was fitted to, widened.
+        names and observations: the landmarks that it was fitted to, as the fit was told.
         """
         if not self._known_wrong:
-            return _FIT_SHARE * estimate.covariance
+            return _FIT_SHARE * estimate.covariance.diagonal()
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
         is_gap = not 0.0 <= seconds <= MAX_GAP_S
-        seen = Observed.of(observed)
-        columns = np.array([self._column[name] for name in seen.names], dtype=np.int64)
+        columns = np.array([self._column[name] for name in names], dtype=np.int64)
         return _considered(
             self._chains,
-            observation_arrays(self._landmarks, seen),
+            observations,
             columns,
             (estimate.rotation, estimate.angles_rad, estimate.covariance),
             (self._S, self._sigmas),
@@ -128,7 +135,7 @@ def _considered(
     errors: tuple[Array, Array],
     keep: float,
 ) -> Array:
-    """The covariance (26, 26) of a pose with what the model's errors add to it.
+    """The variances (26,) of a pose with what the model's errors add to them.
 
     estimate: rotation (3, 3), angles (5, 4) and covariance (26, 26) of the fit. errors: S (26, b),
     taken on to this message, and their standard deviations (b,). keep: how much of an old error's
@@ -146,9 +153,38 @@ def _considered(
         rows = slice(3 * n, 3 * n + 3)
         H[rows] = observations.whitening[n] @ H[rows]
         J[rows] = observations.whitening[n] @ J[rows]
-    S -= covariance @ (H.T @ (H @ S + J))
-    scaled = S * sigmas
-    return _FIT_SHARE * covariance + scaled @ scaled.T
+    gain = covariance @ H.T
+    gain *= _consistent_share(H @ gain)
+    S -= gain @ (H @ S + J)
+    variances = np.empty(UNKNOWNS)
+    for i in range(UNKNOWNS):
+        variances[i] = _FIT_SHARE * covariance[i, i]
+        for k in range(sigmas.size):
+            variances[i] += (S[i, k] * sigmas[k]) ** 2
+    return variances
+
+
+@njit(cache=True)
+def _consistent_share(B: Array) -> float:
+    """How much of a gain is left where B = H P H' (n, n), whitened, is to be at most 1.
+
+    P is what is left of a prior after the landmarks: no more than they alone would leave. 1 where
+    that holds, which a Cholesky factorisation tells; else 1 / the largest eigenvalue.
+    """
+    n = B.shape[0]
+    L = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            value = (1.0 + _ROUNDING if i == j else 0.0) - B[i, j]
+            for k in range(j):
+                value -= L[i, k] * L[j, k]
+            if i > j:
+                L[i, j] = value / L[j, j]
+            elif value > 0.0:
+                L[i, i] = math.sqrt(value)
+            else:
+                return 1.0 / max(np.linalg.eigvalsh(0.5 * (B + B.T))[-1], 1.0)
+    return 1.0
 
 
 @njit(cache=True)

@@ -139,12 +139,12 @@ def joint_sources(
     return result
 
 
-def pose_uncertainty(covariance: Array, limits: Array) -> PoseUncertainty:
-    """From the covariance (26, 26) of a pose; limits (5, 4, 2) tell which angles can move.
+def pose_uncertainty(variances: Array, limits: Array) -> PoseUncertainty:
+    """From the variances (26,) of a pose; limits (5, 4, 2) tell which angles can move.
 
     Half a turn and a metre say: unknown.
     """
-    wrist_m, wrist_rad, *fingers_rad = _standard_deviations(covariance, limits).tolist()
+    wrist_m, wrist_rad, *fingers_rad = _standard_deviations(variances, limits).tolist()
     return PoseUncertainty(
         wrist_m=min(wrist_m, 1.0),
         wrist_rad=min(wrist_rad, math.pi),
@@ -153,18 +153,18 @@ def pose_uncertainty(covariance: Array, limits: Array) -> PoseUncertainty:
 
 
 @njit(cache=True)
-def _standard_deviations(covariance: Array, limits: Array) -> Array:
+def _standard_deviations(variances: Array, limits: Array) -> Array:
     """Of the wrist's position and rotation, as lengths, and of each digit's angles (7,)."""
     found = np.zeros(7)
     for i in range(3):
-        found[0] += max(covariance[3 + i, 3 + i], 0.0)
-        found[1] += max(covariance[i, i], 0.0)
+        found[0] += max(variances[3 + i], 0.0)
+        found[1] += max(variances[i], 0.0)
     for row in range(5):
         movable = 0
         for j in range(4):
             if limits[row, j, 1] > limits[row, j, 0]:
                 angle = 6 + 4 * row + j
                 movable += 1
-                found[2 + row] += max(covariance[angle, angle], 0.0)
+                found[2 + row] += max(variances[angle], 0.0)
         found[2 + row] /= max(movable, 1)
     return np.sqrt(found)

@@ -86,13 +86,15 @@ class _Hand:
             return None
         fingers = self._solve_fingers(estimate, observed)
         limits = self.tracker.chains.limits_rad
-        covariance = self._model_error.pose_covariance(points.stamp_ns, estimate, observed)
+        variances = self._model_error.pose_variances(
+            points.stamp_ns, estimate, observed.names, self.tracker.fitted
+        )
         return hand_pose(
             points,
             self._settings.method,
             self._skeleton(estimate, fingers, observed),
             fingers,
-            pose_uncertainty(covariance, limits),
+            pose_uncertainty(variances, limits),
         )
 
     def _solve_fingers(self, estimate: HandEstimate, observed: Observed) -> FingerSolution:

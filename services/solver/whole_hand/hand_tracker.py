@@ -75,6 +75,8 @@ class HandTracker:
         self._misfit_m2 = 0.0
         self._rival: Rival | None = None
         self._restart_landmarks: frozenset[str] = frozenset()
+        # What the last estimate was fitted to.
+        self.fitted = observation_arrays(landmarks, {})
         # An estimate that is to be compared with a restart, and what it was fitted to.
         self._to_challenge: tuple[HandEstimate, Observations] | None = None
 
@@ -96,6 +98,7 @@ class HandTracker:
                 return None
             self._misfit_m2, seconds = 0.0, MAX_GAP_S
         observations = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
+        self.fitted = observations
         if self._estimate is None:
             own = self._initialise(observations)
         else:
