@@ -18,8 +18,8 @@ _LOST_NS = 5_000_000_000
 _SIGMAS, _MIN_RADIUS = 3.0, 0.018
 # Letters and lines, as shares of the picture's width: readable where it is 350 pixels wide.
 _LETTER, _LINE = 1.0 / 26.0, 1.0 / 320.0
-# A letter's breadth for its height, the mean of a sans-serif's small letters.
-_BROAD = 0.58
+# A letter's breadth for its height: the mean of a broad sans-serif's small letters and its outline.
+_BROAD = 0.68
 _WHITE, _LOST, _SEARCHED = "#ffffff", "#ffb000", "#7fd4ff"
 # Names of colours that are not in view, before they are counted.
 _MAX_NAMES = 6
