@@ -138,7 +138,36 @@ def boxes(page: Any) -> list[tuple[str, float, float]]:
     return placed
 
 
-def test_visitors_do_not_change_each_others_view(
+def nothing_overlaps_at_a_desk(page: Any) -> None:
+    """The panel is beside the scene."""
+    canvas = page.locator("canvas").first.bounding_box()
+    left = page.get_by_role("tab", name="Live").bounding_box()["x"]
+    assert canvas["x"] + canvas["width"] <= left
+    assert canvas["width"] > 0.6 * DESK["width"]
+    nothing_overlaps(page, DESK)
+
+
+def nothing_overlaps_on_a_phone(page: Any) -> None:
+    """The sheet is closed at first; opened, it leaves the upper half to the hand."""
+    closed = until(page, lambda: page.locator(SHEET).bounding_box())
+    until(page, lambda: page.locator(SHEET).bounding_box()["height"] < 80)
+    assert closed["width"] == PHONE["width"]
+    page.locator(SHEET).get_by_text("rhot: 1 problem").click()
+    until(page, lambda: page.locator(SHEET).bounding_box()["height"] > 300)
+    page.wait_for_timeout(500)
+    assert page.locator(SHEET).bounding_box()["y"] >= 0.49 * PHONE["height"]
+    nothing_overlaps(page, PHONE)
+
+
+def nothing_overlaps(page: Any, size: dict[str, int]) -> None:
+    """What stands in the panel stands below each other, within the window."""
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    assert "rig.json: no such file" in page.inner_text("body")
+    for (name, _, bottom), (below, top, _) in itertools.pairwise(boxes(page)):
+        assert bottom <= top + 1.0, f"{name} overlaps {below} at {size}"
+
+
+def test_visitors_do_not_change_each_others_view_and_nothing_overlaps(
     chromium: Any, viewer: str, bend: list[float]
 ) -> None:
     asked: list[str] = []
@@ -158,6 +187,8 @@ def test_visitors_do_not_change_each_others_view(
     bend[0] = 0.5
     until(desk, lambda: degrees(desk, "index") == ["1°", "47°", "57°", "35°"])
     assert desk.title() == "rhot"
+    desk.get_by_text("rhot: 1 problem").first.wait_for(**WAIT)
+    nothing_overlaps_at_a_desk(desk)
 
     choose(desk, "camera pictures", "left")
     desk.locator("svg circle").first.wait_for(**WAIT)
@@ -169,13 +200,8 @@ def test_visitors_do_not_change_each_others_view(
 
     phone = visit(PHONE)
     until(phone, lambda: "rhot: 1 problem" in phone.inner_text("body"))
-    phone.locator(SHEET).get_by_text("rhot: 1 problem").click()
-    phone.get_by_label("camera pictures", exact=True).first.wait_for(**WAIT)
-    assert phone.get_by_label("camera pictures", exact=True).first.input_value() == "none"
-    assert not phone.get_by_label("finger trails").first.is_checked()
-    assert phone.locator('img[src^="data:image/jpeg"]').count() == 0
-    assert phone.locator(".uplot").count() == 0
-    assert phone.get_by_role("tab", name="Live").get_attribute("aria-selected") == "true"
+    nothing_overlaps_on_a_phone(phone)
+    shows_nothing_of_the_desk(phone)
     # And what the phone chooses leaves the desk as it is.
     choose(phone, "camera pictures", "right")
     phone.get_by_text("waiting for the picture of right").wait_for(**WAIT)
@@ -190,34 +216,14 @@ def test_visitors_do_not_change_each_others_view(
         page.context.close()
 
 
-def test_nothing_overlaps_at_a_desk_or_on_a_phone(
-    chromium: Any, viewer: str, bend: list[float]
-) -> None:
-    for size in (DESK, PHONE):
-        page = chromium.new_page(viewport=size)
-        page.set_default_timeout(DEADLINE_S * 1e3)
-        page.goto(viewer)
-        page.get_by_text("rhot: 1 problem").first.wait_for(**WAIT)
-        if size is PHONE:
-            closed = until(page, lambda page=page: page.locator(SHEET).bounding_box())
-            until(page, lambda page=page: page.locator(SHEET).bounding_box()["height"] < 80)
-            assert closed["width"] == size["width"]
-            page.get_by_text("rhot: 1 problem").first.click()
-            until(page, lambda page=page: page.locator(SHEET).bounding_box()["height"] > 300)
-            page.wait_for_timeout(500)
-            # The upper half is the hand's.
-            assert page.locator(SHEET).bounding_box()["y"] >= 0.49 * size["height"]
-        else:
-            canvas = page.locator("canvas").first.bounding_box()
-            left = page.get_by_role("tab", name="Live").bounding_box()["x"]
-            assert canvas["x"] + canvas["width"] <= left
-            assert canvas["width"] > 0.6 * size["width"]
-        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
-        assert "rig.json: no such file" in page.inner_text("body")
-        placed = boxes(page)
-        for (name, _, bottom), (below, top, _) in itertools.pairwise(placed):
-            assert bottom <= top + 1.0, f"{name} overlaps {below} at {size}"
-        page.close()
+def shows_nothing_of_the_desk(phone: Any) -> None:
+    """No picture, no trails, no chart, and the first tab."""
+    phone.get_by_label("camera pictures", exact=True).first.wait_for(**WAIT)
+    assert phone.get_by_label("camera pictures", exact=True).first.input_value() == "none"
+    assert not phone.get_by_label("finger trails").first.is_checked()
+    assert phone.locator('img[src^="data:image/jpeg"]').count() == 0
+    assert phone.locator(".uplot").count() == 0
+    assert phone.get_by_role("tab", name="Live").get_attribute("aria-selected") == "true"
 
 
 def test_a_browser_comes_in_with_the_token_only(chromium: Any) -> None:
