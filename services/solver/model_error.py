@@ -150,9 +150,8 @@ def _considered(
     J = np.zeros((3 * observations.joint.size, sigmas.size))
     _fill_derivatives(chains, observations, paint_columns, rotation, angles, (H, J))
     for n in range(observations.joint.size):
-        rows = slice(3 * n, 3 * n + 3)
-        H[rows] = observations.whitening[n] @ H[rows]
-        J[rows] = observations.whitening[n] @ J[rows]
+        _whiten(observations.whitening[n], H[3 * n : 3 * n + 3])
+        _whiten(observations.whitening[n], J[3 * n : 3 * n + 3])
     gain = covariance @ H.T
     gain *= _consistent_share(H @ gain)
     S -= gain @ (H @ S + J)
@@ -162,6 +161,22 @@ def _considered(
         for k in range(sigmas.size):
             variances[i] += (S[i, k] * sigmas[k]) ** 2
     return variances
+
+
+@njit(cache=True)
+def _turn(R: Array, v: Array, out: Array) -> None:
+    """Fill out (3,) with R v: for three numbers a call of `@` costs more than the product."""
+    for i in range(3):
+        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+
+
+@njit(cache=True)
+def _whiten(W: Array, rows: Array) -> None:
+    """Multiply rows (3, n) by a lower triangle W (3, 3), in place."""
+    for k in range(rows.shape[1]):
+        rows[2, k] = W[2, 0] * rows[0, k] + W[2, 1] * rows[1, k] + W[2, 2] * rows[2, k]
+        rows[1, k] = W[1, 0] * rows[0, k] + W[1, 1] * rows[1, k]
+        rows[0, k] = W[0, 0] * rows[0, k]
 
 
 @njit(cache=True)
@@ -203,7 +218,7 @@ def _fill_derivatives(
     """
     H, J = out
     frames = digit_frames(chains, angles)
-    p = np.empty(3)
+    p, arm, moved = np.empty(3), np.empty(3), np.empty(3)
     for n in range(observations.joint.size):
         row = observations.digit[n]
         h, j = H[3 * n : 3 * n + 3], J[3 * n : 3 * n + 3]
@@ -215,17 +230,23 @@ def _fill_derivatives(
             k = 0
             while CHAINS[row, k] != observations.joint[n]:
                 k += 1
-            p[:] = frames.roots_m[row, k] + frames.rotations[row, k] @ observations.offset_m[n]
-            paint[:] = R @ frames.rotations[row, k]
+            _turn(frames.rotations[row, k], observations.offset_m[n], p)
+            p += frames.roots_m[row, k]
+            for i in range(3):
+                _turn(R, frames.rotations[row, k, :, i], paint[:, i])
             j[:, _ROOTS + 3 * row : _ROOTS + 3 * row + 3] = R
             for bone in range(k):
                 along = frames.roots_m[row, bone + 1] - frames.roots_m[row, bone]
-                j[:, _BONES + 3 * row + bone] = R @ along
+                _turn(R, along, j[:, _BONES + 3 * row + bone])
             for a in range(observations.depth[n]):
                 # Axis x lever arm. Abduction and the first flexion turn about the same root.
                 lever = p - frames.roots_m[row, max(a - 1, 0)]
-                h[:, 6 + 4 * row + a] = R @ np.cross(frames.axes[row, a], lever)
-        arm = R @ p
+                x, y, z = frames.axes[row, a]
+                moved[0] = y * lever[2] - z * lever[1]
+                moved[1] = z * lever[0] - x * lever[2]
+                moved[2] = x * lever[1] - y * lever[0]
+                _turn(R, moved, h[:, 6 + 4 * row + a])
+        _turn(R, p, arm)
         j[:, _SIZE] = arm
         h[0, 1], h[0, 2] = arm[2], -arm[1]
         h[1, 0], h[1, 2] = -arm[2], arm[0]

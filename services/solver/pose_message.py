@@ -29,6 +29,7 @@ from services.solver.maths.quaternions import quaternions_from_rotations
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
 _DECIMALS = 6
+_UNITS = 10.0**_DECIMALS
 
 # Of each joint: the digit whose chain it belongs to, -1 for those fixed to the wrist.
 _DIGIT_OF = [next((row for row in range(5) if joint in CHAINS[row, 1:]), -1) for joint in range(26)]
@@ -61,18 +62,17 @@ def hand_pose(
     uncertainty: PoseUncertainty,
 ) -> HandPose:
     """The message; fingers are already rounded and within limits."""
-    positions = rounded(skeleton.positions_m)
-    orientations = rounded(quaternions_from_rotations(skeleton.rotations))
-    parts = zip(JOINTS, positions, orientations, skeleton.radii_m, skeleton.sources, strict=True)
+    numbers = _rounded_frames(skeleton.positions_m, skeleton.rotations).tolist()
+    parts = zip(JOINTS, numbers, skeleton.radii_m, skeleton.sources, strict=True)
     joints = [
         HandJoint(
             name=name,
-            position_m=tuple(position),
-            orientation_wxyz=tuple(orientation),
+            position_m=(px, py, pz),
+            orientation_wxyz=(w, x, y, z),
             radius_m=radius_m,
             source=source,
         )
-        for name, position, orientation, radius_m, source in parts
+        for name, (px, py, pz, w, x, y, z), radius_m, source in parts
     ]
     wrist = joints[JOINT_INDEX["wrist"]]
     return HandPose(
@@ -112,13 +112,31 @@ def rounded(values: Array) -> list:
     return (np.round(values, _DECIMALS) + 0.0).tolist()
 
 
+@njit(cache=True)
+def _rounded_frames(positions: Array, rotations: Array) -> Array:
+    """Positions (n, 3) and quaternions wxyz of rotations (n, 3, 3) as `rounded`; (n, 7)."""
+    quaternions = quaternions_from_rotations(rotations)
+    numbers = np.empty((positions.shape[0], 7))
+    for n in range(positions.shape[0]):
+        for i in range(3):
+            numbers[n, i] = np.rint(positions[n, i] * _UNITS) / _UNITS + 0.0
+        for i in range(4):
+            numbers[n, 3 + i] = np.rint(quaternions[n, i] * _UNITS) / _UNITS + 0.0
+    return numbers
+
+
+@njit(cache=True)
 def rounded_within_limits(angles: Array, limits: Array) -> Array:
     """Angles (5, 4) as they go out: rounded, and still within limits (5, 4, 2).
 
     Rounding alone would cross a limit here and there.
     """
-    inside = np.maximum(np.round(angles, _DECIMALS), limits[:, :, 0])
-    return np.minimum(inside, limits[:, :, 1]) + 0.0
+    inside = np.empty((5, 4))
+    for row in range(5):
+        for k in range(4):
+            near = max(np.rint(angles[row, k] * _UNITS) / _UNITS, limits[row, k, 0])
+            inside[row, k] = min(near, limits[row, k, 1]) + 0.0
+    return inside
 
 
 def joint_sources(

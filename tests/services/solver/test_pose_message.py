@@ -14,7 +14,7 @@ def test_rounding_has_no_negative_zero() -> None:
 
 
 def test_rounding_does_not_leave_the_limits() -> None:
-    limits = np.tile([-1.0 / 3.0, 1.0 / 3.0], (5, 4, 1))
+    limits = np.tile(np.array([-1.0 / 3.0, 1.0 / 3.0]), (5, 4, 1))
     inside = rounded_within_limits(np.full((5, 4), 1.0 / 3.0), limits)
     assert np.all(inside <= limits[..., 1])
     assert rounded_within_limits(np.full((5, 4), 0.1234567), limits)[0, 0] == pytest.approx(
