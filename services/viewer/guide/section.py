@@ -95,7 +95,8 @@ class GuideTab:
         if step is self._shown:
             return
         self._shown = step
-        _set(self._text, texts.instructions(step))
+        simulated = any(one.source == "simulator" for one in self._section.service.config.camera)
+        _set(self._text, texts.instructions(step, simulated=simulated))
         self._exposure.show(step.name == "camera")
         self._colours.show(step.name == "colours")
         self._measured.show(_measurable(step))

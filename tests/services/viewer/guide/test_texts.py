@@ -75,3 +75,8 @@ def test_an_exposure_is_judged_by_what_its_tracker_finds() -> None:
     assert "it is black; light" in texts.exposure("left", fixed, "", faults)
     assert "Good" in texts.exposure("right", fixed, "", faults)
     assert "nothing to set" in texts.exposure("left", ExposureControl(adjustable=False), "", [])
+
+
+def test_a_simulated_rig_asks_nobody_to_follow():
+    assert "simulated" not in texts.instructions(STEPS[0])
+    assert "needs no calibration" in texts.instructions(STEPS[0], simulated=True)
