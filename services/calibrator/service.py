@@ -7,10 +7,17 @@ somebody says so. What goes wrong is told to who asks, and ends the step, never 
 from __future__ import annotations
 
 import asyncio
+import importlib.util
 
 from rhot import topics
 from rhot.process.service import Service
 from services.calibrator.endpoints.guide import Guide
+
+# What its steps need. They are imported as the first one starts: until then it stays small.
+_NEEDED = ("cv2", "numba", "scipy")
+for _name in _NEEDED:
+    if importlib.util.find_spec(_name) is None:
+        raise ModuleNotFoundError(f"No module named {_name!r}", name=_name)
 
 
 async def serve(service: Service) -> None:
