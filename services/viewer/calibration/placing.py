@@ -1,5 +1,6 @@
-"""A camera's picture on a canvas of the shape of a browser's window: beside the panel, or above it
-on a phone. Pure.
+"""A camera's picture on a canvas of the shape of the scene's window, above the panel on a phone.
+
+Pure.
 """
 
 from __future__ import annotations
@@ -11,11 +12,9 @@ import numpy as np
 
 from services.viewer.calibration.picture import Image
 
-# The panel floats over the right side of the window, this wide (control_width "large"); in a narrow
-# window it covers the lower part.
-_PANEL_PX, _NARROW_PX = 400, 640
-# Of a narrow window, how much is above the panel.
-_ABOVE = 0.45
+# In a window as narrow as a phone's the panel covers the lower part, and so much is above it; in
+# others it is docked beside the scene.
+_NARROW_PX, _ABOVE = 640, 0.45
 _MARGIN = 0.03
 # A larger canvas is only sent for longer; a window that has said nothing yet is a small one.
 _MOST_PX, _LEAST_PX = 1600, 240
@@ -38,14 +37,12 @@ class Place(NamedTuple):
 def placed(rgb: Image, window_px: tuple[int, int]) -> tuple[Image, Place]:
     """The picture (h, w, 3) on a canvas of the window's shape, and where it is there."""
     width, height = (max(int(one), _LEAST_PX) for one in window_px)
-    narrow = width < _NARROW_PX
-    free_w = width if narrow else width - min(_PANEL_PX, width // 2)
-    free_h = int(_ABOVE * height) if narrow else height
-    scale = (1.0 - 2.0 * _MARGIN) * min(free_w / rgb.shape[1], free_h / rgb.shape[0])
+    free_h = int(_ABOVE * height) if width < _NARROW_PX else height
+    scale = (1.0 - 2.0 * _MARGIN) * min(width / rgb.shape[1], free_h / rgb.shape[0])
     shrink = min(1.0, _MOST_PX / max(width, height))
     canvas_w, canvas_h = round(width * shrink), round(height * shrink)
     w, h = (max(1, round(side * scale * shrink)) for side in (rgb.shape[1], rgb.shape[0]))
-    left, top = round(0.5 * (free_w * shrink - w)), round(0.5 * (free_h * shrink - h))
+    left, top = round(0.5 * (width * shrink - w)), round(0.5 * (free_h * shrink - h))
     canvas = np.full((canvas_h, canvas_w, 3), _BACKGROUND, np.uint8)
     shown = cv2.resize(rgb, (w, h), interpolation=cv2.INTER_LINEAR)
     canvas[top : top + h, left : left + w] = shown
