@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Coroutine
-from typing import Any
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
 
 from rhot import topics
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Objects, load_objects, load_rig_cameras
+from rhot.topics import Topic
 from services.calibrator.endpoints.desk import Desk
 from services.calibrator.guided.found import Found
 from services.calibrator.guided.objects import objects_found
@@ -17,6 +18,8 @@ from services.calibrator.objects.recorded import Recorded
 from services.calibrator.objects.register import register
 from services.calibrator.objects.wanted import Painted, painted_objects
 from services.calibrator.output.objects_file import objects_file
+
+T = TypeVar("T")
 
 _LOOK_S = 1.0
 # So long at least: more of the same seconds average the noise away.
@@ -49,25 +52,15 @@ async def objects_step(desk: Desk) -> Found:
 
 
 def _listeners(desk: Desk, recorded: Recorded) -> list[Coroutine[Any, Any, None]]:
-    bus = desk.bus
-
-    async def frames() -> None:
-        subscription = bus.every(topics.MARKERS, _QUEUE)
+    async def take(topic: Topic[T], add: Callable[[T], object]) -> None:
+        subscription = desk.bus.every(topic, _QUEUE)
         try:
-            async for frame in subscription:
-                recorded.add_frame(frame)
+            async for message in subscription:
+                add(message)
         finally:
-            bus.close(subscription)
+            desk.bus.close(subscription)
 
-    async def poses() -> None:
-        subscription = bus.every(topics.OPENVR, _QUEUE)
-        try:
-            async for pose in subscription:
-                recorded.add_pose(pose)
-        finally:
-            bus.close(subscription)
-
-    return [frames(), poses()]
+    return [take(topics.MARKERS, recorded.add_frame), take(topics.OPENVR, recorded.add_pose)]
 
 
 async def _listen(desk: Desk, recorded: Recorded, painted: list[Painted]) -> None:
