@@ -27,6 +27,7 @@ class Onlooker:
 
     def __init__(self, bus) -> None:
         self.seen: list[tuple[str, str]] = []
+        self.titles: list[str] = []
         self.captions: list[str] = []
         self._bus = bus
         self._step = ""
@@ -38,6 +39,8 @@ class Onlooker:
     async def captions_said(self) -> None:
         async for caption in self._bus.every(topics.CAPTION, 64):
             self._step = caption.title
+            if caption.title not in self.titles:
+                self.titles.append(caption.title)
             if caption.text not in self.captions:
                 self.captions.append(caption.text)
 
@@ -81,8 +84,9 @@ async def test_everything_that_the_tour_announces_happens(rig) -> None:
         await asyncio.gather(*tasks, return_exceptions=True)
         await rig.bus.request(topics.SIM_STAGE, SimStage(), timeout_s=60.0)
     assert all(tour.happened.values()), tour.happened
-    alive, paint, bump, grasp = dict.fromkeys(step for step, _ in onlooker.seen if step)
-    assert (alive, "tip measured") in onlooker.seen
+    alive, paint, bump, grasp = onlooker.titles
+    # The tour begins with poses; at this pace its first step may be over before the next points.
+    assert "tip measured" in [what for step, what in onlooker.seen if step in ("", alive)]
     order = [what for step, what in onlooker.seen if step == paint]
     assert order.index("tip lost") < order.index("missed")
     assert (bump, "moved") in onlooker.seen
