@@ -47,11 +47,11 @@ soak: $(STAMP)
 browser: $(STAMP)
 	@command -v chromium >/dev/null || { echo "Chromium is missing: sudo apt install chromium"; exit 1; }
 	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[browser]'
-	$(BIN)/pytest -q --durations=10 tests/browser $(ARGS)
+	$(call twice,-q --durations=10 tests/browser $(ARGS))
 
 # The built wheel in new environments, with each extra alone; takes minutes and downloads packages.
 wheel: $(STAMP)
-	$(BIN)/pytest -q --durations=10 -m wheel tests/wheel tests/deploy $(ARGS)
+	$(call twice,-q --durations=10 -m wheel tests/wheel tests/deploy $(ARGS))
 
 # All packages of an installation without a network: dist/wheels/master (this kind of machine) and pi.
 wheels: $(STAMP)
@@ -65,13 +65,13 @@ test-arm64: $(STAMP)
 # A rig as it is used: planted faults and what `rhot doctor` says of them, floods on a secured bus,
 # two Pis as network namespaces, every command of docs/guide/operations.md. Ten minutes.
 test-field: $(STAMP)
-	$(BIN)/pytest -q --durations=10 -m field tests $(ARGS)
+	$(call twice,-q --durations=10 -m field tests $(ARGS))
 
 # A master and two Pis as containers with systemd, installed by deploy/install.sh; faults are planted
 # and a table is printed (and written to build/system.json). Needs root and systemd-container; the
 # first run compiles kernels for minutes, later ones find them in build/hosts.
 test-system: $(STAMP)
-	$(BIN)/pytest -q tests/system $(ARGS)
+	$(call twice,-q tests/system $(ARGS))
 
 # The generated reference pages, and the tables of figures from docs/figures/*.json.
 docs: $(STAMP)
