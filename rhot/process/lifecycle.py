@@ -5,8 +5,8 @@ A service is one coroutine, `serve(service)`. It runs in one TaskGroup together 
 and the watchdog; whatever fails there ends the process with a message and a code (2: the user can
 mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0;
 new calibration files end it with code 75, to be started with them at once.
-While the router is away at start, the service waits for it. Fusion, solver and object tracker may
-serve several rigs (rhot/process/rigs/).
+While the router is away at start, the service waits for it. Fusion, solver, object tracker and
+viewer may serve several rigs (rhot/process/rigs/).
 """
 
 from __future__ import annotations

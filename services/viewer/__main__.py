@@ -7,7 +7,7 @@ from rhot.process.lifecycle import command
 
 def main() -> None:
     """Entry point of rhot-viewer."""
-    command("viewer", "services.viewer.service", __doc__)
+    command("viewer", "services.viewer.service", __doc__, several_rigs=True)
 
 
 if __name__ == "__main__":

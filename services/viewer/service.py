@@ -4,11 +4,13 @@ cameras, joint angles, rates.
 Nothing is subscribed to, and nothing is computed, while no browser is connected. Late streams are
 drawn when they come and hidden when they are a second old; missing ones are said to be missing.
 Uncalibrated cameras are left out, with a note; new lenses and places start the view anew.
+Of several rigs each has a page of its own, which leads to the others.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import socket
 import time
@@ -28,6 +30,7 @@ from rhot.watch.rig_monitor import RigMonitor
 from services.viewer.guide.captions import Captions
 from services.viewer.guide.section import GuideSection
 from services.viewer.live.model import ViewModel
+from services.viewer.pages import RigPage, announced, others
 from services.viewer.panel.banner import Banner
 from services.viewer.panel.fault_texts import starting
 from services.viewer.panel.live_tab import LiveSection
@@ -91,11 +94,15 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
     setup = load_and_watch(service, files, lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
-    with open_server(config.viewer) as server:
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(open_server(config.viewer))
+        own = RigPage(config.rig.name, config.viewer, server.get_port(), socket.gethostname())
+        if not _replays(service):
+            stack.enter_context(announced(own))
         layers = {name: Layer(f"/{name}") for name in LAYERS}
         history = History(config)
         sections: list[Section] = [
-            LiveSection(config, setup.notes, PictureFeed(service), layers),
+            LiveSection(config, setup.notes, PictureFeed(service), layers, lambda: others(own)),
             PlotsSection(config, history),
             RecordingSection(link, config.rig.name, replay_address),
         ]
@@ -109,8 +116,8 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
             Captions(server),
             link.now_s if _replays(service) else time.monotonic,
         )
-        service.values["port"] = server.get_port()
-        log.info("live view at %s", _address(service, server.get_port()))
+        service.values["port"] = own.port
+        log.info("live view at %s", _address(service, own.port))
         service.ready()
         try:
             while True:

@@ -35,28 +35,26 @@ class LiveSection:
         notes: Sequence[str],
         feed: PictureFeed,
         layers: Mapping[LayerName, Layer],
+        other_rigs: Callable[[], Sequence[tuple[str, str]]],
     ) -> None:
-        self._config, self._notes, self._feed, self._layers = config, notes, feed, layers
+        """other_rigs tells name and page of the other rigs of this process."""
+        self.config, self.notes, self.feed, self.layers = config, notes, feed, layers
+        self.other_rigs = other_rigs
 
     def open(self, client: viser.ClientHandle, tab: viser.GuiTabHandle) -> LiveTab:  # noqa: ARG002
         """Fill one visitor's tab."""
-        return LiveTab(client, self._config, self._notes, self._feed, self._layers)
+        return LiveTab(client, self)
 
 
 class LiveTab:
     """Switches and texts of one visitor."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        config: RigConfig,
-        notes: Sequence[str],
-        feed: PictureFeed,
-        layers: Mapping[LayerName, Layer],
-    ) -> None:
-        gui = client.gui
+    def __init__(self, client: viser.ClientHandle, section: LiveSection) -> None:
+        gui, config, notes = client.gui, section.config, section.notes
         self._client, self._config, self._notes = client, config, notes
-        self._feed, self._layers = feed, layers
+        self._feed, self._layers = section.feed, section.layers
+        self._other_rigs = section.other_rigs
+        self._rigs = gui.add_html("", visible=False)
         self._status = gui.add_html(texts.status(config, _NOTHING, notes))
         gui.add_html(texts.legend())
         self._switches = {
@@ -85,6 +83,9 @@ class LiveTab:
     def update(self, seen: Seen) -> None:
         """Bring the texts up to date, and watch the cameras that are chosen."""
         view = seen.view
+        rigs = self._other_rigs()
+        self._rigs.visible = bool(rigs)
+        self._rigs.content = texts.other_rigs(self._config.rig.name, rigs)
         self._status.content = texts.status(self._config, view, self._notes)
         self._rates.content = texts.rates(view.health)
         for hand, handle in self._angles.items():

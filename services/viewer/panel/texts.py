@@ -6,6 +6,7 @@ What is missing is said in words, with what to check.
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 
 import numpy as np
@@ -59,6 +60,15 @@ def _missing(view: View) -> str:
         if needed not in services:
             return missing
     return "it: hold it into the view of two cameras"
+
+
+def other_rigs(own: str, rigs: Sequence[tuple[str, str]]) -> str:
+    """Which rig this page shows, and links to those of the others: name and address of each."""
+    links = (
+        f'<a href="{html.escape(address)}" style="text-decoration:underline">{text(rig)}</a>'
+        for rig, address in rigs
+    )
+    return _box(f"rig <b>{text(own)}</b>; others: {', '.join(links)}")
 
 
 def legend() -> str:

@@ -12,6 +12,7 @@ import pytest
 from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
+from rhot.files.rig_tables import RigTable
 from rhot.messages.camera import SeenInPicture
 from services.viewer.service import serve
 
@@ -220,3 +221,20 @@ async def test_trails_are_one_visitors_alone(
         # What is drawn for all: a trail that was waited for, and to the other still hidden.
         await asyncio.to_thread(other.wait_for, "GuiUpdateMessage")
         assert not other.heard_of("/trails", "SetSceneNodeVisibilityMessage", visible=True)
+
+
+async def test_the_pages_of_two_rigs_lead_to_each_other(
+    running: Callable, config: RigConfig, browse: Make
+) -> None:
+    bench = msgspec.structs.replace(config, rig=RigTable(name="bench"))
+    async with running("viewer", serve, config) as (service, _):
+        await until(lambda: service.state == "running")
+        browser = await asyncio.to_thread(browse, int(service.values["port"]))
+        async with running("viewer", serve, bench, instance="bench") as (other, _):
+            await until(lambda: other.state == "running")
+            address = f"http://127.0.0.1:{other.values['port']}"
+            kind, fields = hears(f'<a href="{address}"')
+            await asyncio.to_thread(browser.wait_for, kind, **fields)
+        kind, fields = "GuiUpdateMessage", {"updates": lambda u: u.get("visible") is False}
+        browser.forget()
+        await asyncio.to_thread(browser.wait_for, kind, **fields)

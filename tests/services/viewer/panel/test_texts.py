@@ -157,3 +157,10 @@ def test_nothing_from_the_network_is_code(make_health: Callable[..., Health], ev
 def test_previews() -> None:
     assert "waiting for the picture of left" in texts.preview("left", None)
     assert 'src="data:image/jpeg;base64,AAAA"' in texts.preview("left", "AAAA")
+
+
+def test_other_rigs_are_links_and_no_name_is_code() -> None:
+    said = texts.other_rigs("desk", [("bench", "http://127.0.0.1:1/?token=a&b")])
+    assert "rig <b>desk</b>" in said
+    assert '<a href="http://127.0.0.1:1/?token=a&amp;b"' in said
+    assert "<script>" not in texts.other_rigs("<script>", [("<script>", '"><script>')])

@@ -1,0 +1,33 @@
+"""Each rig's page leads to the others of its process, and gives no token away."""
+
+from __future__ import annotations
+
+from rhot.files.rig_tables import Viewer
+from services.viewer.pages import RigPage, announced, others
+
+
+def test_pages_lead_to_each_other_while_they_are_open() -> None:
+    desk, bench = (RigPage(rig, Viewer(), port) for rig, port in (("desk", 8080), ("bench", 8081)))
+    with announced(desk):
+        assert others(desk) == []
+        with announced(bench):
+            assert others(desk) == [("bench", "http://127.0.0.1:8081")]
+            assert others(bench) == [("desk", "http://127.0.0.1:8080")]
+        assert others(desk) == []
+
+
+def test_a_token_is_told_only_to_who_has_given_it() -> None:
+    desk, bench, hall = (
+        RigPage(rig, Viewer(host="10.0.0.2", token=token), port)
+        for rig, token, port in (
+            ("desk", "a" * 24, 1),
+            ("bench", "a" * 24, 2),
+            ("hall", "b" * 24, 3),
+        )
+    )
+    with announced(desk), announced(bench), announced(hall):
+        assert others(desk) == [
+            ("bench", f"http://10.0.0.2:2/?token={'a' * 24}"),
+            ("hall", "http://10.0.0.2:3"),
+        ]
+        assert "a" * 24 not in str(others(hall))
