@@ -102,7 +102,14 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
         layers = {name: Layer(f"/{name}") for name in LAYERS}
         history = History(config)
         sections: list[Section] = [
-            LiveSection(config, setup.notes, PictureFeed(service), layers, lambda: others(own)),
+            LiveSection(
+                config,
+                setup.notes,
+                PictureFeed(service),
+                layers,
+                lambda: others(own),
+                replayed=_replays(service),
+            ),
             PlotsSection(config, history),
             RecordingSection(link, config.rig.name, replay_address),
         ]

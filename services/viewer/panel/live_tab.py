@@ -36,8 +36,11 @@ class LiveSection:
         feed: PictureFeed,
         layers: Mapping[LayerName, Layer],
         other_rigs: Callable[[], Sequence[tuple[str, str]]],
+        *,
+        replayed: bool,
     ) -> None:
         """other_rigs tells name and page of the other rigs of this process."""
+        self.replayed = replayed
         self.config, self.notes, self.feed, self.layers = config, notes, feed, layers
         self.other_rigs = other_rigs
 
@@ -55,7 +58,8 @@ class LiveTab:
         self._feed, self._layers = section.feed, section.layers
         self._other_rigs = section.other_rigs
         self._rigs = gui.add_html("", visible=False)
-        self._status = gui.add_html(texts.status(config, _NOTHING, notes))
+        self._replayed = section.replayed
+        self._status = gui.add_html(self._said(_NOTHING))
         gui.add_html(texts.legend())
         self._switches = {
             name: gui.add_checkbox(words.label, words.on, hint=words.hint)
@@ -86,7 +90,7 @@ class LiveTab:
         rigs = self._other_rigs()
         self._rigs.visible = bool(rigs)
         self._rigs.content = texts.other_rigs(self._config.rig.name, rigs)
-        self._status.content = texts.status(self._config, view, self._notes)
+        self._status.content = self._said(view)
         self._rates.content = texts.rates(view.health)
         for hand, handle in self._angles.items():
             handle.content = (
@@ -102,6 +106,9 @@ class LiveTab:
         self._watched.clear()
         for layer in self._layers.values():
             layer.forget(self._client)
+
+    def _said(self, view: View) -> str:
+        return texts.status(self._config, view, self._notes, replayed=self._replayed)
 
     def _show_layers(self) -> None:
         for name, switch in self._switches.items():

@@ -29,8 +29,13 @@ box: where it is looked for</span>'
 _LEFT = "padding:0 0.5em 0 0;text-align:left"
 
 
-def status(config: RigConfig, view: View, notes: Sequence[str]) -> str:
-    """What is tracked, what is waited for, and standing notes such as missing calibration."""
+def status(config: RigConfig, view: View, notes: Sequence[str], *, replayed: bool = False) -> str:
+    """What is tracked, what is waited for, and standing notes such as missing calibration.
+
+    Nothing is waited for of what is replayed: no program of this rig makes it.
+    """
+    if replayed and not (view.hands or view.points or view.objects):
+        return _box("Nothing was recorded at this moment: play on, or move the time line.")
     lines = [_hand_line(hand, view) for hand in config.hand]
     if not config.hand:
         lines.append("no hand is configured: add [hand.right.markers] to rig.toml")

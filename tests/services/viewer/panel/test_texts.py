@@ -164,3 +164,10 @@ def test_other_rigs_are_links_and_no_name_is_code() -> None:
     assert "rig <b>desk</b>" in said
     assert '<a href="http://127.0.0.1:1/?token=a&amp;b"' in said
     assert "<script>" not in texts.other_rigs("<script>", [("<script>", '"><script>')])
+
+
+def test_of_a_replay_nothing_is_waited_for(config: RigConfig) -> None:
+    nothing = ViewModel().view(0.0)
+    assert "waiting for" in texts.status(config, nothing, [])
+    assert "move the time line" in texts.status(config, nothing, [], replayed=True)
+    assert "waiting for" not in texts.status(config, nothing, [], replayed=True)
