@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from rhot.process.lifecycle import EXIT_AGAIN
 
 # Software rendering, and nothing that talks to anybody.
 FLAGS = (
@@ -61,3 +67,37 @@ def in_background() -> Iterator[Callable[[Callable[[threading.Event], None]], th
     for thread, stop in running:
         stop.set()
         thread.join()
+
+
+@pytest.fixture
+def page_of(router: str, repository: Path) -> Iterator[Callable[..., str]]:
+    """`page_of(rig_toml, *words)` starts a viewer, and beside it a service for each of words, which
+    are its name and options as one string; the page's address. They must end well.
+    """
+    started: list[subprocess.Popen[str]] = []
+
+    def start(rig: Path, *beside: str) -> str:
+        for words in (*beside, "viewer"):
+            service, *options = words.split()
+            command = [sys.executable, "-m", f"services.{service}", *options]
+            process = subprocess.Popen(
+                [*command, "--config", str(rig), "--connect", router],
+                stdout=subprocess.PIPE,
+                text=True,
+                cwd=repository,
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
+            )
+            stack.enter_context(process)
+            started.append(process)
+        output = started[-1].stdout
+        assert output is not None
+        line = next(line for line in output if "live view at" in line)
+        return line.split("live view at ")[1].split('"')[0].strip()
+
+    with ExitStack() as stack:
+        yield start
+        for process in started:
+            process.terminate()
+            process.communicate(timeout=30.0)
+    # A viewer ends by itself with a new calibration, to be started again; perhaps just now.
+    assert {process.returncode for process in started} <= {0, EXIT_AGAIN}

@@ -5,13 +5,9 @@ on painted fingers.
 from __future__ import annotations
 
 import itertools
-import os
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -97,31 +93,10 @@ def camera(router: str, shot: np.ndarray, in_background: InBackground) -> list[M
 
 
 @pytest.fixture
-def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
-    """A tracker without any calibration and a viewer, as processes; the page's address."""
+def page_url(page_of: Callable[..., str], tmp_path: Path) -> str:
+    """The page beside a tracker without any calibration; its address."""
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    common = ["--config", str(tmp_path / "rig.toml"), "--connect", router]
-    processes = []
-    with ExitStack() as stack:
-        for words in (["services.pi_tracker", "--camera", "left"], ["services.viewer"]):
-            command = [sys.executable, "-m", *words, *common]
-            processes.append(
-                stack.enter_context(
-                    subprocess.Popen(
-                        command, stdout=subprocess.PIPE, text=True, cwd=repository, env=environment
-                    )
-                )
-            )
-        output = processes[1].stdout
-        assert output is not None
-        line = next(line for line in output if "live view at" in line)
-        yield line.split("live view at ")[1].strip()
-        for process in processes:
-            process.terminate()
-            assert process.stdout is not None
-            process.stdout.read()
-    assert [process.returncode for process in processes] == [0, 0]
+    return page_of(tmp_path / "rig.toml", "pi_tracker --camera left")
 
 
 def pixels(page: Any) -> np.ndarray:

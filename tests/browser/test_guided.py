@@ -4,12 +4,8 @@ viewer and calibrator processes, and a camera that shows rendered boards.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -65,32 +61,10 @@ def board_shown(router: str, in_background: InBackground) -> None:
 
 
 @pytest.fixture
-def page_url(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
+def page_url(page_of: Callable[..., str], tmp_path: Path) -> str:
     """A viewer and a calibrator of a rig that was never calibrated; the page's address."""
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    common = ["--config", str(tmp_path / "rig.toml"), "--connect", router]
-    with ExitStack() as stack:
-        processes = []
-        for name in ("calibrator", "viewer"):
-            process = subprocess.Popen(
-                [sys.executable, "-m", f"services.{name}", *common],
-                stdout=subprocess.PIPE,
-                text=True,
-                cwd=repository,
-                env=environment,
-            )
-            processes.append(stack.enter_context(process))
-        output = processes[1].stdout
-        assert output is not None
-        line = next(line for line in output if "live view at" in line)
-        yield line.split("live view at ")[1].strip()
-        for process in processes:
-            process.terminate()
-            assert process.stdout is not None
-            process.stdout.read()
-    # The viewer ends by itself with the new lens, to be started again; perhaps just now.
-    assert processes[0].returncode == 0
+    return page_of(tmp_path / "rig.toml", "calibrator")
 
 
 def test_a_lens_is_calibrated_from_start_to_saved(

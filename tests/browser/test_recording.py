@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -60,33 +60,15 @@ def rig(repository: Path, tmp_path: Path) -> Path:
     path = tmp_path / "rig.toml"
     path.write_text(f"{text}\n[viewer]\nport = 0\n")
     (tmp_path / "recordings").mkdir()
-    write_hand(tmp_path / "recordings" / "pinch.mcap", load_rig(path), 20.0)
+    # Long enough for a browser that starts slowly: what has ended cannot be paused.
+    write_hand(tmp_path / "recordings" / "pinch.mcap", load_rig(path), 240.0)
     return path
 
 
 @pytest.fixture
-def services(rig: Path, router: str) -> Iterator[str]:
+def services(page_of: Callable[..., str], rig: Path) -> str:
     """Recorder and viewer as `rhot up` starts them; the page's address."""
-    argv = [sys.executable, "-m"]
-    options = ["--config", str(rig), "--connect", router]
-    started = [
-        subprocess.Popen([*argv, "services.recorder", *options, "--on-request"]),
-        subprocess.Popen([*argv, "services.viewer", *options], stdout=subprocess.PIPE, text=True),
-    ]
-    try:
-        output = started[1].stdout
-        assert output is not None
-        yield (
-            next(line for line in output if "live view at" in line)
-            .split("live view at ")[1]
-            .split('"')[0]
-            .strip()
-        )
-    finally:
-        for process in started:
-            process.terminate()
-        for process in started:
-            process.communicate(timeout=20.0)
+    return page_of(rig, "recorder --on-request")
 
 
 def test_a_person_records_and_replays(services: str, rig: Path, router: str, chromium: Any) -> None:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import os
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -60,33 +57,12 @@ def rig(repository: Path) -> RigConfig:
 
 
 @pytest.fixture
-def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
-    """A viewer process on a free port; its address."""
+def viewer(page_of: Callable[..., str], repository: Path, tmp_path: Path) -> str:
+    """The page of the simulated rig with a cup; its address."""
     text = (repository / "config" / "sim.toml").read_text(encoding="utf-8")
     (tmp_path / "rig.toml").write_text(text.partition("[[object]]")[0] + CUP, encoding="utf-8")
     (tmp_path / "calibration").symlink_to(repository / "config" / "calibration")
-    command = [
-        sys.executable,
-        "-m",
-        "services.viewer",
-        "--config",
-        str(tmp_path / "rig.toml"),
-        "--connect",
-        router,
-    ]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=repository,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-    ) as process:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if "live view at" in line)
-        yield line.split("live view at ")[1].strip()
-        process.terminate()
-        process.stdout.read()
-    assert process.returncode == 0
+    return page_of(tmp_path / "rig.toml")
 
 
 def hand_pose(seq: int) -> HandPose:

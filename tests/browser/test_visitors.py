@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import os
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -51,23 +48,10 @@ InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
 
 
 @pytest.fixture
-def viewer(router: str, repository: Path, tmp_path: Path) -> Iterator[str]:
-    """A viewer process of a rig that is not calibrated; its address."""
+def viewer(page_of: Callable[..., str], tmp_path: Path) -> str:
+    """The page of a rig that is not calibrated; its address."""
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
-    rig = ["--config", str(tmp_path / "rig.toml"), "--connect", router]
-    with subprocess.Popen(
-        [sys.executable, "-m", "services.viewer", *rig],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=repository,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-    ) as process:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if "live view at" in line)
-        yield line.split("live view at ")[1].strip()
-        process.terminate()
-        process.stdout.read()
-    assert process.returncode == 0
+    return page_of(tmp_path / "rig.toml")
 
 
 @pytest.fixture
