@@ -20,6 +20,7 @@ from mcap.writer import CompressionType, Writer
 from rhot.errors import CaptureError, DiskFullError, disk_full
 from rhot.messages.json_schema import json_schema
 from rhot.topics import Topic
+from services.recorder.chunk_spool import ChunkSpool
 from services.recorder.foxglove.scene import Drawn, scene_of, schema
 from services.recorder.schemas import SCHEMA_ENCODING, schema_name
 
@@ -31,6 +32,8 @@ CHUNK_BYTES = 65_536
 CHUNK_NS = 500_000_000
 # mcap ends a chunk when it is full; that it can be ended otherwise is not for its users.
 _END_CHUNK = "_Writer__finalize_chunk"
+# Where it keeps what is known of those that have ended.
+_CHUNKS = "_Writer__chunk_indices"
 # Channels that are made of others for other programs have this in their metadata, and no reader of
 # ours reads them.
 COMPANION = "companion-of"
@@ -47,7 +50,7 @@ class RecordingWriter:
     """An open recording; use it as a context manager, which finishes the file.
 
     messages, bytes and refused (messages on more keys than MAX_CHANNELS) count what came; keys are
-    those that have a channel.
+    those that have a channel; chunks are those that have ended.
     """
 
     def __init__(
@@ -71,9 +74,11 @@ class RecordingWriter:
             check_space(path.parent)
             self._file = path.open("xb")
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self.chunks = ChunkSpool(path.parent)
         except OSError as error:
             raise _failed(path, error) from None
         self._writer = _writer(self._file)
+        setattr(self._writer, _CHUNKS, self.chunks)
         self._begin(rig, version, attachments or {})
 
     def _begin(self, rig: str, version: str, attachments: Mapping[str, bytes]) -> None:
@@ -86,6 +91,7 @@ class RecordingWriter:
             self._file.flush()
         except OSError as error:
             _close(self._file)
+            _close(self.chunks)
             raise _failed(self.path, error) from None
 
     @property
@@ -168,6 +174,7 @@ class RecordingWriter:
             raise _failed(self.path, error) from None
         finally:
             _close(self._file)
+            _close(self.chunks)
 
     def __enter__(self) -> RecordingWriter:
         return self
