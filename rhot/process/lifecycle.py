@@ -30,6 +30,7 @@ from rhot.bus.security.credentials import client_endpoints
 from rhot.errors import RhotError, disk_full, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
+from rhot.process.allocator import share_one_heap
 from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.certificate_watch import watch_certificate
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
@@ -67,6 +68,8 @@ def command(
     required. variants are options without a value: each with the coroutine that it runs instead,
     and its help. several_rigs: --config may be given more than once, or be a folder.
     """
+    # Before anything starts a thread.
+    share_one_heap()
     program = _program(name)
     parser = _parser(program, about, instance_option, several_rigs=several_rigs)
     for option, (function, text) in variants.items():

@@ -24,6 +24,7 @@ from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import systemd
+from rhot.process.allocator import share_one_heap
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.process.lifecycle import EXIT_USER, fed_watchdog
 from rhot.process.restart_hold import hold_back
@@ -87,6 +88,7 @@ def router(
     if show:
         typer.echo(router_json5(*_settings(config, listen)))
         return
+    share_one_heap()
     started_s = time.monotonic()
     try:
         uvloop.run(_route(*_settings(config, listen)))
