@@ -10,7 +10,6 @@ gives HandPoints without points.
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -140,7 +139,7 @@ class FusionStep:
         self._unsettled.insert(0, partial(self._watch, view, times_s))
         hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
         white = np.hypot(self._systematic.white_sigmas(view), hidden)
-        view = dataclasses.replace(view, sigmas=white)
+        view = view._replace(sigmas=white)
         self.method.observe(view, times_s - late_s, clock_sigma_s)
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._points_at(due_ns)

@@ -82,7 +82,10 @@ class ModelError:
         """landmarks: all of the model (landmarks.hand_landmarks)."""
         spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
         paint = [spread.tip_paint_m if name in TIPS else spread.dab_m for name in landmarks]
-        self._chains, self._landmark_m = chains, spread.landmark_m
+        self._chains = chains
+        # Added to each landmark's covariance (3, 3).
+        self._landmark_m2 = spread.landmark_m**2 * np.eye(3)
+        self._widens = spread.landmark_m > 0.0
         self._column = {name: _PAINT + 3 * n for n, name in enumerate(landmarks)}
         self._sigmas = np.concatenate(
             [[spread.size], [spread.bone] * 15, [spread.root_m] * 15, np.ravel(paint)]
@@ -94,9 +97,9 @@ class ModelError:
     def widened(self, observed: Mapping[str, Observation]) -> Observed:
         """Landmarks known no better than the model knows where they sit."""
         seen = Observed.of(observed)
-        if self._landmark_m == 0.0:
+        if not self._widens:
             return seen
-        wider_m2 = seen.covariances_m2 + self._landmark_m**2 * np.eye(3)
+        wider_m2 = seen.covariances_m2 + self._landmark_m2
         return Observed(seen.names, seen.points_m, wider_m2, seen.measured)
 
     def pose_variances(

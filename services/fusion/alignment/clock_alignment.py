@@ -10,7 +10,6 @@ set, or stamps that are right again, end it.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,8 +92,7 @@ class ClockAlignment:
         known = self._corrections.get(view.camera)
         if known is None:
             return view
-        return dataclasses.replace(
-            view,
+        return view._replace(
             instant_ns=view.instant_ns - round(known.late_s * 1e9),
             clock_sigma_s=max(view.clock_sigma_s, _SIGMA_S),
         )

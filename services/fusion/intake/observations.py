@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,8 +50,7 @@ class Landmark:
     name: str
 
 
-@dataclass(frozen=True, eq=False)
-class View:
+class View(NamedTuple):
     """What one camera saw in one frame: n observations, each with its own instant."""
 
     camera: int  # index into ObservationBuilder.cameras
@@ -97,15 +97,16 @@ class ObservationBuilder:
         best = self._best_markers(frame, camera)
         landmarks = sorted(best)
         markers = [best[landmark] for landmark in landmarks]
-        pixels = np.array([(one.x_px, one.y_px) for one in markers]).reshape(-1, 2)
+        numbers = np.array([(one.x_px, one.y_px, one.sigma_px, one.area_px) for one in markers])
+        numbers = numbers.reshape(-1, 4)
+        pixels, sigmas_px, areas_px = numbers[:, :2], numbers[:, 2], numbers[:, 3]
         rays, scale, valid = undistort(camera, pixels)
-        sigmas_px = [min(max(one.sigma_px, SIGMA_MIN_PX), SIGMA_MAX_PX) for one in markers]
         columns = (
             np.array(landmarks, dtype=np.int64),
             (pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9,
             rays,
-            np.array(sigmas_px) * scale,
-            np.array([one.area_px for one in markers]) * scale**2,
+            np.minimum(np.maximum(sigmas_px, SIGMA_MIN_PX), SIGMA_MAX_PX) * scale,
+            areas_px * scale**2,
         )
         used = len(landmarks)
         if not valid.all():
@@ -121,6 +122,8 @@ class ObservationBuilder:
         )
 
     def _count_of_hands(self, frame: MarkerFrame) -> int:
+        if not self._of_objects:
+            return len(frame.markers)
         return sum(marker.color not in self._of_objects for marker in frame.markers)
 
     def _best_markers(self, frame: MarkerFrame, camera: Camera) -> dict[int, Marker]:

@@ -29,9 +29,8 @@ from services.fusion.kalman.frame_update import (
 )
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
 from services.fusion.kalman.one_camera import LastLocated
-from services.fusion.kalman.recent_observations import alone_before, largest_sigmas, sights
-from services.fusion.kalman.rest.rest_mixing import mix_rest
-from services.fusion.kalman.smoother import smooth_all
+from services.fusion.kalman.recent_observations import alone_before
+from services.fusion.kalman.telling import empty_telling, tell
 from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
 from services.fusion.method import Counts, Estimates
@@ -91,6 +90,7 @@ class KalmanMethod:
         self._extrinsics = extrinsics(cameras)
         self._centres_rig = np.array([camera.centre_rig for camera in cameras])  # (C, 3)
         self._periods_s = periods_s
+        self._seen_since_s = SEEN_FRAMES * periods_s  # (C,)
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
         self.reset()
@@ -115,6 +115,8 @@ class KalmanMethod:
         self.counts.gated += gated
         self.counts.late += late
         self.counts.refused += len(codes) - accepted - gated - late - new
+        if accepted == len(codes) and not is_back.any():
+            return
         for n, code in enumerate(codes):
             landmark = int(view.landmarks[n])
             contradicted = code == GATED and self._is_contradicted(landmark)
@@ -199,17 +201,9 @@ class KalmanMethod:
     def estimate(self, time_s: float) -> Estimates:
         """All landmarks at an instant."""
         self._drop(time_s)
-        history, rest, recent = self._state
-        landmarks = len(history.size)
-        means = np.zeros((landmarks, 6))
-        covs = np.zeros((landmarks, 6, 6))
-        found = smooth_all(history, time_s, MODELS, means, covs)
-        mix_rest(rest, time_s, found, means, covs)
-        seen_since_s = SEEN_FRAMES * self._periods_s  # (C,)
-        seen_by, measured, detected, alone = sights(
-            recent.accepted_s, recent.observed_s, time_s, seen_since_s
-        )
-        largest_sigma = largest_sigmas(means, covs, found)
+        told = empty_telling(len(self._state.history.size), len(self._periods_s))
+        tell(self._state, time_s, self._seen_since_s, MODELS, told)
+        means, covs, largest_sigma, seen_by, (found, measured, detected, alone) = told
         self._located.note(found & measured, means[:, :3], time_s)
         if not measured.all():
             self._tell_alone(time_s, found & alone, seen_by, (means, covs, largest_sigma))

@@ -129,21 +129,24 @@ def _smooth(
 
 @njit(cache=True)
 def _apply_adjoint(adjoint: Array, information: Array, state: Gaussian) -> None:
-    """x -= P adjoint, P -= P information P, kept symmetric; in place."""
+    """x -= P adjoint, P -= P information P, kept symmetric; in place, of position and velocity.
+
+    Nobody asks for the acceleration. A row of P at a time: its products are of neighbours in
+    memory, which a processor takes several at a time of.
+    """
     P = state.cov
-    P_information = np.zeros((9, 9))
-    for i in range(9):
-        for j in range(9):
-            state.mean[i] -= P[i, j] * adjoint[j]
-            for k in range(9):
+    P_information = np.zeros((6, 9))
+    reduction = np.zeros((6, 6))
+    for i in range(6):
+        for k in range(9):
+            state.mean[i] -= P[i, k] * adjoint[k]
+            for j in range(9):
                 P_information[i, j] += P[i, k] * information[k, j]
-    reduction = np.zeros((9, 9))
-    for i in range(9):
-        for j in range(9):
-            for k in range(9):
+        for k in range(9):
+            for j in range(6):
                 reduction[i, j] += P_information[i, k] * P[k, j]
-    for i in range(9):
-        for j in range(9):
+    for i in range(6):
+        for j in range(6):
             P[i, j] -= 0.5 * (reduction[i, j] + reduction[j, i])
 
 

@@ -16,6 +16,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.messages import HandPoint, HandPoints
+from services.solver.maths.symmetric import eigen
 from services.solver.whole_hand.landmarks import Bools, Landmarks, Observed
 
 # No camera of this kind sees a finger tip 10 m away.
@@ -113,8 +114,10 @@ def _believed(row: Array, C: Array) -> bool:
             if row[10] == _PREDICTED:
                 C *= _PREDICTED_SIGMA_FACTOR**2
             return True
-        variances, axes = np.linalg.eigh(C)
-        if variances[0] < -(_MIN_SIGMA_M**2):
+        axes = np.empty((3, 3))
+        eigen(C, axes)
+        variances = np.diag(C)
+        if variances.min() < -(_MIN_SIGMA_M**2):
             return False
         sigmas = np.sqrt(np.maximum(variances, 0.0))
     if np.count_nonzero(sigmas <= _MAX_SIGMA_M) < 2:

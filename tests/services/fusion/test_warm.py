@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from services.fusion.kalman import frame_update, recent_observations, smoother, track_history
-from services.fusion.kalman.rest import rest_mixing
+from services.fusion.kalman import frame_update, recent_observations, telling, track_history
 from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
@@ -12,10 +11,7 @@ LIVE = (
     frame_update.update_frame,
     frame_update.drop_lost_tracks,
     recent_observations.alone_before,
-    recent_observations.sights,
-    recent_observations.largest_sigmas,
-    rest_mixing.mix_rest,
-    smoother.smooth_all,
+    telling.tell,
     track_history.start_track,
     paint_to_bone._correct,
     hand_plausibility._coherent,
