@@ -101,9 +101,11 @@ system:
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python's venv is missing: sudo apt install python3-venv"; exit 1; }
 	@$(PYTHON) -c 'import struct, sys; sys.exit(struct.calcsize("P") != 8)' || { echo "rhot needs a 64-bit system (there are no 32-bit packages of OpenCV and Zenoh): install the 64-bit Raspberry Pi OS"; exit 1; }
 
-$(STAMP): pyproject.toml | system
+# Not services/..., which would install anew with every change: only what is compiled then.
+$(STAMP): pyproject.toml hatch_build.py $(wildcard services/pi_tracker/compiled/*.[ch]) | system
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --disable-pip-version-check --quiet -e '.[dev]'
+	$(BIN)/python -c 'from services.pi_tracker.compiled.library import state; print("markers are measured", state)'
 	$(BIN)/rhot warm
 	@touch $@
 

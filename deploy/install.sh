@@ -273,6 +273,8 @@ build_version() {
         rm -rf -- "$place"
         fail "pip could not install rhot (see above); nothing was changed for the version that runs"
     }
+    say "    markers are measured $(cd / && "$place/bin/python" -c \
+        'from services.pi_tracker.compiled.library import state; print(state)')"
     cp -r -- "$HERE" "$place/deploy"
     touch "$place/.complete"
 }

@@ -1,25 +1,32 @@
 """Collect every wheel that install.sh needs without a network: `make wheels`.
 
 dist/wheels/master holds rhot and its dependencies for this machine, dist/wheels/pi those for 64-bit
-Raspberry Pi OS 12 and 13 (Python 3.11 and 3.13).
+Raspberry Pi OS 12 and 13 (Python 3.11 and 3.13). rhot's own wheel has the tracker's compiled form
+for that machine. Where there is no compiler for a Pi (apt install gcc-aarch64-linux-gnu), PyPI's
+ziglang is fetched once into build/zig, 80 MB; without either the tracker measures in Python there.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 from pip._vendor.packaging.requirements import Requirement
 
+from hatch_build import compilers, file_name
+
 SOURCE = Path(__file__).resolve().parents[1]
 # Debian 12 and 13 have glibc 2.36 and 2.41: wheels of both older tags run there.
 PI_PLATFORMS = ("manylinux_2_28_aarch64", "manylinux_2_17_aarch64", "manylinux2014_aarch64")
+ZIG = SOURCE / "build" / "zig"
 SYSTEM_PYTHON = "/usr/bin/python3"
-PI_PYTHONS = ("3.11", "3.13")
+PI_MACHINE, PI_PYTHONS = "aarch64", ("3.11", "3.13")
 
 
 def requirements(extra: str, python: str, machine: str) -> list[str]:
@@ -38,20 +45,40 @@ def requirements(extra: str, python: str, machine: str) -> list[str]:
     return wanted
 
 
-def pip(*arguments: str) -> None:
+def pip(*arguments: str, **environment: str) -> None:
     """Run pip of this Python; its failure ends the program with its code."""
+    code = _pip_code(*arguments, **environment)
+    if code:
+        sys.exit(code)
+
+
+def _pip_code(*arguments: str, **environment: str) -> int:
     quiet = ("--quiet", "--disable-pip-version-check")
     command = [sys.executable, "-m", "pip", *arguments[:1], *quiet, *arguments[1:]]
-    done = subprocess.run(command, check=False)
-    if done.returncode:
-        sys.exit(done.returncode)
+    return subprocess.run(command, check=False, env=os.environ | environment).returncode
+
+
+def own_wheel(folder: Path, machine: str) -> str:
+    """Build rhot's wheel for a machine; returns how its tracker measures there."""
+    if not compilers(machine) and not ZIG.is_dir():
+        print(f"no compiler for {machine}: fetching ziglang from PyPI into {ZIG}")
+        _pip_code("install", "--no-deps", "--target", str(ZIG), "ziglang")
+    # An older build of the same number would be taken for the newest.
+    for old in folder.glob("rhot-*.whl"):
+        old.unlink()
+    environment = {"RHOT_COMPILE_FOR": machine, "RHOT_ZIG": str(ZIG)}
+    pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(SOURCE), **environment)
+    (made,) = folder.glob("rhot-*.whl")
+    with zipfile.ZipFile(made) as wheel:
+        compiled = any(name.endswith(file_name(machine)) for name in wheel.namelist())
+    return f"compiled for {machine}" if compiled else f"in Python: not compiled for {machine}"
 
 
 def collect_pi(folder: Path) -> None:
     """Wheels of a Pi's tracker, for each Python that Raspberry Pi OS has."""
     platforms = [option for one in PI_PLATFORMS for option in ("--platform", one)]
     for python in PI_PYTHONS:
-        _download(folder, "pi", python, "aarch64", platforms)
+        _download(folder, "pi", python, PI_MACHINE, platforms)
 
 
 def collect_master(folder: Path) -> None:
@@ -79,12 +106,10 @@ def main() -> None:
     for role in options.roles or COLLECT:
         folder = options.out / role
         folder.mkdir(parents=True, exist_ok=True)
-        # An older build of the same number would be taken for the newest.
-        for old in folder.glob("rhot-*.whl"):
-            old.unlink()
-        pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(SOURCE))
+        measures = own_wheel(folder, PI_MACHINE if role == "pi" else platform.machine())
         COLLECT[role](folder)
-        print(f"{folder}: {len(list(folder.glob('*.whl')))} wheels")
+        count = len(list(folder.glob("*.whl")))
+        print(f"{folder}: {count} wheels; rhot's tracker measures {measures}")
 
 
 if __name__ == "__main__":

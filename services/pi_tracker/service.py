@@ -9,6 +9,7 @@ camera starts without them, so that it can be calibrated.
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
 from collections.abc import Coroutine
 
@@ -19,6 +20,7 @@ from rhot.messages import MarkerFrame
 from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
 from services.pi_tracker import sources
+from services.pi_tracker.compiled import library
 from services.pi_tracker.endpoints.camera_faults import CameraFaults
 from services.pi_tracker.endpoints.color_fitting import ColorFitting
 from services.pi_tracker.endpoints.color_ranges import ColorRanges
@@ -29,9 +31,12 @@ from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.monitors.camera_monitor import CameraMonitor
 from services.pi_tracker.tracker import CameraTracker
 
+log = logging.getLogger("rhot.pi_tracker")
+
 
 async def serve(service: Service) -> None:
     """Finds the coloured markers in one camera's images."""
+    log.info("markers are measured %s", library.state)
     gate = SessionGate(service.bus)
     camera = CameraService(service, gate)
     beside = (gate.follow(), watch_computer(service), *camera.companions())

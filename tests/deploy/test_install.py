@@ -72,7 +72,7 @@ def wheels(tmp_path_factory) -> tuple[Path, Path]:
     run([*PIP, "-w", now, f"{ROOT}[pi]"], timeout_s=600.0)
     tree = folder / "tree"
     files = run(["git", "-C", ROOT, "ls-files", "rhot", "services", "config", "deploy"]).split("\n")
-    for name in (*filter(None, files), "pyproject.toml", "README.md", "LICENSE"):
+    for name in (*filter(None, files), "pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tree / name)
     text = (tree / "pyproject.toml").read_text()

@@ -4,6 +4,7 @@ calibrations, and the machine's certificate.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -68,6 +69,8 @@ def certificate_files(of: Machine, config: RigConfig) -> list[Path]:
 def stage(of: Machine, config: RigConfig, rig_toml: Path, wheels: list[Path], folder: Path) -> None:
     """Fill the folder; without wheels, rhot's own is built from the source tree.
 
+    That one has the tracker's compiled form for a Pi if this machine has a compiler for it.
+
     Raises ConfigError if that cannot be done.
     """
     shutil.copytree(deploy_dir(), folder / "deploy")
@@ -92,6 +95,10 @@ def _build_wheel(folder: Path) -> None:
             "name a folder that has it with --wheels"
         )
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check"]
-    done = subprocess.run([*command, "--no-deps", "-w", str(folder), str(tree)], check=False)
+    # Which machine it is for is not known here: a wheel for each that there are packages for.
+    environment = os.environ | {"RHOT_COMPILE_FOR": "x86_64 aarch64"}
+    done = subprocess.run(
+        [*command, "--no-deps", "-w", str(folder), str(tree)], check=False, env=environment
+    )
     if done.returncode:
         raise ConfigError("rhot's wheel could not be built (see above)")

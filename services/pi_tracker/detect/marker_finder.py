@@ -23,7 +23,8 @@ from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, Rect, picture
-from services.pi_tracker.measure.centroid import Centroid, centroids
+from services.pi_tracker.measure.centroid import Centroid
+from services.pi_tracker.measure.fastest import centroids
 
 # Every so many frames the whole image is searched although nothing is lost, so that a mistake does
 # not last; and in the first ones, to learn the static background.

@@ -22,7 +22,7 @@ from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture, picture
-from services.pi_tracker.measure.centroid import centroids
+from services.pi_tracker.measure.fastest import centroids
 
 # The centre of a part of a blob is known to this share of its diameter, and so much less of its
 # quality is left.

@@ -12,7 +12,7 @@ An image that does not have the shape its frame claims raises SourceError.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -33,8 +33,17 @@ _CHROMA = np.array([[*_U_FROM_BGR, 128.0], [*_V_FROM_BGR, 128.0]])
 
 # Full range to limited range: 256 levels to 219 of luma about 16, and to 224 of chroma about 128.
 _LEVELS = np.arange(256.0)
-_LIMITED_LUMA = np.round(16.0 + _LEVELS * (219.0 / 255.0)).astype(np.uint8)
-_LIMITED_CHROMA = np.round(128.0 + (_LEVELS - 128.0) * (224.0 / 255.0)).astype(np.uint8)
+LIMITED_LUMA = np.round(16.0 + _LEVELS * (219.0 / 255.0)).astype(np.uint8)
+LIMITED_CHROMA = np.round(128.0 + (_LEVELS - 128.0) * (224.0 / 255.0)).astype(np.uint8)
+
+
+class Window(NamedTuple):
+    """A part of a picture: uint8, the last axis contiguous."""
+
+    rect: Rect  # cells that it has
+    luma: Image  # (2h, 2w) of every pixel
+    chroma: Image  # (2, h, w) u, v of every cell
+    full_range: bool  # both are yet to be scaled, by LIMITED_LUMA and LIMITED_CHROMA
 
 
 class Picture(Protocol):
@@ -53,6 +62,9 @@ class Picture(Protocol):
 
         luma (2h, 2w) of every pixel, chroma u, v (2, h, w) of every cell.
         """
+
+    def window(self, rect: Rect) -> Window:
+        """The planes of a rectangle or of more, without a copy where there are planes."""
 
 
 class _PlanarPicture:
@@ -78,6 +90,10 @@ class _PlanarPicture:
         luma[:] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
         chroma[:] = self._chroma[:, y0:y1, x0:x1]
 
+    def window(self, rect: Rect) -> Window:
+        del rect
+        return Window((0, 0, *self.size), self._y, self._chroma, full_range=False)
+
 
 class _FullRangePicture:
     """I420 with luma in 0..255, scaled to limited range where it is asked for."""
@@ -88,12 +104,15 @@ class _FullRangePicture:
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         luma, chroma = self._planes.cells(rect, step)
-        return cv2.LUT(luma, _LIMITED_LUMA), cv2.LUT(chroma, _LIMITED_CHROMA)
+        return cv2.LUT(luma, LIMITED_LUMA), cv2.LUT(chroma, LIMITED_CHROMA)
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
         self._planes.copy_to(rect, luma, chroma)
-        luma[:] = _LIMITED_LUMA[luma]
-        chroma[:] = _LIMITED_CHROMA[chroma]
+        luma[:] = LIMITED_LUMA[luma]
+        chroma[:] = LIMITED_CHROMA[chroma]
+
+    def window(self, rect: Rect) -> Window:
+        return self._planes.window(rect)._replace(full_range=True)
 
 
 class _BgrPicture:
@@ -111,6 +130,12 @@ class _BgrPicture:
         bgr = _pixels(self._image, rect)
         luma[:] = cv2.transform(bgr, _LUMA)
         chroma[:] = cv2.split(cv2.transform(_cell_means(bgr), _CHROMA))
+
+    def window(self, rect: Rect) -> Window:
+        h, w = rect[3] - rect[1], rect[2] - rect[0]
+        luma, chroma = np.empty((2 * h, 2 * w), np.uint8), np.empty((2, h, w), np.uint8)
+        self.copy_to(rect, luma, chroma)
+        return Window(rect, luma, chroma, full_range=False)
 
 
 def picture(frame: Frame) -> Picture:

@@ -46,29 +46,31 @@ _SQUARE = np.ones((3, 3), np.uint8)
 # (Error of disparity without noise, simulated hands resting at 1.0 and 0.5 m, moving at 0.7 m,
 # random seeds 1-10: one round .072, .056, .137 px; two rounds .063, .048, .121; with the mask's
 # core no longer taken for paint as such .056, .048, .117.)
-_BACKGROUND_BELOW, _PAINT_ABOVE = 0.2, (0.85, 0.95)
-_PAINT_BAND = _PAINT_ABOVE[1] - _PAINT_ABOVE[0]
-# As factors of the fraction and summands: 1 - fraction / _BACKGROUND_BELOW and
-# (fraction - _PAINT_ABOVE[0]) / _PAINT_BAND.
-_PURE_FACTOR = np.array([-1.0 / _BACKGROUND_BELOW, 1.0 / _PAINT_BAND], np.float32)
-_PURE_OFFSET = np.array([1.0, -_PAINT_ABOVE[0] / _PAINT_BAND], np.float32)
+BACKGROUND_BELOW, PAINT_ABOVE = 0.2, (0.85, 0.95)
+PAINT_BAND = PAINT_ABOVE[1] - PAINT_ABOVE[0]
+# As factors of the fraction and summands: 1 - fraction / BACKGROUND_BELOW and
+# (fraction - PAINT_ABOVE[0]) / PAINT_BAND.
+_PURE_FACTOR = np.array([-1.0 / BACKGROUND_BELOW, 1.0 / PAINT_BAND], np.float32)
+_PURE_OFFSET = np.array([1.0, -PAINT_ABOVE[0] / PAINT_BAND], np.float32)
 # Weight of a cell that the mask takes for pure, but the paint fraction does not: it decides only
 # where no other cell is pure.
-_MASK_ONLY_WEIGHT = 1e-3
+MASK_ONLY_WEIGHT = 1e-3
 # The paint fraction is noisy about 0 and 1; this slope about 1/2 lets clipping remove most of that
 # noise at little loss of sub-pixel position (disparity RMS at sigma 5: slope 1.5 .052, 2 .053, 3
 # .056 px; absolute error .237, .223, .209).
-_SLOPE = 2.0
+SLOPE = 2.0
 # Cores smaller than this hold no pure paint; then the whole mask must do.
-_MIN_CORE_CELLS = 3
+MIN_CORE_CELLS = 3
 # Paint this far from its surroundings in chroma per luma is distinguished without doubt; the paints
 # of the simulator lie at .4 to .7.
-_FULL_CONTRAST = 0.25
-# Of a blob in which the paint fraction finds no paint.
-_LOST_SIGMA_PX = 2.0
+FULL_CONTRAST = 0.25
+# Of a blob without paint after all.
+LOST_SIGMA_PX = 2.0
 # The image's edge cuts off between none and half of a blob, which moves the centre by up to a
 # quarter of its width: what it adds to sigma, per square root of the area, and a factor of quality.
-_CUT_SIGMA, _CUT_QUALITY = 0.15, 0.4
+CUT_SIGMA, CUT_QUALITY = 0.15, 0.4
+# A disc fills pi / 4 of its box, of few cells less: so much of it, and quality is full.
+DISC_FILL = 0.7
 # Blobs of up to this size share one stack; larger ones have their own, so that not every tile
 # grows.
 _MAX_STACKED_CELLS = 26
@@ -157,8 +159,8 @@ class _Masks(NamedTuple):
         masks[3] = core.reshape(h, n, w)
         pure = masks.astype(np.float32)
         core_cells = raw_moments(pure[3], 0)
-        if core_cells.min() < _MIN_CORE_CELLS:
-            few = core_cells.ravel() < _MIN_CORE_CELLS
+        if core_cells.min() < MIN_CORE_CELLS:
+            few = core_cells.ravel() < MIN_CORE_CELLS
             pure[3][:, few] = pure[1][:, few]
         return cls(reach, pure[:2], pure[2:])
 
@@ -171,10 +173,14 @@ def _pixel_weights(tiles: Tiles, paint: PaintFraction, reach: Image) -> Image:
     h, n, w = paint.fraction.shape
     # Not clipped yet, a pixel's weight is ramp[0] + ramp[1] times its luma.
     ramp = np.empty((h, 2, n, w), np.float32)
-    slope = np.multiply(paint.by_luma, _SLOPE, out=ramp[:, 1])
-    constant = paint.fraction * _SLOPE
-    constant += 0.5 - 0.5 * _SLOPE
+    slope = np.multiply(paint.by_luma, SLOPE, out=ramp[:, 1])
+    constant = paint.fraction * SLOPE
+    constant += 0.5 - 0.5 * SLOPE
     np.subtract(constant, slope * tiles.cells[0], out=ramp[:, 0])
+    # Where a tile ends it goes on as it is: gaps show nothing, and the next tile is another place.
+    ramp[..., -GAP] = ramp[..., -GAP - 1]
+    ramp[:, :, :-1, -1] = ramp[:, :, 1:, 0]
+    ramp[:, 0, -1, -1] = ramp[:, 1, 0, 0]
     ramp = pixels_from_cells(ramp)
     weight = ramp[:, 1] * tiles.luma
     weight += ramp[:, 0]
@@ -193,7 +199,7 @@ def _two_round_mixture(tiles: Tiles, masks: _Masks) -> Mixture:
     pure = fraction * _PURE_FACTOR[:, None, None, None]
     pure += _PURE_OFFSET[:, None, None, None]
     np.minimum(pure, masks.may_be_pure, out=pure)
-    np.maximum(pure, masks.pure_by_mask * _MASK_ONLY_WEIGHT, out=pure)
+    np.maximum(pure, masks.pure_by_mask * MASK_ONLY_WEIGHT, out=pure)
     return Mixture(light, pure)
 
 
@@ -204,21 +210,25 @@ def _dilated(masks: Image) -> Image:
     return dilated
 
 
+def lost(blob: Blob) -> Centroid:
+    """Of a blob in which the paint fraction finds no paint."""
+    return Centroid(blob.x_px, blob.y_px, blob.area_px, LOST_SIGMA_PX, 0.0)
+
+
 def _centroid(tiles: Tiles, k: int, blob: Blob, moments: _TileMoments) -> Centroid:
     """The centroid of tile k from its moments."""
     m = moments.weights
     area = m[0][0]
     if area < 1.0:
-        return Centroid(blob.x_px, blob.y_px, blob.area_px, _LOST_SIGMA_PX, 0.0)
+        return lost(blob)
     x, y = m[0][1] / area, m[1][0] / area
-    noise_px = noise_sigma_px(moments.variances, area, x, y, _SLOPE)
+    noise_px = noise_sigma_px(moments.variances, area, x, y, SLOPE)
     sigma = math.hypot(noise_px, misfit_sigma_px(4.0 * moments.edge_cells, area))
     left, top, right, bottom = blob.rect
-    # A disc fills pi / 4 of its box.
-    fill = blob.cells / (0.7 * (right - left) * (bottom - top))
-    quality = min(1.0, fill) * min(1.0, moments.contrast / _FULL_CONTRAST)
+    fill = blob.cells / (DISC_FILL * (right - left) * (bottom - top))
+    quality = min(1.0, fill) * min(1.0, moments.contrast / FULL_CONTRAST)
     if min(left, top) <= 0 or right >= tiles.size[0] or bottom >= tiles.size[1]:
-        quality *= _CUT_QUALITY
-        sigma += _CUT_SIGMA * area**0.5
+        quality *= CUT_QUALITY
+        sigma += CUT_SIGMA * area**0.5
     origin_x, origin_y = tiles.origins[k]
     return Centroid(2 * origin_x + x, 2 * origin_y + y, area, sigma, quality)

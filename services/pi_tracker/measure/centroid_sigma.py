@@ -13,7 +13,7 @@ import math
 # .09 px resting at 0.5 and 1.0 m, .14 moving at 0.7 m (.2 where the band is wider than 1.8 px), .47
 # and .65 in coloured light where it is 2.1 and 2.4 px. Error over sigma is then .7-.8 resting, 1.1
 # moving, 1.25 in coloured light.
-_MISFIT_PX, _MISFIT_PER_PX, _SHARP_BAND_PX = 0.1, 1.0, 1.75
+MISFIT_PX, MISFIT_PER_PX, SHARP_BAND_PX = 0.1, 1.0, 1.75
 
 
 def noise_sigma_px(
@@ -47,4 +47,4 @@ def misfit_sigma_px(edge_px2: float, area_px2: float) -> float:
     radius = math.sqrt(area_px2 / math.pi)
     # The band of a disc has an area of 2 pi r times its width.
     band_px = edge_px2 / (2.0 * math.pi * radius)
-    return _MISFIT_PX + _MISFIT_PER_PX * max(band_px - _SHARP_BAND_PX, 0.0)
+    return MISFIT_PX + MISFIT_PER_PX * max(band_px - SHARP_BAND_PX, 0.0)

@@ -32,28 +32,28 @@ from services.pi_tracker.measure.blob_tiles import GAP, powers
 
 # BT.601 in limited range: Y - 16, U - 128, V - 128 to R, G, B in 0..255. Rounded to three digits,
 # unlike image/hue.py: measured figures are with these.
-_RGB = np.array([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]], np.float32)
+RGB = np.array([[1.164, 0.0, 1.596], [1.164, -0.392, -0.813], [1.164, 2.017, 0.0]], np.float32)
 # From levels 0..255 to the power of 1.5 back to Y, U, V on the same scale. Decoding all the way
 # (2.2) suits the mixture better, but a dark side of a finger, whose shade is never known well,
 # weighs more there: disparity error without noise, hands resting at 1.0 and 0.5 m, and scatter at
 # 1.0 m: power 1 .094, .069, .065 px; 1.5 .070, .055, .060; 2 .074, .065, .063.
-_YUV_FROM_POWER = (np.linalg.inv(_RGB) / 255.0**0.5).astype(np.float32)
+YUV_FROM_POWER = (np.linalg.inv(RGB) / 255.0**0.5).astype(np.float32)
 # Both for what ends with a 1, which they leave.
 _RGB1, _YUV1_FROM_POWER = np.eye(4, dtype=np.float32), np.eye(4, dtype=np.float32)
-_RGB1[:3, :3], _YUV1_FROM_POWER[:3, :3] = _RGB, _YUV_FROM_POWER
+_RGB1[:3, :3], _YUV1_FROM_POWER[:3, :3] = RGB, YUV_FROM_POWER
 # Of x^1.5 the derivative is 1.5 x^.5.
-_POWER_SLOPES = 1.5 * _YUV_FROM_POWER.T
+POWER_SLOPES = 1.5 * YUV_FROM_POWER.T
 # The background of a cell is that of its direct neighbours (Gaussian of so many cells). Its paint's
 # luma, which falls off across a finger, is the mean of 3 x 3 cells, its colour that of 5 x 5: with
 # 3 there is more noise, with all of a large marker's cells its highlight.
-_BLUR = cv2.getGaussianKernel(3, 0.6, cv2.CV_32F)
+BLUR = cv2.getGaussianKernel(3, 0.6, cv2.CV_32F)
 _ROW3, _ROW5 = np.full(3, 1 / 3, np.float32), np.full(5, 1 / 5, np.float32)
 # Weight of the mean of all pure cells beside that of near ones: nothing where there are any,
 # everything where there are none.
-_FALLBACK_WEIGHT = 1e-5
+FALLBACK_WEIGHT = 1e-5
 # Luma, of 255, below which a ratio of chroma to luma is noise. (1, so that a sum of weighted lumas
 # may be compared with that of weights.)
-_DARKEST = 1.0
+DARKEST = 1.0
 
 
 class LinearLight:
@@ -75,9 +75,9 @@ class LinearLight:
 
     def derivative_by_encoded(self, slopes: Image) -> Image:
         """Chain rule: derivatives (3, h, n, w) by Y, U, V of light, as those by Y, U, V encoded."""
-        by_rgb = np.dot(_POWER_SLOPES, slopes.reshape(3, -1))
+        by_rgb = np.dot(POWER_SLOPES, slopes.reshape(3, -1))
         by_rgb *= self._root
-        return np.dot(_RGB.T, by_rgb).reshape(slopes.shape)
+        return np.dot(RGB.T, by_rgb).reshape(slopes.shape)
 
 
 class PaintFraction(NamedTuple):
@@ -102,7 +102,7 @@ class Mixture:
         planes = known.reshape(2, h, 4 * n * w)
         # Y, U, V and weight in windows about every cell, of background and of paint.
         near = np.empty_like(planes)
-        _filtered(planes[0], _BLUR, near[0])
+        _filtered(planes[0], BLUR, near[0])
         _filtered(planes[1], _ROW5, near[1])
         by_channel = near.reshape(2, h, 4, n * w)
         luma = np.maximum(by_channel[:, :, 0], by_channel[:, :, 3])
@@ -171,8 +171,8 @@ class Mixture:
         # Of as few numbers, Python's arithmetic takes half as long as numpy's.
         return [
             math.hypot(
-                u / max(y, _DARKEST) - u_b / max(y_b, _DARKEST),
-                v / max(y, _DARKEST) - v_b / max(y_b, _DARKEST),
+                u / max(y, DARKEST) - u_b / max(y_b, DARKEST),
+                v / max(y, DARKEST) - v_b / max(y_b, DARKEST),
             )
             for y_b, u_b, v_b, y, u, v in self._means[:, :3].reshape(6, -1).T.tolist()
         ]
@@ -204,9 +204,9 @@ def _weighted_cells(rows: Image, weights: Image) -> tuple[Image, Image]:
 
 @functools.lru_cache(maxsize=256)
 def _faint(width: int) -> Image:
-    """_FALLBACK_WEIGHT for a tile's columns, next to nothing for the gap at its end; (w,).
+    """FALLBACK_WEIGHT for a tile's columns, next to nothing for the gap at its end; (w,).
 
     So windows do not reach the next tile, and no sum is 0 there.
     """
     weights = np.repeat(np.array([1.0, 1e-6], np.float32), (width - GAP, GAP))
-    return _FALLBACK_WEIGHT * weights
+    return FALLBACK_WEIGHT * weights

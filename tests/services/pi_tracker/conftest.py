@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import platform
+from pathlib import Path
+
 import pytest
 
+from hatch_build import compile_for
 from rhot.files.calibration import Colors
 from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect.blob_search import BlobDetector
@@ -45,6 +50,21 @@ def tip() -> type[synthetic_images.Tip]:
 def colors() -> Colors:
     """Ranges of all paints."""
     return synthetic_images.ranges()
+
+
+@pytest.fixture(scope="session")
+def compiled_file(tmp_path_factory) -> Path:
+    """The tracker's C, compiled from the sources as they are."""
+    path = tmp_path_factory.mktemp("compiled") / "tracker.so"
+    if wrong := compile_for(platform.machine(), path):
+        pytest.skip(f"the compiler {wrong}")
+    return path
+
+
+@pytest.fixture(scope="session")
+def compiled(compiled_file) -> ctypes.CDLL:
+    """The same, loaded."""
+    return ctypes.CDLL(str(compiled_file))
 
 
 @pytest.fixture

@@ -1,0 +1,205 @@
+/* Sub-pixel centroids of blobs: what services/pi_tracker/measure does, in one call for all blobs.
+
+   Formulas, their reasons and their sources are in measure/centroid.py and paint_fraction.py, from
+   where the constants come as well. A test compares both forms.
+
+   Nothing of the C library is used and nothing is allocated: the caller owns all memory. Sizes and
+   rectangles are checked before the first access; a call that returns less than 0 has touched
+   nothing. Without -ffast-math and without fused operations results are the same on every
+   machine. */
+
+#include "mixture.h"
+
+/* Cells a side of a picture, at most: so no product of sizes overflows. */
+#define MOST_CELLS 16384
+/* x, y, area, sigma and quality of a blob. */
+#define VALUES 5
+
+/* What this was compiled from (hatch_build.py). */
+#ifndef RHOT_DIGEST
+#define RHOT_DIGEST ""
+#endif
+const char *const rhot_digest = RHOT_DIGEST;
+/* Who calls has the same structures: their sizes are compared. */
+const int32_t rhot_sizes[2] = {sizeof(picture), sizeof(constants)};
+
+enum { BAD_PICTURE = -1, BAD_BLOB = -2, BAD_MASKS = -3, BAD_SCRATCH = -4 };
+
+typedef struct {
+    double area, x, y;                     /* of the pixels' weights: sum, times x, times y */
+    double var, var_x, var_y, var_squares; /* of the cells' variances; the last by x^2 + y^2 */
+    double edge; /* as many cells as have weights that are neither 0 nor 1 */
+} moments;
+
+/* Between cells a ramp is linear: 3 parts of a pixel's own cell, 1 of its neighbour's. */
+static inline float between(const float *near, const float *far, size_t own, size_t beside) {
+    return 0.75f * (0.75f * near[own] + 0.25f * near[beside]) +
+           0.25f * (0.75f * far[own] + 0.25f * far[beside]);
+}
+
+/* Adds the four pixels of cell (x, y), where a weight is at most 1. */
+static void add_cell(moments *m, const tile *t, const shape *s, int32_t x, int32_t y) {
+    size_t row = row_at(s, y), own = (size_t)x, wide = 2 * (size_t)s->row;
+    /* Where a tile ends it goes on as it is. */
+    size_t rows[2] = {y > 0 ? row - (size_t)s->row : row,
+                      y < s->h - 1 ? row + (size_t)s->row : row};
+    size_t columns[2] = {x > 0 ? own - 1 : own, x < s->w - 1 ? own + 1 : own};
+    double weight[4], cell = 0.0, partly = 0.0;
+    for (int i = 0; i < 4; i++) {
+        float ramp[2];
+        for (int part = 0; part < 2; part++) {
+            const float *plane = t->plane[RAMP + part];
+            ramp[part] = between(plane + row, plane + rows[i / 2], own, columns[i % 2]);
+        }
+        float luma = t->plane[LUMA][(2 * (size_t)y + (size_t)(i / 2)) * wide + 2 * own +
+                                    (size_t)(i % 2)];
+        float clipped = larger(smaller(ramp[1] * luma + ramp[0], 1.0f), 0.0f);
+        weight[i] = clipped;
+        cell += clipped;
+        /* Where clipping holds the weight at 0 or 1, noise does not move it. */
+        if (clipped > 0.0f && clipped < 1.0f) partly += 0.25;
+    }
+    m->area += cell;
+    m->x += cell * (2 * x) + (weight[1] + weight[3]);
+    m->y += cell * (2 * y) + (weight[2] + weight[3]);
+    m->edge += partly;
+    double variance = partly * t->plane[VARIANCE][row + own];
+    m->var += variance;
+    m->var_x += variance * x;
+    m->var_y += variance * y;
+    m->var_squares += variance * ((double)x * x + (double)y * y);
+}
+
+static moments weights(const tile *t, const shape *s) {
+    moments m = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    for (int32_t y = 0; y < s->h; y++) {
+        const float *reach = t->plane[REACH] + row_at(s, y);
+        for (int32_t x = 0; x < s->w; x++)
+            if (reach[x] > 0.0f) add_cell(&m, t, s, x, y);
+    }
+    return m;
+}
+
+/* Distance of the paint's mean chroma per luma from the background's, in light. */
+static double contrast(const tile *t, const constants *k) {
+    double by = at_least(t->means[0][0], k->darkest), y = at_least(t->means[1][0], k->darkest);
+    double u = t->means[1][1] / y - t->means[0][1] / by;
+    double v = t->means[1][2] / y - t->means[0][2] / by;
+    return __builtin_sqrt(u * u + v * v);
+}
+
+/* Standard deviation of a centroid (x, y) in its tile, px (measure/centroid_sigma.py). */
+static double sigma_of(const moments *m, const constants *k, double area, double x, double y) {
+    const double pi = 3.14159265358979323846;
+    x = (x - 0.5) / 2.0;
+    y = (y - 0.5) / 2.0;
+    double about = m->var_squares - 2.0 * (x * m->var_x + y * m->var_y) + (x * x + y * y) * m->var;
+    double noise = k->slope * __builtin_sqrt(32.0 * at_least(about, 0.0)) / area;
+    double band = 4.0 * m->edge / (2.0 * pi * __builtin_sqrt(area / pi));
+    double misfit = k->misfit_px + k->misfit_per_px * at_least(band - k->sharp_band_px, 0.0);
+    return __builtin_sqrt(noise * noise + misfit * misfit);
+}
+
+static void conclude(double out[VALUES], const tile *t, const shape *s, const constants *k,
+                     const picture *p, const blob *b) {
+    moments m = weights(t, s);
+    /* Of less than a pixel of paint the caller makes nothing. */
+    double area = at_least(m.area, 1e-9), x = m.x / area, y = m.y / area;
+    double sigma = sigma_of(&m, k, area, x, y);
+    double box = (double)(b->right - b->left) * (double)(b->bottom - b->top);
+    double fill = b->cells / (k->disc_fill * box), strength = contrast(t, k) / k->full_contrast;
+    double quality = (fill < 1.0 ? fill : 1.0) * (strength < 1.0 ? strength : 1.0);
+    if (b->left <= 0 || b->top <= 0 || b->right >= p->width || b->bottom >= p->height) {
+        quality *= k->cut_quality;
+        sigma += k->cut_sigma * __builtin_sqrt(area);
+    }
+    out[0] = 2.0 * s->left + x;
+    out[1] = 2.0 * s->top + y;
+    out[2] = m.area;
+    out[3] = sigma;
+    out[4] = quality;
+}
+
+/* Where a tile begins so that it lies in the picture. */
+static int32_t placed(int32_t begin, int32_t last) {
+    return begin < 0 ? 0 : begin > last ? last : begin;
+}
+
+/* The tile of a blob: its rectangle and MARGIN cells more. */
+static shape tile_of(const blob *b, const picture *p) {
+    shape s;
+    s.w = b->right - b->left + 2 * MARGIN;
+    s.h = b->bottom - b->top + 2 * MARGIN;
+    if (s.w > p->width) s.w = p->width;
+    if (s.h > p->height) s.h = p->height;
+    s.left = placed(b->left - MARGIN, p->width - s.w);
+    s.top = placed(b->top - MARGIN, p->height - s.h);
+    /* A multiple of what a processor takes at a time. */
+    s.row = (s.w + 2 * PAD + 3) / 4 * 4;
+    s.size = (size_t)(s.h + 2 * PAD) * (size_t)s.row;
+    return s;
+}
+
+static int is_picture(const picture *p) {
+    int64_t w = (int64_t)p->right - p->left, h = (int64_t)p->bottom - p->top;
+    if (!p->y || !p->u || !p->v || p->width > MOST_CELLS || p->height > MOST_CELLS) return 0;
+    if (p->left < 0 || p->top < 0 || w < 1 || h < 1) return 0;
+    if (p->right > p->width || p->bottom > p->height) return 0;
+    return p->row_y >= 2 * w && p->row_chroma >= w &&
+           p->bytes_y >= (2 * h - 1) * p->row_y + 2 * w &&
+           p->bytes_chroma >= (h - 1) * p->row_chroma + w;
+}
+
+/* Whether a blob lies in the picture and its tile in the window. */
+static int is_blob(const blob *b, const picture *p) {
+    if (b->left < 0 || b->top < 0 || b->right > p->width || b->bottom > p->height) return 0;
+    if (b->left >= b->right || b->top >= b->bottom) return 0;
+    shape s = tile_of(b, p);
+    return s.left >= p->left && s.top >= p->top && s.left + s.w <= p->right &&
+           s.top + s.h <= p->bottom;
+}
+
+/* Floats of scratch for a blob of w x h cells; less than 0 if there is no such blob. */
+int64_t rhot_centroid_scratch(int32_t w, int32_t h) {
+    if (w < 1 || h < 1 || w > MOST_CELLS || h > MOST_CELLS) return BAD_BLOB;
+    int64_t row = ((int64_t)w + 2 * MARGIN + 2 * PAD + 3) / 4 * 4;
+    return PLANES * row * ((int64_t)h + 2 * MARGIN + 2 * PAD);
+}
+
+/* What is wrong with the arguments of rhot_centroids; 0 if nothing is. */
+static int32_t check(const picture *p, int32_t count, const blob *blobs, int64_t masks_size,
+                     int64_t scratch_size) {
+    if (!is_picture(p)) return BAD_PICTURE;
+    for (int32_t n = 0; n < count; n++) {
+        if (!is_blob(&blobs[n], p)) return BAD_BLOB;
+        int32_t w = blobs[n].right - blobs[n].left, h = blobs[n].bottom - blobs[n].top;
+        masks_size -= (int64_t)w * h;
+        if (masks_size < 0) return BAD_MASKS;
+        if (rhot_centroid_scratch(w, h) > scratch_size) return BAD_SCRATCH;
+    }
+    return 0;
+}
+
+/* Measures blobs into out, VALUES doubles each. masks are those of their rectangles, one behind the
+   other, not 0 where the blob is; noise is a cell's standard deviation in luma and in chroma. */
+int32_t rhot_centroids(const picture *p, const constants *k, const double noise[2], int32_t count,
+                       const blob *blobs, const uint8_t *masks, int64_t masks_size, float *scratch,
+                       int64_t scratch_size, double *out) {
+    int32_t wrong = check(p, count, blobs, masks_size, scratch_size);
+    for (int32_t n = 0; n < count && !wrong; n++) {
+        const blob *b = &blobs[n];
+        shape s = tile_of(b, p);
+        tile t;
+        for (size_t i = 0; i < PLANES; i++) t.plane[i] = scratch + i * s.size;
+        for (size_t i = 0; i < CLEARED * s.size; i++) scratch[i] = 0.0f;
+        read_picture(&t, &s, p, k);
+        read_masks(&t, &s, k, b, masks);
+        mix(&t, &s, k, BY_MASK, 1);
+        purify(&t, &s, k);
+        mix(&t, &s, k, PURE, 0);
+        unmix(&t, &s, k, noise);
+        conclude(out + (size_t)n * VALUES, &t, &s, k, p, b);
+        masks += (size_t)(b->right - b->left) * (size_t)(b->bottom - b->top);
+    }
+    return wrong;
+}

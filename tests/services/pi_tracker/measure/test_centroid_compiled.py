@@ -1,0 +1,177 @@
+"""The compiled centroids are those of the Python form, and stay within what they are given."""
+
+from __future__ import annotations
+
+import ctypes
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.pi_tracker.detect.search_region import whole
+from services.pi_tracker.image.blob import make_blob
+from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.image.noise import Noise
+from services.pi_tracker.image.yuv_planes import picture
+from services.pi_tracker.measure import centroid_compiled, fastest
+from services.pi_tracker.measure.centroid import centroids
+from testing import synthetic_images
+
+# Cells of the pictures of random levels.
+WIDTH, HEIGHT = 20, 14
+
+
+@pytest.fixture(scope="module")
+def measure(compiled):
+    return centroid_compiled.CompiledCentroids(compiled)
+
+
+def agree(found, expected):
+    """To rounding.
+
+    Where nothing is known better than to a pixel, both divide small differences of large numbers.
+    """
+    assert len(found) == len(expected)
+    for one, other in zip(found, expected, strict=True):
+        unsure = other.sigma_px > 1.0
+        tolerance = 1e-3 * other.sigma_px if unsure else 1e-4
+        assert (one.x_px, one.y_px) == pytest.approx((other.x_px, other.y_px), abs=tolerance)
+        assert one.area_px == pytest.approx(other.area_px, rel=1e-2 if unsure else 1e-4, abs=1e-3)
+        assert one.sigma_px == pytest.approx(other.sigma_px, rel=3e-2 if unsure else 1e-3)
+        assert one.quality == pytest.approx(other.quality, rel=1e-3 if unsure else 1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_markers_of_random_pictures_are_the_same(studio, tip, detector, measure, seed):
+    """Tips of all sizes, shades and noise, the edges of the picture among their places."""
+    rng = np.random.default_rng(seed)
+    size = (160, 120)
+    tips = [
+        tip(
+            paint,
+            *rng.uniform(0, size),
+            rng.uniform(4, 22) if seed % 8 else 70.0,
+            length_px=rng.uniform(6, 30),
+            turn_rad=rng.uniform(0, 6.3),
+            light_rad=rng.uniform(-1, 1),
+        )
+        for paint in studio.paints
+    ]
+    wall = tuple(rng.uniform(40, 220, 3))
+    bgr = studio.bgr(studio.clean(tips, size, wall=wall)[0], rng.uniform(0, 8), seed)
+    frame = (
+        studio.of(bgr, layout="bgr"),
+        studio.of(bgr),
+        synthetic_images.frame_of(bgr, full_range=True),
+    )[seed % 3]
+    image, noise = picture(frame), Noise(rng.uniform(0.3, 3.0), rng.uniform(0.3, 3.0))
+    blobs = detector.detect(image, whole(image.size))
+    assert blobs
+    agree(measure(image, blobs, noise), [centroids(image, [blob], noise)[0] for blob in blobs])
+
+
+rects = st.tuples(
+    st.integers(0, WIDTH - 1), st.integers(0, HEIGHT - 1), st.integers(1, WIDTH), st.integers(1, 14)
+).map(lambda r: (r[0], r[1], min(r[0] + r[2], WIDTH), min(r[1] + r[3], HEIGHT)))
+
+
+def picture_of(levels, full_range=False):
+    """Planes of any levels, (3 HEIGHT, 2 WIDTH), as a picture."""
+    size_px = (2 * WIDTH, 2 * HEIGHT)
+    return picture(Frame("left", 0, 0, 0.0, size_px, levels, "i420", full_range))
+
+
+def blob_of(rect, mask):
+    part = np.ascontiguousarray(mask[rect[1] : rect[3], rect[0] : rect[2]])
+    return make_blob(0, rect, part, int(np.count_nonzero(part)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 1 << 30),
+    places=st.lists(rects, min_size=1, max_size=4),
+    fill=st.floats(0, 1),
+)
+def test_hostile_blobs_of_random_levels_are_measured_like_others(measure, seed, places, fill):
+    """Of one cell, empty, of the whole picture, beside each edge; pixels mean nothing."""
+    rng = np.random.default_rng(seed)
+    low, high = sorted(rng.integers(0, 256, 2))
+    levels = rng.integers(low, high + 1, (HEIGHT * 3, WIDTH * 2), np.uint8)
+    image = picture_of(levels, full_range=bool(seed % 2))
+    mask = (rng.uniform(size=(HEIGHT, WIDTH)) < fill).astype(np.uint8) * 255
+    blobs = [blob_of(rect, mask) for rect in places]
+    noise = Noise(1.0, 1.0)
+    for blob, found in zip(blobs, measure(image, blobs, noise), strict=True):
+        (expected,) = centroids(image, [blob], noise)
+        assert np.isfinite(found).all()
+        tolerance = 1e-4 + 2e-3 * expected.sigma_px
+        assert (found.x_px, found.y_px) == pytest.approx(
+            (expected.x_px, expected.y_px), abs=tolerance
+        )
+
+
+@pytest.mark.parametrize(
+    "rect",
+    [
+        (-1, 0, 3, 3),
+        (0, -1, 3, 3),
+        (0, 0, WIDTH + 1, 3),
+        (0, 0, 3, HEIGHT + 1),
+        (3, 3, 3, 5),
+        (3, 3, 5, 3),
+        (5, 5, 3, 3),
+        (WIDTH, HEIGHT, WIDTH + 2, HEIGHT + 2),
+        (-(2**31), 0, 2**31 - 1, 4),
+        (0, 0, 2**31 - 1, 2**31 - 1),
+    ],
+)
+def test_a_blob_outside_the_picture_is_refused(measure, rect):
+    image = picture_of(np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8))
+    blob = make_blob(0, rect, np.ones((4, 4), np.uint8), 16)
+    with pytest.raises(ValueError, match=r"no such blob: blobs at \[\("):
+        measure(image, [blob], Noise())
+
+
+def test_a_mask_smaller_than_its_rectangle_is_refused(measure):
+    image = picture_of(np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8))
+    blob = make_blob(0, (2, 2, 8, 8), np.ones((4, 4), np.uint8), 16)
+    with pytest.raises(ValueError, match="masks too small"):
+        measure(image, [blob], Noise())
+
+
+def test_planes_smaller_than_the_picture_are_refused(measure):
+    image = picture_of(np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8))
+    image.size = (WIDTH, 2 * HEIGHT)
+    blob = make_blob(0, (2, 2, 8, 8), np.ones((6, 6), np.uint8), 36)
+    with pytest.raises(ValueError, match="no such picture"):
+        measure(image, [blob], Noise())
+
+
+def test_both_sides_have_the_same_structures(compiled):
+    sizes = (ctypes.c_int32 * 2).in_dll(compiled, "rhot_sizes")
+    constants = centroid_compiled._constants()
+    assert list(sizes) == [ctypes.sizeof(centroid_compiled._Picture), ctypes.sizeof(constants)]
+
+
+def test_threads_do_not_share_memory(studio, tip, detector, noise, measure):
+    """C runs without Python's lock."""
+    images = []
+    for n in range(6):
+        tips = [tip("green", 30.0 + n, 31.0, 8.0 + 3 * n), tip("blue", 90.0, 40.0, 9.0)]
+        image = picture(studio.frame(tips, seq=n, size_px=(128, 80))[0])
+        images.append((image, detector.detect(image, whole(image.size))))
+    alone = [measure(image, blobs, noise) for image, blobs in images]
+    with ThreadPoolExecutor(3) as pool:
+        for _ in range(20):
+            assert list(pool.map(lambda one: measure(*one, noise), images)) == alone
+
+
+def test_no_blobs_no_centroids(studio, measure, noise):
+    assert measure(picture(studio.frame([])[0]), [], noise) == []
+
+
+def test_the_tracker_takes_what_this_machine_has():
+    assert fastest.centroids in (centroid_compiled.centroids, centroids)
+    assert (fastest.centroids is centroids) == (centroid_compiled.centroids is None)
