@@ -5,8 +5,8 @@
 rhot-fusion and rhot-solver, a router, and two relays that do nothing but put a payload of the same
 size, each a process of its own. Two cameras' frames are put at the pace of their stamps, and half
 way to the next frame a bare message takes as many hops: whatever else this machine does, it does to
-both. Latencies from the put of the frame whose instant the pose is of (fusion's lag is 0) to the
-callback that has the pose:
+both. At 60 fps once more without the router, each a peer of the others. Latencies from the put of
+the frame whose instant the pose is of (fusion's lag is 0) to the callback that has the pose:
     latency_ratio_p50   median of ours over the median of bare Zenoh, at 60 fps
     latency_p99_ms      of ours, at 60 fps
 Where the time goes: `sent_ns` of points and poses splits it, in a run of its own, as whoever
@@ -29,6 +29,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import zenoh
+from latency_peer import peer_config
 from latency_relay import NUMBER_BYTES
 from latency_rig import BARE_KEYS, RIG, Recording, record, running
 from latency_steps import alone_us
@@ -48,9 +49,9 @@ START_S = 60.0
 class Played:
     """When frames were put (ns, by their stamp), and when what came of them was here."""
 
-    def __init__(self, endpoint: str, recording: Recording, *, points: bool) -> None:
+    def __init__(self, endpoint: str, recording: Recording, *, points: bool, direct: bool) -> None:
         self._recording = recording
-        self._session = zenoh.open(client_config([endpoint]))
+        self._session = zenoh.open((peer_config if direct else client_config)([endpoint]))
         self.put_ns: dict[int, int] = {}  # by the frame's instant, which points due with it have
         self.due_ns: list[int] = []  # when frames were put that points are due with
         self.bare_put_ns: list[int] = []
@@ -183,18 +184,22 @@ def quantiles(values: list[float]) -> dict[str, float]:
 def measure(fps: float, seconds: float) -> dict[str, Any]:
     """One rate: latencies, then where they come from."""
     recording = record(fps, seconds + WARM_S)
-    found = played(recording, points=False).figures()
+    found = played(recording).figures()
     if fps == MAIN_FPS:
+        found["direct"] = played(recording, direct=True).figures()
         found["split"] = played(recording, points=True).split_us()
         found["alone"] = alone_us(recording)
         found["stages_us"] = dict(stages(found))
     return found
 
 
-def played(recording: Recording, *, points: bool) -> Played:
-    """A recording, played to processes of its own."""
-    with tempfile.TemporaryDirectory() as folder, running(Path(folder), recording) as endpoint:
-        run = Played(endpoint, recording, points=points)
+def played(recording: Recording, *, points: bool = False, direct: bool = False) -> Played:
+    """A recording, played to processes of its own; points: listening to those as well."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running(Path(folder), recording, direct=direct) as endpoint,
+    ):
+        run = Played(endpoint, recording, points=points, direct=direct)
         run.play()
     return run
 
@@ -221,13 +226,11 @@ def stages(found: dict[str, Any]) -> list[tuple[str, float]]:
 
 def print_table(results: dict[float, dict[str, Any]]) -> None:
     """Latencies of all rates, then the stages."""
-    print(f"{'2 cameras, router':<24} {'p50':>8} {'95 %':>8} {'p99':>8} {'max':>8}  ms")
+    print(f"{'2 cameras':<24} {'p50':>8} {'95 %':>8} {'p99':>8} {'max':>8}  ms")
     for fps, found in results.items():
-        for name, row in (("marker to pose", found["ours"]), ("bare Zenoh", found["bare"])):
-            told = " ".join(f"{value:8.3f}" for value in row.values())
-            print(f"{fps:3.0f} fps {name:<16} {told}")
-        ratio = found["ours"]["p50"] / found["bare"]["p50"]
-        print(f"        ratio {ratio:12.2f}, {found['poses']} of {found['due']} poses")
+        print_way(f"{fps:3.0f} fps", found)
+        if "direct" in found:
+            print_way("direct", found["direct"])
     for found in results.values():
         if "split" in found:
             print("\nwhere the median goes at 60 fps, us")
@@ -235,6 +238,15 @@ def print_table(results: dict[float, dict[str, Any]]) -> None:
                 print(f"  {name:<34} {value:7.0f}")
             alone = found["alone"]
             print(f"  {'fusion, step that tells none':<34} {alone['fusion_silent']:7.0f}")
+
+
+def print_way(title: str, found: dict[str, Any]) -> None:
+    """Latencies of one run."""
+    for name, row in (("marker to pose", found["ours"]), ("bare Zenoh", found["bare"])):
+        told = " ".join(f"{value:8.3f}" for value in row.values())
+        print(f"{title:<7} {name:<16} {told}")
+    ratio = found["ours"]["p50"] / found["bare"]["p50"]
+    print(f"        ratio {ratio:12.2f}, {found['poses']} of {found['due']} poses")
 
 
 def main() -> None:

@@ -101,8 +101,11 @@ def write_rig(folder: Path, rig: SyntheticRig) -> Path:
 
 
 @contextlib.contextmanager
-def running(folder: Path, recording: Recording) -> Iterator[str]:
-    """The router, fusion, the solver and two bare relays as processes; the router's endpoint."""
+def running(folder: Path, recording: Recording, *, direct: bool) -> Iterator[str]:
+    """The router, fusion, the solver and two bare relays as processes; the router's endpoint.
+
+    direct: peers without a router; the endpoint is that of their hub.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -112,14 +115,19 @@ def running(folder: Path, recording: Recording) -> Iterator[str]:
     _, points, pose = recording.example
     (folder / "points").write_bytes(points)
     (folder / "pose").write_bytes(pose)
-    relay = str(_HERE / "latency_relay.py")
+    peer = str(_HERE / "latency_peer.py")
+    run = (peer,) if direct else ("-m",)
     commands = [
-        ("-m", "services.cli", "router", "--listen", endpoint),
-        ("-m", "services.fusion", *common),
-        ("-m", "services.solver", *common),
-        (relay, endpoint, *BARE_KEYS[:2], str(folder / "points")),
-        (relay, endpoint, *BARE_KEYS[1:], str(folder / "pose")),
+        (peer, "hub", endpoint)
+        if direct
+        else ("-m", "services.cli", "router", "--listen", endpoint),
+        (*run, "services.fusion", *common),
+        (*run, "services.solver", *common),
+        (*run, "latency_relay", endpoint, *BARE_KEYS[:2], str(folder / "points")),
+        (*run, "latency_relay", endpoint, *BARE_KEYS[1:], str(folder / "pose")),
     ]
+    # Modules of this folder, beside those that the caller finds.
+    path = os.pathsep.join([str(_HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
     with contextlib.ExitStack() as stack:
         log = stack.enter_context((folder / "log").open("wb"))
         for command in commands:
@@ -128,7 +136,8 @@ def running(folder: Path, recording: Recording) -> Iterator[str]:
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as `rhot up` has it
+                # One thread, as `rhot up` has it.
+                env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
             )
             stack.enter_context(process)
             stack.callback(process.terminate)
