@@ -64,12 +64,15 @@ async def serve(service: Service) -> None:
         outlet.consumers.append(drift.take)
         service.tasks.create_task(drift.follow())
     service.ready()
-    async for pose in poses:
+
+    def take(pose: OpenVrPose) -> None:
         result = step.step(pose, clock.now_ns())
         if result is not None:
             outlet.put(result)
         elif config.object and not step.knows(pose.device.serial):
             unknown.note(pose.device.serial, time.monotonic())
+
+    await poses.each(take)
 
 
 class Outlet:
