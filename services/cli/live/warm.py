@@ -20,7 +20,7 @@ import services
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig, load_rig
 from rhot.hand import HandModel, HandName
-from rhot.process.numba_cache import adopt, clear_old
+from rhot.process.numba_cache import adopt, cache_folder, clear_old
 from services.cli.defaults import sim_toml
 
 
@@ -31,14 +31,19 @@ def warm(
 ) -> None:
     """Compile all kernels once, ahead of the first start."""
     package = Path(services.__file__).parent
-    adopt(package)
+    adopted = adopt(package)
     started_s = time.monotonic()
     path = config or sim_toml()
     rig = load_rig(path)
     # Those that take longest begin.
-    parts = ["fusion", "solver"]
+    parts = ["solver", "fusion"]
     if any(camera.source == "simulator" for camera in rig.camera):
-        parts.insert(1, "simulator")
+        parts.append("simulator")
+    known = adopted or any(cache_folder(package).rglob("*.nbc"))
+    typer.echo(
+        f"{'loading' if known else 'compiling'} the kernels of {', '.join(parts)} into"
+        f" {cache_folder(package)}{'' if known else ': a minute or two, once'}"
+    )
     # Processes, as numba compiles in one thread at a time; spawned, as its locks do not survive a
     # fork.
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:

@@ -10,7 +10,7 @@ from rhot.errors import CalibrationError
 from services.cli.live.warm import warm
 
 
-def test_a_broken_calibration_is_named(tmp_path, repository):
+def test_says_what_it_compiles_and_names_a_broken_calibration(tmp_path, repository, capsys):
     config = tmp_path / "config"
     shutil.copytree(repository / "config", config)
     rig = config / "sim.toml"
@@ -19,3 +19,4 @@ def test_a_broken_calibration_is_named(tmp_path, repository):
     (config / "calibration" / "hand.right.json").write_text('{"x":')
     with pytest.raises(CalibrationError, match=r"hand\.right\.json.*rhot calibrate hand"):
         warm(rig)
+    assert "the kernels of solver, fusion into" in capsys.readouterr().out
