@@ -1,7 +1,7 @@
 """The rate at which a camera really delivers. Pure; time is an argument.
 
 Counted over some seconds: frames come late and in pairs now and then, and that is no fault. Until
-so many seconds have passed there is no rate.
+so many seconds of frames have passed there is no rate: a camera that has just begun is not slow.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ class FrameRate:
 
     def beat(self, now_ns: int) -> None:
         """About once a second: the rate over the last seconds."""
+        # The second in which the first frame came is not a whole one.
+        if self._beats and self._beats[-1][1] == 0:
+            self._beats.clear()
         self._beats.append((now_ns, self._count))
         while len(self._beats) > 2 and now_ns - self._beats[1][0] >= WINDOW_S * 1e9:
             self._beats.popleft()

@@ -81,8 +81,8 @@ def test_a_slow_camera_and_one_that_stops_and_comes_back(film, monitor):
 
 
 def test_a_camera_that_never_begins(monitor):
-    beats = [monitor.beat(10**18 + n * 10**9) for n in range(8)]
-    assert beats[0] == {}
+    beats = [monitor.beat(10**18 + n * 10**9) for n in range(16)]
+    assert not any(beats[:-1])
     assert "no picture yet" in beats[-1]["camera_slow"]
 
 

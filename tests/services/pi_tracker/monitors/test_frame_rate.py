@@ -21,10 +21,15 @@ def beats(rate, counts, now_ns=0):
 
 def test_no_rate_before_some_seconds_have_passed():
     rate = FrameRate(30.0)
-    beats(rate, [0, 30, 30, 30])
+    beats(rate, [0, 30, 30, 30, 30])
     assert rate.rate_hz is None
-    beats(rate, [30], 4 * 10**9)
+    beats(rate, [30], 5 * 10**9)
     assert rate.rate_hz == pytest.approx(30.0)
+
+
+def test_a_camera_that_has_just_begun_is_not_slow():
+    assert not any(beats(FrameRate(30.0), [0] * 8 + [1] + [30] * 8))
+    assert not any(beats(FrameRate(30.0), [1] + [30] * 8))
 
 
 def test_one_lost_second_is_told_a_lost_frame_is_not():
