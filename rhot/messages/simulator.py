@@ -93,12 +93,30 @@ class SimClock(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
 _Degrees = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 
 
+class SimBoard(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A calibration board as `rhot board` prints it, carried before simulated cameras.
+
+    It is carried to the place of that number and held still there; each number has its own place.
+    camera is the one whose picture it is carried through, "" for what all cameras see.
+    """
+
+    kind: Literal["chessboard", "charuco"] = "chessboard"
+    camera: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{0,64}$")] = ""
+    place: Annotated[int, msgspec.Meta(ge=0, le=100_000)] = 0
+
+
+# Slower, a calibration's patience ends; faster, motion blurs the paint.
+_Speed = Annotated[float, msgspec.Meta(ge=0.1, le=4.0)]
+
+
 class SimStage(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the simulator shows, and what has gone wrong with it: to be tried without any hardware.
 
     scene is one of the catalogue's, "" the one of rig.toml. hidden are landmarks whose paint is
     covered, as `right.index_tip`. turned_deg says how far cameras were turned about their own x
-    (down), y (right) and z after the calibration, which knows nothing of it. As a request: what
+    (down), y (right) and z after the calibration, which knows nothing of it. board is shown instead
+    of hands and objects. speed makes what moves faster; begins_in_s lets the hands wait so long and
+    then do the scene from its beginning, None: they are in the midst of it. As a request: what
     shall be.
     """
 
@@ -107,3 +125,6 @@ class SimStage(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     turned_deg: dict[Name, tuple[_Degrees, _Degrees, _Degrees]] = msgspec.field(
         default_factory=dict
     )
+    board: SimBoard | None = None
+    speed: _Speed = 1.0
+    begins_in_s: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] | None = None

@@ -28,4 +28,4 @@ async def serve(service: Service) -> None:
     try:
         await asyncio.Event().wait()
     finally:
-        guide.close()
+        await guide.close()

@@ -4,9 +4,11 @@ ground truth, in real time.
 Each camera runs at its own phase, in a thread of its own; a picture is published when a real one
 would have arrived. The true time is CLOCK_REALTIME of this machine, which is the master's; the
 clock of a simulated camera computer is off by SimFrame.clock_skew_ns, and can be set
-(computer_clocks.py). Which scene is shown, covered paint and bumped cameras are set while it runs
-(stage.py). Late: a camera that cannot keep up skips frames and counts them in health.
-Uncalibrated: the service ends with the error that names the command. Nobody listens: it runs on.
+(computer_clocks.py). Which scene is shown, covered paint, bumped cameras and calibration boards are
+set while it runs (stage.py). Cameras and hands stay those of the calibration that it began with,
+whatever is saved meanwhile. Late: a camera that cannot keep up skips frames and counts them in
+health. Uncalibrated: the service ends with the error that names the command. Nobody listens: it
+runs on.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ import time
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import cv2
 import msgspec
@@ -26,6 +30,7 @@ from rhot.messages.simulator import SimFrame, SimStage
 from rhot.process.service import Service
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.computer_clocks import ComputerClocks
+from services.simulator.files.calibration_kept import calibration_kept
 from services.simulator.scene.scene import Scene
 from services.simulator.scene.vive_trackers import tracker_pose
 from services.simulator.stage import Stage
@@ -75,9 +80,12 @@ async def serve(service: Service) -> None:
     """Renders a virtual rig live: camera pictures, tracker poses and the ground truth."""
     cv2.setNumThreads(1)
     config = service.config
-    stage = Stage(config)
     names = [c.name for c in config.camera if c.source == "simulator"]
-    with ThreadPoolExecutor(max(1, len(names)), "camera") as threads:
+    with (
+        TemporaryDirectory(prefix="rhot-simulator-") as folder,
+        ThreadPoolExecutor(max(1, len(names)), "camera") as threads,
+    ):
+        stage = Stage(config, calibration_kept(config, Path(folder)))
         sources = [
             await asyncio.get_running_loop().run_in_executor(
                 threads, _compiled, stage.seen_by(name), name
@@ -85,7 +93,7 @@ async def serve(service: Service) -> None:
             for name in names
         ]
         clock, computers = SceneClock(), ComputerClocks(names)
-        service.bus.answer_requests(topics.SIM_STAGE, partial(_answer_stage, stage))
+        service.bus.answer_requests(topics.SIM_STAGE, partial(_answer_stage, stage, clock))
         async with asyncio.TaskGroup() as tasks:
             for source in sources:
                 camera = _LiveCamera(service, source, stage, threads)
@@ -103,11 +111,12 @@ def _compiled(scene: Scene, camera: str) -> FrameSource:
     return source
 
 
-async def _answer_stage(stage: Stage, payload: bytes) -> SimStage:
+async def _answer_stage(stage: Stage, clock: SceneClock, payload: bytes) -> SimStage:
     """What is shown, after the change that a request asks for."""
     if payload:
         # Where a hand takes an object is searched for: that takes longer than a frame.
-        await asyncio.to_thread(stage.set, msgspec.json.decode(payload, type=SimStage))
+        wanted = msgspec.json.decode(payload, type=SimStage)
+        await asyncio.to_thread(stage.set, wanted, clock.now_s)
     return stage.wanted
 
 

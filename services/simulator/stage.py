@@ -2,21 +2,30 @@
 any hardware. Pure.
 
 A covered dab of paint is skin. A bumped camera takes its pictures from where it is now, while its
-calibration, which every other service reads, says where it was.
+calibration, which every other service reads, says where it was. Who shows a board has no hand free,
+and has put the objects away: behind the cameras.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
-from rhot.geometry.transforms import rotation_x, rotation_y, rotation_z, transform
-from rhot.messages.simulator import SimStage
+from rhot.geometry.transforms import Array, rotation_x, rotation_y, rotation_z, transform
+from rhot.messages.simulator import SimBoard, SimStage
+from services.simulator.board.carried import CarriedBoard
+from services.simulator.board.places import place
+from services.simulator.hands.gestures import Gesture, Motion
 from services.simulator.recorded_motion.scenes import live_scene
 from services.simulator.scene.scene import Scene, load_scene
+
+# Objects that are put away, in the first camera's frame.
+_PUT_AWAY = transform(np.eye(3), (0.0, 0.0, -1.0))
 
 
 class Stage:
@@ -25,25 +34,53 @@ class Stage:
     scene is as it is: its truth and its trackers. changes counts how often it was set.
     """
 
-    def __init__(self, config: RigConfig) -> None:
-        """Errors as of services/simulator/recorded_motion/scenes.py."""
-        self._config = config
-        self.scene: Scene = live_scene(config)
+    def __init__(self, config: RigConfig, kept: RigConfig | None = None) -> None:
+        """kept has the calibration of scenes that are set later, where config's may change.
+
+        Errors as of services/simulator/recorded_motion/scenes.py.
+        """
+        self._config = kept or config
+        self._scene: Scene = live_scene(config)
+        self.scene: Scene = self._scene
         self.wanted = SimStage()
         self.changes = 0
 
-    def set(self, wanted: SimStage) -> None:
-        """Show something else.
+    def set(self, wanted: SimStage, now_s: Callable[[], float] = lambda: 0.0) -> None:
+        """Show something else; now_s tells the scene's time.
 
         Raises ConfigError that lists what is valid; nothing has changed then.
         """
-        scene = self.scene
-        if wanted.scene != self.wanted.scene:
-            own = not wanted.scene
-            scene = live_scene(self._config) if own else load_scene(self._config, wanted.scene)
+        scene, before = self._scene, self.wanted
+        if (wanted.scene, wanted.speed) != (before.scene, before.speed):
+            scene = self._loaded(wanted)
         _check(wanted, scene)
-        self.scene, self.wanted = scene, wanted
+        if wanted.board and self.scene.board and _same_board(wanted, before):
+            self.scene.board.carry(self._place(wanted.board), now_s())
+            self.wanted = wanted
+            return
+        self._scene, self.wanted = scene, wanted
+        if wanted.begins_in_s is not None:
+            scene = _begun(scene, now_s() + wanted.begins_in_s)
+        if wanted.board:
+            scene = _put_away(scene)
+            board = CarriedBoard(wanted.board.kind, self._place(wanted.board))
+            scene = replace(scene, hands={}, board=board)
+        self.scene = scene
         self.changes += 1
+
+    def _loaded(self, wanted: SimStage) -> Scene:
+        settings = self._config.simulator
+        speed = settings.speed * wanted.speed
+        if wanted.scene:
+            return load_scene(self._config, wanted.scene, speed=speed)
+        simulator = msgspec.structs.replace(settings, speed=speed)
+        return live_scene(msgspec.structs.replace(self._config, simulator=simulator))
+
+    def _place(self, board: SimBoard) -> Array:
+        """T_rig_from_board (4, 4) where it shall be."""
+        cameras, seed = self._scene.cameras, self._scene.seed
+        meant = [cameras[board.camera]] if board.camera else list(cameras.values())
+        return place(meant, board.place, seed)
 
     def seen_by(self, camera: str) -> Scene:
         """The scene as that camera sees it: without hidden paint, and from where it is now."""
@@ -68,12 +105,49 @@ class Stage:
         return replace(scene, hands=hands, cameras=cameras)
 
 
+def _same_board(wanted: SimStage, before: SimStage) -> bool:
+    """Whether nothing differs but the place of the board."""
+    if wanted.board is None or before.board is None:
+        return False
+    board = msgspec.structs.replace(wanted.board, place=before.board.place)
+    return msgspec.structs.replace(wanted, board=board) == before
+
+
+def _begun(scene: Scene, begins_s: float) -> Scene:
+    """The scene with hands that begin their motion at that scene time, and wait for it."""
+
+    def waiting(motion: Motion, begins: float) -> Motion:
+        def at(t: float) -> Gesture:
+            return motion(max(0.0, t - begins))
+
+        return at
+
+    hands = {
+        name: replace(hand, motion=waiting(hand.motion, hand.speed * begins_s))
+        for name, hand in scene.hands.items()
+    }
+    return replace(scene, hands=hands)
+
+
+def _put_away(scene: Scene) -> Scene:
+    first = next(iter(scene.cameras.values()))
+    away = first.T_rig_from_camera @ _PUT_AWAY
+    objects = [
+        replace(item, T_rig_from_rest=away, holder=None, sweep=None) for item in scene.objects
+    ]
+    return replace(scene, objects=objects)
+
+
 def _check(wanted: SimStage, scene: Scene) -> None:
     """Raises ConfigError for paint or cameras that the scene does not have."""
     painted = [f"{name}.{mark}" for name, hand in scene.hands.items() for mark in hand.landmarks]
     for landmark in wanted.hidden:
         if landmark not in painted:
             raise ConfigError(f"no paint {landmark!r} to cover; valid: {', '.join(painted)}")
+    if wanted.board and wanted.board.camera not in ("", *scene.cameras):
+        raise ConfigError(
+            f"no camera {wanted.board.camera!r} to show a board; valid: {', '.join(scene.cameras)}"
+        )
     for camera in wanted.turned_deg:
         if camera not in scene.cameras:
             raise ConfigError(f"no camera {camera!r} to turn; valid: {', '.join(scene.cameras)}")

@@ -50,7 +50,9 @@ def board_shown(router: str, in_background: InBackground) -> None:
         asked += 1
         with query:
             key = topics.FRAME.key("desk", camera="left")
-            query.reply(key, pictures[min((asked - 1) // 4, POSITIONS - 1)])
+            # No two pictures of a camera are the same.
+            shown = pictures[min((asked - 1) // 4, POSITIONS - 1)]
+            query.reply(key, shown + asked.to_bytes(4))
 
     def show(stop: threading.Event) -> None:
         with zenoh.open(client_config([router])) as session:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Protocol
 
 import cv2
@@ -83,11 +83,15 @@ class BoardCollection:
         count: int,
         teller: Teller,
         keep: Callable[[Mapping[str, bytes]], None],
+        after_take: Callable[[Verdict | None], Awaitable[None]] | None = None,
     ) -> None:
+        """after_take hears what became of each take, None before a board is found."""
         self.board: Board | None = None
         self.selection: LiveSelection | None = None
         self._names, self._teller, self._keep = names, teller, keep
         self._square_m, self._count = square_m, count
+        self._after_take = after_take
+        self._before: dict[str, bytes] = {}
         self._size: tuple[int, int] | None = None
 
     async def run(self, bus: Bus, board: Board | None) -> None:
@@ -95,36 +99,46 @@ class BoardCollection:
         news_s = time.monotonic()
         while self.selection is None or not self.selection.done:
             pictures = await ask_all(bus, self._names)
-            images = {
-                name: await asyncio.to_thread(decoded, name, picture, cv2.IMREAD_GRAYSCALE)
-                for name, picture in pictures.items()
-            }
-            if self.selection is None:
-                board = board or await asyncio.to_thread(self._counted, images)
-                if board is not None:
-                    self.selection = LiveSelection(self._names, board, self._count)
-            if self.selection is not None and await self._offer(self.selection, images, pictures):
-                news_s = time.monotonic()
+            # A slow camera answers twice with one picture, in which everything stands still.
+            if not any(pictures[name] == self._before.get(name) for name in self._names):
+                self._before = pictures
+                verdict = await self._take(pictures, board)
+                if verdict is Verdict.KEPT:
+                    news_s = time.monotonic()
+                if self._after_take is not None and not (self.selection and self.selection.done):
+                    await self._after_take(verdict)
             if time.monotonic() - news_s > _PATIENCE_S:
                 raise CalibrationError(self._given_up())
             await asyncio.sleep(_PAUSE_S)
 
+    async def _take(self, pictures: dict[str, bytes], board: Board | None) -> Verdict | None:
+        """What became of new pictures; None as long as no board was counted."""
+        images = {
+            name: await asyncio.to_thread(decoded, name, picture, cv2.IMREAD_GRAYSCALE)
+            for name, picture in pictures.items()
+        }
+        if self.selection is None:
+            board = board or await asyncio.to_thread(self._counted, images)
+            if board is None:
+                return None
+            self.selection = LiveSelection(self._names, board, self._count)
+        return await self._offer(self.selection, images, pictures)
+
     async def _offer(
         self, selection: LiveSelection, images: dict[str, np.ndarray], pictures: dict[str, bytes]
-    ) -> bool:
-        """Whether the position was kept."""
+    ) -> Verdict:
+        """What became of the position."""
         seen = {
             name: await asyncio.to_thread(_detected, image, selection.board)
             for name, image in images.items()
         }
         take = selection.offer(seen)
-        kept = take.verdict is Verdict.KEPT
-        if kept:
+        if take.verdict is Verdict.KEPT:
             self.board = selection.board
             self._keep(pictures)
             self._teller.line(selection.text())
         self._teller.status(selection.text(take))
-        return kept
+        return take.verdict
 
     def _counted(self, images: dict[str, np.ndarray]) -> Board | None:
         before, self._size = self._size, find_board_size(images.values())

@@ -9,10 +9,12 @@ from pathlib import Path
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Lens, load_lens
+from rhot.messages.simulator import SimBoard, SimStage
 from services.calibrator.board.board import Board
 from services.calibrator.board.picture_folder import PictureSet
 from services.calibrator.endpoints.board_positions import BoardCollection
 from services.calibrator.endpoints.desk import Desk
+from services.calibrator.endpoints.practice import Performer, practising
 from services.calibrator.guided.boards import lens_found, rig_found
 from services.calibrator.guided.found import Found
 
@@ -32,7 +34,9 @@ async def board_step(desk: Desk) -> Found:
             raise CalibrationError("one camera has no place to others: rig.toml needs two of them")
     with tempfile.TemporaryDirectory(prefix="board-") as folder:
         kept = _Kept(Path(folder), names)
-        board = await _collect(desk, names, kept)
+        shown = SimBoard(camera=names[0] if len(names) == 1 else "")
+        async with practising(desk, SimStage(board=shown)) as performer:
+            board = await _collect(desk, names, kept, performer)
         desk.computing("The pictures are compared with each other; this takes up to a minute.")
         pictures = PictureSet(kept.files)
         if order.step == "lens":
@@ -57,7 +61,7 @@ class _Kept:
             self.files[name][number] = path
 
 
-async def _collect(desk: Desk, names: list[str], kept: _Kept) -> Board:
+async def _collect(desk: Desk, names: list[str], kept: _Kept, performer: Performer | None) -> Board:
     order = desk.order
 
     class Teller:
@@ -74,7 +78,8 @@ async def _collect(desk: Desk, names: list[str], kept: _Kept) -> Board:
 
     desk.tell(0.0, "show all of the board, and hold it still", [])
     square_m = 1e-3 * order.square_mm
-    collection = BoardCollection(names, square_m, order.count, Teller(), kept.keep)
+    after_take = performer.after_take if performer else None
+    collection = BoardCollection(names, square_m, order.count, Teller(), kept.keep, after_take)
     await collection.run(desk.bus, None)
     if collection.board is None:
         raise CalibrationError("no board was seen")

@@ -18,6 +18,8 @@ from services.calibrator.guided.found import Found
 log = logging.getLogger("rhot.calibrator")
 
 _WORKING = ("collecting", "computing")
+# systemd and `rhot up` give a service five seconds to end.
+_CLOSING_S = 2.0
 
 
 class Guide:
@@ -42,10 +44,11 @@ class Guide:
                     await self._save()
         return self._state
 
-    def close(self) -> None:
-        """End what is going on."""
+    async def close(self) -> None:
+        """End what is going on; a simulated rig shows its own scene again."""
         if self._task is not None:
             self._task.cancel()
+            await asyncio.wait({self._task}, timeout=_CLOSING_S)
 
     def _start(self, order: CalibrationOrder) -> None:
         if self._state.phase in _WORKING:

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import NamedTuple
 
+import msgspec
+
 from rhot import topics
 from rhot.bus.bus import Bus
 from rhot.errors import CalibrationError
@@ -29,9 +31,12 @@ class Exercising(NamedTuple):
 
 
 async def follow_exercises(
-    bus: Bus, which: HandName, tell: Callable[[Exercising], None]
+    bus: Bus, which: HandName, tell: Callable[[Exercising], None], pace: float = 1.0
 ) -> list[HandPoints]:
     """One pass through the exercises; `tell` hears of every message.
+
+    A simulated hand may do them at another pace: 2 in half the time. The stamps that come back are
+    those of the usual pace, as if its time had passed more slowly.
 
     Raises CalibrationError if no points come.
     """
@@ -40,7 +45,7 @@ async def follow_exercises(
     try:
         tell(Exercising(-1, 0.0, []))
         await asyncio.sleep(READY_S)
-        passed_s = 0.0
+        passed_s, began_ns = 0.0, 0
         # By the hand's own time, from its first point on: a recording must hold all of them.
         while passed_s <= CYCLE_S:
             try:
@@ -50,8 +55,10 @@ async def follow_exercises(
                     f"no points of the {which} hand for {_SILENT_S:.0f} s: is fusion running and "
                     "the hand in view? `rhot top` shows it"
                 ) from None
-            messages.append(message)
-            passed_s = 1e-9 * (message.stamp_ns - messages[0].stamp_ns)
+            began_ns = began_ns or message.stamp_ns
+            passed_ns = round(pace * (message.stamp_ns - began_ns))
+            messages.append(msgspec.structs.replace(message, stamp_ns=began_ns + passed_ns))
+            passed_s = 1e-9 * passed_ns
             number = min(int(passed_s // EXERCISE_S), len(EXERCISES) - 1)
             tell(Exercising(number, passed_s, _missing(message)))
     finally:

@@ -10,8 +10,10 @@ from typing import Any, TypeVar
 from rhot import topics
 from rhot.errors import CalibrationError
 from rhot.files.calibration import Objects, load_objects, load_rig_cameras
+from rhot.messages.simulator import SimStage
 from rhot.topics import Topic
 from services.calibrator.endpoints.desk import Desk
+from services.calibrator.endpoints.practice import practising
 from services.calibrator.guided.found import Found
 from services.calibrator.guided.objects import objects_found
 from services.calibrator.objects.recorded import Recorded
@@ -41,12 +43,13 @@ async def objects_step(desk: Desk) -> Found:
     """
     painted = painted_objects(desk.config, [], None)
     recorded = Recorded()
-    listeners = [asyncio.create_task(one) for one in _listeners(desk, recorded)]
-    try:
-        await _listen(desk, recorded, painted)
-    finally:
-        for listener in listeners:
-            listener.cancel()
+    async with practising(desk, SimStage(scene="registration")):
+        listeners = [asyncio.create_task(one) for one in _listeners(desk, recorded)]
+        try:
+            await _listen(desk, recorded, painted)
+        finally:
+            for listener in listeners:
+                listener.cancel()
     desk.computing("The lighthouses' frame is being found; this takes some seconds.")
     return await asyncio.to_thread(_registered, desk, recorded, painted)
 

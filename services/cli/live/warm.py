@@ -20,6 +20,7 @@ import services
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig, load_rig
 from rhot.hand import HandModel, HandName
+from rhot.messages.simulator import SimBoard, SimStage
 from rhot.process.numba_cache import adopt, cache_folder, clear_old
 from services.cli.defaults import sim_toml
 
@@ -61,11 +62,13 @@ def _warm(part: str, config: Path) -> float:
     # Only here: `rhot --help` must not wait for numba.
     if part == "simulator":
         from services.simulator.camera.frame_source import FrameSource
-        from services.simulator.scene.scene import load_scene
+        from services.simulator.stage import Stage
 
-        scene = load_scene(rig)
-        for camera in rig.camera:
-            FrameSource(scene, camera.name).take(0)
+        stage = Stage(rig)
+        for shown in (SimStage(), SimStage(board=SimBoard())):
+            stage.set(shown)
+            for camera in rig.camera:
+                FrameSource(stage.scene, camera.name).renderer.picture(0)
     elif part == "solver":
         from services.solver.warm import warm_up as warm_solver
 

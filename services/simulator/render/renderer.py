@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from services.simulator.board.draw import Canvas, RowTimes, bounds, draw_board, homographies
+from services.simulator.board.sheet import INK, PAPER, printed
 from services.simulator.hands.bodies import Ints
 from services.simulator.render import develop
 from services.simulator.render.antialias import supersample
@@ -26,7 +28,13 @@ from services.simulator.render.buffers import (
     frame_buffers,
 )
 from services.simulator.render.edges import flag_edges, widen_columns
-from services.simulator.render.materials import flicker_gains, surfaces_in_light
+from services.simulator.render.materials import (
+    AMBIENT,
+    FILL,
+    KEY,
+    flicker_gains,
+    surfaces_in_light,
+)
 from services.simulator.render.motion_paths import (
     BodyPoses,
     find_rows,
@@ -36,6 +44,7 @@ from services.simulator.render.motion_paths import (
 from services.simulator.render.noise import NoiseDraw, add_noise, draw_noise, noise_bank
 from services.simulator.render.projection import Array32, pixel_rays
 from services.simulator.render.ray_capsule import FAR
+from services.simulator.render.shade import light_on
 from services.simulator.render.trace import trace
 from services.simulator.scene.backdrop import backdrop, vignette, wall_texture
 from services.simulator.scene.scene import Scene
@@ -67,6 +76,7 @@ class Renderer:
         first = next(iter(scene.cameras.values()))
         rng = np.random.default_rng([scene.seed, 23, number])
         gains = 1.0 + _GAIN_SIGMA * rng.standard_normal(3)
+        self._gains = gains
         self._seed = scene.seed * 64 + number
         self._view = camera_view(self.camera)
         self._buffers = self._make_buffers(first, gains)
@@ -114,6 +124,11 @@ class Renderer:
         self._backdrop_planes = develop.copy_planes(self._planes)
         # First and last row and column that differ from the backdrop, None if none does.
         self._changed: Ints | None = None
+        # A board that is held still before things that rest: where the planes show it. Drawing it
+        # takes 25 ms of a desktop computer's time, noise 5.
+        self._held: Array | None = None
+        resting = all(item.sweep is None and item.holder is None for item in self.scene.objects)
+        self._board_alone = resting and not self.scene.hands
 
     def picture(self, frame: int) -> Bytes:
         """Frame number `frame` as I420 (h * 3 / 2, w), with everything a camera adds."""
@@ -159,15 +174,60 @@ class Renderer:
 
     def _draw(self, time_s: float) -> None:
         """Everything up to the unrounded planes."""
+        board = self._reach_board(time_s)
+        if board and self._held is not None and np.array_equal(board[0], self._held):
+            return
         self._restore_backdrop()
         timing = self._trace(time_s)
+        if board is not None:
+            self._widen_to(board[1])
         longest = flag_edges(self._arrays.capsules, self._buffers, timing.exposure)
         # What moves reaches beyond where it was in the middle of the exposure.
         widen_columns(self._buffers.columns, int(0.5 * longest) + _MARGIN_PX, self._wide)
         np.minimum(self._wide[:, 1], self.camera.size_px[0] - 1, out=self._wide[:, 1])
         self._changed = _bounds(self._wide)
         supersample(self._arrays, self._buffers, timing, longest, self._wide)
+        if board is not None:
+            self._draw_board(*board, timing)
+            self._held = board[0] if self._board_alone else None
         self._develop(self._buffers.light)
+
+    def _reach_board(self, time_s: float) -> tuple[Array, Ints] | None:
+        """Poses (3, 4, 4) of the scene's board during a frame, and the first and last row and
+        column (4,) that it touches; None if no board is seen.
+        """
+        board = self.scene.board
+        if board is None:
+            return None
+        middle_s, half_s = self._exposed(time_s)
+        poses = np.stack([board.pose(middle_s + k * half_s) for k in (-1, 0, 1)])
+        box = bounds(self.camera, printed(board.kind), poses)
+        return None if box is None else (poses, box)
+
+    def _widen_to(self, box: Ints) -> None:
+        """Count these rows and columns among those that are drawn anew."""
+        columns = self._buffers.columns[box[0] : box[1] + 1]
+        np.minimum(columns[:, 0], box[2], out=columns[:, 0])
+        np.maximum(columns[:, 1], box[3], out=columns[:, 1])
+
+    def _draw_board(self, poses: Array, box: Ints, timing: FrameTiming) -> None:
+        """The board, matt on both sides, over what is behind it."""
+        board = self.scene.board
+        if board is None:
+            return
+        T_camera_from_board = self.camera.T_camera_from_rig @ poses
+        middle = T_camera_from_board[1]
+        away = middle[:3, 2] @ middle[:3, 3] >= 0.0
+        x, y, z = -middle[:3, 2] if away else middle[:3, 2]
+        lights = self._arrays.surfaces.lights
+        key, fill, _, sky, _ = light_on(lights, (x, y, z), (0.0, 0.0, 1.0))
+        light = (lights[KEY] * key + lights[FILL] * fill + lights[AMBIENT] * sky) * self._gains
+        # Nothing is printed on its back.
+        tones = np.outer((INK if away else PAPER, PAPER), light)
+        buffers = self._buffers
+        canvas = Canvas(buffers.rays, buffers.vignette, buffers.depth, buffers.light)
+        path = homographies(T_camera_from_board)
+        draw_board(printed(board.kind), path, RowTimes(*timing), box, tones, canvas)
 
     def _develop(self, light: Array32) -> None:
         """From light to planes, in the columns that are drawn anew."""
@@ -176,6 +236,7 @@ class Renderer:
 
     def _restore_backdrop(self) -> None:
         """Undo the last picture."""
+        self._held = None
         if self._changed is None:
             return
         first_row, last_row, first_column, last_column = self._changed.tolist()
@@ -188,12 +249,16 @@ class Renderer:
         develop.copy_part(self._backdrop_planes, self._planes, rows, columns)
         self._changed = None
 
+    def _exposed(self, time_s: float) -> tuple[float, float]:
+        """The middle of a frame whose row 0 is exposed about time_s, and half its length; s."""
+        to_last_s = (self.camera.size_px[1] - 1) * (self.clock.row_time_ns * 1e-9)
+        return time_s + 0.5 * to_last_s, 0.5 * (to_last_s + self.clock.exposure_s)
+
     def _trace(self, time_s: float, only: Capsules | None = None) -> FrameTiming:
         """One ray a pixel of the frame whose row 0 is exposed about time_s."""
         height = self.camera.size_px[1]
         row_s, exposure_s = self.clock.row_time_ns * 1e-9, self.clock.exposure_s
-        half_s = 0.5 * ((height - 1) * row_s + exposure_s)
-        middle_s = time_s + 0.5 * (height - 1) * row_s
+        middle_s, half_s = self._exposed(time_s)
         frames = [self.scene.body_frames(middle_s + k * half_s) for k in (-1, 0, 1)]
         poses = BodyPoses(
             np.stack([f.positions for f in frames]), np.stack([f.rotations for f in frames])

@@ -137,7 +137,7 @@ def shade(n: int, hits: Hits, g: Array, surfaces: Surfaces) -> None:
         else:
             nx, ny, nz = solid_normal(g[c], int(hits.along[i]), (ax, ay, az), surfaces.facets)
 
-        diffuse, fill, rim, sky, cosine = _light_on(lights, (nx, ny, nz), (x, y, z))
+        diffuse, fill, rim, sky, cosine = light_on(lights, (nx, ny, nz), (x, y, z))
         shininess = materials[s, SHININESS]
         highlight = materials[s, GLOSS] * cosine / (shininess - shininess * cosine + cosine)
 
@@ -177,7 +177,7 @@ def _normal(g: Array, along: float, ax: float, ay: float, az: float) -> tuple[fl
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
-def _light_on(
+def light_on(
     lights: Array, normal: tuple[float, float, float], ray: tuple[float, float, float]
 ) -> tuple[float, float, float, float, float]:
     """Shares of key, fill, rim and ambient light, and the cosine of the key lamp's highlight.

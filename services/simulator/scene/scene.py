@@ -21,6 +21,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages.simulator import Truth
+from services.simulator.board.carried import CarriedBoard
 from services.simulator.camera_clock import CameraClock, camera_clock
 from services.simulator.hands.calibration_exercises import guided
 from services.simulator.hands.gestures import MOTIONS
@@ -68,6 +69,8 @@ class Scene:
     cameras: dict[str, Camera]
     clocks: dict[str, CameraClock]
     T_rig_from_lighthouse: Array  # (4, 4)
+    # Somebody shows a calibration board; there are no hands then.
+    board: CarriedBoard | None = None
 
     def hand_states(self, t_s: float) -> dict[HandName, HandState]:
         """Every hand at one instant."""

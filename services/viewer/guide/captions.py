@@ -6,6 +6,7 @@ A caption that is not said again within seconds is over, and is taken away.
 from __future__ import annotations
 
 import asyncio
+import re
 
 import viser
 
@@ -15,6 +16,8 @@ from rhot.messages import Caption
 
 # Captions are said once a second; on a busy machine one or two of them come late.
 _OVER_S = 4.0
+# A note is plain text: what a terminal marks as a command is quoted here.
+_COMMAND = re.compile(r"`([^`]+)`")
 
 
 class Captions:
@@ -41,7 +44,7 @@ class Captions:
 
     def _show(self, caption: Caption) -> None:
         number = f"{caption.step}/{caption.steps}  " if caption.steps else ""
-        title, body = number + caption.title, caption.text
+        title, body = number + caption.title, _quoted(caption.text)
         clients = self._server.get_clients()
         self._shown = {one: note for one, note in self._shown.items() if one in clients}
         for one, client in clients.items():
@@ -55,3 +58,7 @@ class Captions:
         for note in self._shown.values():
             note.remove()
         self._shown.clear()
+
+
+def _quoted(text: str) -> str:
+    return _COMMAND.sub("\u2018\\1\u2019", text)

@@ -1,7 +1,7 @@
 """The steps of a guided calibration, in the order in which they build on each other. Pure data.
 
 What to do in plain sentences, a small picture where it helps, the same on the command line, and the
-files by which a step is known to be done.
+files by which a step is known to be done. Of a simulated rig, what there is to practise.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ StepName = Literal["camera", "colours", "lens", "stereo", "hand", "objects"]
 
 @dataclass(frozen=True)
 class Step:
-    """One step; files and commands are of a rig. error is the figure of a file that counts."""
+    """One step; files and commands are of a rig. error is the figure of a file that counts.
+
+    practice is what happens on a simulated rig.
+    """
 
     name: StepName
     title: str
@@ -28,6 +31,7 @@ class Step:
     command: Callable[[RigConfig], str]
     error: str = ""
     unit: str = ""
+    practice: str = ""
 
 
 def _cameras(config: RigConfig) -> list[str]:
@@ -51,6 +55,7 @@ STEPS: tuple[Step, ...] = (
         drawings.CAMERA,
         lambda config: [f"{name}.exposure.json" for name in _cameras(config)],
         lambda config: f"rhot calibrate camera {_first(config)} --auto",
+        practice="Its light is always right: there is nothing to measure.",
     ),
     Step(
         "colours",
@@ -60,6 +65,7 @@ STEPS: tuple[Step, ...] = (
         drawings.COLOURS,
         lambda config: [f"{name}.colors.json" for name in _cameras(config)],
         lambda config: f"rhot calibrate colors {_first(config)} --auto",
+        practice="Its colours are known already; clicking on them works as on a real hand.",
     ),
     Step(
         "lens",
@@ -71,6 +77,7 @@ STEPS: tuple[Step, ...] = (
         lambda config: f"rhot calibrate lens {_first(config)} pictures --live --config rig.toml",
         "held_out_px",
         "px",
+        practice="Press Start: a board with squares of 25 mm is carried before the camera.",
     ),
     Step(
         "stereo",
@@ -82,6 +89,7 @@ STEPS: tuple[Step, ...] = (
         lambda _: "rhot calibrate stereo pictures --live --config rig.toml",
         "epipolar_px",
         "px",
+        practice="Press Start: a board with squares of 25 mm is carried before all cameras.",
     ),
     Step(
         "hand",
@@ -91,6 +99,7 @@ STEPS: tuple[Step, ...] = (
         drawings.HAND,
         lambda config: [f"hand.{name}.json" for name in config.hand],
         lambda config: f"rhot calibrate hand {_hand(config)} --config rig.toml",
+        practice="Press Start: its hand does the exercises, twice as fast as you would.",
     ),
     Step(
         "objects",
@@ -102,6 +111,7 @@ STEPS: tuple[Step, ...] = (
         lambda _: "rhot calibrate objects --config rig.toml",
         "held_out_mm",
         "mm",
+        practice="Press Start: the painted tracker is moved and turned.",
     ),
 )
 # What the calibrator measures; the others are between the page and the cameras' trackers.

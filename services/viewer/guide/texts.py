@@ -17,10 +17,7 @@ from services.viewer.panel.words import text
 _STYLE = "font-size:0.85em;line-height:1.4;padding:0 0.6em;overflow-wrap:anywhere"
 _GREEN, _AMBER, _RED, _GREY = "#1e8449", "#b9770e", "#c0392b", "#7f8c8d"
 _LONGEST = 600
-_SIMULATED = (
-    "This rig is simulated and needs no calibration: its cameras see no board, and its hand does "
-    "what its scene says, not what is asked here."
-)
+_SIMULATED = "This rig is simulated, so that you can practise."
 _BAR = "height:6px;border-radius:3px"
 
 
@@ -56,7 +53,9 @@ def _day(date: str) -> str:
 
 def instructions(step: Step, *, simulated: bool = False) -> str:
     """What a step is about, with its picture; of a simulated rig that it is for real ones."""
-    note = f'<br><span style="color:{_GREY}">{_SIMULATED}</span>' if simulated else ""
+    note = (
+        f'<br><span style="color:{_GREY}">{_SIMULATED} {step.practice}</span>' if simulated else ""
+    )
     return _box(f"<b>{step.title}</b><br>{step.what}{note}{step.drawing}")
 
 

@@ -57,7 +57,7 @@ async def page(router: str, rig: RigConfig) -> AsyncIterator[Bus]:
             while not await ours.get(topics.CALIBRATE):
                 await asyncio.sleep(0.02)
         yield ours
-        guide.close()
+        await guide.close()
 
 
 async def until(page: Bus, *phases: CalibrationPhase) -> CalibrationState:
@@ -77,8 +77,8 @@ async def test_a_lens_from_the_first_picture_to_its_file(
     def answer() -> bytes:
         nonlocal asked
         asked += 1
-        # Each position stands still over four takes.
-        return shown[min((asked - 1) // 4, POSITIONS - 1)]
+        # Each position stands still over four takes; no two pictures of a camera are the same.
+        return shown[min((asked - 1) // 4, POSITIONS - 1)] + asked.to_bytes(4)
 
     async with open_bus("desk", [router]) as camera:
         camera.answer(topics.FRAME, answer, camera="left")
@@ -113,3 +113,25 @@ async def test_a_step_is_stopped(page: Bus) -> None:
     assert began.phase == "collecting"
     stopped = await page.request(topics.CALIBRATE, CalibrationOrder(action="stop"))
     assert (stopped.phase, stopped.number) == ("idle", began.number)
+
+
+async def test_a_picture_that_comes_twice_shows_nothing_that_stands_still(
+    page: Bus, router: str, shown: list[bytes]
+) -> None:
+    asked = 0
+
+    def answer() -> bytes:
+        nonlocal asked
+        asked += 1
+        return shown[(asked // 2) % POSITIONS]
+
+    async with open_bus("desk", [router]) as camera:
+        camera.answer(topics.FRAME, answer, camera="left")
+        await page.request(topics.CALIBRATE, LENS)
+        async with asyncio.timeout(DEADLINE_S):
+            while asked < 20:
+                await asyncio.sleep(0.05)
+        state = await until(page, "collecting", "failed", "done")
+        assert state.phase == "collecting"
+        assert f"0/{WANTED} positions" in " ".join(state.seen)
+        await page.request(topics.CALIBRATE, CalibrationOrder(action="stop"))

@@ -30,7 +30,7 @@ async def test_a_caption_is_shown_changed_and_taken_away(
             publisher = theirs.publisher(topics.CAPTION)
             said = [
                 Caption(title="A hand", text="<b>six</b> dots", step=1, steps=4),
-                Caption(title="A hand", text="is alive", step=1, steps=4),
+                Caption(title="A hand", text="run `rhot demo`", step=1, steps=4),
             ]
 
             async def heard(type_: str, **fields: Any) -> dict[str, Any]:
@@ -44,7 +44,10 @@ async def test_a_caption_is_shown_changed_and_taken_away(
             assert shown["props"]["title"] == "1/4  A hand"
             assert shown["props"]["body"] == "<b>six</b> dots"
             publisher.put(said[1])
-            await heard("NotificationUpdateMessage", props=lambda new: new["body"] == "is alive")
+            await heard(
+                "NotificationUpdateMessage",
+                props=lambda new: new["body"] == "run \u2018rhot demo\u2019",
+            )
             # Nobody says anything more.
             await heard("RemoveNotificationMessage")
             following.cancel()

@@ -77,6 +77,8 @@ def test_an_exposure_is_judged_by_what_its_tracker_finds() -> None:
     assert "nothing to set" in texts.exposure("left", ExposureControl(adjustable=False), "", [])
 
 
-def test_a_simulated_rig_asks_nobody_to_follow():
-    assert "simulated" not in texts.instructions(STEPS[0])
-    assert "needs no calibration" in texts.instructions(STEPS[0], simulated=True)
+def test_a_simulated_rig_says_what_there_is_to_practise():
+    for step in STEPS:
+        assert "simulated" not in texts.instructions(step)
+        assert step.practice
+        assert step.practice in texts.instructions(step, simulated=True)

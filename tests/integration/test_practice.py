@@ -1,0 +1,129 @@
+"""Every step that the calibrator measures, practised on a simulated rig from Start to Save: the
+simulator performs it, the result is near the simulator's truth, and the rig takes it over.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import numpy as np
+import pytest
+import pytest_asyncio
+
+from rhot import topics
+from rhot.errors import RefusedError
+from rhot.files.calibration import load_cameras, load_lens
+from rhot.files.config import load_rig
+from rhot.geometry.transforms import vector_from_rotation
+from rhot.messages.calibration import CalibrationOrder, CalibrationPhase, CalibrationState
+from rhot.messages.simulator import SimStage
+from services.cli.defaults import sim_toml
+from services.cli.live.supervisor import Child, service_argv
+from tests.integration.conftest import RunningRig
+
+pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
+
+DEADLINE_S = 240.0
+# Fewer than a person is asked for; more make it more accurate, not another thing.
+POSITIONS = 8
+TRUTH = load_rig(sim_toml())
+
+
+class Page:
+    """Asks what the page asks."""
+
+    def __init__(self, rig: RunningRig) -> None:
+        self.rig = rig
+        self.folder = load_rig(rig.config).calibration_dir
+
+    async def order(self, action: str, step: str = "hand", **options: object) -> CalibrationState:
+        order = CalibrationOrder(action=action, step=step, **options)
+        return await self.rig.bus.request(topics.CALIBRATE, order, timeout_s=30.0)
+
+    async def until(self, *phases: CalibrationPhase) -> CalibrationState:
+        async with asyncio.timeout(DEADLINE_S):
+            while True:
+                for state in await self.rig.bus.get(topics.CALIBRATE, timeout_s=10.0):
+                    if state.phase in phases:
+                        return state
+                await asyncio.sleep(0.1)
+
+    async def carried_out(self, step: str, **options: object) -> CalibrationState:
+        """The step, from Start to Save."""
+        await self.order("start", step, **options)
+        state = await self.until("done", "failed")
+        assert state.phase == "done", state.to_do
+        assert await self.stage() == SimStage(), "the rig shows its own scene again"
+        assert state.good, (state.figures, state.advice)
+        return await self.order("save")
+
+    async def stage(self) -> SimStage:
+        (shown,) = await self.rig.bus.get(topics.SIM_STAGE, timeout_s=30.0)
+        return shown
+
+    async def taken_over(self, by: str, file: str) -> None:
+        """The service has started again with that file, and points of the hand come."""
+        await self.rig.until(
+            lambda: any(f"[{by}]" in line and f"{file} changed" in line for line in self.rig.logged)
+        )
+        async with asyncio.timeout(DEADLINE_S):
+            points = self.rig.bus.every(topics.POINTS, 16)
+            await anext(points)
+            self.rig.bus.close(points)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def page(rig: RunningRig) -> AsyncIterator[Page]:
+    """The rig with a calibrator."""
+    options = ["--config", str(rig.config), "--connect", rig.endpoint]
+    child = Child("calibrator", service_argv("calibrator", *options))
+    keeping = asyncio.create_task(rig.supervisor.keep_running(child))
+    page = Page(rig)
+    await page.until("idle")
+    yield page
+    keeping.cancel()
+    await asyncio.gather(keeping, return_exceptions=True)
+
+
+async def test_a_lens(page: Page) -> None:
+    saved = await page.carried_out("lens", camera="left", count=POSITIONS)
+    assert saved.files == ["left.lens.json"]
+    made, true = load_lens(page.folder, "left"), load_lens(TRUTH.calibration_dir, "left")
+    # Of eight positions; what is left comes from corners that are off by .05 px.
+    assert made.matrix[0][0] == pytest.approx(true.matrix[0][0], rel=0.01)
+
+
+async def test_the_places_of_the_cameras_and_the_rig_goes_on_with_them(page: Page) -> None:
+    saved = await page.carried_out("stereo", count=POSITIONS)
+    assert saved.files == ["rig.json"]
+    made, true = (
+        load_cameras(folder, ["left", "right"])["right"].T_rig_from_camera
+        for folder in (page.folder, TRUTH.calibration_dir)
+    )
+    assert np.linalg.norm(made[:3, 3]) == pytest.approx(np.linalg.norm(true[:3, 3]), rel=0.01)
+    turn = vector_from_rotation(made[:3, :3].T @ true[:3, :3])
+    assert np.rad2deg(np.linalg.norm(turn)) < 0.3
+    await page.taken_over("fusion", "rig.json")
+
+
+async def test_a_step_that_is_left_leaves_the_rig_as_it_was(page: Page) -> None:
+    await page.order("start", "stereo", count=POSITIONS)
+    async with asyncio.timeout(DEADLINE_S):
+        while (await page.stage()).board is None:
+            await asyncio.sleep(0.1)
+    with pytest.raises(RefusedError, match="stop it first"):
+        await page.order("start", "lens", camera="left")
+    stopped = await page.order("stop")
+    assert stopped.phase == "idle"
+    assert await page.stage() == SimStage()
+
+
+async def test_who_sets_the_stage_meanwhile_ends_the_step(page: Page) -> None:
+    await page.order("start", "objects")
+    async with asyncio.timeout(DEADLINE_S):
+        while (await page.stage()).scene != "registration":
+            await asyncio.sleep(0.1)
+    await page.rig.bus.request(topics.SIM_STAGE, SimStage(scene="wave"), timeout_s=60.0)
+    state = await page.until("failed", "done")
+    assert "told to show something else" in state.to_do
