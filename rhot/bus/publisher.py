@@ -60,9 +60,9 @@ class Publisher(Generic[T]):
         if b"null" in payload and not self._decodes(payload):
             self.stats.rejected += 1
             return
+        self._publisher.put(payload)
         stamp_ns = getattr(message, "stamp_ns", 0)
         self._count(now_ns - stamp_ns if stamp_ns else None)
-        self._publisher.put(payload)
 
     def _decodes(self, payload: bytes) -> bool:
         try:
