@@ -7,6 +7,7 @@ in words what the tracker does, for systemd.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 
 from rhot.clock import OffsetEstimator
@@ -17,7 +18,7 @@ from services.pi_tracker.sources import Source
 from services.pi_tracker.tracker import CameraTracker
 
 _PERIOD_S = 1.0
-# What starts together with fusion has its session and its clock by then.
+# What starts together with fusion has its session by then, and its clock so long after the session.
 _PATIENCE_S = 5.0
 # A hand at 0.5 m/s moves 10 mm meanwhile: the master has not answered for minutes.
 _MAX_CLOCK_SIGMA_NS = 20_000_000
@@ -43,6 +44,8 @@ class CameraFaults:
         self._camera = service.instance
         self._source: Source | None = None
         self._began_s = time.monotonic()
+        # Since when there is a master.
+        self._known_s = math.inf
         self._notes: dict[tuple[str, str], str] = {}
 
     def attach(self, source: Source) -> None:
@@ -79,12 +82,9 @@ class CameraFaults:
             self._service.faults.report(code, text, subject)
         self._notes = standing
 
-    @property
-    def _patient(self) -> bool:
-        return time.monotonic() - self._began_s < _PATIENCE_S
-
     def _session_text(self) -> str:
-        if self._gate.running or (not self._gate.known and self._patient):
+        patient = time.monotonic() - self._began_s < _PATIENCE_S
+        if self._gate.running or (not self._gate.known and patient):
             return ""
         if self._gate.known:
             return f"the session is stopped: camera {self._camera!r} sends no markers"
@@ -95,7 +95,9 @@ class CameraFaults:
 
     def _clock_text(self, source: Source) -> str:
         # Without a master there is no session either, and one fault is enough.
-        if self._patient or not self._gate.known:
+        if self._gate.known:
+            self._known_s = min(self._known_s, time.monotonic())
+        if time.monotonic() - max(self._began_s, self._known_s) < _PATIENCE_S:
             return ""
         sigma_ns = self._offset.at(source.now_ns()).sigma_ns
         if sigma_ns < 0:
