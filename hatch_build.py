@@ -32,7 +32,7 @@ ROOM = Path("services/pi_tracker/compiled")
 # roots set no errno and traps are ignored changes no result.) What is compiled uses no library, so
 # that it runs with any: no calls of memset for a loop, no stack protector.
 FLAGS = (
-    *("-std=c11", "-O3", "-shared", "-fPIC", "-nostdlib", "-fvisibility=default"),
+    *("-std=c11", "-O3", "-shared", "-fPIC", "-nostdlib", "-s"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-fno-stack-protector", "-fno-builtin", "-fno-sanitize=all"),
 )
@@ -122,7 +122,8 @@ class CustomBuildHook(BuildHookInterface):
                     build_data["force_include"][str(into)] = str(ROOM / name)
         if made == machines and not editable:
             build_data["pure_python"] = False
-            build_data["tag"] = "py3-none-" + ".".join(f"linux_{machine}" for machine in made)
+            platforms = ".".join(f"linux_{machine}" for machine in sorted(made))
+            build_data["tag"] = f"py3-none-{platforms}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Remove what is in the wheel now."""
@@ -136,7 +137,7 @@ def told(machine: str, wrong: str) -> str:
         return f"rhot: the tracker's C is compiled for {machine}"
     return (
         f"rhot: the tracker's C is not compiled: {wrong}; on {machine} it measures in Python, "
-        "four times as slowly. For the compiled form: sudo apt install gcc, then install again"
+        "the same in twice the time (for the compiled form: sudo apt install gcc, install again)"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -12,6 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from hatch_build import compilers, file_name
+
+MACHINE = platform.machine()
 pytestmark = [pytest.mark.wheel, pytest.mark.timeout(900)]
 
 ENTRY_POINTS = (
@@ -61,14 +65,44 @@ def installed(python: Path, what: str, cwd: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.fixture(scope="module")
-def wheel(repository, tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("dist")
-    pip = (sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check")
-    done = run(*pip, "--no-deps", "-w", folder, repository, cwd=folder)
+def build(repository: Path, folder: Path, **environment: str) -> tuple[Path, str]:
+    """rhot's wheel, and what its build says."""
+    pip = (sys.executable, "-m", "pip", "wheel", "--verbose", "--disable-pip-version-check")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        done = run(*pip, "--no-deps", "-w", folder, repository, cwd=folder)
     assert done.returncode == 0, done.stderr
     (built,) = folder.glob("rhot-*.whl")
-    return built
+    return built, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(repository, tmp_path_factory) -> Path:
+    return build(repository, tmp_path_factory.mktemp("dist"))[0]
+
+
+def test_it_has_the_trackers_compiled_form_for_this_machine(wheel):
+    if not compilers(MACHINE):
+        pytest.skip("no C compiler")
+    assert wheel.name.endswith(f"-py3-none-linux_{MACHINE}.whl")
+    assert f"services/pi_tracker/compiled/{file_name(MACHINE)}" in zipfile.ZipFile(wheel).namelist()
+
+
+def test_without_a_compiler_it_installs_everywhere_and_says_so(repository, tmp_path):
+    built, said = build(repository, tmp_path, RHOT_COMPILE_FOR="pdp11")
+    assert built.name.endswith("-py3-none-any.whl")
+    assert not [name for name in zipfile.ZipFile(built).namelist() if name.endswith(".so")]
+    assert "rhot: the tracker's C is not compiled: found no compiler for pdp11" in said
+
+
+def test_a_wheel_for_machines_of_which_one_is_missing_installs_on_both(repository, tmp_path):
+    if not compilers(MACHINE):
+        pytest.skip("no C compiler")
+    built, _ = build(repository, tmp_path, RHOT_COMPILE_FOR=f"pdp11 {MACHINE}")
+    assert built.name.endswith("-py3-none-any.whl")
+    names = zipfile.ZipFile(built).namelist()
+    assert f"services/pi_tracker/compiled/{file_name(MACHINE)}" in names
 
 
 @pytest.fixture(scope="module", params=COMPLETE)
@@ -124,6 +158,14 @@ def test_services_without_their_extra_say_so_in_one_line(environment, tmp_path):
             assert "rig.toml" in said, said
         assert "Traceback" not in said, said
         assert done.returncode == 2, said
+
+
+def test_the_tracker_measures_compiled_where_that_is_in_the_wheel(environment, wheel):
+    extra, commands = environment
+    ask = "from services.pi_tracker.compiled.library import state; print(state)"
+    said = run(commands / "python", "-c", ask, cwd=commands).stdout
+    has_it = any(name.endswith(".so") for name in zipfile.ZipFile(wheel).namelist())
+    assert said.startswith("compiled (" if has_it else "in Python: "), f"[{extra}] {said}"
 
 
 @pytest.mark.parametrize("environment", ["pi"], indirect=True, scope="module")
