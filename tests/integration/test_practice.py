@@ -5,6 +5,7 @@ simulator performs it, the result is near the simulator's truth, and the rig tak
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator
 
 import numpy as np
@@ -13,9 +14,10 @@ import pytest_asyncio
 
 from rhot import topics
 from rhot.errors import RefusedError
-from rhot.files.calibration import load_cameras, load_lens
+from rhot.files.calibration import load_cameras, load_hand, load_lens, load_objects
 from rhot.files.config import load_rig
-from rhot.geometry.transforms import vector_from_rotation
+from rhot.geometry.transforms import inverse, vector_from_rotation
+from rhot.hand import default_hand
 from rhot.messages.calibration import CalibrationOrder, CalibrationPhase, CalibrationState
 from rhot.messages.simulator import SimStage
 from services.cli.defaults import sim_toml
@@ -27,6 +29,8 @@ pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
 DEADLINE_S = 240.0
 # Fewer than a person is asked for; more make it more accurate, not another thing.
 POSITIONS = 8
+# A third of the pictures measures the hand as well as all of them; with fewer, fusion loses it.
+ENOUGH_HZ = 20
 TRUTH = load_rig(sim_toml())
 
 
@@ -61,6 +65,16 @@ class Page:
     async def stage(self) -> SimStage:
         (shown,) = await self.rig.bus.get(topics.SIM_STAGE, timeout_s=30.0)
         return shown
+
+    async def points_a_second(self) -> float:
+        """Of the hand, all measured."""
+        count, points = 0, self.rig.bus.every(topics.POINTS, 256)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(2.0):
+                async for message in points:
+                    count += all(point.source == "measured" for point in message.points)
+        self.rig.bus.close(points)
+        return count / 2.0
 
     async def taken_over(self, by: str, file: str) -> None:
         """The service has started again with that file, and points of the hand come."""
@@ -105,6 +119,32 @@ async def test_the_places_of_the_cameras_and_the_rig_goes_on_with_them(page: Pag
     turn = vector_from_rotation(made[:3, :3].T @ true[:3, :3])
     assert np.rad2deg(np.linalg.norm(turn)) < 0.3
     await page.taken_over("fusion", "rig.json")
+
+
+async def test_a_hand(page: Page) -> None:
+    if await page.points_a_second() < ENOUGH_HZ:
+        pytest.skip(f"this machine does not track {ENOUGH_HZ} pictures a second at present")
+    saved = await page.carried_out("hand", hand="right")
+    assert saved.files == ["hand.right.json"]
+    made, true = load_hand(page.folder, "right"), default_hand("right")
+    for digit, of_truth in zip(made.digits[1:], true.digits[1:], strict=True):
+        difference = np.subtract(digit.lengths_m, of_truth.lengths_m)
+        # With all pictures 1.5 mm are left.
+        assert np.abs(difference).max() < 4e-3, (digit, of_truth)
+    await page.taken_over("solver", "hand.right.json")
+
+
+async def test_a_tracker(page: Page) -> None:
+    saved = await page.carried_out("objects")
+    assert saved.files == ["objects.json"]
+    made, true = (
+        np.array(load_objects(folder).T_rig_from_lighthouse)
+        for folder in (page.folder, TRUTH.calibration_dir)
+    )
+    # Where it counts: before the cameras, as seen from the lighthouse.
+    middle = np.array([0.04, 0.0, 0.5, 1.0])
+    assert np.linalg.norm((made @ inverse(true) @ middle - middle)[:3]) < 5e-3
+    await page.taken_over("object_tracker", "objects.json")
 
 
 async def test_a_step_that_is_left_leaves_the_rig_as_it_was(page: Page) -> None:
