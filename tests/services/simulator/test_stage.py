@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
+import msgspec
 import numpy as np
 import pytest
 
 from rhot.errors import ConfigError
+from rhot.files.calibration import load_rig_cameras
 from rhot.files.config import RigConfig
-from rhot.messages.simulator import SimStage
+from rhot.messages.simulator import SimBoard, SimStage
+from services.simulator.files.calibration_kept import calibration_kept
 from services.simulator.render.renderer import Renderer
 from services.simulator.stage import Stage
 
@@ -54,6 +60,7 @@ def test_a_bumped_camera_sees_the_hand_elsewhere_while_its_calibration_stays(sta
         (SimStage(scene="pinhc"), "pinch"),
         (SimStage(hidden=["right.elbow"]), "right.index_tip"),
         (SimStage(turned_deg={"top": (1.0, 0.0, 0.0)}), "left, right"),
+        (SimStage(board=SimBoard(camera="top")), "left, right"),
     ],
 )
 def test_what_cannot_be_is_refused_and_changes_nothing(
@@ -63,3 +70,32 @@ def test_what_cannot_be_is_refused_and_changes_nothing(
     with pytest.raises(ConfigError, match=valid):
         stage.set(wanted)
     assert (stage.scene, stage.wanted, stage.changes) == before
+
+
+def test_a_hand_waits_and_begins_its_scene_when_it_is_told(stage: Stage) -> None:
+    stage.set(SimStage(scene="guided", speed=2.0))
+    usual = stage.scene.hands["right"]
+    stage.set(SimStage(scene="guided", speed=2.0, begins_in_s=3.0), lambda: 100.0)
+    told = stage.scene.hands["right"]
+    assert told.speed == 2.0 * stage.scene.config.simulator.speed
+    for t_s in (0.0, 1.0, 9.0):
+        begun = told.motion(told.speed * (103.0 + t_s)).angles_rad
+        np.testing.assert_allclose(begun, usual.motion(usual.speed * t_s).angles_rad, atol=1e-9)
+    waiting = told.motion(told.speed * 101.0).angles_rad
+    np.testing.assert_array_equal(waiting, usual.motion(0.0).angles_rad)
+
+
+def test_a_calibration_that_is_saved_meanwhile_does_not_move_the_world(
+    config: RigConfig, tmp_path: Path
+) -> None:
+    written, kept_in = tmp_path / "calibration", tmp_path / "kept"
+    shutil.copytree(config.calibration_dir, written)
+    kept_in.mkdir()
+    rig = msgspec.structs.replace(config, folder=str(tmp_path))
+    stage = Stage(rig, calibration_kept(rig, kept_in))
+    before = stage.scene.cameras["right"].T_rig_from_camera
+    text = (written / "rig.json").read_text(encoding="utf-8")
+    (written / "rig.json").write_text(text.replace("0.07419451", "0.08"), encoding="utf-8")
+    assert load_rig_cameras(rig)["right"].T_rig_from_camera[0, 3] == 0.08
+    stage.set(SimStage(scene="wave"))
+    np.testing.assert_array_equal(stage.scene.cameras["right"].T_rig_from_camera, before)
