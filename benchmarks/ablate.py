@@ -45,7 +45,9 @@ LAGS = (0, 2)
 # Points have none of these.
 _OF_PAINT = ("finger direction", "paint to bone", "systematic error")
 # One model that is neither calm nor lively: the geometric middle of the ladder's upper half.
-_ONE_MODEL = np.array([[300.0, 0.0, estimator.SLOWING]])
+_ONE_MODEL = np.array([[300.0, 0.0, estimator.SLOWING, 0.0]])
+# None whose noise is larger along the way that a landmark came.
+_NO_WAY = estimator.MODELS[estimator.MODELS[:, 3] == 0.0]
 
 
 class Part(NamedTuple):
@@ -87,6 +89,9 @@ PARTS: dict[str, Part] = {
     "liveliest model": Part(
         "the ladder ends before the model of sharp turns",
         _replaced((estimator, "MODELS", estimator.MODELS[:-1])),
+    ),
+    "way": Part(
+        "no model knows which way a landmark came", _replaced((estimator, "MODELS", _NO_WAY))
     ),
     "gate": Part("innovations are never refused", _replaced((estimator, "GATE", np.inf))),
     "clock tuning": Part("offsets stay as announced", settings={"tune_clocks": False}),

@@ -59,7 +59,7 @@ def update_frame(
 ) -> Ints:
     """Take in a frame; returns what became of its observations (n,), NO_TRACK where there is none.
 
-    models (M, 3): as motion_model.discretize has them. gate: the largest squared Mahalanobis
+    models (M, 4): as motion_model.discretize has them. gate: the largest squared Mahalanobis
     distance that a model takes. new: observations to remember, not remembered ones.
     """
     if new:

@@ -7,9 +7,11 @@ model's speed is bounded, as a hand's is: where cameras take turns, a sharp turn
 like metres a second of depth.
 
 A state (9,) is position, velocity, acceleration in the rig frame (m, s), its covariance (9, 9).
-A model (3,) is its jerk density (m^2/s^5) and the rates (1/s) at which velocity and acceleration
-fade: the velocity's may be 0, and they must differ. dt_s >= 0. Exact for any dt but for the
-quadrature of noise: two short steps equal one long step, which the smoother relies on. Compiled.
+A model (4,) is its jerk density (m^2/s^5), the rates (1/s) at which velocity and acceleration fade:
+the velocity's may be 0, and they must differ; and a density that is added along the way that the
+landmark came (recent_way.py). Only the first three count here. dt_s >= 0. Exact for any dt but for
+the quadrature of noise: two short steps equal one long step, which the smoother relies on.
+Compiled.
 """
 
 from __future__ import annotations
@@ -77,7 +79,7 @@ def transition(dt_s: float, velocity_rate: float, acceleration_rate: float, F: A
 
 @njit(cache=True)
 def discretize(dt_s: float, model: Array, step: Step) -> None:
-    """A model (3,) over dt_s; written in place."""
+    """A model (4,) over dt_s; written in place."""
     density, a, b = model[0], model[1], model[2]
     F, Q = step.F, step.Q
     Q[:] = 0.0
@@ -92,7 +94,7 @@ def discretize(dt_s: float, model: Array, step: Step) -> None:
 
 @njit(cache=True)
 def discretize_next(dt_s: float, models: Array, m: int, step: Step) -> None:
-    """Model m of models (M, 3) over dt_s, where step is still that of model m - 1; in place.
+    """Model m of models (M, 4) over dt_s, where step is still that of model m - 1; in place.
 
     Models whose rates are alike differ in their noise only.
     """

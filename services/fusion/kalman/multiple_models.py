@@ -1,8 +1,9 @@
 """Several Kalman filters side by side, from calm to lively, weighted by their likelihoods.
 
 Multiple-model adaptive estimation (Magill, IEEE TAC 10(4), 1965): the motion models differ in their
-jerk density. So a resting hand is averaged and a fast one is followed, and the covariance is right
-for both. Each gates observations for itself (model_choice.py). Compiled; nothing here raises.
+jerk density, and in whether it is larger along the way that the landmark came. So a resting hand is
+averaged and a fast one is followed, and the covariance is right for both. Each gates observations
+for itself (model_choice.py). Compiled; nothing here raises.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from services.fusion.kalman.model_choice import (
     update_probabilities,
 )
 from services.fusion.kalman.motion_model import discretize_next, empty_step, predict
+from services.fusion.kalman.recent_way import add_noise_along, update_way
 from services.fusion.kalman.track_history import (
     TrackHistory,
     filtered,
@@ -56,7 +58,7 @@ def filter_node(
 ) -> Fit:
     """Predict, then update: all models' estimates after node `index` from the node before it.
 
-    models (M, 3): as motion_model.discretize has them. gate: the largest squared Mahalanobis
+    models (M, 4): as motion_model.discretize has them. gate: the largest squared Mahalanobis
     distance of an innovation that a model takes.
     """
     last = history.order[landmark, index - 1]
@@ -74,6 +76,7 @@ def filter_node(
     parent = history.parent[landmark, node]
     choose_parents(prior, history.strikes[landmark, last], parent)
     step = empty_step()
+    way = history.way[landmark, last]
     log_likelihoods = np.empty(models.shape[0])
     took = np.zeros(models.shape[0], dtype=np.bool_)
     for m in range(models.shape[0]):
@@ -81,6 +84,8 @@ def filter_node(
         innovation = innovation_of(history, landmark, node, m)
         discretize_next(dt_s, models, m, step)
         predict(filtered(history, landmark, last, parent[m]), step, state)
+        if models[m, 3] > 0.0:
+            add_noise_along(way, step, models[m, 3] / models[m, 0], state)
         log_likelihoods[m] = innovate(state, measured, innovation)
         if log_likelihoods[m] == NOT_VISIBLE:
             _pass_over(innovation)
@@ -95,6 +100,7 @@ def filter_node(
     likeliest = int(np.argmax(posterior))
     strikes = history.strikes[landmark, node]
     count_strikes(history.strikes[landmark, last], took, likeliest, strikes)
+    update_way(way, history.state[landmark, node, likeliest], dt_s, history.way[landmark, node])
     visible = log_likelihoods.max() > NOT_VISIBLE
     return Fit(visible, bool(took.any()), bool(took[likeliest]), log_likelihood)
 

@@ -22,6 +22,7 @@ from services.fusion.kalman.motion_model import (
     predict,
     transition,
 )
+from services.fusion.kalman.recent_way import add_noise_along
 from services.fusion.kalman.track_history import (
     TrackHistory,
     filtered,
@@ -37,7 +38,7 @@ def smooth_landmark(
 ) -> bool:
     """Position and velocity (6,), (6, 6) of a landmark at an instant; written in place.
 
-    models (M, 3): as motion_model.discretize has them; between two observations it is the step that
+    models (M, 4): as motion_model.discretize has them; between two observations it is the step that
     was taken. False if its track does not reach back that far, or there is none.
     """
     index = nodes_until(history, landmark, time_s)
@@ -53,8 +54,12 @@ def smooth_landmark(
     for m in range(models.shape[0]):
         before = _follow(history, landmark, index, m, path)
         state = Gaussian(means[m], covs[m])
-        discretize(dt_s, models[path[index] if index < path.shape[0] else m], step)
+        taken = path[index] if index < path.shape[0] else m
+        discretize(dt_s, models[taken], step)
         predict(filtered(history, landmark, last, before), step, state)
+        if models[taken, 3] > 0.0:
+            ratio = models[taken, 3] / models[taken, 0]
+            add_noise_along(history.way[landmark, last], step, ratio, state)
         if index < path.shape[0]:
             _smooth(history, landmark, index, path, models, time_s, state)
     _mix(probability, means, covs, out)

@@ -17,6 +17,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.kalman.measurement import Innovation
 from services.fusion.kalman.motion_model import Gaussian
+from services.fusion.kalman.recent_way import unknown_way
 
 # 32 observations are .53 s of two cameras at 30 fps and 90 ms of four at 90 fps: room for two
 # frames of lag and for latency.
@@ -40,6 +41,7 @@ class TrackHistory(NamedTuple):
     probability: Array  # (L, NODES, M) of each model
     strikes: Ints  # (L, NODES, M) model_choice.count_strikes
     parent: Ints  # (L, NODES, M) from which model's estimate at the node before each one goes on
+    way: Array  # (L, NODES, 3, 3) recent_way.py
     state: Array  # (L, NODES, M, 9) filtered
     cov: Array  # (L, NODES, M, 9, 9)
     H: Array  # (L, NODES, M, 2, 3) and what follows: measurement.Innovation
@@ -63,6 +65,7 @@ def empty_history(landmarks: int, models: int) -> TrackHistory:
         probability=np.zeros((*nodes, models)),
         strikes=np.zeros((*nodes, models), dtype=np.int64),
         parent=np.zeros((*nodes, models), dtype=np.int64),
+        way=np.zeros((*nodes, 3, 3)),
         state=np.zeros((*nodes, models, 9)),
         cov=np.zeros((*nodes, models, 9, 9)),
         H=np.zeros((*nodes, models, 2, 3)),
@@ -91,6 +94,7 @@ def start_track(
     history.probability[landmark, node] = 0.01
     history.probability[landmark, node, models - 1] = 1.0 - 0.01 * (models - 1)
     history.strikes[landmark, node] = 0
+    unknown_way(history.way[landmark, node])
     history.state[landmark, node] = 0.0
     history.cov[landmark, node] = 0.0
     for m in range(models):

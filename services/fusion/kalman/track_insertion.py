@@ -42,7 +42,7 @@ def insert(
     """Filter one observation into a running track: ACCEPTED, or GATED, LATE, NOT_SEEN.
 
     gate is the largest squared Mahalanobis distance of an innovation that a model takes; models
-    (M, 3) as motion_model.discretize has them. GATED: the likeliest model did not take it. What no
+    (M, 4) as motion_model.discretize has them. GATED: the likeliest model did not take it. What no
     model takes leaves the track unchanged, but for the oldest node of a full one.
     """
     index = nodes_until(history, landmark, observed.time_s)

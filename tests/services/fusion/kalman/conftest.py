@@ -24,10 +24,14 @@ class OneTrack:
     START_M = np.array([0.05, 0.0, 0.6])
     SIGMA = 1e-4  # of each ray coordinate
 
-    def __init__(self, densities: Sequence[float] = (40.0,), start_s: float = 0.0) -> None:
-        """densities: of the models' jerk; all slow down alike."""
+    def __init__(
+        self, densities: Sequence[float] = (40.0,), start_s: float = 0.0, along: float = 0.0
+    ) -> None:
+        """densities: of the models' jerk, and along the way as well; all slow down alike."""
         self.cameras = extrinsics(tuple(SyntheticRig().rig().values()))
-        self.models = np.array([[density, 0.0, 1.0 / ACCELERATION_TIME_S] for density in densities])
+        self.models = np.array(
+            [[density, 0.0, 1.0 / ACCELERATION_TIME_S, along] for density in densities]
+        )
         self.history = empty_history(1, len(densities))
         start_track(self.history, 0, start_s, self.START_M, np.array([0.02, 0.5, 5.0]))
 
@@ -55,8 +59,8 @@ class OneTrack:
 class CurvedTrack(OneTrack):
     """It has 12 observations of a landmark on a curved path, inserted in some order."""
 
-    def __init__(self, order: Sequence[int] = tuple(range(12))) -> None:
-        super().__init__(start_s=-0.001)
+    def __init__(self, order: Sequence[int] = tuple(range(12)), along: float = 0.0) -> None:
+        super().__init__(start_s=-0.001, along=along)
         random = np.random.default_rng(4)
         self.observed = []  # time, camera, ray
         for k in range(12):

@@ -18,7 +18,7 @@ from testing.synthetic_points import SyntheticRig
 
 PLACES = np.array([[0.0, 0.0, 0.6], [0.05, 0.02, 0.6], [0.02, -0.05, 0.6]])
 CAMERAS = extrinsics(tuple(SyntheticRig().rig().values()))
-MODELS = np.array([[0.1, 0.0, 3.0], [1000.0, 0.0, 3.0]])
+MODELS = np.array([[0.1, 0.0, 3.0, 0.0], [1000.0, 0.0, 3.0, 0.0]])
 
 
 def update(state, frame, *, new=True):

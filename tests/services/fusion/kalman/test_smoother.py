@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from services.fusion.kalman.motion_model import discretize, empty_step
 
@@ -17,15 +18,19 @@ def rts(track):
         step = empty_step()
         discretize(times[k + 1] - times[k], track.models[0], step)
         F = np.kron(step.F, np.eye(3))
-        prior = F @ P[k] @ F.T + np.kron(step.Q, np.eye(3))
+        density, _, _, along = track.models[0]
+        way = history.way[0, nodes[k]]
+        noise = np.eye(3) + along / density * way / np.trace(way)
+        prior = F @ P[k] @ F.T + np.kron(step.Q, noise)
         C = P[k] @ F.T @ np.linalg.inv(prior)
         xs[k] = x[k] + C @ (xs[k + 1] - F @ x[k])
         Ps[k] = P[k] + C @ (Ps[k + 1] - prior) @ C.T
     return times, xs, Ps
 
 
-def test_smoothing_equals_rauch_tung_striebel(curved_track):
-    track = curved_track()
+@pytest.mark.parametrize("along", [0.0, 4000.0])
+def test_smoothing_equals_rauch_tung_striebel(curved_track, along):
+    track = curved_track(along=along)
     times, xs, Ps = rts(track)
     for k in range(1, len(times)):
         mean, cov = track.at(times[k])
