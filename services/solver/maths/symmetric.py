@@ -1,6 +1,6 @@
 """Eigenvalues and axes of a symmetric 3x3 matrix: a covariance's spreads, and along what.
 
-Written out it takes .4 us; LAPACK's takes 1.3 us, and 8 where its code has left the caches, as
+Written out it takes .4 us; LAPACK's takes 1.3 us, about 5 where its code has left the caches, as
 between two messages.
 """
 
