@@ -15,14 +15,21 @@ TIMES = np.arange(-0.4, 0.001, 1 / 30)
 def test_an_arrival_is_found_between_samples_whatever_the_level(kink_s, level_m):
     values = level_m + 0.12 * np.maximum(0.0, kink_s - TIMES)
     found = arrival(TIMES, values)
-    assert found.time_s == pytest.approx(kink_s, abs=0.005)
+    # What is 0.6 mm from where it rests touches.
+    assert found.time_s == pytest.approx(kink_s - 0.0006 / 0.12, abs=0.006)
     assert found.level_m == pytest.approx(level_m, abs=3e-4)
-    assert found.speed_m_s == pytest.approx(0.12, rel=0.05)
+    assert found.rise_m == pytest.approx(0.12 * (kink_s - TIMES[0]), rel=0.05)
+
+
+def test_a_finger_that_slows_down_into_a_touch_is_dated_by_its_last_millimetre():
+    values = 0.4 * np.maximum(0.0, -0.12 - TIMES) ** 2
+    begin_s = -0.12 - (0.0006 / 0.4) ** 0.5
+    assert arrival(TIMES, values).time_s == pytest.approx(begin_s, abs=0.006)
 
 
 def test_a_departure_is_the_mirrored_arrival():
     values = -0.001 + 0.09 * np.maximum(0.0, TIMES + 0.1)
-    assert departure(TIMES, values).time_s == pytest.approx(-0.1, abs=0.005)
+    assert departure(TIMES, values).time_s == pytest.approx(-0.1 + 0.0005 / 0.09, abs=0.005)
 
 
 def test_a_finger_that_set_out_only_just_before_is_dated_by_where_it_stops():
