@@ -38,7 +38,7 @@ Length = tuple[float, float]
 # What a base line that was given as two points of the picture is called among the places.
 GIVEN_BASE = Segment("base_start", "base_end")
 _NOTES = {
-    "edges": "bones are as long as the clicks in the first picture say",
+    "edges": "bones are as long as all pictures together say, the last one as it was clicked",
     "edges-paper": "joints are the centroids of the paper's regions",
 }
 # A normal distribution's sigma is so much of its median absolute deviation.

@@ -11,10 +11,12 @@ from services.pi_tracker.image.frame import Frame
 from studies.grasp.measure.dots.finder import DotJoints
 from studies.grasp.measure.edges.finder import EdgeFinder
 from studies.grasp.measure.edges.paper import PaperFinder
+from studies.grasp.measure.flat import flat_about
 from studies.grasp.measure.gaps import bridged
 from studies.grasp.measure.joints import Place, Seen, fingers_in
 from studies.grasp.measure.pictures import Pictures, corrected_seeds
 from studies.grasp.measure.seeds import Method, Seeds, check_seeds
+from studies.grasp.metrology.plane import Plane
 
 
 class Finder(Protocol):
@@ -29,8 +31,10 @@ def see(
     method: Method,
     color: ColorRange | None,
     advance: Callable[[], None],
+    plane: Plane | None = None,
 ) -> list[Seen]:
-    """What every picture shows. seeds: px of the first picture as the camera saw it.
+    """What every picture shows. seeds: px of the first picture as the camera saw it; plane: the
+    finger's, where a reference says it: an outline's bones are rigid only straight from the front.
 
     advance is called after each. Raises CaptureError of seeds or pictures that will not do.
     """
@@ -41,7 +45,7 @@ def see(
     corrected = corrected_seeds(seeds, pictures.lens)
     whole = chain([first], frames)
     if method == "edges":
-        return _by_outline(whole, corrected)
+        return _by_outline(whole, corrected, plane)
     finders = _finders(first, corrected, method, color)
     seen = [_together([finder.find(frame) for finder in finders]) for frame in whole]
     return bridged(seen) if method == "dots" else seen
@@ -58,13 +62,17 @@ def _checked(
         advance()
 
 
-def _by_outline(frames: Iterable[Frame], seeds: Seeds) -> list[Seen]:
+def _by_outline(frames: Iterable[Frame], seeds: Seeds, plane: Plane | None) -> list[Seen]:
     """What all pictures together show."""
-    finders = [EdgeFinder(finger, seeds) for finger in fingers_in(list(seeds))]
+    flat = None if plane is None else flat_about(plane, seeds)
+    at = seeds if flat is None else flat.seeds(seeds)
+    finders = [EdgeFinder(finger, at) for finger in fingers_in(list(seeds))]
     for frame in frames:
+        front = frame if flat is None else flat.frame(frame)
         for finder in finders:
-            finder.look(frame)
-    return [_together(one) for one in zip(*(finder.seen() for finder in finders), strict=True)]
+            finder.look(front)
+    seen = [_together(one) for one in zip(*(finder.seen() for finder in finders), strict=True)]
+    return seen if flat is None else [flat.back(one) for one in seen]
 
 
 def _finders(first: Frame, seeds: Seeds, method: Method, color: ColorRange | None) -> list[Finder]:

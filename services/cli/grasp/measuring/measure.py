@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.recordings import Finding, Line, Wanted
     from studies.grasp.measure.seeds import Method, Seeds
+    from studies.grasp.metrology.reference import Known
 
 _GRID = "first-frame.png"
 
@@ -57,10 +58,12 @@ def measure(
     seeds = for_method(seeds, look.method)
     if not seeds:
         raise _seeds_wanted(pictures, out)
+    known = _known(scaled.reference, pictures)
+    plane = None if known is None else known.plane
     line = Progress("measuring", 0, progress)
-    seen = see(pictures, seeds, look.method, color, line.advance)
+    seen = see(pictures, seeds, look.method, color, line.advance, plane)
     line.end()
-    findings = _findings(seen, seeds, look.method, scaled.reference, wanted, pictures)
+    findings = _findings(seen, seeds, look.method, known, wanted, pictures)
     _write(out, findings, seen)
     if overlay:
         drawing = Progress("drawing", len(seen), progress)
@@ -75,12 +78,12 @@ def _findings(
     seen: list[Seen],
     seeds: Seeds,
     method: Method,
-    reference: str | None,
+    known: Known | None,
     wanted: Wanted,
     pictures: Pictures,
 ) -> dict[Finger, Finding]:
     """What was seen as recordings of fingers, in the reference's plane if there is one."""
-    from services.cli.grasp.measuring.in_plane import in_plane, reference_of
+    from services.cli.grasp.measuring.in_plane import in_plane
     from studies.grasp.measure.recordings import recordings
     from studies.grasp.measure.seeds import missing_notes
 
@@ -90,9 +93,15 @@ def _findings(
     def recorded(seen: list[Seen], wanted: Wanted) -> dict[Finger, Finding]:
         return recordings(seen, list(seeds), wanted, method, notes)
 
+    return recorded(seen, wanted) if known is None else in_plane(known, seen, wanted, recorded)
+
+
+def _known(reference: str | None, pictures: Pictures) -> Known | None:
     if reference is None:
-        return recorded(seen, wanted)
-    return in_plane(reference_of(reference, pictures), seen, wanted, recorded)
+        return None
+    from services.cli.grasp.measuring.in_plane import reference_of
+
+    return reference_of(reference, pictures)
 
 
 def _color(look: LookOptions) -> ColorRange | None:

@@ -20,6 +20,7 @@ from studies.grasp.measure.edges.contrast import colours_of
 from studies.grasp.measure.edges.follow import Followed, Follower
 from studies.grasp.measure.edges.learn import Learnt, learn, learn_base, widths_beside
 from studies.grasp.measure.edges.outline import Link, frame_of
+from studies.grasp.measure.edges.patches import placed
 from studies.grasp.measure.edges.segments import Array, edges_near
 from studies.grasp.measure.edges.silhouette import joints_at
 from studies.grasp.measure.joints import B1, B2, Finger, Place, Seen, joints_of
@@ -32,6 +33,9 @@ _WIDEST_BASE = 1.5
 # A phalanx of which less than this of both sides is supported by edges was not measured; from
 # _WELL on it is as well seen as it gets (one side is folded away where a finger is bent).
 _LEAST_SUPPORT, _WELL = 0.15, 0.5
+# The mean of all pictures' skin is as sharp as their poses are right: made so often. DIP errors of
+# subjects 1, 3, 5, clicks of 1 px: 3.0 deg RMS without skin, 2.3 by one round, 1.5 by two.
+_SKIN_ROUNDS = 2
 
 
 class _Instant(NamedTuple):
@@ -68,8 +72,18 @@ class EdgeFinder:
         """The joints of all pictures, and why others are missing."""
         if self._follower is None:
             return []
-        found = adjust(self._follower.shape, self._followed, self._clicks)
+        found = self._adjusted(self._follower)
         return [self._told(found, number) for number in range(len(self._instants))]
+
+    def _adjusted(self, follower: Follower) -> Adjusted:
+        """All pictures together: by the outline first, then by where each phalanx' skin is."""
+        found = adjust(follower.shape, self._followed, self._clicks)
+        kept = [one.kept for one in self._followed]
+        then = follower.shape, np.stack([one.vector for one in self._followed])
+        for _ in range(_SKIN_ROUNDS):
+            skin = placed(kept, follower.windows, then, (found.shape, found.poses))
+            found = adjust(follower.shape, self._followed, self._clicks, skin, found)
+        return found
 
     def _learnt(self, image: np.ndarray) -> Learnt:
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)

@@ -22,6 +22,7 @@ from studies.grasp.measure.edges.contrast import (
 )
 from studies.grasp.measure.edges.fit import within_limits
 from studies.grasp.measure.edges.learn import Learnt
+from studies.grasp.measure.edges.patches import Kept, kept_of, windows_of
 from studies.grasp.measure.edges.segments import Array
 from studies.grasp.measure.edges.silhouette import POSE, joints_at, lay, normals_of, shown
 from studies.grasp.measure.edges.texture import (
@@ -57,7 +58,7 @@ _LEARN_COLOUR = 0.3
 
 class Followed(NamedTuple):
     """One picture: pose (6,); the skin's move since the last one (6,), None in the first; edges
-    (n, MOST, 2) px and their weights (n, MOST); the skin's misfit, levels.
+    (n, MOST, 2) px and their weights (n, MOST); the skin's misfit, levels; each segment's skin.
     """
 
     vector: Array
@@ -65,6 +66,7 @@ class Followed(NamedTuple):
     edges: Array
     weights: Array
     misfit: float
+    kept: Kept
 
 
 class Follower:
@@ -75,6 +77,7 @@ class Follower:
         self.shape = learnt.shape
         self._normals = normals_of(learnt.shape)
         self._skin = skin_of(learnt.shape)
+        self.windows = windows_of(learnt.shape)
         self._vector = learnt.vector.copy()
         self._velocity = np.zeros(POSE)
         self._memory: list[Array] | None = None
@@ -154,7 +157,8 @@ class Follower:
             self._inside = inside
         self._inside = self._inside + np.float32(_LEARN_COLOUR) * (inside - self._inside)
         places = laid.points[:, None] + found.offsets[..., None] * laid.normals[:, None]
-        return Followed(self._vector.copy(), move, places, found.weights, misfit)
+        skin = kept_of(colours, self.windows, self.shape, self._vector)
+        return Followed(self._vector.copy(), move, places, found.weights, misfit, skin)
 
 
 def _misfit(found: Moved) -> float:

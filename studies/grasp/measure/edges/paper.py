@@ -2,10 +2,18 @@
 
 In the first one a person says where the joints are; the outline is learned there (outline.py), and
 laid into each later picture from where it was before (fit.py). That says where the paper's regions
-lie, of which the centroids are the joints (regions.py).
+lie, of which the centroids are the joints.
+
+"Each region (B1, B2, and A1 to A4) is represented by a bounding box having a convex polygonal area
+inside defined by the intersection points of fitted line segments within the box. The centroid of
+each convex polygonal region represents the end point of the median line." A box' half side is half
+the finger's width: a larger one holds more of the inside of a bent joint than of its outside, and
+pulls the centroid there.
 """
 
 from __future__ import annotations
+
+from itertools import combinations, product
 
 import cv2
 import numpy as np
@@ -23,8 +31,7 @@ from studies.grasp.measure.edges.outline import (
     refined_widths,
     tip_end,
 )
-from studies.grasp.measure.edges.regions import centroids
-from studies.grasp.measure.edges.segments import Array, edges_near
+from studies.grasp.measure.edges.segments import Array, Edges, edges_near
 from studies.grasp.measure.joints import B1, B2, Finger, Place, Seen
 from studies.grasp.measure.joints import joints_of as names_of
 from studies.grasp.measure.seeds import Seeds
@@ -41,6 +48,12 @@ _LEAST_COVER = 0.25
 _WIDEST_BASE = 1.5
 # A turn goes on as it was, less a little: fingers that stop are as many as those that go on.
 _MOMENTUM = 0.7
+# Lines of less cover than this are not seen.
+_LINE_COVER = 0.3
+_ALONG = np.cos(np.radians(20.0))
+_NEAR_PX = 3.0
+# A line: a point (2,) on it and its unit direction (2,).
+Line = tuple[Array, Array]
 
 
 class PaperFinder:
@@ -157,7 +170,7 @@ class PaperFinder:
         return Seen(frame.seq, 1e-9 * frame.stamp_ns, places, lost)
 
     def _at_centroids(self, seen: Seen, found: list[Array | None]) -> Seen:
-        """The same joints at the centroids of A1 to A4 (regions.py)."""
+        """The same joints at the centroids of A1 to A4."""
         places, lost = dict(seen.places), dict(seen.lost)
         for name, centroid in zip(self._names, found, strict=True):
             place = places.pop(name, None)
@@ -182,3 +195,79 @@ def _sigma(outline: Outline, fitted: Fitted, joint: int) -> float:
         J[:, 2 + k - 3 + phalanx] = length * np.array([-np.sin(turn), np.cos(turn)])
     cov = J @ fitted.cov @ J.T
     return float(np.sqrt(0.5 * np.trace(cov)))
+
+
+def side_lines(edges: Edges, outline: Outline, fitted: Fitted) -> dict[tuple[int, int], Line]:
+    """The line fitted to each side of each phalanx (0..2) that is seen, by (phalanx, side)."""
+    found: dict[tuple[int, int], Line] = {}
+    joints = joints_of(outline, fitted.chain)
+    first = len(outline.links) - 3
+    for phalanx, link in enumerate(outline.phalanges):
+        turn = fitted.chain.directions[first + phalanx]
+        u = np.array([np.cos(turn), np.sin(turn)])
+        n = np.array([-u[1], u[0]])
+        offset = edges.points - joints[phalanx]
+        along, across = offset @ u, offset @ n
+        inner = (along > 0.1 * link.length) & (along < 0.9 * link.length)
+        inner &= np.abs(edges.directions @ u) >= _ALONG
+        for number, side in enumerate(link.sides):
+            if side is None or fitted.cover[first + phalanx, number] < _LINE_COVER:
+                continue
+            expected = side.start + (side.end - side.start) * along / link.length
+            own = inner & (np.abs(across - expected) < _NEAR_PX)
+            if np.count_nonzero(own) < 6 or np.ptp(along[own]) < 0.25 * link.length:
+                continue
+            slope, level = (float(v) for v in np.polyfit(along[own], across[own], 1))
+            direction = u + slope * n
+            found[phalanx, number] = (
+                joints[phalanx] + level * n,
+                direction / np.hypot(1.0, slope),
+            )
+    return found
+
+
+def centroids(edges: Edges, outline: Outline, fitted: Fitted) -> list[Array | None]:
+    """The centroids (2,) of A1 to A4; None where less than both sides of a joint are seen."""
+    lines = side_lines(edges, outline, fitted)
+    joints = joints_of(outline, fitted.chain)
+    found: list[Array | None] = []
+    for joint in range(4):
+        links = [phalanx for phalanx in (joint - 1, joint) if 0 <= phalanx <= 2]
+        own = [
+            lines[key] for phalanx in links for key in ((phalanx, 0), (phalanx, 1)) if key in lines
+        ]
+        sides = {number for phalanx in links for number in (0, 1) if (phalanx, number) in lines}
+        half = float(np.mean([outline.phalanges[phalanx].width for phalanx in links]))
+        found.append(_centroid(own, joints[joint], half) if len(sides) == 2 else None)
+    return found
+
+
+def _centroid(lines: list[Line], centre: Array, half: float) -> Array | None:
+    """Of the convex polygon of the lines' intersections with each other and with the box."""
+    axes: list[Line] = [(np.eye(2)[0], np.eye(2)[1]), (np.eye(2)[1], np.eye(2)[0])]
+    border: list[Line] = [
+        (centre + sign * half * across, along) for across, along in axes for sign in (-1.0, 1.0)
+    ]
+    pairs = [*combinations(lines, 2), *product(lines, border)]
+    corners = []
+    for one, other in pairs:
+        crossing = _crossing(one, other)
+        if crossing is not None and np.abs(crossing - centre).max() <= half + 1e-6:
+            corners.append(crossing)
+    if len(corners) < 3:
+        return None
+    hull = cv2.convexHull(np.array(corners, np.float32)).reshape(-1, 2)
+    moments = cv2.moments(hull.reshape(-1, 1, 2))
+    if moments["m00"] < 1.0:
+        return None
+    return np.array([moments["m10"], moments["m01"]]) / moments["m00"]
+
+
+def _crossing(one: Line, other: Line) -> Array | None:
+    """Where two lines meet; None of nearly parallel ones."""
+    (p, u), (q, v) = one, other
+    sine = float(u[0] * v[1] - u[1] * v[0])
+    if abs(sine) < 0.05:
+        return None
+    step = q - p
+    return p + u * float(step[0] * v[1] - step[1] * v[0]) / sine

@@ -124,7 +124,7 @@ def test_bones_by_edges_are_as_sure_as_the_clicks():
     names = ("index_wrist", *NAMES)
     recording = recordings(pictures, names, Wanted(), "edges", {})["index"].recording
     assert recording.lengths_sigma == pytest.approx((2**0.5,) * 3, abs=1e-3)
-    assert any("as long as the clicks" in note for note in recording.notes)
+    assert any("as long as all pictures together say" in note for note in recording.notes)
 
 
 def test_a_phalanx_that_shrinks_is_doubted():

@@ -16,7 +16,7 @@ from studies.grasp.measure.edges.outline import (
     refined_widths,
     tip_end,
 )
-from studies.grasp.measure.edges.regions import centroids, side_lines
+from studies.grasp.measure.edges.paper import centroids, side_lines
 from studies.grasp.measure.edges.segments import Edges
 
 LENGTHS = [100.0, 60.0, 45.0]
