@@ -19,6 +19,8 @@ from rhot.bus.zenoh_config import client_config
 from rhot.messages import Session
 
 Fault = Callable[[], Awaitable[None]]
+# The kind whose memory takes longest to settle.
+PICTURES = "100 pictures asked for"
 
 
 class Faults:
@@ -47,7 +49,7 @@ class Faults:
             ("session stopped for 2 s", self._session_off),
             ("2,000 messages of garbage", self._garbage),
             ("JSON nested 32,000 deep on every stream", self._nested),
-            ("100 pictures asked for", self._pictures),
+            (PICTURES, self._pictures),
         ]
 
     async def _kill(self, process: str) -> None:
