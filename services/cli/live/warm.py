@@ -7,6 +7,7 @@ services share no kernels, and each has a process of its own.
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -31,6 +32,8 @@ def warm(
     ] = None,
 ) -> None:
     """Compile all kernels once, ahead of the first start."""
+    # Where it is missing, that is said before anything else.
+    importlib.import_module("numba")
     package = Path(services.__file__).parent
     adopted = adopt(package)
     started_s = time.monotonic()

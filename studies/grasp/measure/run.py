@@ -11,7 +11,7 @@ from services.pi_tracker.image.frame import Frame
 from studies.grasp.measure.dots.finder import DotJoints
 from studies.grasp.measure.edges.finder import EdgeFinder
 from studies.grasp.measure.edges.paper import PaperFinder
-from studies.grasp.measure.flat import flat_about
+from studies.grasp.measure.flat import Flat, flat_about
 from studies.grasp.measure.gaps import bridged
 from studies.grasp.measure.joints import Place, Seen, fingers_in
 from studies.grasp.measure.pictures import Pictures, corrected_seeds
@@ -64,10 +64,13 @@ def _checked(
 
 def _by_outline(frames: Iterable[Frame], seeds: Seeds, plane: Plane | None) -> list[Seen]:
     """What all pictures together show."""
-    flat = None if plane is None else flat_about(plane, seeds)
-    at = seeds if flat is None else flat.seeds(seeds)
-    finders = [EdgeFinder(finger, at) for finger in fingers_in(list(seeds))]
+    flat: Flat | None = None
+    finders: list[EdgeFinder] = []
     for frame in frames:
+        if not finders:
+            flat = None if plane is None else flat_about(plane, seeds, frame.size_px)
+            at = seeds if flat is None else flat.seeds(seeds)
+            finders = [EdgeFinder(finger, at) for finger in fingers_in(list(seeds))]
         front = frame if flat is None else flat.frame(frame)
         for finder in finders:
             finder.look(front)
