@@ -63,7 +63,8 @@ test-arm64: $(STAMP)
 	tests/deploy/arm64.sh
 
 # A rig as it is used: planted faults and what `rhot doctor` says of them, floods on a secured bus,
-# two Pis as network namespaces, every command of docs/guide/operations.md. Ten minutes.
+# two Pis as network namespaces, every command of docs/guide/operations.md, every calibration step
+# from Start to Save on a simulated rig. Twelve minutes.
 test-field: $(STAMP)
 	$(call twice,-q --durations=10 -m field tests $(ARGS))
 

@@ -24,7 +24,7 @@ from services.cli.defaults import sim_toml
 from services.cli.live.supervisor import Child, service_argv
 from tests.integration.conftest import RunningRig
 
-pytestmark = [pytest.mark.integration, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 
 DEADLINE_S = 240.0
 # Fewer than a person is asked for; more make it more accurate, not another thing.
