@@ -117,7 +117,8 @@ def boxes(page: Any) -> list[tuple[str, float, float]]:
     }
     placed = []
     for name, one in found.items():
-        box = one.bounding_box()
+        # What is being brought up to date is nowhere for a moment.
+        box = until(page, one.bounding_box)
         placed.append((name, box["y"], box["y"] + box["height"]))
     return placed
 
