@@ -28,6 +28,10 @@ _SHARED_FROM_BYTES = 65_537
 # Where the limit is reached (8 MB for most users) messages are lost without a word.
 _LOCKED_BYTES = 16 * _POOL_BYTES
 _CAP_IPC_LOCK = 14
+# An attempt to connect is given up after so long; Zenoh's own is 10 s. One that begins just after
+# the cable is out, while the neighbour is still in the table, lasts its whole time: poses were back
+# 3.4 s after 8 s without a cable. Long enough for a handshake with certificates on a slow computer.
+_OPEN_MS = 3000
 # Tried again so soon that a link's return waits for the neighbour table and for little else: after
 # 8 s without a cable at most 1.13 s where ARP asks once a second, 0.47 s where install.sh has set
 # it to four times (deploy/sysctl.d); with pauses of 500 ms 1.22 and 0.71 s.
@@ -45,7 +49,7 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
         link["rx"] = {"max_message_size": max_message_bytes}
     return {
         "link": link,
-        "unicast": {"qos": {"enabled": True}},
+        "unicast": {"qos": {"enabled": True}, "open_timeout": _OPEN_MS},
         "shared_memory": {
             "enabled": may_lock(_LOCKED_BYTES),
             "transport_optimization": {
