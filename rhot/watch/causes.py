@@ -16,8 +16,8 @@ from rhot.watch.rig_state import StandingFault
 
 _OBJECT_CODES = {kind.code for kind in OBJECTS}
 _OBJECT_SERVICES = ("object_tracker", "openvr_bridge")
-# What a stream's key says of objects, in a text of a slow one.
-_OBJECT_KEYS = ("/object/", "/openvr/")
+# What a stream's key says of objects and of cameras, in a text of a slow one.
+_OBJECT_KEYS, _CAMERA_KEY = ("/object/", "/openvr/"), "/camera/"
 _START_ALL = "start them: `rhot up rig.toml` starts all that belong on this computer"
 
 
@@ -81,6 +81,9 @@ def _touches(cause: StandingFault, follower: StandingFault) -> bool:
 
 
 def _of_objects(one: StandingFault) -> bool:
+    # The object tracker hears the cameras, too: their paint on its trackers.
+    if one.fault.code in SLOW and _CAMERA_KEY in one.fault.text:
+        return False
     names = (one.teller, one.fault.subject)
     return (
         one.fault.code in _OBJECT_CODES

@@ -12,6 +12,7 @@ from rhot.watch.rig_state import StandingFault
 from testing.sample_health import NOW_NS, SECOND_NS, beat, fault
 
 SLOW_POSES = "rhot/sim/hand/*/pose: 0.0 Hz received of 30.0 expected"
+SLOW_MARKERS = "rhot/sim/camera/*/markers: 12.0 Hz received of 60.0 expected"
 SLOW_OBJECTS = "rhot/sim/object/*/pose: 0.0 Hz received of 120.0 expected"
 
 
@@ -83,6 +84,12 @@ def test_objects_and_hands_do_not_explain_each_other() -> None:
         ("no_pose", []),
     ]
     assert codes([slow, told("camera_moved", "fusion", "left")])[0] == ("camera_moved", [])
+
+
+def test_what_the_object_tracker_misses_of_slow_cameras_follows_from_them() -> None:
+    camera = told("camera_slow", "pi_tracker/left", "left")
+    slow = told("stream_slow", "object_tracker", text=SLOW_MARKERS)
+    assert codes([slow, camera]) == [("camera_slow", ["stream_slow"])]
 
 
 def test_errors_come_before_warnings_and_nothing_is_lost() -> None:
