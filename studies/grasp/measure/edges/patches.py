@@ -24,6 +24,7 @@ from studies.grasp.measure.edges.silhouette import (
     bends_of,
     joints_at,
 )
+from studies.grasp.measure.edges.texture import sampled
 
 # The skin that is compared: shares of a bone, of the back of the hand and of half the width.
 # Beyond .65 of that a finger turns away from the camera and shading is steep.
@@ -198,7 +199,7 @@ def _registered(
     """Frames (f, 3) at which the pictures show what their mean shows, and weights (f,)."""
     seen = np.stack(
         [
-            _flat(_sampled(image, _points(start, window.local)), window.light, show)
+            _flat(sampled(image, _points(start, window.local)), window.light, show)
             for image, start, show in zip(images, starts, shown, strict=True)
         ]
     )
@@ -230,7 +231,7 @@ def _found(
     frame = start.copy()
     for _ in range(_STEPS):
         points = _points(frame, window.local)
-        now, dx, dy = (_sampled(plane, points) for plane in planes)
+        now, dx, dy = (sampled(plane, points) for plane in planes)
         offset = points - frame[:2]
         turned = dy * offset[:, 0] - dx * offset[:, 1]
         rows = np.column_stack([dx, dy, turned, window.light])
@@ -250,9 +251,3 @@ def _found(
 def _points(frame: Array, local: Array) -> Array:
     c, s = np.cos(frame[2]), np.sin(frame[2])
     return frame[:2] + local @ np.array([[c, s], [-s, c]])
-
-
-def _sampled(plane: Picture, points: Array) -> Array:
-    x, y = points[:, :1].astype(np.float32), points[:, 1:].astype(np.float32)
-    seen = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(seen[:, 0], dtype=np.float64)

@@ -100,7 +100,7 @@ def pyramid_of(colours: Picture) -> Pyramid:
 def remembered(pyramid: Pyramid, skin: Skin, shape: Silhouette, vector: Array) -> list[Array]:
     """What a picture shows on the grid at a pose, (n,) for each level."""
     points, _ = carried(vector, shape.lengths, skin.segment, skin.local)
-    return [_sampled(level[0], points) for level in pyramid.levels]
+    return [sampled(level[0], points) for level in pyramid.levels]
 
 
 def moved(
@@ -123,7 +123,7 @@ def _step(
     vector: Array,
 ) -> tuple[Array, Array, float]:
     points, derivative = carried(vector, shape.lengths, skin.segment, skin.local)
-    now, dx, dy = (_sampled(plane, points) for plane in level)
+    now, dx, dy = (sampled(plane, points) for plane in level)
     rows = np.concatenate(
         [dx[:, None] * derivative[:, 0] + dy[:, None] * derivative[:, 1], skin.light], axis=1
     )
@@ -143,7 +143,8 @@ def _step(
     return vector + np.clip(step[:POSE], -_LARGEST, _LARGEST), information, scale
 
 
-def _sampled(plane: Picture, points: Array) -> Array:
+def sampled(plane: Picture, points: Array) -> Array:
+    """A plane of a picture at points (n, 2) px, between its pixels."""
     x, y = points[:, :1].astype(np.float32), points[:, 1:].astype(np.float32)
     seen = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(seen[:, 0], dtype=np.float64)
