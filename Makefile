@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # What a machine can check of the house without running it.
-HOUSE := tests/test_architecture.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
+HOUSE := tests/test_architecture.py tests/test_purity.py tests/test_sizes.py tests/test_references.py tests/test_public_names.py
 QUICK := not browser and not wheel and not integration and not field and not system
 SHELL := /bin/bash
 # pytest with these arguments; if tests failed (1), those once more, one after the other. (5: of the

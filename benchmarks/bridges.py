@@ -41,6 +41,7 @@ from websockets.sync.client import connect
 from rhot import topics
 from rhot.bus.bus import Bus, client_config, open_bus
 from rhot.hand import HANDS
+from testing.loopback import free_endpoint, free_port
 from testing.sample_hands import object_pose, random_pose
 
 BRIDGES = ("vmc", "opengloves", "monado", "websocket", "foxglove", "ros2")
@@ -101,9 +102,7 @@ def consume(names: Sequence[str], endpoint: str) -> None:
     ports = []
     for name in names:
         if name in SERVERS:
-            with socket.socket() as probe:
-                probe.bind(("127.0.0.1", 0))
-                ports.append(probe.getsockname()[1])
+            ports.append(free_port())
             threading.Thread(
                 target=connect_to, args=(name, ports[-1], endpoint), daemon=True
             ).start()
@@ -221,9 +220,7 @@ async def measure(
     names: Sequence[str], rounds: int, seconds: float
 ) -> list[dict[str, dict[str, float]]]:
     """Of each round: p50_ms, p99_ms and cpu_percent of each state."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     results = []
     with tempfile.TemporaryDirectory() as folder:
         async with (

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import socket
 import statistics
 import threading
 import time
@@ -24,6 +23,7 @@ from rhot import topics
 from rhot.bus.bus import open_bus
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.messages import Marker, MarkerFrame
+from testing.loopback import free_endpoint
 
 MESSAGES, WARM_UP = 1000, 100
 
@@ -97,9 +97,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     ways: dict[str, Callable[[], list[float] | Awaitable[list[float]]]] = {
         "bare Zenoh callback": lambda: bare(endpoint),
         "rhot raw()": lambda: typed(endpoint, "raw"),

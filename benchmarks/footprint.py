@@ -24,7 +24,6 @@ import asyncio
 import contextlib
 import json
 import os
-import socket
 import statistics
 import sys
 import tempfile
@@ -43,6 +42,7 @@ from rhot.files.calibration import save
 from rhot.messages import Session
 from rhot.messages.simulator import SimFrame
 from testing import synthetic_images
+from testing.loopback import free_endpoint
 
 RIG, CAMERA, SIZE, FPS = "footprint", "left", (640, 480), 30.0
 FORBIDDEN = ("scipy", "numba", "llvmlite", "viser")
@@ -179,10 +179,8 @@ def cpu_seconds(pid: int) -> float:
 
 async def measure(runs: int, seconds: float) -> dict[str, Any]:
     """All figures."""
-    with socket.socket() as probe, tempfile.TemporaryDirectory() as folder:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-        probe.close()
+    endpoint = free_endpoint()
+    with tempfile.TemporaryDirectory() as folder:
         rig = write_rig(Path(folder))
         with zenoh.open(router_config([endpoint])):
             async with open_bus(RIG, [endpoint]) as bus:

@@ -20,6 +20,7 @@ from rhot.hand import BASIC_LANDMARKS, default_hand, forward, landmark_point
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.step import FusionStep
 from services.solver.step import SolverStep
+from testing.loopback import free_port
 from testing.synthetic_points import COLORS, SyntheticRig, frames
 
 RIG = "latency"
@@ -106,9 +107,7 @@ def running(folder: Path, recording: Recording, *, direct: bool) -> Iterator[str
 
     direct: peers without a router; the endpoint is that of their hub.
     """
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     endpoint = f"tcp/127.0.0.1:{port}"
     rig = str(write_rig(folder, recording.rig))
     common = ("--config", rig, "--connect", endpoint)

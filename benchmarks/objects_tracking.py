@@ -2,12 +2,9 @@
 
     python benchmarks/objects_tracking.py [--seconds S] [--json FILE]
 
-objects_cpu: rhot-object-tracker as it is started, a process of its own on a real router, receives
-16 trackers at 250 Hz from a third process that only sends, and publishes 16 objects; its own
-processor time over the run, as a share of one core, and how many messages were lost on the way
-(sent against published). The rest is computed on the real recordings in $RHOT_DATA (left out if
-absent): vive/libsurvive's still tracker and its tracker with outliers, and the 20 minutes of
-vive/marvin. What smoothing costs is measured on motions that are known exactly.
+The cost is benchmarks/objects_load.py's. The rest is computed on the real recordings in $RHOT_DATA
+(left out if absent): vive/libsurvive's still tracker and its tracker with outliers, and the 20
+minutes of vive/marvin. What smoothing costs is measured on motions that are known exactly.
 
     jitter_*_mm          RMS distance of the still tracker from its one-second mean
     jitter_half_*_mm     the same of the second half, which no constant was chosen on
@@ -22,168 +19,27 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
 import gzip
 import json
 import math
 import os
-import socket
-import subprocess
 import sys
-import tempfile
-import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
-import zenoh
+from objects_load import load
 
-from rhot import topics
-from rhot.bus.bus import open_bus
-from rhot.bus.zenoh_config import client_config, router_config
-from rhot.files.calibration import Objects, save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects as ObjectsTable
 from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import Array, rotation_from_quaternion
-from rhot.messages.objects import ObjectPose, OpenVrDevice, OpenVrPose
+from rhot.messages.objects import ObjectPose
 from services.object_tracker.step import ObjectStep
+from testing.openvr_poses import openvr_pose, registered
 
-RIG, TRACKERS, RATE_HZ = "objects", 16, 250.0
 DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data")) / "vive"
-EYE = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 OUTLIER_M = 0.05
 SERIAL = "LHR-00"
-
-
-def message(serial: str, seq: int, stamp_ns: int, rows: Any, speed: float = 0.0) -> OpenVrPose:
-    """An OpenVrPose as the bridge sends it; rows is 3 x 4."""
-    return OpenVrPose(
-        v=1,
-        seq=seq,
-        stamp_ns=stamp_ns,
-        universe="raw:1",
-        device=OpenVrDevice(
-            index=1,
-            serial=serial,
-            device_class="GenericTracker",
-            model="VIVE Tracker 3.0",
-            battery=0.9,
-            charging=False,
-        ),
-        mDeviceToAbsoluteTracking=tuple(tuple(row) for row in rows),
-        vVelocity=(speed, 0.0, 0.0),
-        vAngularVelocity=(0.0, 0.0, 0.0),
-        eTrackingResult=200,
-        bPoseIsValid=True,
-        bDeviceIsConnected=True,
-        clock_sigma_ns=100_000,
-    )
-
-
-def send(endpoint: str, seconds: float) -> None:
-    """The third process: 16 hands that wave, for so long; prints how many messages it sent."""
-    encode, rng = msgspec.json.Encoder().encode, np.random.default_rng(0)
-    serials = [f"LHR-{k:02d}" for k in range(TRACKERS)]
-    with zenoh.open(client_config([endpoint])) as session:
-        publishers = [
-            session.declare_publisher(
-                topics.OPENVR.key(RIG, serial=serial),
-                congestion_control=zenoh.CongestionControl.BLOCK,
-                priority=zenoh.Priority.REAL_TIME,
-                express=True,
-            )
-            for serial in serials
-        ]
-        while not all(publisher.matching_status.matching for publisher in publishers):
-            time.sleep(0.01)
-        time.sleep(0.5)
-        begin_s, steps = time.monotonic(), round(seconds * RATE_HZ)
-        noise = rng.normal(0.0, 3e-4, (steps, 3)).tolist()
-        for seq in range(steps):
-            time.sleep(max(0.0, begin_s + seq / RATE_HZ - time.monotonic()))
-            angle, now_ns = 0.02 * seq, time.time_ns()
-            c, s, (x, y, z) = math.cos(angle), math.sin(angle), noise[seq]
-            rows = ((c, 0.0, s, 0.3 * s + x), (0.0, 1.0, 0.0, 1.0 + y), (-s, 0.0, c, 0.2 * c + z))
-            for serial, publisher in zip(serials, publishers, strict=True):
-                publisher.put(encode(message(serial, seq, now_ns, rows, 1.5 * c)))
-        time.sleep(1.0)
-    print(steps * TRACKERS)
-
-
-@contextlib.contextmanager
-def object_tracker(endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
-    """rhot-object-tracker with 16 registered objects."""
-    with tempfile.TemporaryDirectory() as folder:
-        rig = [f'[rig]\nname = "{RIG}"\n[bus]\nconnect = ["{endpoint}"]\n[objects]']
-        rig += [f'source = "network"\nrate_hz = {RATE_HZ}']
-        rig += [f'[[object]]\nname = "o{k}"\nserial = "LHR-{k:02d}"' for k in range(TRACKERS)]
-        (Path(folder) / "rig.toml").write_text("\n".join(rig) + "\n")
-        save(Path(folder) / "calibration" / "objects.json", registration())
-        command = [sys.executable, "-m", "services.object_tracker", "--config"]
-        silent = subprocess.DEVNULL
-        command.append(f"{folder}/rig.toml")
-        process = subprocess.Popen(command, stdout=silent, stderr=silent)
-        try:
-            yield process
-        finally:
-            process.terminate()
-            process.wait(10.0)
-
-
-def registration() -> Objects:
-    """The lighthouse frame as the rig's."""
-    return Objects(T_rig_from_lighthouse=EYE, universe="raw:1")
-
-
-def cpu_s(pid: int) -> float:
-    """Processor time of a process with all its threads."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-async def load(seconds: float) -> dict[str, float]:
-    """objects_cpu, lost and the latency of 16 trackers at 250 Hz."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    # A process of its own: the router's threads are not the tracker's.
-    with zenoh.open(router_config([endpoint])), object_tracker(endpoint) as process:
-        async with open_bus(RIG, [endpoint]) as bus:
-            objects = bus.raw(topics.OBJECT, 4096)
-            found = bus.watch_alive()
-            async for alive in found:
-                if alive.service == "object_tracker":
-                    break
-            script = [sys.executable, __file__, "--send", endpoint, "--seconds", str(seconds)]
-            sender = await asyncio.create_subprocess_exec(*script, stdout=subprocess.PIPE)
-            payloads: list[tuple[bytes, int]] = []
-            reader = asyncio.create_task(collect(objects, payloads))
-            while not payloads:
-                await asyncio.sleep(0.01)
-            before_s, began_s = cpu_s(process.pid), time.monotonic()
-            await asyncio.sleep(0.9 * seconds)
-            share = (cpu_s(process.pid) - before_s) / (time.monotonic() - began_s)
-            sent = int((await sender.communicate())[0])
-            reader.cancel()
-    poses = [(msgspec.json.decode(one, type=ObjectPose), at_ns) for one, at_ns in payloads]
-    good = [(pose, at_ns) for pose, at_ns in poses if pose.tracking == "ok"]
-    ages_ms = sorted((at_ns - pose.stamp_ns) * 1e-6 for pose, at_ns in good)
-    return {
-        "objects_cpu": round(share, 3),
-        "sent": sent,
-        "lost": sent - len(good),
-        "latency_p50_ms": round(ages_ms[len(ages_ms) // 2], 2),
-        "latency_p99_ms": round(ages_ms[int(0.99 * len(ages_ms))], 2),
-    }
-
-
-async def collect(objects: Any, payloads: list[tuple[bytes, int]]) -> None:
-    """Keep what arrives, undecoded."""
-    async for sample in objects:
-        payloads += [(sample.payload, sample.received_ns)]
 
 
 def recording(name: str, kind: str) -> tuple[Array, Array, Array]:
@@ -201,10 +57,10 @@ def tracked(
     config = RigConfig(
         object=[ObjectTable(name="o", serial=SERIAL)], objects=ObjectsTable(filter_mm=filter_mm)
     )
-    step = ObjectStep(config, registration())
+    step = ObjectStep(config, registered())
     rows = np.concatenate([rotations, positions[:, :, None]], axis=2).tolist()
     return [
-        step.step(message(SERIAL, k, 10**18 + round(at * 1e9), matrix))
+        step.step(openvr_pose(matrix, SERIAL, seq=k, stamp_ns=10**18 + round(at * 1e9)))
         for k, (at, matrix) in enumerate(zip(t, rows, strict=True))
     ]
 
@@ -303,11 +159,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--send", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.send:
-        send(options.send, options.seconds)
-        return
     figures = measure(options.seconds)
     for name, value in figures.items():
         print(f"{name:<22} {value:>12g}")

@@ -14,7 +14,6 @@ import argparse
 import asyncio
 import json
 import random
-import socket
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -34,6 +33,7 @@ from rhot.bus.zenoh_config import client_config, router_config
 from services.recorder.reader import Record, read
 from services.recorder.sources.replay import replay
 from services.recorder.writer import RecordingWriter
+from testing.loopback import free_endpoint
 
 # What a rig sends: topic, names, Hz and bytes of a message.
 STREAMS = (
@@ -161,9 +161,7 @@ def _is_subsequence(got: list[bytes], payloads: list[bytes]) -> bool:
 
 async def run(seconds: float) -> list[Result]:
     """All measurements."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     results = []
     line, theirs = Pipe()
     # Spawned: a forked process would have this one's Zenoh threads in pieces.

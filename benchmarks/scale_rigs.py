@@ -14,6 +14,7 @@ from pathlib import Path
 
 from latency_rig import RIG, write_rig
 
+from testing.loopback import free_endpoint
 from testing.synthetic_points import SyntheticRig
 
 _TICKS = os.sysconf("SC_CLK_TCK")
@@ -67,7 +68,7 @@ class Machine:
 @contextlib.contextmanager
 def running(folder: Path, rig: SyntheticRig, rigs: int, routers: int) -> Iterator[Machine]:
     """All processes; the rigs take turns with the routers."""
-    machine = Machine([f"tcp/127.0.0.1:{_free_port()}" for _ in range(routers)])
+    machine = Machine([free_endpoint() for _ in range(routers)])
     configs = folder / "rigs"
     configs.mkdir()
     for n in range(rigs):
@@ -107,12 +108,6 @@ def running(folder: Path, rig: SyntheticRig, rigs: int, routers: int) -> Iterato
         for service in ("fusion", "solver"):
             start(service, f"services.{service}", "--config", str(configs))
         yield machine
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _wait_for(endpoint: str) -> None:

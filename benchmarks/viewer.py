@@ -31,7 +31,6 @@ import contextlib
 import json
 import os
 import signal
-import socket
 import statistics
 import subprocess
 import sys
@@ -52,6 +51,7 @@ from rhot.files.rig_tables import HandTable, ObjectTable, Viewer
 from rhot.messages import Message
 from services.simulator.files.rig_toml import rig_toml
 from services.simulator.scene.scene import load_scene
+from testing.loopback import free_endpoint
 from testing.page_visitors import Visitor, chromium
 from testing.scene_messages import hand_points, hand_pose, object_messages
 
@@ -245,10 +245,8 @@ def viewer(rig: str, endpoint: str) -> Iterator[int]:
 
 async def run(options: argparse.Namespace) -> dict[str, Figures]:
     """All kinds of visitors, one after the other."""
-    with socket.socket() as probe, tempfile.TemporaryDirectory() as folder:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-        probe.close()
+    endpoint = free_endpoint()
+    with tempfile.TemporaryDirectory() as folder:
         config = write_rig(Path(folder))
         made = frames(round(4.0 * RATE_HZ))
         rig = f"{folder}/rig.toml"

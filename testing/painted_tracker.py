@@ -32,7 +32,8 @@ from rhot.geometry.transforms import (
     transform,
 )
 from rhot.messages import Marker, MarkerFrame
-from rhot.messages.objects import OpenVrDevice, OpenVrPose
+from rhot.messages.objects import OpenVrPose
+from testing.openvr_poses import openvr_pose
 from testing.synthetic_points import START_NS, SyntheticRig
 
 T_RIG_FROM_LIGHTHOUSE = transform(rotation_x(np.pi) @ rotation_y(0.6), (0.6, 0.9, 1.4))
@@ -99,25 +100,12 @@ class PaintedTracker:
             far = 0.1 if rng.random() < self.outliers else 0.0
             p = T[:3, 3] + (self.tracker_m + far) * rng.standard_normal(3)
             matrix = np.column_stack([rotation_from_quaternion(quaternion_from_rotation(R)), p])
-            yield OpenVrPose(
-                v=1,
+            yield openvr_pose(
+                matrix,
+                self.serial,
                 seq=number,
                 stamp_ns=START_NS + round(1e9 * (t_s + self.time_offset_s)),
                 universe=self.universe,
-                device=OpenVrDevice(
-                    index=1,
-                    serial=self.serial,
-                    device_class="GenericTracker",
-                    model="synthetic",
-                    battery=1.0,
-                    charging=False,
-                ),
-                mDeviceToAbsoluteTracking=rows_of(matrix),
-                vVelocity=(0.0, 0.0, 0.0),
-                vAngularVelocity=(0.0, 0.0, 0.0),
-                eTrackingResult=200,
-                bPoseIsValid=True,
-                bDeviceIsConnected=True,
                 clock_sigma_ns=100_000,
             )
 

@@ -76,6 +76,14 @@ class Camera:
         """hflip is set."""
         self.change = lambda image, _: mirrored(image)
 
+    def slow(self) -> None:
+        """Two of three pictures never come."""
+        self.every = 3
+
+    def ahead(self) -> None:
+        """Its computer's clock is 3 s ahead."""
+        self.ahead_ns = 3_000_000_000
+
     def freeze(self) -> None:
         """The camera hangs, and its driver does not."""
         still = self.images[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import socket
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from rhot.files.config import RigConfig, load_rig
 from services.cli.pki.certificates import Issued, issue, make_authority
 from services.cli.pki.folders import PkiFolder
 from services.cli.pki.hosts import wanted_certificates
+from testing.loopback import free_port
 
 NOW = datetime.datetime.now(datetime.UTC)
 LONG_AGO = NOW - datetime.timedelta(days=800)
@@ -92,10 +92,3 @@ class SecuredRig:
         """The endpoint as a host of that folder reaches it."""
         endpoint = f"tls/{address}:{self.port}"
         return with_certificates([endpoint], self.hosts.host(folder), "connect")
-
-
-def free_port() -> int:
-    """A port nobody listens at on loopback."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

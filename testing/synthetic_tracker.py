@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array, inverse, transform
 from rhot.messages import Marker, MarkerFrame
-from rhot.messages.objects import OpenVrDevice, OpenVrPose
+from rhot.messages.objects import OpenVrPose
+from testing.openvr_poses import openvr_pose
 from testing.synthetic_points import SIZE_PX, START_NS, SyntheticRig
 
 SERIAL, COLOR = "LHR-0A1B2C3D", "orange"
@@ -134,21 +135,7 @@ def _rows(matrix: Array) -> Any:
 
 
 def _pose(seq: int, serial: str, stamp_ns: int, matrix: Array) -> OpenVrPose:
-    return OpenVrPose(
-        v=1,
-        seq=seq,
-        stamp_ns=stamp_ns,
-        universe="1",
-        device=OpenVrDevice(
-            index=1, serial=serial, device_class="tracker", model="", battery=1.0, charging=False
-        ),
-        mDeviceToAbsoluteTracking=_rows(matrix),
-        vVelocity=(0.0, 0.0, 0.0),
-        vAngularVelocity=(0.0, 0.0, 0.0),
-        eTrackingResult=200,
-        bPoseIsValid=True,
-        bDeviceIsConnected=True,
-    )
+    return openvr_pose(_rows(matrix), serial, seq=seq, stamp_ns=stamp_ns, universe="1")
 
 
 def painted_frames(

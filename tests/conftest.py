@@ -12,7 +12,6 @@ import asyncio
 import contextlib
 import resource
 import signal
-import socket
 import subprocess
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, AbstractContextManager
@@ -25,6 +24,7 @@ from rhot.bus.bus import Bus, open_bus, router_config
 from rhot.files.config import RigConfig
 from rhot.process.lifecycle import Serve
 from rhot.process.service import Service
+from testing.loopback import free_endpoint
 
 # A shell's background job ignores Ctrl-C, and so would every process that tests start and end.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -51,9 +51,7 @@ def rhot_data() -> Path:
 @pytest.fixture
 def endpoint() -> str:
     """A loopback endpoint nobody listens at."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return free_endpoint()
 
 
 @pytest.fixture

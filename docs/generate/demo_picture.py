@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -30,6 +29,7 @@ from rhot.files.capture import read_lines
 from rhot.messages import HandPoints, HandPose
 from rhot.messages.objects import ObjectContacts, ObjectPose
 from services.cli.live.working_copy import working_copy
+from testing.loopback import free_endpoint
 
 TARGET = Path(__file__).parents[1] / "demo.png"
 # The scene is 1280 pixels wide, and the panel beside it 400.
@@ -91,9 +91,7 @@ def _instant(tracked: Path) -> dict[str, Shown]:
 @contextmanager
 def _page(config: Path) -> Iterator[tuple[str, str]]:
     """A router and a viewer: the endpoint and the page's address."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     python, common = [sys.executable, "-m"], ["--config", str(config)]
     router = [*python, "services.cli", "router", *common, "--listen", endpoint]
     viewer = [*python, "services.viewer", *common, "--connect", endpoint]

@@ -28,8 +28,8 @@ from rhot.geometry.transforms import (
 from rhot.hand_mesh.skinned_hand import skinned_hand
 from rhot.messages import HandPose
 from testing.hand_stream import pose_at
+from testing.loopback import free_port
 from testing.sample_hands import object_pose
-from testing.secured_rig import free_port
 
 pytestmark = pytest.mark.browser
 # Chromium without a graphics card shares its cores with everything else.

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
-from typing import Any
+from collections.abc import AsyncIterator
 
 import msgspec
 import numpy as np
@@ -21,6 +20,7 @@ from services.bridges.ros2.node import RosNode
 from services.bridges.ros2.topics import TF_STATIC, all_topics
 from services.cli.live.router import running_router
 from testing.secured_rig import SecuredRig
+from testing.waiting import until
 
 DOMAIN = 3
 # Long enough for an answer on a busy machine; none comes to what is forbidden.
@@ -46,12 +46,6 @@ async def sessions(rig) -> AsyncIterator[dict[str, zenoh.Session]]:
                 )
                 for name, endpoints in hosts.items()
             }
-
-
-async def until(found: Callable[[], Any], deadline_s: float = 8.0) -> None:
-    async with asyncio.timeout(deadline_s):
-        while not found():
-            await asyncio.sleep(0.02)
 
 
 async def tokens(session: zenoh.Session) -> set[str]:

@@ -9,15 +9,8 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.bus.bus import open_bus
 from rhot.errors import BusError, CalibrationError, RefusedError
 from rhot.messages.camera import FitRequest, FitResult
-
-
-@pytest.fixture
-async def pair(router):
-    async with open_bus("test", [router]) as asker, open_bus("test", [router]) as answerer:
-        yield asker, answerer
 
 
 async def ask(asker, request, timeout_s=5.0):

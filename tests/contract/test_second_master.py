@@ -9,14 +9,7 @@ from rhot.bus.bus import open_bus
 from rhot.bus.master_clock import follow_master
 from rhot.clock import OffsetEstimator
 from rhot.messages import ClockEcho
-
-DEADLINE_S = 60.0
-
-
-async def until(condition) -> None:
-    async with asyncio.timeout(DEADLINE_S):
-        while not condition():
-            await asyncio.sleep(0.01)
+from testing.waiting import until
 
 
 def be_master(bus, ahead_ns: int, uptime_ns: int) -> None:

@@ -8,41 +8,20 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from rhot.files.calibration import save
 from testing import hosts
 from testing.hosts.commands import run
 from testing.hosts.container import Container
-from testing.hosts.network import Network, lan
-from testing.source_tree import ROOT
-from testing.synthetic_images import ranges
+from testing.hosts.network import Network
 
 SYSTEM_PYTHON = Path("/usr/bin/python3")
 INSTALL, RUNS = "/srv/deploy/install.sh", "/opt/rhot/current/deploy/install.sh"
 UNIT = "rhot-pi-tracker@left.service"
-PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet")
-RIG = """
-[bus]
-connect = ["tcp/127.0.0.1:7447"]
-[[camera]]
-name = "left"
-source = "folder:/srv/pictures"
-host = "pi-left"
-"""
-ROUTER = """
-import time, zenoh
-from rhot.bus.bus import router_config
-session = zenoh.open(router_config(["tcp/127.0.0.1:7447"]))
-time.sleep(1e6)
-"""
 
 
 def why_not() -> str:
@@ -62,47 +41,6 @@ pytestmark = [
     pytest.mark.timeout(900),
     pytest.mark.skipif(bool(why_not()), reason=why_not()),
 ]
-
-
-@pytest.fixture(scope="module")
-def wheels(tmp_path_factory) -> tuple[Path, Path]:
-    """Folders that hold all a Pi needs: with this rhot, and with one that is called 9.9.9."""
-    folder = tmp_path_factory.mktemp("wheels")
-    now, next_one = folder / "now", folder / "next"
-    run([*PIP, "-w", now, f"{ROOT}[pi]"], timeout_s=600.0)
-    tree = folder / "tree"
-    files = run(["git", "-C", ROOT, "ls-files", "rhot", "services", "config", "deploy"]).split("\n")
-    for name in (*filter(None, files), "pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
-        (tree / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, tree / name)
-    text = (tree / "pyproject.toml").read_text()
-    (tree / "pyproject.toml").write_text(re.sub(r'(?m)^version = ".*"', 'version = "9.9.9"', text))
-    shutil.copytree(now, next_one, ignore=shutil.ignore_patterns("rhot-*"))
-    run([*PIP, "--no-deps", "-w", next_one, tree], timeout_s=600.0)
-    return now, next_one
-
-
-@pytest.fixture(scope="module")
-def network() -> Iterator[Network]:
-    with lan("pi-left", "desk") as network:
-        yield network
-
-
-@pytest.fixture(scope="module")
-def pi(network, wheels, tmp_path_factory) -> Iterator[Container]:
-    """A host that has booted, and knows nothing of rhot."""
-    shown = {ROOT / "deploy": "/srv/deploy", wheels[0]: "/srv/now", wheels[1]: "/srv/next"}
-    host = Container("pi-left", network.namespace_path("pi-left"), shown)
-    try:
-        for number in range(3):
-            host.write(f"/srv/pictures/{number}.ppm", "P3 2 2 255\n" + "9 9 9 " * 4)
-        save(host.disk / "srv" / "left.colors.json", ranges())
-        host.write("/srv/rig.toml", RIG)
-        host.write("/srv/router.py", ROUTER)
-        host.boot()
-        yield host
-    finally:
-        host.remove()
 
 
 def wait_until_active(host: Container, unit: str, pid: str = "") -> str:
@@ -228,37 +166,6 @@ def test_three_versions_are_kept(pi):
     assert current(pi) in kept
 
 
-@pytest.fixture
-def ssh_config(pi, network) -> Iterator[Path]:
-    """A daemon on the Pi, and what the desk needs to log in there as root."""
-    # Not tmp_path: a path of a socket has at most 108 characters.
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for key in ("host", "user"):
-            run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", folder / key])
-        daemon = (
-            f"Port 2222\nListenAddress {network.addresses['pi-left']}\nStrictModes no\n"
-            "HostKey /srv/ssh/host\nAuthorizedKeysFile /srv/ssh/user.pub\nPidFile none\n"
-            "PermitRootLogin prohibit-password\nSubsystem sftp internal-sftp\n"
-        )
-        (folder / "sshd").write_text(daemon)
-        pi.run("mkdir", "-p", "/srv/ssh", "/run/sshd")
-        for path in (folder / "host", folder / "user.pub", folder / "sshd"):
-            words = pi.inside("sh", "-c", f"umask 077; cat >/srv/ssh/{path.name}")
-            subprocess.run(words, input=path.read_bytes(), check=True)
-        pi.run(
-            "systemd-run", "-q", "--unit=ssh-test", "/usr/sbin/sshd", "-D", "-f", "/srv/ssh/sshd"
-        )
-        (folder / "config").write_text(
-            f"Host pi-left\nHostName {network.addresses['pi-left']}\nPort 2222\nUser root\n"
-            f"IdentityFile {folder}/user\nIdentitiesOnly yes\nBatchMode yes\n"
-            f"StrictHostKeyChecking accept-new\nUserKnownHostsFile {folder}/known\n"
-            "ConnectionAttempts 20\n"
-        )
-        yield folder / "config"
-        pi.run("systemctl", "stop", "ssh-test")
-
-
 def at_the_desk(
     network: Network, host: str, folder: Path, wheels: Path, *options: str | Path
 ) -> list[str | Path]:
@@ -269,9 +176,9 @@ def at_the_desk(
 
 
 def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
-    pi, network, wheels, ssh_config, tmp_path
+    pi, network, wheels, ssh_config, rig_toml, tmp_path
 ):
-    (tmp_path / "rig.toml").write_text(RIG + "fps = 25.0\n")
+    (tmp_path / "rig.toml").write_text(rig_toml + "fps = 25.0\n")
     (tmp_path / "calibration").mkdir()
     (tmp_path / "calibration" / "left.lens.json").write_text("{}")
     (tmp_path / "calibration" / "right.lens.json").write_text("{}")
@@ -292,8 +199,8 @@ def test_rhot_deploy_brings_rhot_and_the_rigs_file_over_ssh(
     assert "rhot-deploy" not in pi.run("ls", "-a", "/root")
 
 
-def test_a_host_that_is_not_there_is_told(network, ssh_config, wheels, tmp_path):
-    (tmp_path / "rig.toml").write_text(RIG.replace('"pi-left"', '"10.77.0.99"'))
+def test_a_host_that_is_not_there_is_told(network, ssh_config, wheels, rig_toml, tmp_path):
+    (tmp_path / "rig.toml").write_text(rig_toml.replace('"pi-left"', '"10.77.0.99"'))
     said = run(
         at_the_desk(network, "10.77.0.99", tmp_path, wheels[0]),
         timeout_s=120.0,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ from rhot.files.config import load_rig
 from services.cli.live.supervisor import Child, Supervisor
 from services.cli.live.up import children_of
 from services.cli.live.working_copy import working_copy
+from testing.loopback import free_endpoint
 
 # numba's first compilation on a loaded machine takes most of it.
 START_S = 180.0
@@ -50,9 +50,7 @@ class RunningRig:
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def rig() -> AsyncIterator[RunningRig]:
     """A copy of the rig of config/sim.toml without its viewer, all services started."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     logged: list[str] = []
     supervisor = Supervisor(lambda name, level, text: logged.append(f"[{name}] {level}: {text}"))
     with working_copy() as config:

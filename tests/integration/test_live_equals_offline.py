@@ -7,7 +7,6 @@ a message arrives would show here: which pose the next points' paint is correcte
 from __future__ import annotations
 
 import asyncio
-import socket
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from services.fusion.output.pose_feedback import POSE_DELAY_NS
 from services.simulator.files.marker_capture import write_marker_capture
 from services.simulator.recorded_motion.scenes import MotionView, load_motion, point_scene
 from services.simulator.scene.scene import load_scene
+from testing.loopback import free_endpoint
 from tests.integration.conftest import START_S, all_running
 
 pytestmark = pytest.mark.integration
@@ -105,9 +105,7 @@ async def test_live_points_are_those_of_the_files(recording: Capture, tmp_path: 
 
 async def _played_live(recording: Capture, rate: float) -> Heard:
     """The recording through processes that have just started."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     logged: list[str] = []
     supervisor = Supervisor(lambda name, level, text: logged.append(f"[{name}] {level}: {text}"))
     config = load_rig(recording.rig_toml)

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import itertools
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -29,6 +28,7 @@ from services.pi_tracker import sources
 from services.pi_tracker.service import serve
 from services.pi_tracker.sources.controls import Controls
 from services.pi_tracker.sources.simulator import SimulatorSource
+from testing.loopback import free_ports
 from testing.page_commands import Command, commands, run, setup
 from tests.integration.conftest import START_S, all_running
 
@@ -182,17 +182,6 @@ def holding_cup(seq: int, now_ns: int) -> ObjectContacts:
     ]
     grasp = Grasp(hand="right", parts=["thumb", "index"], since_ns=since_ns)
     return ObjectContacts(object="cup", seq=seq, stamp_ns=now_ns, contacts=contacts, grasps=[grasp])
-
-
-def free_ports(count: int) -> list[int]:
-    """Ports of the loopback interface that nobody listens at."""
-    probes = [socket.socket() for _ in range(count)]
-    for probe in probes:
-        probe.bind(("127.0.0.1", 0))
-    ports = [probe.getsockname()[1] for probe in probes]
-    for probe in probes:
-        probe.close()
-    return ports
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

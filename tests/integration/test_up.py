@@ -21,6 +21,7 @@ from rhot.bus.bus import open_bus
 from rhot.files.calibration import save
 from rhot.hand import default_hand
 from services.cli.live.working_copy import working_copy
+from testing.loopback import free_port
 
 pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 RHOT = str(Path(sys.executable).parent / "rhot")
@@ -51,12 +52,6 @@ class Up:
                     await asyncio.sleep(0.05)
         except TimeoutError:
             pytest.fail(f"{part!r} was not printed:\n{self.text[since:]}")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def use_ports(config: Path, port: int) -> None:

@@ -5,8 +5,6 @@ pose at a time; streams of them are in test_streams.py.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -14,11 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot.errors import CalibrationError
-from rhot.files.calibration import ObjectPlace, Objects, save
+from rhot.files.calibration import ObjectPlace, Objects
 from rhot.files.config import RigConfig
-from rhot.files.rig_tables import Objects as ObjectsTable
-from rhot.files.rig_tables import ObjectTable, RigTable
 from rhot.geometry.transforms import (
     Array,
     angle_between,
@@ -27,12 +22,11 @@ from rhot.geometry.transforms import (
     rotation_from_vector,
     transform,
 )
-from rhot.messages.objects import ObjectPose, OpenVrDevice, OpenVrPose
+from rhot.messages.objects import ObjectPose, OpenVrPose
 from services.object_tracker.intake.reading import TRACKING_RESULTS
-from services.object_tracker.registration import load_registration
 from services.object_tracker.step import ObjectStep
+from testing.openvr_poses import openvr_pose
 
-MakePose = Callable[..., OpenVrPose]
 OFFSET = (0.03, -0.05, 0.11)
 TURN = (0.5, 0.5, -0.5, 0.5)
 T_RIG_FROM_LIGHTHOUSE = transform(rotation_from_vector([0.3, -1.1, 2.0]), [0.4, -1.2, 2.3])
@@ -55,9 +49,9 @@ def step_one(config: RigConfig, file: Objects | None, pose: OpenVrPose) -> Objec
     return result
 
 
-def test_chain_of_frames(config: RigConfig, make_pose: MakePose) -> None:
+def test_chain_of_frames(config: RigConfig) -> None:
     T = transform(rotation_from_vector([-0.7, 0.2, 0.9]), [1.0, 1.5, -0.8])
-    result = step_one(config, calibrated(), make_pose(T))
+    result = step_one(config, calibrated(), openvr_pose(T))
     assert (result.object, result.serial, result.seq, result.tracking, result.registered) == (
         "cup",
         "LHR-1",
@@ -75,15 +69,15 @@ def test_chain_of_frames(config: RigConfig, make_pose: MakePose) -> None:
 @pytest.mark.parametrize(
     "axis", np.vstack([np.eye(3), [[1, 1, 0], [0, -1, 1], [1, -2, 3]]]).tolist()
 )
-def test_orientation_at_180_deg(config: RigConfig, make_pose: MakePose, axis: list[float]) -> None:
+def test_orientation_at_180_deg(config: RigConfig, axis: list[float]) -> None:
     u = np.array(axis) / np.linalg.norm(axis)
     R = 2.0 * np.outer(u, u) - np.eye(3)
-    result = step_one(config, None, make_pose(transform(R, [0.0, 0.0, 1.0])))
+    result = step_one(config, None, openvr_pose(transform(R, [0.0, 0.0, 1.0])))
     assert angle_between(R, rotation_from_quaternion(result.orientation_wxyz)) < 3e-6
     assert result.orientation_wxyz[0] == 0.0
 
 
-def test_velocities_agree_with_finite_differences(config: RigConfig, make_pose: MakePose) -> None:
+def test_velocities_agree_with_finite_differences(config: RigConfig) -> None:
     """A tracker that spins and flies: the published velocities are the derivatives of the published
     poses.
     """
@@ -92,7 +86,7 @@ def test_velocities_agree_with_finite_differences(config: RigConfig, make_pose: 
 
     def at(t: float) -> OpenVrPose:
         T = transform(rotation_from_vector(w * t) @ start, v * t + [0.1, 0.2, 0.3])
-        return make_pose(T, vVelocity=tuple(v.tolist()), vAngularVelocity=tuple(w.tolist()))
+        return openvr_pose(T, vVelocity=tuple(v.tolist()), vAngularVelocity=tuple(w.tolist()))
 
     before, now, after = (step_one(config, calibrated(), at(t)) for t in (-dt, 0.0, dt))
     velocity = (np.array(after.position_m) - before.position_m) / (2 * dt)
@@ -111,18 +105,8 @@ def test_velocities_agree_with_finite_differences(config: RigConfig, make_pose: 
     )  # the lever arm matters
 
 
-def test_without_registration_poses_stay_in_the_lighthouse_frame(
-    config: RigConfig, make_pose: MakePose
-) -> None:
-    T = transform(rotation_from_vector([0.1, 0.2, 0.3]), [0.1, 0.2, 0.3])
-    result = step_one(config, None, make_pose(T, vVelocity=(1.0, 2.0, 3.0)))
-    assert not result.registered
-    assert result.position_m == (0.1, 0.2, 0.3)
-    assert result.velocity_m_s == (1.0, 2.0, 3.0)
-
-
-def test_object_without_a_place_is_its_tracker(config: RigConfig, make_pose: MakePose) -> None:
-    result = step_one(config, objects(), make_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
+def test_object_without_a_place_is_its_tracker(config: RigConfig) -> None:
+    result = step_one(config, objects(), openvr_pose(transform(np.eye(3), [0.1, 0.2, 0.3])))
     assert result.registered
     np.testing.assert_allclose(
         result.position_m, apply(T_RIG_FROM_LIGHTHOUSE, [0.1, 0.2, 0.3]), atol=1e-6
@@ -139,9 +123,9 @@ def test_object_without_a_place_is_its_tracker(config: RigConfig, make_pose: Mak
         (300, "rotation_only"),
     ],
 )
-def test_tracking_results(config: RigConfig, make_pose: MakePose, code: int, tracking: str) -> None:
+def test_tracking_results(config: RigConfig, code: int, tracking: str) -> None:
     result = step_one(
-        config, None, make_pose(transform(np.eye(3), [1.0, 0.0, 0.0]), eTrackingResult=code)
+        config, None, openvr_pose(transform(np.eye(3), [1.0, 0.0, 0.0]), eTrackingResult=code)
     )
     assert (result.tracking, result.position_m) == (tracking, (1.0, 0.0, 0.0))
 
@@ -175,11 +159,11 @@ LATER_NS = 1_700_000_000_004_000_000
 
 @pytest.mark.parametrize("state", SAID_BY_THE_DEVICE)
 def test_a_device_that_says_so_is_lost_and_nothing_is_guessed(
-    config: RigConfig, make_pose: MakePose, state: str
+    config: RigConfig, state: str
 ) -> None:
     step = ObjectStep(config, calibrated())
-    step.step(make_pose(transform(np.eye(3), [1.0, 2.0, 3.0])))
-    result = step.step(make_pose(stamp_ns=LATER_NS, **SAID_BY_THE_DEVICE[state]))
+    step.step(openvr_pose(transform(np.eye(3), [1.0, 2.0, 3.0])))
+    result = step.step(openvr_pose(stamp_ns=LATER_NS, **SAID_BY_THE_DEVICE[state]))
     assert result is not None
     assert (result.tracking, step.lost, result.sigma_m) == ("lost", 1, None)
     assert (result.position_m, result.orientation_wxyz) == ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
@@ -188,24 +172,22 @@ def test_a_device_that_says_so_is_lost_and_nothing_is_guessed(
 
 @pytest.mark.parametrize("reason", MISREAD)
 def test_what_cannot_be_right_is_counted_and_never_published(
-    config: RigConfig, make_pose: MakePose, reason: str
+    config: RigConfig, reason: str
 ) -> None:
     step = ObjectStep(config, calibrated())
-    assert step.step(make_pose(stamp_ns=LATER_NS, **MISREAD[reason])) is None
+    assert step.step(openvr_pose(stamp_ns=LATER_NS, **MISREAD[reason])) is None
     assert step.values()[f"left_out_{reason}"] == 1
     (text,) = step.faults(LATER_NS)["device_misread"].values()
     assert "poses of LHR-1 are left out: 1 for their " + reason in text
     # It is over 5 s after the last one; what is right comes through meanwhile.
-    assert step.step(make_pose(stamp_ns=LATER_NS + 1)) is not None
+    assert step.step(openvr_pose(stamp_ns=LATER_NS + 1)) is not None
     assert not step.faults(LATER_NS + 5_000_000_001)["device_misread"]
 
 
-def test_unknown_serials_are_ignored_counted_and_bounded(
-    config: RigConfig, make_pose: MakePose
-) -> None:
+def test_unknown_serials_are_ignored_counted_and_bounded(config: RigConfig) -> None:
     step = ObjectStep(config, None)
     for number in range(200):
-        assert step.step(make_pose(serial=f"X{number}")) is None
+        assert step.step(openvr_pose(serial=f"X{number}")) is None
     assert (step.unknown, len(step.unknown_serials)) == (200, 64)
     assert "X0" in step.unknown_serials
 
@@ -214,44 +196,11 @@ def test_unknown_serials_are_ignored_counted_and_bounded(
     ("offset_ns", "stamp_ns", "expected_ns"),
     [(5, 100, 95), (-5, 100, 105), (200, 100, 0), (-(10**30), 100, 2**63 - 1)],
 )
-def test_time_offset(
-    config: RigConfig, make_pose: MakePose, offset_ns: int, stamp_ns: int, expected_ns: int
-) -> None:
+def test_time_offset(config: RigConfig, offset_ns: int, stamp_ns: int, expected_ns: int) -> None:
     assert (
-        step_one(config, calibrated(offset_ns), make_pose(stamp_ns=stamp_ns)).stamp_ns
+        step_one(config, calibrated(offset_ns), openvr_pose(stamp_ns=stamp_ns)).stamp_ns
         == expected_ns
     )
-
-
-BAD_FILES = {
-    "scaled": {"T_rig_from_lighthouse": (2.0 * np.eye(4)).tolist()},
-    "mirrored": {"T_rig_from_lighthouse": np.diag([1.0, 1.0, -1.0, 1.0]).tolist()},
-    "bottom row": {
-        "T_rig_from_lighthouse": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 1]]
-    },
-    "huge": {"T_rig_from_lighthouse": (1e300 * np.eye(4)).tolist()},
-    "quaternion": {"objects": {"cup": {"orientation_wxyz": [0, 0, 0, 0]}}},
-    "long quaternion": {"objects": {"cup": {"orientation_wxyz": [1e300, 0, 0, 1e300]}}},
-}
-
-
-@pytest.mark.parametrize("fault", BAD_FILES)
-def test_impossible_registrations_are_refused(config: RigConfig, fault: str) -> None:
-    file = msgspec.convert(
-        {"T_rig_from_lighthouse": np.eye(4).tolist()} | BAD_FILES[fault], Objects
-    )
-    with pytest.raises(CalibrationError, match="run `rhot calibrate objects` again"):
-        ObjectStep(config, file)
-
-
-def test_registration_file(tmp_path: Path) -> None:
-    rig = RigConfig(rig=RigTable(calibration="c"), folder=str(tmp_path))
-    assert load_registration(rig) is None
-    save(tmp_path / "c" / "objects.json", calibrated())
-    assert load_registration(rig) == calibrated()
-    (tmp_path / "c" / "objects.json").write_text("{}")
-    with pytest.raises(CalibrationError, match="T_rig_from_lighthouse"):
-        load_registration(rig)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
@@ -263,50 +212,22 @@ numbers = st.floats(allow_nan=True, allow_infinity=True)
     code=st.sampled_from([*TRACKING_RESULTS, 0, 2, -1, 10**30]),
 )
 def test_any_numbers_give_a_message_that_survives_the_wire(
-    matrix: list[tuple[float, ...]], speeds: tuple[tuple[float, ...], ...], code: int
+    config: RigConfig,
+    matrix: list[tuple[float, ...]],
+    speeds: tuple[tuple[float, ...], ...],
+    code: int,
 ) -> None:
-    pose = OpenVrPose(
-        v=1,
+    pose = openvr_pose(
+        matrix,
         seq=0,
         stamp_ns=0,
-        universe="",
-        device=OpenVrDevice(
-            index=0, serial="LHR-1", device_class="", model="", battery=0.0, charging=False
-        ),
-        mDeviceToAbsoluteTracking=tuple(matrix),  # type: ignore[arg-type]
-        vVelocity=speeds[0],  # type: ignore[arg-type]
-        vAngularVelocity=speeds[1],  # type: ignore[arg-type]
+        vVelocity=speeds[0],
+        vAngularVelocity=speeds[1],
         eTrackingResult=code,
-        bPoseIsValid=True,
-        bDeviceIsConnected=True,
     )
-    config = RigConfig(object=[ObjectTable(name="cup", serial="LHR-1")])
     step = ObjectStep(config, calibrated())
     result = step.step(pose)
     if result is None:
         assert sum(step.values().values()) == 2.0  # registered, and one left out
         return
     assert msgspec.json.decode(msgspec.json.encode(result), type=ObjectPose) == result
-
-
-def test_real_steamvr_drift_recording_is_all_rotations(
-    config: RigConfig, make_pose: MakePose, vive: Path
-) -> None:
-    """20 minutes of a still tracker, 3x4 rows (MarvinGravert/Vive-Accuracy-Experiment)."""
-    recorded = np.loadtxt(vive / "marvin" / "drift20minExperiment.txt.gz").reshape(-1, 3, 4)
-    exact = msgspec.structs.replace(config, objects=ObjectsTable(filter_mm=0.0))
-    step = ObjectStep(exact, None)
-    # 5 Hz.
-    results = [
-        step.step(make_pose(matrix, stamp_ns=10**18 + k * 2 * 10**9, seq=k))
-        for k, matrix in enumerate(recorded[::10])
-    ]
-    assert step.lost == 0
-    assert None not in results
-    assert len(results) > 500
-    worst = max(
-        angle_between(matrix[:, :3], rotation_from_quaternion(result.orientation_wxyz))
-        for matrix, result in zip(recorded[::10], results, strict=True)
-        if result is not None
-    )
-    assert worst < 3e-6

@@ -1,12 +1,8 @@
-"""ObjectStep over streams of poses: old, repeated and foreign messages, universes, clocks, silence,
-outliers in real recordings.
-"""
+"""ObjectStep over streams of poses: old, repeated and foreign messages, clocks, silence."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -14,33 +10,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot.files.calibration import ObjectPlace, Objects
+from rhot.files.calibration import ObjectPlace
 from rhot.files.config import RigConfig
-from rhot.files.rig_tables import Objects as ObjectsTable
-from rhot.files.rig_tables import ObjectTable
 from rhot.geometry.transforms import transform
-from rhot.messages.objects import ObjectPose, OpenVrDevice, OpenVrEvent, OpenVrPose
+from rhot.messages.objects import ObjectPose
 from services.object_tracker.step import ObjectStep
+from testing.openvr_poses import openvr_pose, registered
 
-MakePose = Callable[..., OpenVrPose]
 MS = 1_000_000
 T0 = 1_700_000_000_000_000_000
-EYE = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
-def registered(**fields) -> Objects:
-    return Objects(T_rig_from_lighthouse=EYE, **fields)
-
-
-def event(number: int) -> OpenVrEvent:
-    return OpenVrEvent(v=1, stamp_ns=T0, event_type=number, name="SomethingMoved")
-
-
-def test_old_and_repeated_messages_are_counted_and_never_published(
-    config: RigConfig, make_pose: MakePose
-) -> None:
+def test_old_and_repeated_messages_are_counted_and_never_published(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
-    stream = [make_pose(seq=k, stamp_ns=T0 + k * 4 * MS) for k in range(2000)]
+    stream = [openvr_pose(seq=k, stamp_ns=T0 + k * 4 * MS) for k in range(2000)]
     for pose in stream:
         assert step.step(pose, pose.stamp_ns + MS) is not None
     now_ns = stream[-1].stamp_ns
@@ -49,45 +32,43 @@ def test_old_and_repeated_messages_are_counted_and_never_published(
         assert step.step(pose, now_ns + k * 4 * MS) is None
     values = step.values()
     assert values["left_out_out_of_order"] + values["left_out_repeated"] == 4000
-    assert step.step(make_pose(seq=9000, stamp_ns=now_ns + 17_000 * MS)) is not None
+    assert step.step(openvr_pose(seq=9000, stamp_ns=now_ns + 17_000 * MS)) is not None
 
 
 @pytest.mark.parametrize(("shift_s", "reason"), [(3600, "future"), (-3600, "out_of_order")])
 def test_a_stamp_of_another_time_does_not_stop_the_stream(
-    config: RigConfig, make_pose: MakePose, shift_s: int, reason: str
+    config: RigConfig, shift_s: int, reason: str
 ) -> None:
     step = ObjectStep(config, registered())
     for k in range(50):
         stamp_ns = T0 + k * 4 * MS + (shift_s * 10**9 if k == 20 else 0)
-        result = step.step(make_pose(seq=k, stamp_ns=stamp_ns), T0 + k * 4 * MS)
+        result = step.step(openvr_pose(seq=k, stamp_ns=stamp_ns), T0 + k * 4 * MS)
         assert (result is None) == (k == 20)
     assert step.values()[f"left_out_{reason}"] == 1
 
 
 @pytest.mark.parametrize("shift_s", [-3600, 3600])
 def test_a_clock_that_was_set_is_followed_after_two_seconds(
-    config: RigConfig, make_pose: MakePose, shift_s: int
+    config: RigConfig, shift_s: int
 ) -> None:
     step = ObjectStep(config, registered())
     shown = []
     for k in range(1500):
         stamp_ns = T0 + k * 4 * MS + (shift_s * 10**9 if k >= 500 else 0)
-        shown.append(step.step(make_pose(seq=k, stamp_ns=stamp_ns), T0 + k * 4 * MS) is not None)
+        shown.append(step.step(openvr_pose(seq=k, stamp_ns=stamp_ns), T0 + k * 4 * MS) is not None)
     assert all(shown[:500])
     assert not any(shown[500:950])
     assert all(shown[1010:])
 
 
-def test_two_senders_the_second_is_left_out_and_told_while_it_is_there(
-    config: RigConfig, make_pose: MakePose
-) -> None:
+def test_two_senders_the_second_is_left_out_and_told_while_it_is_there(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
     there = transform(np.eye(3), [1.0, 0.0, 0.0])
     for k in range(500):
         at_ns = T0 + k * 4 * MS
-        assert step.step(make_pose(seq=1000 + k, stamp_ns=at_ns), at_ns) is not None
+        assert step.step(openvr_pose(seq=1000 + k, stamp_ns=at_ns), at_ns) is not None
         if 100 <= k < 200:
-            other = make_pose(there, seq=k, stamp_ns=at_ns + 2 * MS, universe="other")
+            other = openvr_pose(there, seq=k, stamp_ns=at_ns + 2 * MS, universe="other")
             assert step.step(other, at_ns + 2 * MS) is None
         if k in (105, 400):
             assert "LHR-1" in step.faults(at_ns)["device_twice"]
@@ -97,94 +78,53 @@ def test_two_senders_the_second_is_left_out_and_told_while_it_is_there(
     assert not step.faults(T0)["registration_stale"]
 
 
-def test_two_senders_that_count_alike(config: RigConfig, make_pose: MakePose) -> None:
+def test_two_senders_that_count_alike(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
     there = transform(np.eye(3), [1.0, 0.0, 0.0])
     shown = []
     for k in range(100):
         at_ns = T0 + k * 4 * MS
-        shown.append(step.step(make_pose(seq=k, stamp_ns=at_ns), at_ns))
-        assert step.step(make_pose(there, seq=k, stamp_ns=at_ns + MS), at_ns + MS) is None
+        shown.append(step.step(openvr_pose(seq=k, stamp_ns=at_ns), at_ns))
+        assert step.step(openvr_pose(there, seq=k, stamp_ns=at_ns + MS), at_ns + MS) is None
     assert None not in shown
     assert step.faults(T0 + 400 * MS)["device_twice"]
 
 
-def test_a_sender_started_again_counts_from_zero(config: RigConfig, make_pose: MakePose) -> None:
+def test_a_sender_started_again_counts_from_zero(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
     for k in range(50):
-        step.step(make_pose(seq=k + 1000, stamp_ns=T0 + k * MS), T0 + k * MS)
+        step.step(openvr_pose(seq=k + 1000, stamp_ns=T0 + k * MS), T0 + k * MS)
     again_ns = T0 + 500 * MS
-    assert step.step(make_pose(seq=0, stamp_ns=again_ns), again_ns) is not None
+    assert step.step(openvr_pose(seq=0, stamp_ns=again_ns), again_ns) is not None
     assert not step.faults(again_ns)["device_twice"]
 
 
-def test_a_recording_is_replayed_with_its_own_stamps_and_again(
-    config: RigConfig, make_pose: MakePose
-) -> None:
+def test_a_recording_is_replayed_with_its_own_stamps_and_again(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
     now_ns = T0 + 10**18
     for begin_ns in (now_ns, now_ns + 30 * 10**9):
         for k in range(100):
-            pose = make_pose(seq=k, stamp_ns=T0 + k * 10 * MS)
+            pose = openvr_pose(seq=k, stamp_ns=T0 + k * 10 * MS)
             assert step.step(pose, begin_ns + k * 10 * MS) is not None
 
 
-def test_another_universe_makes_the_registration_stale_until_it_is_made_anew(
-    config: RigConfig, make_pose: MakePose
-) -> None:
-    step = ObjectStep(config, registered(universe="raw:1"))
-    names = ["raw:1", "raw", "raw:1", "raw:2", "raw:1"]
-    results = [
-        step.step(make_pose(seq=k, stamp_ns=T0 + k * MS, universe=name))
-        for k, name in enumerate(names)
-    ]
-    states = [(one.tracking, one.registered) for one in results if one is not None]
-    assert states == [("ok", True)] * 3 + [("unregistered", False)] * 2
-    (text,) = step.faults(T0)["registration_stale"].values()
-    assert "'raw:2'" in text
-    assert "'raw:1'" in text
-    assert step.values()["registered"] == 0.0
-
-
-def test_without_a_name_in_the_file_the_first_universe_is_the_registered_one(
-    config: RigConfig, make_pose: MakePose
-) -> None:
-    step = ObjectStep(config, registered())
-    first = step.step(make_pose(seq=0, universe="a"))
-    second = step.step(make_pose(seq=1, stamp_ns=T0 + MS, universe="b"))
-    assert first is not None
-    assert second is not None
-    assert (first.tracking, second.tracking) == ("ok", "unregistered")
-
-
-@pytest.mark.parametrize(("number", "holds"), [(801, False), (804, True), (808, True), (100, True)])
-def test_events(config: RigConfig, make_pose: MakePose, number: int, holds: bool) -> None:
-    step = ObjectStep(config, registered())
-    warning = step.event(event(number))
-    result = step.step(make_pose())
-    assert result is not None
-    assert result.registered is holds
-    assert bool(step.faults(T0)["registration_stale"]) is not holds
-    assert (warning is not None) == (number in (804, 808))
-
-
-def test_stamps_are_brought_to_the_masters_clock(config: RigConfig, make_pose: MakePose) -> None:
+def test_stamps_are_brought_to_the_masters_clock(config: RigConfig) -> None:
     place = ObjectPlace(time_offset_ns=30 * MS)
     step = ObjectStep(config, registered(objects={"cup": place}))
     # Two seconds ahead, and it does not know at first.
     for k in range(20):
         offset = {"clock_offset_ns": 2 * 10**9, "clock_sigma_ns": 1000} if k >= 10 else {}
         at_ns = T0 + k * 4 * MS
-        result = step.step(make_pose(seq=k, stamp_ns=at_ns + 2 * 10**9, **offset), at_ns)
+        result = step.step(openvr_pose(seq=k, stamp_ns=at_ns + 2 * 10**9, **offset), at_ns)
         assert result is not None
         assert result.stamp_ns == at_ns - 30 * MS + (0 if k >= 10 else 2 * 10**9)
 
 
-def test_the_battery_is_told_until_it_is_charged(config: RigConfig, make_pose: MakePose) -> None:
+def test_the_battery_is_told_until_it_is_charged(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
 
     def told(k: int, battery: float, *, charging: bool = False) -> bool:
-        pose = make_pose(seq=k, stamp_ns=T0 + k * MS)
+        pose = openvr_pose(seq=k, stamp_ns=T0 + k * MS)
         device = msgspec.structs.replace(pose.device, battery=battery, charging=charging)
         step.step(msgspec.structs.replace(pose, device=device))
         return bool(step.faults(T0)["device_battery"])
@@ -195,36 +135,14 @@ def test_the_battery_is_told_until_it_is_charged(config: RigConfig, make_pose: M
     assert not told(8, 0.05, charging=True)
 
 
-def test_a_device_that_stops_is_lost_and_one_never_heard_is_nothing(
-    config: RigConfig, make_pose: MakePose
-) -> None:
+def test_a_device_that_stops_is_lost_and_one_never_heard_is_nothing(config: RigConfig) -> None:
     step = ObjectStep(config, registered())
     assert step.silent(T0) == []
-    step.step(make_pose(), T0 + 10**18)
+    step.step(openvr_pose(), T0 + 10**18)
     assert step.silent(T0 + 10**18 + 400 * MS) == []
     (lost,) = step.silent(T0 + 10**18 + 700 * MS)
     # A recording's stamps go on.
     assert (lost.object, lost.tracking, lost.stamp_ns) == ("cup", "lost", T0 + 700 * MS)
-
-
-def test_sigma_grows_with_the_registrations(config: RigConfig, make_pose: MakePose) -> None:
-    T = transform(np.eye(3), [3.0, 0.0, 0.0])
-
-    def sigma(**fields) -> float:
-        step = ObjectStep(config, registered(**fields))
-        results = [step.step(make_pose(T, seq=k, stamp_ns=T0 + k * 4 * MS)) for k in range(50)]
-        last = results[-1]
-        assert last is not None
-        assert last.sigma_m is not None
-        return last.sigma_m
-
-    of_tracker = sigma()
-    assert 0.2e-3 < of_tracker < 2e-3
-    assert sigma(sigma_m=5e-3) == pytest.approx(math.hypot(of_tracker, 5e-3), abs=1e-6)
-    # A milliradian at 2 m.
-    turned = sigma(sigma_m=5e-3, sigma_rad=1e-3, middle_m=(1.0, 0.0, 0.0))
-    assert turned == pytest.approx(math.hypot(of_tracker, 5e-3, 2e-3), abs=1e-6)
-    assert sigma(sigma_m=math.nan, sigma_rad=-1.0) == of_tracker
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
@@ -244,31 +162,21 @@ stamps = st.integers(-3, 3).map(lambda n: T0 + n * 4 * MS) | st.integers(0, 2**6
         max_size=30,
     )
 )
-def test_any_stream_gives_rising_stamps_and_messages_that_survive_the_wire(messages) -> None:
-    config = RigConfig(object=[ObjectTable(name="cup", serial="LHR-1")])
-    device = OpenVrDevice(
-        index=0, serial="LHR-1", device_class="", model="", battery=math.nan, charging=False
-    )
+def test_any_stream_gives_rising_stamps_and_messages_that_survive_the_wire(
+    config: RigConfig, messages
+) -> None:
+    device = msgspec.structs.replace(openvr_pose().device, battery=math.nan)
     step = ObjectStep(config, registered())
     given_out = 0
-    for k, (stamp_ns, seq, offset_ns, sigma_ns, position, code) in enumerate(messages):
-        rotation = np.eye(3).tolist()
-        pose = OpenVrPose(
-            v=1,
-            seq=seq,
-            stamp_ns=stamp_ns,
-            universe="",
+    for k, (stamp_ns, seq, offset_ns, sigma_ns, (x, y, z), code) in enumerate(messages):
+        pose = openvr_pose(
+            [(1.0, 0.0, 0.0, x), (0.0, 1.0, 0.0, y), (0.0, 0.0, 1.0, z)],
             device=device,
-            mDeviceToAbsoluteTracking=tuple(
-                (*row, p) for row, p in zip(rotation, position, strict=True)
-            ),
-            vVelocity=(0.0, 0.0, 0.0),
-            vAngularVelocity=(0.0, 0.0, 0.0),
-            eTrackingResult=code,
-            bPoseIsValid=True,
-            bDeviceIsConnected=True,
+            stamp_ns=stamp_ns,
+            seq=seq,
             clock_offset_ns=offset_ns,
             clock_sigma_ns=sigma_ns,
+            eTrackingResult=code,
         )
         result = step.step(pose, T0 + k * 4 * MS)
         step.faults(T0 + k * 4 * MS)
@@ -280,45 +188,3 @@ def test_any_stream_gives_rising_stamps_and_messages_that_survive_the_wire(messa
     left_out = sum(n for name, n in step.values().items() if name.startswith("left_out"))
     # A pose that disagrees for long is told as lost, and counted as left out all the same.
     assert given_out + left_out >= len(messages)
-
-
-def recorded(vive: Path, name: str) -> list[tuple[float, list[float], list[float]]]:
-    """Seconds, position and quaternion of a table of vive/libsurvive."""
-    table = np.genfromtxt(
-        vive / "libsurvive" / name, delimiter=",", skip_header=1, usecols=(0, *range(3, 10))
-    )
-    return [(float(row[0]), row[1:4].tolist(), row[4:8].tolist()) for row in table]
-
-
-def poses_of(rows, make_pose: MakePose) -> list[OpenVrPose]:
-    from rhot.geometry.transforms import rotation_from_quaternion
-
-    return [
-        make_pose(
-            transform(rotation_from_quaternion(quaternion), position),
-            seq=k,
-            stamp_ns=T0 + round(t_s * 1e9),
-        )
-        for k, (t_s, position, quaternion) in enumerate(rows)
-    ]
-
-
-def test_outliers_of_a_real_tracker_are_not_published(
-    config: RigConfig, make_pose: MakePose, vive: Path
-) -> None:
-    """Against the median of seven poses around each: what is off by 50 mm or more is an outlier."""
-    unfiltered = msgspec.structs.replace(config, objects=ObjectsTable(filter_mm=0.0))
-    rows = recorded(vive, "poses_tracker-bad-tracking.csv.gz")
-    step = ObjectStep(unfiltered, registered())
-    results = [step.step(pose) for pose in poses_of(rows, make_pose)]
-    positions = np.array([position for _, position, _ in rows])
-    around = np.lib.stride_tricks.sliding_window_view(positions, 7, axis=0)  # (n - 6, 3, 7)
-    off_m = np.linalg.norm(positions[3:-3] - np.median(around, axis=2), axis=1)
-    outliers = np.flatnonzero(off_m > 0.05) + 3
-    assert len(outliers) >= 3
-    for k in outliers:
-        result = results[k]
-        assert result is None or result.tracking == "lost"
-    # And the hand that moves at 3 m/s and turns at 35 rad/s is followed: 98 % come through.
-    shown = sum(result is not None and result.tracking == "ok" for result in results)
-    assert shown >= 0.98 * len(rows)

@@ -15,11 +15,7 @@ from services.openvr_bridge import service as bridge
 from services.openvr_bridge.service import serve
 from services.openvr_bridge.sources.polling import StuckError
 from testing.steamvr import BASE_STATION, device, init_error
-
-
-async def until(condition) -> None:
-    while not condition():
-        await asyncio.sleep(0.02)
+from testing.waiting import until
 
 
 def faults(service) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +18,7 @@ from rhot.process.service import Service
 from services.recorder.reader import read
 from services.recorder.recorder import Recorder
 from services.recorder.service import serve
+from testing.waiting import until
 
 KEY = "rhot/desk/camera/left/markers"
 CONFIG = RigConfig(camera=[CameraTable(name="left")], recorder=RecorderTable(autostart=True))
@@ -41,12 +41,6 @@ def test_a_write_that_fails_is_one_line_and_another_file_goes_on(
     recorder.stop()
     second = tmp_path / "rhot-desk-20010909-014640-2.mcap"
     assert [record.payload for record in read(second)] == [b"kept"]
-
-
-async def until(condition: Callable[[], object], act: Callable[[], None]) -> None:
-    while not condition():
-        act()
-        await asyncio.sleep(0.02)
 
 
 async def test_a_full_disk_is_a_fault_that_ends_with_space(

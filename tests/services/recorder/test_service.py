@@ -20,15 +20,9 @@ from services.recorder.service import serve
 from services.recorder.sources.playback import check_names
 from services.recorder.sources.replay import replay
 from services.recorder.writer import RecordingWriter
+from testing.waiting import until
 
 Write = Callable[..., Path]
-
-
-async def until(condition: Callable[[], object], act: Callable[[], None] = lambda: None) -> None:
-    """Act again and again until a condition holds; the caller has a deadline."""
-    while not condition():
-        act()
-        await asyncio.sleep(0.02)
 
 
 async def test_everything_marked_is_recorded_garbage_too(running: Callable, tmp_path: Path) -> None:

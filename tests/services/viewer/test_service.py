@@ -15,6 +15,7 @@ from rhot.files.config import RigConfig
 from rhot.files.rig_tables import RigTable
 from rhot.messages.camera import SeenInPicture
 from services.viewer.service import serve
+from testing.waiting import until
 
 Make = Callable[..., Any]
 Message = tuple[str, dict[str, Any]]
@@ -31,12 +32,6 @@ class MarkerNoMore(msgspec.Struct):
 
 
 JPEG = b"\xff\xd8\xff\xe0picture"
-
-
-async def until(condition: Callable[[], object]) -> None:
-    """Wait for a condition; the caller has a deadline."""
-    while not condition():
-        await asyncio.sleep(0.01)
 
 
 def hears(words: str) -> Message:

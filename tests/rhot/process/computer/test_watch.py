@@ -10,6 +10,7 @@ from rhot.files.config import RigConfig
 from rhot.files.rig_tables import RigTable
 from rhot.process.computer import watch
 from rhot.process.computer.watch import watch_computer
+from testing.waiting import until
 
 
 @pytest.fixture
@@ -20,11 +21,6 @@ def hot(tmp_path):
     (zone / "type").write_text("cpu-thermal\n")
     (zone / "temp").write_text("81000\n")
     return tmp_path
-
-
-async def until(condition):
-    while not condition():
-        await asyncio.sleep(0.01)
 
 
 async def test_one_of_two_tells_and_the_other_takes_over(running, hot, monkeypatch):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from services.cli.live.supervisor import Child, Supervisor
+from testing.waiting import until
 
 DEADLINE_S = 60.0
 
@@ -23,12 +24,6 @@ def lines():
 @pytest.fixture
 def supervisor(lines):
     return Supervisor(lambda name, level, text: lines.append((name, level, text)))
-
-
-async def until(condition):
-    async with asyncio.timeout(DEADLINE_S):
-        while not condition():
-            await asyncio.sleep(0.02)
 
 
 def child(script):

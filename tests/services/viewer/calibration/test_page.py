@@ -19,6 +19,7 @@ from rhot.messages.camera import ColorRange, Colors, FitRequest, FitResult, Patc
 from rhot.process.service import Service
 from services.viewer.calibration.placing import placed
 from services.viewer.service import serve
+from testing.waiting import until
 
 GREEN = ColorRange(hsv_low=(50, 100, 40), hsv_high=(70, 255, 255))
 
@@ -53,11 +54,6 @@ class Tracker:
         if payload:
             self.colors = msgspec.json.decode(payload, type=Colors)
         return self.colors
-
-
-async def until(condition: Callable[[], object]) -> None:
-    while not condition():
-        await asyncio.sleep(0.01)
 
 
 class Page:

@@ -17,11 +17,7 @@ from services.recorder.service import serve_on_request
 from services.viewer.recording.link import RecorderLink
 from services.viewer.recording.replay_page import ReplayPage
 from testing.recorded_hand import write_hand
-
-
-async def until(condition: Callable[[], object]) -> None:
-    while not condition():
-        await asyncio.sleep(0.02)
+from testing.waiting import until
 
 
 @pytest.fixture

@@ -14,15 +14,10 @@ from services.viewer.server import open_server
 from services.viewer.visits.layer import Layer
 from services.viewer.visits.section import Seen
 from services.viewer.visits.visits import Visits
+from testing.waiting import until
 
 DEADLINE_S = 60.0
 SEEN = Seen(ViewModel().view(0.0), [], 0.0, 0)
-
-
-async def until(condition: Callable[[], object]) -> None:
-    async with asyncio.timeout(DEADLINE_S):
-        while not condition():
-            await asyncio.sleep(0.01)
 
 
 class Noting:
