@@ -116,8 +116,11 @@ class SimStage(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     covered, as `right.index_tip`. turned_deg says how far cameras were turned about their own x
     (down), y (right) and z after the calibration, which knows nothing of it. board is shown instead
     of hands and objects. speed makes what moves faster; begins_in_s lets the hands wait so long and
-    then do the scene from its beginning, None: they are in the midst of it. As a request: what
-    shall be.
+    then do the scene from its beginning, None: they are in the midst of it.
+
+    As a request: what shall be. With lease_s for so long, unless who asked asks again; then what
+    was there before is shown again, as it is at once with a lease of 0. A request that only
+    renews changes nothing where something else is shown by then.
     """
 
     scene: Annotated[str, msgspec.Meta(max_length=64)] = ""
@@ -128,3 +131,14 @@ class SimStage(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     board: SimBoard | None = None
     speed: _Speed = 1.0
     begins_in_s: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] | None = None
+    lease_s: Annotated[float, msgspec.Meta(ge=0.0, le=60.0)] | None = None
+    renews: bool = False
+
+    def shows_as(self, other: SimStage) -> bool:
+        """Whether both show the same, wherever a board is: it may be on its way."""
+        return _apart_from_place(self) == _apart_from_place(other)
+
+
+def _apart_from_place(stage: SimStage) -> SimStage:
+    board = stage.board and msgspec.structs.replace(stage.board, place=0)
+    return msgspec.structs.replace(stage, board=board, lease_s=None, renews=False)

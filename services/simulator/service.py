@@ -37,6 +37,8 @@ from services.simulator.stage import Stage
 
 # From the last row's exposure to the picture in memory: the image processor of a Raspberry Pi.
 _PROCESSING_S = 3e-3
+# How often it is looked whether somebody's lease of the stage is over.
+_LEASES_S = 0.5
 # Share of the newest value in the running mean of the rendering time.
 _SMOOTHING = 0.05
 
@@ -93,8 +95,11 @@ async def serve(service: Service) -> None:
             for name in names
         ]
         clock, computers = SceneClock(), ComputerClocks(names)
-        service.bus.answer_requests(topics.SIM_STAGE, partial(_answer_stage, stage, clock))
+        # One change after the other: each takes its time, in a thread.
+        turns = asyncio.Lock()
+        service.bus.answer_requests(topics.SIM_STAGE, partial(_answer_stage, stage, clock, turns))
         async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(_end_leases(stage, clock, turns))
             for source in sources:
                 camera = _LiveCamera(service, source, stage, threads)
                 tasks.create_task(_run_camera(camera, clock, computers))
@@ -111,13 +116,24 @@ def _compiled(scene: Scene, camera: str) -> FrameSource:
     return source
 
 
-async def _answer_stage(stage: Stage, clock: SceneClock, payload: bytes) -> SimStage:
+async def _answer_stage(
+    stage: Stage, clock: SceneClock, turns: asyncio.Lock, payload: bytes
+) -> SimStage:
     """What is shown, after the change that a request asks for."""
     if payload:
         # Where a hand takes an object is searched for: that takes longer than a frame.
         wanted = msgspec.json.decode(payload, type=SimStage)
-        await asyncio.to_thread(stage.set, wanted, clock.now_s)
+        async with turns:
+            await asyncio.to_thread(stage.set, wanted, clock.now_s)
     return stage.wanted
+
+
+async def _end_leases(stage: Stage, clock: SceneClock, turns: asyncio.Lock) -> None:
+    """Take away, for ever, what was shown for somebody who is gone."""
+    while True:
+        await asyncio.sleep(_LEASES_S)
+        async with turns:
+            await asyncio.to_thread(stage.end_lease, clock.now_s)
 
 
 class _LiveCamera:

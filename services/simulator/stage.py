@@ -8,6 +8,7 @@ and has put the objects away: behind the cameras.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -44,17 +45,37 @@ class Stage:
         self.scene: Scene = self._scene
         self.wanted = SimStage()
         self.changes = 0
+        # What is shown once a lease is over, and when that is.
+        self._lasting = SimStage()
+        self._lease_ends_s = math.inf
 
     def set(self, wanted: SimStage, now_s: Callable[[], float] = lambda: 0.0) -> None:
-        """Show something else; now_s tells the scene's time.
+        """Show something else, or the same for longer; now_s tells the scene's time.
 
         Raises ConfigError that lists what is valid; nothing has changed then.
         """
+        if not wanted.renews:
+            self._show(wanted, now_s)
+        elif not wanted.shows_as(self.wanted):
+            return
+        if wanted.lease_s is None:
+            self._lasting, self._lease_ends_s = self.wanted, math.inf
+        else:
+            self._lease_ends_s = now_s() + wanted.lease_s
+            self.end_lease(now_s)
+
+    def end_lease(self, now_s: Callable[[], float]) -> None:
+        """Show again what was there before, once nobody has asked for longer."""
+        if now_s() >= self._lease_ends_s:
+            self._show(self._lasting, now_s)
+            self._lease_ends_s = math.inf
+
+    def _show(self, wanted: SimStage, now_s: Callable[[], float]) -> None:
         scene, before = self._scene, self.wanted
         if (wanted.scene, wanted.speed) != (before.scene, before.speed):
             scene = self._loaded(wanted)
         _check(wanted, scene)
-        if wanted.board and self.scene.board and _same_board(wanted, before):
+        if wanted.board and self.scene.board and wanted.shows_as(before):
             self.scene.board.carry(self._place(wanted.board), now_s())
             self.wanted = wanted
             return
@@ -103,14 +124,6 @@ class Stage:
             was = cameras[camera]
             cameras[camera] = replace(was, T_rig_from_camera=was.T_rig_from_camera @ turn)
         return replace(scene, hands=hands, cameras=cameras)
-
-
-def _same_board(wanted: SimStage, before: SimStage) -> bool:
-    """Whether nothing differs but the place of the board."""
-    if wanted.board is None or before.board is None:
-        return False
-    board = msgspec.structs.replace(wanted.board, place=before.board.place)
-    return msgspec.structs.replace(wanted, board=board) == before
 
 
 def _begun(scene: Scene, begins_s: float) -> Scene:

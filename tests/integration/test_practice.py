@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import signal
 from collections.abc import AsyncIterator
 
 import numpy as np
@@ -167,3 +169,15 @@ async def test_who_sets_the_stage_meanwhile_ends_the_step(page: Page) -> None:
     await page.rig.bus.request(topics.SIM_STAGE, SimStage(scene="wave"), timeout_s=60.0)
     state = await page.until("failed", "done")
     assert "told to show something else" in state.to_do
+
+
+async def test_a_calibrator_that_is_killed_leaves_no_board(page: Page) -> None:
+    before = await page.stage()
+    await page.order("start", "stereo", count=POSITIONS)
+    async with asyncio.timeout(DEADLINE_S):
+        while (await page.stage()).board is None:
+            await asyncio.sleep(0.1)
+        os.kill(page.rig.supervisor.pids["calibrator"], signal.SIGKILL)
+        while (await page.stage()).board is not None:
+            await asyncio.sleep(0.1)
+    assert await page.stage() == before

@@ -1,5 +1,6 @@
 """A simulated rig performs what a step asks of a person, so that it can be practised without any
-hardware: its simulator is told what to show, and shows what it showed before once the step ends.
+hardware: its simulator is told what to show, and shows what it showed before once the step ends,
+or this process does.
 
 A real rig, or a simulated one whose simulator does not answer, is left alone.
 """
@@ -14,15 +15,17 @@ import msgspec
 
 from rhot import topics
 from rhot.bus.bus import Bus
-from rhot.errors import CalibrationError, RhotError
+from rhot.errors import BusError, CalibrationError, RhotError
 from rhot.messages.simulator import SimStage
 from services.calibrator.board.live_selection import Verdict
 from services.calibrator.endpoints.desk import Desk
 
 # Whether a simulator is there, s; a scene with a grasp takes it several seconds.
 _THERE_S, _STAGE_S = 3.0, 60.0
-# How often it is looked whether somebody else has set the stage: a tour does so within seconds.
-_WATCH_S = 2.0
+# How often the stage is asked for anew, and seen whether somebody else has set it: a tour does so
+# within seconds. Who is killed leaves it to the simulator after the lease, s: ten askings, since a
+# fit on a busy machine may hold the loop for some of them.
+_WATCH_S, _LEASE_S = 2.0, 20.0
 # The simulated person's way to the next place takes .7 s, and pictures are a little late.
 _WAY_S = 0.9
 # A board that is not seen as a whole so often is carried on. A place that counts needs two takes;
@@ -37,10 +40,17 @@ class Performer:
         self._bus, self.stage = bus, stage
         self._takes = 0
 
-    async def show(self, stage: SimStage) -> None:
-        """Show that from now on; raises BusError or RefusedError."""
-        self.stage = stage
-        await self._bus.request(topics.SIM_STAGE, stage, timeout_s=_STAGE_S)
+    async def show(self) -> None:
+        """Show it from now on; raises BusError or RefusedError."""
+        await self._ask(_LEASE_S, renews=False)
+
+    async def leave(self) -> None:
+        """Show what was there before, unless somebody else has set the stage; raises alike."""
+        await self._ask(0.0, renews=True)
+
+    async def _ask(self, lease_s: float, *, renews: bool, timeout_s: float = _STAGE_S) -> SimStage:
+        wanted = msgspec.structs.replace(self.stage, lease_s=lease_s, renews=renews)
+        return await self._bus.request(topics.SIM_STAGE, wanted, timeout_s=timeout_s)
 
     async def after_take(self, verdict: Verdict | None) -> None:
         """Carry the board on once its place counts, or cannot; None: no board was found yet."""
@@ -51,15 +61,18 @@ class Performer:
             return
         self._takes = 0
         carried = msgspec.structs.replace(board, place=board.place + 1)
-        await self.show(msgspec.structs.replace(self.stage, board=carried))
+        self.stage = msgspec.structs.replace(self.stage, board=carried)
+        await self.show()
         await asyncio.sleep(_WAY_S)
 
     async def taken_away(self) -> None:
-        """Return once the simulator shows what somebody else wanted."""
+        """Keep the stage; return once the simulator shows what somebody else wanted."""
         while True:
             await asyncio.sleep(_WATCH_S)
-            for shown in await self._bus.get(topics.SIM_STAGE, timeout_s=_THERE_S):
-                if _anywhere(shown) != _anywhere(self.stage):
+            # A simulator that does not answer for once has lost nothing yet.
+            with contextlib.suppress(BusError):
+                shown = await self._ask(_LEASE_S, renews=True, timeout_s=_THERE_S)
+                if not shown.shows_as(self.stage):
                     return
 
 
@@ -70,20 +83,17 @@ async def practising(desk: Desk, stage: SimStage) -> AsyncIterator[Performer | N
     Raises CalibrationError if somebody else sets the stage meanwhile.
     """
     simulated = any(camera.source == "simulator" for camera in desk.config.camera)
-    before = await desk.bus.get(topics.SIM_STAGE, timeout_s=_THERE_S) if simulated else []
-    if not before:
+    if not simulated or not await desk.bus.get(topics.SIM_STAGE, timeout_s=_THERE_S):
         yield None
         return
-    # What a calibrator that was killed has left there is nobody's wish.
-    own = SimStage() if before[0].board or before[0].begins_in_s is not None else before[0]
     performer = Performer(desk.bus, stage)
     try:
-        await performer.show(stage)
+        await performer.show()
         async with _undisturbed(performer):
             yield performer
     finally:
         with contextlib.suppress(RhotError):
-            await performer.show(own)
+            await performer.leave()
 
 
 @contextlib.asynccontextmanager
@@ -112,11 +122,3 @@ async def _undisturbed(performer: Performer) -> AsyncIterator[None]:
         ) from None
     finally:
         watch.cancel()
-
-
-def _anywhere(stage: SimStage) -> SimStage:
-    """The same with a board at no particular place: it may be on its way to the next."""
-    board = stage.board
-    if board is None:
-        return stage
-    return msgspec.structs.replace(stage, board=msgspec.structs.replace(board, place=0))

@@ -85,6 +85,34 @@ def test_a_hand_waits_and_begins_its_scene_when_it_is_told(stage: Stage) -> None
     np.testing.assert_array_equal(waiting, usual.motion(0.0).angles_rad)
 
 
+BOARD = SimStage(board=SimBoard(), lease_s=10.0)
+
+
+def test_a_lease_lasts_while_it_is_renewed_and_what_was_there_comes_back(stage: Stage) -> None:
+    before = SimStage(scene="still", hidden=["right.index_tip"])
+    stage.set(before)
+    stage.set(BOARD, lambda: 100.0)
+    carried = msgspec.structs.replace(BOARD, board=SimBoard(place=1))
+    stage.set(carried, lambda: 105.0)
+    stage.set(msgspec.structs.replace(BOARD, renews=True), lambda: 114.0)
+    stage.end_lease(lambda: 123.9)
+    assert (stage.wanted, stage.scene.hands) == (carried, {})
+    stage.end_lease(lambda: 124.0)
+    assert (stage.wanted, stage.scene.board) == (before, None)
+    stage.set(BOARD, lambda: 200.0)
+    stage.set(msgspec.structs.replace(BOARD, renews=True, lease_s=0.0), lambda: 201.0)
+    assert (stage.wanted, stage.scene.board) == (before, None)
+
+
+def test_who_renews_changes_nothing_that_somebody_else_has_set(stage: Stage) -> None:
+    stage.set(BOARD, lambda: 100.0)
+    stage.set(SimStage(scene="still"))
+    for lease_s in (10.0, 0.0):
+        stage.set(msgspec.structs.replace(BOARD, renews=True, lease_s=lease_s), lambda: 101.0)
+    stage.end_lease(lambda: 1000.0)
+    assert stage.wanted == SimStage(scene="still")
+
+
 def test_a_calibration_that_is_saved_meanwhile_does_not_move_the_world(
     config: RigConfig, tmp_path: Path
 ) -> None:
