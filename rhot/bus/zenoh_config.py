@@ -4,9 +4,7 @@ scouting.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -18,16 +16,6 @@ from rhot.bus.security.limits import limits
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
 
-# Of shared memory for what goes to processes of the same machine: room for eight pictures of 640 x
-# 480. Zenoh's own 16 MB, one pool in the sender and its image in each receiver, brought a tracker
-# that gets simulated pictures to 137 MB.
-_POOL_BYTES = 4 << 20
-# Only pictures: JSON is at most 64 kB, and as quick without.
-_SHARED_FROM_BYTES = 65_537
-# Zenoh locks each pool that it maps: its own, and in a router those of all who send pictures.
-# Where the limit is reached (8 MB for most users) messages are lost without a word.
-_LOCKED_BYTES = 16 * _POOL_BYTES
-_CAP_IPC_LOCK = 14
 # An attempt to connect is given up after so long; Zenoh's own is 10 s. One that begins just after
 # the cable is out, while the neighbour is still in the table, lasts its whole time: poses were back
 # 3.4 s after 8 s without a cable. Long enough for a handshake with certificates on a slow computer.
@@ -50,34 +38,12 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
     return {
         "link": link,
         "unicast": {"qos": {"enabled": True}, "open_timeout": _OPEN_MS},
-        "shared_memory": {
-            "enabled": may_lock(_LOCKED_BYTES),
-            "transport_optimization": {
-                "pool_size": _POOL_BYTES,
-                "message_size_threshold": _SHARED_FROM_BYTES,
-            },
-        },
+        # Who receives through it keeps and locks a sender's pool for ever, also once the sender has
+        # ended (eclipse-zenoh/zenoh#2787): a router grew by 7.4 MB whenever a process that sends
+        # pictures started again, and lost them without a word once no more could be locked (#2788).
+        # Without, a simulated picture of 460 kB takes 0.5 ms longer and 0.4 ms more processor time.
+        "shared_memory": {"enabled": False},
     }
-
-
-def may_lock(size_bytes: int) -> bool:
-    """Whether this process may lock so much memory (LimitMEMLOCK of a unit, or the capability).
-
-    On Windows, which has no such limit to ask for, no: what runs there sends no pictures.
-    """
-    try:
-        import resource
-    except ImportError:
-        return False
-    limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
-    if limit == resource.RLIM_INFINITY or limit >= size_bytes:
-        return True
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return False
-    effective = re.search(r"^CapEff:\s*(\w+)$", status, re.MULTILINE)
-    return bool(effective and int(effective[1], 16) >> _CAP_IPC_LOCK & 1)
 
 
 def client_config(connect: Sequence[str]) -> zenoh.Config:
