@@ -10,6 +10,7 @@ import os
 import random
 import signal
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 import zenoh
 
@@ -17,17 +18,30 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus
 from rhot.bus.zenoh_config import client_config
 from rhot.messages import Session
+from services.cli.live.supervisor import service_argv
 
 Fault = Callable[[], Awaitable[None]]
 # The kind whose memory takes longest to settle.
 PICTURES = "100 pictures asked for"
+# For what others keep for a process that does not read: 3 s at 30 pictures a second fill it.
+_LONG_STOP_S = 3.0
+# Until a command has started and shows something, on a busy machine.
+_START_S = 30.0
 
 
 class Faults:
-    """Plants faults in a running rig; pids by process name as the supervisor has them."""
+    """Plants faults in the running rig of a rig.toml; pids by process name as the supervisor has
+    them.
+    """
 
-    def __init__(self, bus: Bus, endpoint: str, pids: dict[str, int], seed: int) -> None:
+    def __init__(
+        self, bus: Bus, path: Path, endpoint: str, pids: dict[str, int], seed: int
+    ) -> None:
         self._bus, self._endpoint, self._pids = bus, endpoint, pids
+        self._watch = service_argv(
+            *("cli", "watch", "camera/left/markers"),
+            *("--config", str(path), "--connect", endpoint),
+        )
         self._random = random.Random(seed)
         self._session = bus.publisher(topics.SESSION)
 
@@ -46,10 +60,22 @@ class Faults:
         seconds = round(self._random.uniform(0.5, 4.0), 1)
         return [
             (f"{process} stopped for {seconds} s", lambda: self._stop(process, seconds)),
+            ("a program that watches is killed", self._visitor),
             ("session stopped for 2 s", self._session_off),
             ("2,000 messages of garbage", self._garbage),
             ("JSON nested 32,000 deep on every stream", self._nested),
             (PICTURES, self._pictures),
+        ]
+
+    def every_stop(self) -> list[tuple[str, Fault]]:
+        """Each process stopped once, for long."""
+
+        def stop(process: str) -> Fault:
+            return lambda: self._stop(process, _LONG_STOP_S)
+
+        return [
+            (f"{process} stopped for {_LONG_STOP_S:g} s", stop(process))
+            for process in sorted(self._pids)
         ]
 
     async def _kill(self, process: str) -> None:
@@ -62,6 +88,18 @@ class Faults:
             await asyncio.sleep(seconds)
         finally:
             os.kill(pid, signal.SIGCONT)
+
+    async def _visitor(self) -> None:
+        """Come and gone without a farewell, as processes of the rig do while lives are short."""
+        visitor = await asyncio.create_subprocess_exec(
+            *self._watch, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL
+        )
+        try:
+            async with asyncio.timeout(_START_S):
+                await visitor.stdout.readline()
+        finally:
+            visitor.kill()
+            await visitor.wait()
 
     async def _session_off(self) -> None:
         self._session.put(Session(running=False, start_ns=clock.now_ns()))

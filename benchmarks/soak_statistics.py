@@ -8,13 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import theilslopes
+
+from testing.memory_growth import Growth, memory_growth
 
 # A process fills its caches in its first minute, and when it first meets a fault of each kind; what
 # it grows by later would go on growing.
 WARM_UP_S = 60.0
-# A slope needs a stretch of time: over less, allocator steps of a megabyte are all one sees.
-SHORTEST_S = 180.0
+# Growth needs a stretch of time: over less, steps of a heap are all one sees.
+SHORTEST_S = 300.0
 # After a fault the latency is that of a rig that finds itself again.
 SETTLE_S = 10.0
 LIMIT_MB_PER_HOUR, LIMIT_LATENCY_RATIO = 1.0, 1.25
@@ -42,22 +43,23 @@ class Run:
     seconds: float = 0.0
     # When every kind of fault had been met.
     warm_s: float = 0.0
+    # How many faults, that end no process, had come until then.
+    warm_up_faults: int = 0
     left_over: int = 0
 
 
 @dataclass(frozen=True)
-class Growth:
-    """Memory of one process over its longest life: MB at its end, MB/h with its 95 % interval."""
+class Life:
+    """Memory of one process over its longest life: minutes, MB at its end, what it gained."""
 
     process: str
     minutes: float
     rss_mb: float
-    slope_mb_h: float
-    low_mb_h: float
-    high_mb_h: float
+    gained_mb: float
+    growth: Growth
 
 
-def growths(run: Run) -> list[Growth]:
+def lives(run: Run) -> list[Life]:
     """The longest life of each process, if it was long enough to tell."""
     longest: dict[str, list[tuple[float, float]]] = {}
     for (process, _), samples in run.memory.items():
@@ -67,19 +69,19 @@ def growths(run: Run) -> list[Growth]:
             longest[process] = warm
     found = []
     for process, samples in sorted(longest.items()):
-        hours, megabytes = (np.array(column) for column in zip(*samples, strict=True))
-        hours = hours / 3600.0
-        span_s = (hours[-1] - hours[0]) * 3600.0
+        times_s, megabytes = (np.array(column) for column in zip(*samples, strict=True))
+        span_s = times_s[-1] - times_s[0]
         if span_s >= SHORTEST_S:
-            slope, _, low, high = theilslopes(megabytes, hours)
-            found.append(Growth(process, span_s / 60.0, float(megabytes[-1]), slope, low, high))
+            growth = memory_growth(times_s, megabytes, LIMIT_MB_PER_HOUR)
+            gained_mb = float(megabytes[-1] - megabytes[0])
+            found.append(Life(process, span_s / 60.0, float(megabytes[-1]), gained_mb, growth))
     return found
 
 
 def quiet_latencies(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s and latencies (n,) in ms of poses that no fault was near."""
+    """Times (n,) in s and latencies (n,) in ms of warmed-up poses that no fault was near."""
     times, latencies = (np.array(column) for column in zip(*run.latencies, strict=True))
-    quiet = times > WARM_UP_S
+    quiet = times > max(WARM_UP_S, run.warm_s)
     for one in run.recoveries:
         until_s = one.at_s + (one.recovered_s or 0.0) + SETTLE_S
         quiet &= (times < one.at_s - 1.0) | (times > until_s)
@@ -99,10 +101,10 @@ def latency_ratio(run: Run) -> tuple[float, float, float]:
 def shortfalls(run: Run) -> list[str]:
     """What this run did not meet; empty if all is well."""
     found = [
-        f"{growth.process} grows by {growth.slope_mb_h:.2f} MB/h"
-        for growth in growths(run)
+        f"{life.process} grows by {life.growth.mb_h:.2f} MB/h"
+        for life in lives(run)
         # The lower end: a slope that noise alone can make is no growth.
-        if growth.slope_mb_h > LIMIT_MB_PER_HOUR and growth.low_mb_h > 0.0
+        if life.growth.mb_h > LIMIT_MB_PER_HOUR and life.growth.low_mb_h > 0.0
     ]
     found += [
         f"no pose after {one.fault} at {one.at_s:.0f} s"
