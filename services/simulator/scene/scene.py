@@ -84,7 +84,8 @@ class Scene:
     def body_frames(self, t_s: float) -> BodyFrames:
         """All body frames at one instant, for the renderer."""
         states = self.hand_states(t_s)
-        positions, rotations = [], []
+        # Nobody may be there: who shows a board has no hand free.
+        positions, rotations = [np.empty((0, 3))], [np.empty((0, 3, 3))]
         for name, state in states.items():
             p, R = self.hands[name].joints(state)
             positions += [p, state.wrist_m[None]]

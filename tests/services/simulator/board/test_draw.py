@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -51,6 +52,15 @@ def test_a_board_comes_and_goes_without_a_trace(stage: Stage) -> None:
     assert np.mean(shown.picture(7) != before) > 0.2
     stage.set(SimStage())
     np.testing.assert_array_equal(Renderer(stage.scene, "left").picture(7), before)
+
+
+def test_a_board_may_be_all_there_is(config: RigConfig) -> None:
+    alone = Stage(msgspec.structs.replace(config, object=()))
+    alone.set(SimStage(board=SimBoard(camera="left")))
+    assert not alone.scene.hands
+    assert not alone.scene.objects
+    picture = Renderer(alone.scene, "left").picture(7)
+    assert detect(picture[:480], Board(COLS, ROWS, SQUARE_M, "chessboard")) is not None
 
 
 def test_a_board_that_is_held_still_looks_as_if_drawn_anew(stage: Stage) -> None:
