@@ -50,11 +50,17 @@ async def connected(connect: Sequence[str], despite_certificates: bool) -> zenoh
                     log.error("%s [certificate_refused]", refused)
             if attempts == _SILENT_ATTEMPTS and not refused:
                 log.warning(
-                    "no router at %s yet, waiting for it: %s",
+                    "no router at %s yet, waiting for it%s",
                     ", ".join(map(plain, connect)),
-                    str(error).partition(" [")[0],
+                    _reason(error),
                 )
             await asyncio.sleep(_RETRY_S)
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """Why, where Zenoh says more than that nobody answers."""
+    said = str(error).partition(" [")[0]
+    return "" if said.startswith("Unable to connect") else f": {said}"
 
 
 async def _refusal_of(connect: Sequence[str], despite_certificates: bool) -> str | None:

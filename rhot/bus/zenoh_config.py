@@ -11,7 +11,7 @@ import msgspec
 import zenoh
 
 from rhot.bus.security.access_control import access_control
-from rhot.bus.security.credentials import with_certificates
+from rhot.bus.security.credentials import plain, with_certificates
 from rhot.bus.security.limits import limits
 from rhot.errors import BusError
 from rhot.files.config import RigConfig
@@ -24,6 +24,11 @@ _OPEN_MS = 3000
 # 8 s without a cable at most 1.13 s where ARP asks once a second, 0.47 s where install.sh has set
 # it to four times (deploy/sysctl.d); with pauses of 500 ms 1.22 and 0.71 s.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
+# Of what Zenoh does not know ("http/...") it says only that nobody answers there.
+_ENDPOINT = re.compile(
+    r"(?:(?:tcp|tls|udp|quic|ws)/[^\s/?#]+:(?P<port>\d{1,5})|(?:unixsock-stream|serial|vsock)/.+)"
+    r"(?:[?#].*)?"
+)
 
 
 def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
@@ -47,7 +52,11 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
 
 
 def client_config(connect: Sequence[str]) -> zenoh.Config:
-    """A client of the routers at `connect`, back within half a second of their return."""
+    """A client of the routers at `connect`, back within half a second of their return.
+
+    Raises BusError for what is no endpoint.
+    """
+    _check(connect)
     return _config(
         {
             "mode": "client",
@@ -72,6 +81,7 @@ def router_config(listen: Sequence[str], rig: RigConfig | None = None) -> zenoh.
 
 def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict[str, Any]:
     """What router_config is made of, for Zenoh's own router to read from a file."""
+    _check(listen)
     bounds = {} if rig is None else limits(rig)
     settings: dict[str, Any] = {
         "mode": "router",
@@ -87,6 +97,16 @@ def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict
         endpoints = with_certificates(rig.bus.routers, rig.certificates_dir, "connect")
         settings["connect"] = {"endpoints": endpoints, "timeout_ms": -1, "retry": _RETRY}
     return settings
+
+
+def _check(endpoints: Sequence[str]) -> None:
+    for endpoint in endpoints:
+        found = _ENDPOINT.fullmatch(endpoint)
+        if found is None or int(found["port"] or 0) > 65535:
+            raise BusError(
+                f"{plain(endpoint)!r} is no address of a router; write it like "
+                "tcp/192.168.1.10:7447 (tls/... with certificates)"
+            )
 
 
 def _config(values: dict[str, Any]) -> zenoh.Config:

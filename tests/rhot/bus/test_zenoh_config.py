@@ -12,7 +12,23 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from rhot.bus.zenoh_config import client_config
+from rhot.bus.zenoh_config import client_config, router_config
+from rhot.errors import BusError
+
+
+@pytest.mark.parametrize("config", [client_config, router_config])
+@pytest.mark.parametrize(
+    "wrong",
+    ["", "127.0.0.1", "localhost:7447", "http://127.0.0.1:8080", "tcp/127.0.0.1", "tcp/a:99999"],
+)
+def test_what_is_no_address_of_a_router_is_said_to_be_none(config, wrong: str) -> None:
+    with pytest.raises(BusError, match="write it like tcp/") as told:
+        config(["tcp/127.0.0.1:7447", wrong])
+    assert repr(wrong) in str(told.value)
+
+
+def test_addresses_of_all_kinds_are_taken() -> None:
+    client_config(["tcp/[::1]:7447", "udp/pi-left.local:7447", "tls/a:1#verify_name=false"])
 
 
 def test_an_attempt_that_nobody_answers_is_given_up_and_made_anew() -> None:
