@@ -63,8 +63,8 @@ class LegendEntry(NamedTuple):
 
 LEGEND: tuple[LegendEntry, ...] = (
     LegendEntry(SOURCE_RGB["measured"], "measured: the cameras see it"),
-    LegendEntry(SOURCE_RGB["solved"], "worked out from what is measured"),
-    LegendEntry(SOURCE_RGB["predicted"], "expected there, not seen now"),
+    LegendEntry(SOURCE_RGB["solved"], "solved: worked out from what they see"),
+    LegendEntry(SOURCE_RGB["predicted"], "predicted: expected there, not seen now"),
     LegendEntry(TOUCH, "touches"),
     LegendEntry(CONTACT, "where it touches"),
     LegendEntry(LIMIT, "can bend no further"),

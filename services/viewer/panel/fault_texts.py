@@ -49,8 +49,14 @@ def wait(names: Sequence[str]) -> str:
 
 
 def banner(causes: Sequence[Cause], now_ns: int) -> str:
-    """The causes as HTML, worst first; "" where there are none."""
-    shown = [_card(cause, now_ns) for cause in causes[:_MAX_CAUSES]]
+    """The causes as HTML, worst first, those that are mended alike together; "" where there are
+    none.
+    """
+    alike: dict[tuple[str, str], list[StandingFault]] = {}
+    for cause in causes[:_MAX_CAUSES]:
+        fault = cause.fault.fault
+        alike.setdefault((fault.severity, fault.action), []).append(cause.fault)
+    shown = [_card(together, now_ns) for together in alike.values()]
     if len(causes) > _MAX_CAUSES:
         more = len(causes) - _MAX_CAUSES
         shown.append(f'<div style="{_BOX}">... and {more} more: <code>rhot top</code></div>')
@@ -74,13 +80,14 @@ def headline(causes: Sequence[Cause]) -> str:
     return f"{count} {word}{'s' * (count > 1)}" if count else ""
 
 
-def _card(cause: Cause, now_ns: int) -> str:
-    fault = cause.fault.fault
+def _card(alike: Sequence[StandingFault], now_ns: int) -> str:
+    """Faults of one severity and with one thing to do."""
+    fault = alike[0].fault
     word, color = _WORDS[fault.severity]
+    told = "<br>".join(_told(one) + _since(one.fault.since_ns, now_ns) for one in alike)
     return (
         f'<div style="{_BOX}border-left:4px solid {color}">'
-        f'<b style="color:{color}">{word}:</b> {_told(cause.fault)}'
-        f"{_since(fault.since_ns, now_ns)}<br>&rarr; {sentence(fault.action)}</div>"
+        f'<b style="color:{color}">{word}:</b> {told}<br>&rarr; {sentence(fault.action)}</div>'
     )
 
 

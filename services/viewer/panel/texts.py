@@ -17,7 +17,7 @@ from rhot.messages import HandPose
 from rhot.messages.health import Health, StreamHealth
 from services.viewer.live.model import View
 from services.viewer.live.object_texts import object_lines
-from services.viewer.live.palette import SOURCE_RGB
+from services.viewer.live.palette import LEGEND
 from services.viewer.panel.words import sentence, service_words, stream_words, text
 
 # Rows of the rates table: a rig of two Pis has some twenty streams.
@@ -55,15 +55,20 @@ def _hand_line(hand: HandName, view: View) -> str:
 
 
 def _missing(view: View) -> str:
-    """What is waited for: the first program on the way to a pose that is not heard."""
-    services = {health.service for health in view.health}
-    for needed, missing in (
-        ("pi_tracker", "a camera's tracker: none is heard"),
-        ("fusion", "fusion, which makes points of what cameras see"),
-        ("solver", "the solver, which makes a hand of points"),
+    """What is waited for: the first program on the way to a pose that is not heard, or prepares
+    itself.
+    """
+    for needed, missing, unheard in (
+        ("pi_tracker", "a camera's tracker", ": none is heard"),
+        ("fusion", "fusion, which makes points of what cameras see", ""),
+        ("solver", "the solver, which makes a hand of points", ""),
+        ("simulator", "the simulator", None),
     ):
-        if needed not in services:
-            return missing
+        states = {health.state for health in view.health if health.service == needed}
+        if not states and unheard is not None:
+            return missing + unheard
+        if states == {"starting"}:
+            return f"{missing}: it is starting"
     return "it: hold it into the view of two cameras"
 
 
@@ -77,11 +82,12 @@ def other_rigs(own: str, rigs: Sequence[tuple[str, str]]) -> str:
 
 
 def legend() -> str:
-    """What the colours of joints and bones mean."""
+    """What the colours of joints, bones, touches and limits mean."""
     return _box(
-        " &nbsp; ".join(
-            f'<span style="color:rgb{rgb}">&#9679;</span> {name}'
-            for name, rgb in SOURCE_RGB.items()
+        " &ensp; ".join(
+            '<span style="display:inline-block">'
+            f'<span style="color:rgb{entry.rgb}">&#9679;</span> {entry.words}</span>'
+            for entry in LEGEND
         )
     )
 

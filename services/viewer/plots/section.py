@@ -15,6 +15,10 @@ from services.viewer.visits.section import Seen
 
 _NONE = "none"
 _HEIGHT_PX = 260
+_HINT = (
+    '<div style="font-size:0.8em;padding:0 0.6em">Choose what to draw: how far joints bend, how '
+    "late poses are, how many come a second. The last half minute is shown.</div>"
+)
 
 
 class PlotsSection:
@@ -44,6 +48,7 @@ class PlotsTab:
         self._choice = client.gui.add_dropdown(
             "plot", (_NONE, *known), hint="the last half minute, drawn while it is chosen"
         )
+        self._hint = client.gui.add_html(_HINT)
         self._drawn = _NONE
         self._plot: viser.GuiUplotHandle | None = None
 
@@ -56,6 +61,7 @@ class PlotsTab:
             if self._plot is not None:
                 self._plot.remove()
                 self._plot = None
+        self._hint.visible = chart is None
         if chart is None:
             return
         data = tuple(self._history.rows([name for name, _ in chart.series], seen.now_s))

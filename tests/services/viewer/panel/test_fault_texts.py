@@ -36,6 +36,20 @@ def test_what_since_when_and_what_to_do():
     assert "for 3 hours" in banner(found(fault("event", since_s=10800)), NOW_NS)
 
 
+def test_what_is_mended_alike_stands_together():
+    both = banner(
+        found(
+            fault("camera_slow", "'left' delivers 4 pictures", "left"),
+            fault("camera_slow", "'right' delivers 5 pictures", "right"),
+            fault("disk_low", "the disk is full"),
+        ),
+        NOW_NS,
+    )
+    assert both.count("note:") == 2
+    assert "&#x27;left&#x27; delivers 4 pictures (says fusion)<br>&#x27;right&#x27;" in both
+    assert both.count("lower fps or size_px") == 1
+
+
 def test_what_follows_is_told_apart():
     both = found(
         fault("stream_slow", "rhot/sim/hand/*/points: 0.0 Hz received of 30.0 expected"),

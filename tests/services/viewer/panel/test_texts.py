@@ -54,8 +54,18 @@ def test_waiting_is_said_with_what_to_look_at(
         ("fusion", "waiting for the solver"),
         ("solver", "hold it into the view of two cameras"),
     ):
+        starting = make_health(service, state="starting")
+        model.health(starting, 0.0)
+        assert ": it is starting ..." in texts.status(config, model.view(0.0), [])
         model.health(make_health(service), 0.0)
         assert next_missing in texts.status(config, model.view(0.0), [])
+
+
+def test_the_legend_has_each_colour_that_means_something() -> None:
+    said = texts.legend()
+    for words in ("measured", "solved", "predicted", "touches", "can bend no further"):
+        assert words in said
+    assert_harmless(said)
 
 
 def test_what_is_there_is_said(
