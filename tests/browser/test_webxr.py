@@ -155,6 +155,34 @@ def test_the_hand_is_seen_to_move_and_nothing_is_asked_elsewhere(chromium, bridg
     page.close()
 
 
+def test_where_nothing_comes_it_is_said_what_is_waited_for(chromium, bridge):
+    page = chromium.new_page(viewport={"width": 390, "height": 844})
+    with bridge.running():
+        page.goto(bridge.url)
+        until(page, "() => document.getElementById('state').textContent.startsWith('Connected')")
+        told = page.inner_text("#panel")
+        for words in ("Right hand: waiting", "cup: waiting", "Does the rig run"):
+            assert words in told
+        assert page.is_disabled("#look")
+        states = page.evaluate(
+            """(poses) => poses.map((pose) => {
+                const cup = rhot.objects.get('cup');
+                cup.show(pose, null);
+                return cup.state;
+            })""",
+            [
+                msgspec.to_builtins(object_pose("cup", registered=registered, tracking=tracking))
+                for registered, tracking in ((False, "ok"), (True, "out_of_range"), (True, "lost"))
+            ],
+        )
+        assert states == [
+            "its place in the rig is not calibrated",
+            "out of the lighthouses' view",
+            "lost",
+        ]
+    page.close()
+
+
 def test_the_skin_is_where_ours_is(chromium, bridge, moving):
     """Vertices as three.js draws them, against the skin that exports are made with."""
     page = chromium.new_page()

@@ -17,6 +17,13 @@ const BODY = new Color(0.0, 0.35, 0.6);
 const TOUCHED = new Color(0.55, 0.3, 0.0);
 const HELD = new Color(0.0, 0.45, 0.2);
 const DARK = new Color(0, 0, 0);
+// What hinders an object whose poses come, by its tracking; elsewhere it is lost.
+const HINDERED = {
+  unregistered: "its place in the rig is not calibrated",
+  rotation_only: "its turn is known, its place is not",
+  calibrating: "its tracker is locating itself",
+  out_of_range: "out of the lighthouses' view",
+};
 
 function geometryOf({ shape, size_m: size = [] }) {
   if (shape === "box") return new BoxGeometry(...size);
@@ -51,12 +58,16 @@ export class RigObject {
   show(pose, contacts) {
     this.seen = pose !== null && pose.registered && pose.tracking === "ok";
     this.root.visible = this.seen;
-    if (!this.seen) return;
+    if (!this.seen) {
+      const hindered = pose?.tracking !== "lost" && pose?.registered === false ? "unregistered" : pose?.tracking;
+      this.state = pose === null ? "waiting for its poses" : (HINDERED[hindered] ?? "lost");
+      return;
+    }
     this.root.position.set(...pose.position_m);
     this.root.quaternion.copy(quaternion(pose.orientation_wxyz));
     const holder = contacts?.grasps[0]?.hand;
     const toucher = contacts?.contacts.find((contact) => contact.touching)?.hand;
-    this.state = holder ? `held, ${holder} hand` : toucher ? `touched, ${toucher} hand` : "";
+    this.state = holder ? `held, ${holder} hand` : toucher ? `touched, ${toucher} hand` : "seen";
     this.material.emissive.copy(holder ? HELD : toucher ? TOUCHED : DARK);
   }
 

@@ -44,11 +44,16 @@ export class Panel {
 
   show(live, hands, objects) {
     const lines = [
-      ...hands.map((hand) => `${hand.name === "left" ? "Left" : "Right"} hand: ${hand.seen ? "seen" : "not seen"}`),
-      ...objects.map((one) => `${one.name}: ${one.seen ? one.state || "seen" : "not seen"}`),
+      ...hands.map(
+        (hand) => `${hand.name === "left" ? "Left" : "Right"} hand: ${hand.seen ? "seen" : "waiting for its poses"}`,
+      ),
+      ...objects.map((one) => `${one.name}: ${one.state}`),
     ];
+    const something = [...hands, ...objects].some((one) => one.seen);
+    element("look").disabled = !hands.some((hand) => hand.seen);
+    element("missing").hidden = something || !live.connected;
     const state = live.connected
-      ? `Live from the rig “${live.hello.rig}”`
+      ? `${something ? "Live from" : "Connected to"} the rig “${live.hello.rig}”`
       : live.hello === null
         ? "Waiting for the bridge…"
         : "The bridge does not answer. Trying again…";
