@@ -40,11 +40,12 @@ def causes(faults: Sequence[StandingFault]) -> list[Cause]:
     if missing:
         parts = missing if len(missing) > 1 else []
         found[_together(missing)] = list(parts)
-    first = [one for one in others if one.fault.code not in FOLLOWING]
+    following = [one for one in others if _may_follow(one, missing)]
+    first = [one for one in others if one not in following]
     for one in sorted(first, key=_order):
         found[one] = []
     # In the order of the way, so that what follows may itself be a cause of what is behind it.
-    for one in sorted((o for o in others if o.fault.code in FOLLOWING), key=_order):
+    for one in sorted(following, key=_order):
         reason = next((cause for cause in found if _explains(cause, missing, one)), None)
         if reason is None:
             found[one] = []
@@ -59,6 +60,13 @@ def _order(one: StandingFault) -> tuple[bool, int, bool, int]:
     # A slow camera, or a result, is the cause only where nothing else is broken.
     late = fault.code in (*SLOW, *RESULTS)
     return (not breaks(fault), place_on_way(fault.code), late, fault.since_ns)
+
+
+def _may_follow(one: StandingFault, missing: Sequence[StandingFault]) -> bool:
+    """Whether a fault may stand for nothing but another one's sake."""
+    # A simulated camera has no pictures without the simulator, and no setting helps.
+    unlit = any(part.fault.subject == "simulator" for part in missing)
+    return one.fault.code in FOLLOWING or (unlit and one.fault.code == "camera_slow")
 
 
 def _explains(

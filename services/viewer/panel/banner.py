@@ -10,13 +10,13 @@ from services.viewer.visits.section import Seen
 
 
 class Banner:
-    """The causes of what is wrong; what follows from them is in a folder, closed at first."""
+    """The worst causes of what is wrong; the rest is in a folder, closed at first."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
         self._causes = client.gui.add_html("", visible=False)
         self._folder = client.gui.add_folder(
-            "what follows from it", expand_by_default=False, visible=False
+            "more, and what follows from it", expand_by_default=False, visible=False
         )
         with self._folder:
             self._follows = client.gui.add_html("")

@@ -13,7 +13,7 @@ from rhot.watch.causes import Cause
 from rhot.watch.rig_state import ServiceRow, StandingFault
 from services.viewer.panel.words import sentence, service_words
 
-# Causes that fit above the tabs of a small screen; the rest is counted.
+# Causes that fit above the tabs of a small screen; the rest is in a folder.
 _MAX_CAUSES = 3
 _MAX_FOLLOWING = 30
 # Preparing takes seconds, and 100 s of a processor's time once for each release of rhot, when numba
@@ -49,28 +49,32 @@ def wait(names: Sequence[str]) -> str:
 
 
 def banner(causes: Sequence[Cause], now_ns: int) -> str:
-    """The causes as HTML, worst first, those that are mended alike together; "" where there are
-    none.
-    """
+    """The worst causes as HTML, those that are mended alike together; "" where there are none."""
     alike: dict[tuple[str, str], list[StandingFault]] = {}
-    for cause in causes[:_MAX_CAUSES]:
+    for cause in _first(causes):
         fault = cause.fault.fault
         alike.setdefault((fault.severity, fault.action), []).append(cause.fault)
-    shown = [_card(together, now_ns) for together in alike.values()]
-    if len(causes) > _MAX_CAUSES:
-        more = len(causes) - _MAX_CAUSES
-        shown.append(f'<div style="{_BOX}">... and {more} more: <code>rhot top</code></div>')
-    return "".join(shown)
+    return "".join(_card(together, now_ns) for together in alike.values())
 
 
 def following(causes: Sequence[Cause]) -> str:
-    """What follows from the causes that are shown, one line each; "" where nothing does."""
-    lines = [_line(one) for cause in causes[:_MAX_CAUSES] for one in cause.follows]
+    """The other causes, and what follows from any, one line each; "" where there is nothing."""
+    first = _first(causes)
+    rest = [cause.fault for cause in causes if cause not in first]
+    lines = [_line(one) for one in (*rest, *(one for cause in causes for one in cause.follows))]
     if not lines:
         return ""
     more = len(lines) - _MAX_FOLLOWING
-    shown = lines[:_MAX_FOLLOWING] + ([f"... and {more} more"] if more > 0 else [])
+    shown = lines[:_MAX_FOLLOWING] + (
+        [f"... and {more} more: <code>rhot top</code>"] if more > 0 else []
+    )
     return f'<div style="{_BOX}">{"<br>".join(shown)}</div>'
+
+
+def _first(causes: Sequence[Cause]) -> Sequence[Cause]:
+    """Problems push notes aside: on a phone the tabs below would be out of sight."""
+    problems = [cause for cause in causes if cause.fault.fault.severity == "error"]
+    return (problems or causes)[:_MAX_CAUSES]
 
 
 def headline(causes: Sequence[Cause]) -> str:

@@ -36,7 +36,7 @@ def status(config: RigConfig, view: View, notes: Sequence[str], *, replayed: boo
     """
     if replayed and not (view.hands or view.points or view.objects):
         return _box("Nothing was recorded at this moment: play on, or move the time line.")
-    lines = [_hand_line(hand, view) for hand in config.hand]
+    lines = [_hand_line(config, hand, view) for hand in config.hand]
     if not config.hand:
         lines.append("no hand is configured: add [hand.right.markers] to rig.toml")
     lines += [text(line, 200) for line in object_lines(config, view)]
@@ -44,20 +44,25 @@ def status(config: RigConfig, view: View, notes: Sequence[str], *, replayed: boo
     return _box("<br>".join(lines))
 
 
-def _hand_line(hand: HandName, view: View) -> str:
+def _hand_line(config: RigConfig, hand: HandName, view: View) -> str:
     if hand in view.hands:
         latency = view.latency_ms.get(hand)
         after = "" if latency is None else f", {latency:.0f} ms after the light"
         return f"{hand} hand: tracked{after}"
     if any(of_hand == hand for of_hand, _ in view.points):
         return f"{hand} hand: its markers are seen; waiting for the solver to pose it ..."
-    return f"{hand} hand: waiting for {_missing(view)} ..."
+    return f"{hand} hand: waiting for {_missing(config, view)} ..."
 
 
-def _missing(view: View) -> str:
+def _missing(config: RigConfig, view: View) -> str:
     """What is waited for: the first program on the way to a pose that is not heard, or prepares
     itself.
     """
+    trackers = {health.instance for health in view.health if health.service == "pi_tracker"}
+    silent = [camera.name for camera in config.camera if camera.name not in trackers]
+    # One camera has no depth.
+    if trackers and silent and len(config.camera) - len(silent) < 2:
+        return f"camera {' and '.join(silent)}: its tracker is not heard"
     for needed, missing, unheard in (
         ("pi_tracker", "a camera's tracker", ": none is heard"),
         ("fusion", "fusion, which makes points of what cameras see", ""),

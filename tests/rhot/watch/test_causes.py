@@ -57,6 +57,14 @@ def test_one_missing_service_is_told_in_its_own_words() -> None:
     assert [one.fault.code for one in cause.follows] == ["no_pose", "stream_slow"]
 
 
+def test_simulated_cameras_are_slow_for_want_of_the_simulator() -> None:
+    gone = told("service_gone", subject="simulator", text="the simulator has ended")
+    slow = told("camera_slow", "pi_tracker/left", "left")
+    assert codes([slow, gone]) == [("service_gone", ["camera_slow"])]
+    other = told("service_gone", subject="solver", text="the solver has ended")
+    assert codes([slow, other]) == [("service_gone", []), ("camera_slow", [])]
+
+
 def test_a_dark_camera_explains_its_own_markers_and_no_others() -> None:
     dark = told("camera_dark", "pi_tracker/left", "left")
     assert codes([told("no_points"), told("marker_not_seen", "pi_tracker/left"), dark]) == [

@@ -50,6 +50,12 @@ def test_what_is_mended_alike_stands_together():
     assert both.count("lower fps or size_px") == 1
 
 
+def test_problems_push_notes_aside_and_nothing_is_lost():
+    every = found(fault("camera_moved", "left has moved", "left"), fault("disk_low", "low"))
+    assert "low" not in banner(every, NOW_NS)
+    assert "low (says fusion)" in following(every)
+
+
 def test_what_follows_is_told_apart():
     both = found(
         fault("stream_slow", "rhot/sim/hand/*/points: 0.0 Hz received of 30.0 expected"),
@@ -73,7 +79,8 @@ def test_strangers_cannot_write_html():
 
 def test_what_is_too_much_is_counted():
     many = found(*(fault("event", str(n)) for n in range(30)))
-    assert "27 more" in banner(many, NOW_NS)
+    assert banner(many, NOW_NS).count("(says fusion)") == 3
+    assert following(many).count("(says fusion)") == 27
     slow = found(fault("camera_moved"), *(fault("stream_slow", str(n)) for n in range(60)))
     assert "30 more" in following(slow)
 

@@ -49,16 +49,18 @@ def test_waiting_is_said_with_what_to_look_at(
     assert "right hand: waiting for a camera's tracker: none is heard" in said
     assert "waiting for the object cup" in said
     assert "camera left is not drawn" in said
-    for service, next_missing in (
-        ("pi_tracker", "waiting for fusion"),
-        ("fusion", "waiting for the solver"),
-        ("solver", "hold it into the view of two cameras"),
+    for service, instance, next_missing in (
+        ("pi_tracker", "left", "waiting for camera right: its tracker is not heard"),
+        ("pi_tracker", "right", "waiting for fusion"),
+        ("fusion", "main", "waiting for the solver"),
+        ("solver", "main", "hold it into the view of two cameras"),
     ):
-        starting = make_health(service, state="starting")
-        model.health(starting, 0.0)
-        assert ": it is starting ..." in texts.status(config, model.view(0.0), [])
-        model.health(make_health(service), 0.0)
+        model.health(make_health(service, instance=instance), 0.0)
         assert next_missing in texts.status(config, model.view(0.0), [])
+    for service, waited_for in (("fusion", "what cameras see"), ("simulator", "the simulator")):
+        model.health(make_health(service, state="starting"), 0.0)
+        assert f"{waited_for}: it is starting ..." in texts.status(config, model.view(0.0), [])
+        model.health(make_health(service), 0.0)
 
 
 def test_the_legend_has_each_colour_that_means_something() -> None:
