@@ -4,6 +4,7 @@ scouting.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
