@@ -31,7 +31,8 @@ from tracker import rms, view_pair
 
 from rhot.files.calibration import load_colors
 from rhot.files.config import RigConfig, load_rig
-from rhot.files.rig_tables import Fusion, Simulator, Tracker
+from rhot.files.rig_tables import Fusion, Tracker
+from rhot.files.simulator_table import Simulator
 from rhot.messages import MarkerFrame
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep

@@ -33,17 +33,19 @@ from rhot.bus.queries import (
     Asker,
     Handler,
     RequestHandler,
+    Tasks,
     decoded,
     only_answer,
 )
 from rhot.bus.security.credentials import plain
-from rhot.bus.stats import StreamStats
+from rhot.bus.stats import Direction, StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
 from rhot.errors import BusError
 from rhot.topics import Kind, Topic
 
 T = TypeVar("T")
+Listener = TypeVar("Listener", Subscription[Any], RawSubscription)
 log = logging.getLogger("rhot.bus")
 
 __all__ = [
@@ -118,7 +120,7 @@ class Bus:
         self._loop = asyncio.get_running_loop()
         self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = Tasks(self._loop)
 
     @property
     def routers(self) -> list[str]:
@@ -132,7 +134,7 @@ class Bus:
             raise BusError(
                 f"cannot publish on the pattern {key}; give {list(topic.fields)} and the rig's name"
             )
-        publisher = Publisher(self._session, topic, key, self._stats(topic, key, names, "out"))
+        publisher = Publisher(self._session, topic, key, self._stats(topic, names, "out"))
         self._open.append(publisher)
         return publisher
 
@@ -154,19 +156,13 @@ class Bus:
 
     def raw(self, topic: Topic[T], n: int, **names: str) -> RawSubscription:
         """Undecoded samples through a queue of n that drops the oldest."""
-        key = topic.key(self.rig, **names)
-        subscription = RawSubscription(self._loop, self._stats(topic, key, names, "in"), n)
-        subscription.declare(self._session, key)
-        self._open.append(subscription)
-        return subscription
+        stats = self._stats(topic, names, "in")
+        return self._declared(RawSubscription(self._loop, stats, n))
 
     def others(self, topic: Topic[T], n: int, **names: str) -> RawSubscription:
         """As raw(), of what other sessions publish alone; it is no stream of health."""
-        key = topic.key(self.rig, **names)
-        subscription = RawSubscription(self._loop, StreamStats(topic, key, names, "in"), n)
-        subscription.declare(self._session, key, zenoh.Locality.REMOTE)
-        self._open.append(subscription)
-        return subscription
+        stats = StreamStats(topic, topic.key(self.rig, **names), names, "in")
+        return self._declared(RawSubscription(self._loop, stats, n), zenoh.Locality.REMOTE)
 
     def _subscribe(
         self,
@@ -175,17 +171,17 @@ class Bus:
         names: dict[str, str],
         expected: frozenset[str] = frozenset(),
     ) -> Subscription[T]:
-        key = topic.key(self.rig, **names)
-        stats = self._stats(topic, key, names, "in")
-        subscription = Subscription(self._loop, topic, stats, n, expected)
-        subscription.declare(self._session, key)
-        self._open.append(subscription)
-        return subscription
+        stats = self._stats(topic, names, "in")
+        return self._declared(Subscription(self._loop, topic, stats, n, expected))
 
-    def _stats(
-        self, topic: Topic[Any], key: str, names: dict[str, str], direction: Any
-    ) -> StreamStats:
-        stats = StreamStats(topic, key, names, direction)
+    def _declared(self, one: Listener, origin: zenoh.Locality = zenoh.Locality.ANY) -> Listener:
+        """A subscription to its own key, from now on and until the session ends."""
+        one.declare(self._session, origin)
+        self._open.append(one)
+        return one
+
+    def _stats(self, topic: Topic[Any], names: dict[str, str], direction: Direction) -> StreamStats:
+        stats = StreamStats(topic, topic.key(self.rig, **names), names, direction)
         if topic.kind is Kind.STREAM:
             self.streams.append(stats)
         return stats
@@ -236,29 +232,16 @@ class Bus:
         on the event loop. It returns a message, bytes, or None for no answer; what it raises goes
         to the asker as a Refusal.
         """
-        key = topic.key(self.rig, **names)
-        on_query = Answerer(topic, key, self._spawn_threadsafe).plain(handler)
-        self._open.append(self._session.declare_queryable(key, on_query))
+        answerer = Answerer(topic, topic.key(self.rig, **names), self._tasks.start)
+        self._open.append(answerer.declare(self._session, answerer.plain(handler)))
 
     def answer_requests(self, topic: Topic[Any], handler: RequestHandler, **names: str) -> None:
         """As answer(), with a coroutine function that takes the request's payload.
 
         The payload is empty for a plain question. A request larger than max_bytes gets no answer.
         """
-        key = topic.key(self.rig, **names)
-        on_query = Answerer(topic, key, self._spawn_threadsafe).with_request(handler)
-        self._open.append(self._session.declare_queryable(key, on_query))
-
-    def _spawn_threadsafe(self, coroutine: Any) -> None:
-        try:
-            self._loop.call_soon_threadsafe(self._spawn, coroutine)
-        except RuntimeError:  # the loop is gone
-            coroutine.close()
-
-    def _spawn(self, coroutine: Any) -> None:
-        task = self._loop.create_task(coroutine)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        answerer = Answerer(topic, topic.key(self.rig, **names), self._tasks.start)
+        self._open.append(answerer.declare(self._session, answerer.with_request(handler)))
 
     def alive(self, service: str, instance: str) -> None:
         """Declare this service alive until the session ends."""
@@ -292,8 +275,7 @@ class Bus:
 
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""
-        for task in self._tasks:
-            task.cancel()
+        self._tasks.cancel()
         for entity in self._open:
             with contextlib.suppress(zenoh.ZError):
                 entity.undeclare()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -131,13 +131,44 @@ def only_answer(topic: Topic[T], key: str, replies: Replies) -> T:
     raise BusError(f"nobody answers on {key}; `rhot top` shows which services are alive")
 
 
+class Tasks:
+    """Coroutines that Zenoh's threads start on the event loop."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._running: set[asyncio.Task[None]] = set()
+
+    def start(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        """From any thread; nothing once the loop is gone."""
+        try:
+            self._loop.call_soon_threadsafe(self._run, coroutine)
+        except RuntimeError:
+            coroutine.close()
+
+    def _run(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(coroutine)
+        self._running.add(task)
+        task.add_done_callback(self._running.discard)
+
+    def cancel(self) -> None:
+        """End all of them."""
+        for task in self._running:
+            task.cancel()
+
+
 class Answerer:
     """Answers the queries of one key: coroutines on the event loop, functions in Zenoh's thread."""
 
     def __init__(
-        self, topic: Topic[Any], key: str, spawn: Callable[[Awaitable[None]], None]
+        self, topic: Topic[Any], key: str, spawn: Callable[[Coroutine[Any, Any, None]], None]
     ) -> None:
         self._topic, self._key, self._spawn = topic, key, spawn
+
+    def declare(
+        self, session: zenoh.Session, on_query: Callable[[zenoh.Query], None]
+    ) -> zenoh.Queryable[Any]:
+        """Answer this key's queries so from now on."""
+        return session.declare_queryable(self._key, on_query)
 
     def plain(self, handler: Handler) -> Callable[[zenoh.Query], None]:
         """A Zenoh callback for a handler without a request: a function, or a coroutine function."""

@@ -13,6 +13,7 @@ from typing import Literal
 from rhot.messages.health import StreamHealth
 from rhot.topics import Topic
 
+Direction = Literal["in", "out"]
 # A beat of 1 s at 1 kHz keeps every second latency; more would cost more than the percentiles are
 # worth.
 _LATENCIES = 512
@@ -25,7 +26,7 @@ class StreamStats:
     topic: Topic
     key: str
     names: dict[str, str]
-    direction: Literal["in", "out"]
+    direction: Direction
     count: int = 0
     dropped: int = 0
     rejected: int = 0

@@ -71,12 +71,8 @@ class RawSubscription(Buffer[Sample]):
         # The second it is, and how many of other keys it had.
         self._second, self._strangers = 0, 0
 
-    def declare(
-        self,
-        session: zenoh.Session,
-        key: str,
-        origin: zenoh.Locality = zenoh.Locality.ANY,
-    ) -> None:
+    def declare(self, session: zenoh.Session, origin: zenoh.Locality) -> None:
+        key = self.stats.key
         self._entity = session.declare_subscriber(key, self._on_sample, allowed_origin=origin)
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
@@ -137,8 +133,8 @@ class Subscription(Generic[T]):
         # What a key says that its messages say as well: worked out once a key, not once a message.
         self._said: dict[str, tuple[tuple[str, str], ...]] = {}
 
-    def declare(self, session: zenoh.Session, key: str) -> None:
-        self._raw.declare(session, key)
+    def declare(self, session: zenoh.Session, origin: zenoh.Locality) -> None:
+        self._raw.declare(session, origin)
 
     @property
     def waiting(self) -> int:

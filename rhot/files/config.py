@@ -8,9 +8,7 @@ name.
 
 from __future__ import annotations
 
-import difflib
 import tomllib
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
@@ -30,14 +28,15 @@ from rhot.files.rig_tables import (
     ObjectTable,
     Recorder,
     RigTable,
-    Simulator,
     Solver,
     Table,
     Tracker,
     Viewer,
 )
+from rhot.files.simulator_table import Simulator
+from rhot.files.table_rules import joints_problem, markers_problem, shape_problem
 from rhot.files.viewer_access import access_problem
-from rhot.hand import CHAIN_JOINTS, DIGITS, HANDS, JOINTS, LANDMARKS
+from rhot.hand import CHAIN_JOINTS, DIGITS, HANDS, JOINTS
 from rhot.topics import Rate
 
 
@@ -195,26 +194,6 @@ def _convert(data: dict[str, Any], path: Path) -> RigConfig:
         raise ConfigError(f"{path}: {explain(str(error), RigConfig)}") from None
 
 
-def joints_problem(table: HandTable) -> str | None:
-    """What is wrong with a hand's joints and fingers together; None if nothing is."""
-    if table.fingers and not table.joints:
-        return 'has fingers, but no joints; write joints = "red", or name each dot in markers'
-    twice = sorted({name for name in table.fingers if table.fingers.count(name) > 1})
-    return f"fingers has {twice[0]!r} twice" if twice else None
-
-
-def sharing_problem(table: HandTable) -> str | None:
-    """What is wrong with landmarks of a hand that have one colour; None if nothing is."""
-    wearers = Counter(table.markers.values())
-    for landmark, color in table.markers.items():
-        if wearers[color] > 1 and landmark in ("palm", "wrist"):
-            return (
-                f"colour {color!r} is used twice, once for {landmark}; only joints of fingers can "
-                "share one"
-            )
-    return None
-
-
 def with_joints(config: RigConfig) -> RigConfig:
     """The same with `joints` of each hand written out as markers."""
     hands: dict[Literal["left", "right"], HandTable] = {}
@@ -234,20 +213,8 @@ def _check(config: RigConfig, path: Path) -> None:
     _unique([o.name for o in config.object], "[[object]] name", path)
     _unique([o.serial for o in config.object], "[[object]] serial", path)
     for hand, table in config.hand.items():
-        where = f"{path}: [hand.{hand}.markers]"
-        for landmark in table.markers:
-            if landmark not in LANDMARKS:
-                near = difflib.get_close_matches(landmark, LANDMARKS, n=1)
-                hint = f"did you mean {near[0]!r}? " if near else ""
-                raise ConfigError(
-                    f"{where}: unknown landmark {landmark!r}; {hint}Valid: {', '.join(LANDMARKS)}"
-                )
-        if wrong := sharing_problem(table):
-            raise ConfigError(f"{where}: {wrong}")
-        if not table.markers:
-            raise ConfigError(
-                f'{where}: is empty; name at least one landmark, e.g. index_tip = "blue"'
-            )
+        if wrong := markers_problem(table):
+            raise ConfigError(f"{path}: [hand.{hand}.markers]: {wrong}")
     _unique(
         [
             *(c for h in HANDS if h in config.hand for c in set(config.hand[h].markers.values())),
@@ -257,36 +224,10 @@ def _check(config: RigConfig, path: Path) -> None:
         path,
     )
     for item in config.object:
-        wrong = shape_problem(item)
-        if wrong:
+        if wrong := shape_problem(item):
             raise ConfigError(f"{path}: [[object]] {item.name!r}: {wrong}")
     if wrong := access_problem(config.viewer):
         raise ConfigError(f"{path}: {wrong}")
-
-
-# How many lengths size_m has, and what they are.
-_SIZES = {
-    "box": (3, "[x, y, z]"),
-    "cylinder": (2, "[diameter, height along y]"),
-    "sphere": (1, "[diameter]"),
-}
-
-
-def shape_problem(item: ObjectTable) -> str | None:
-    """What is wrong with an object's shape, size_m and mesh together; None if nothing is."""
-    if item.mesh and item.shape != "mesh":
-        return f'has mesh = {item.mesh!r} and shape = {item.shape!r}; write shape = "mesh"'
-    if item.shape == "mesh" and not item.mesh:
-        return 'shape = "mesh" needs mesh = "FILE.glb" (or .stl), relative to rig.toml'
-    count, meaning = _SIZES.get(item.shape, (0, "nothing"))
-    if len(item.size_m) != count:
-        kind = f"shape = {item.shape!r}" if item.shape else "no shape"
-        return (
-            f"size_m has {len(item.size_m)} lengths; with {kind} it has {count}: {meaning}"
-            if count
-            else f"size_m has {len(item.size_m)} lengths; with {kind} there are none"
-        )
-    return None
 
 
 def _unique(names: list[str], what: str, path: Path) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rhot.errors import CalibrationError, ConfigError
-from rhot.files.config import shape_problem
 from rhot.files.rig_tables import ObjectTable
+from rhot.files.table_rules import shape_problem
 from rhot.geometry.solids import Box, Cylinder, Solid, Sphere
 from rhot.geometry.transforms import Array
 

@@ -16,7 +16,10 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+import viser
 
 from rhot import clock, topics
 from rhot.bus.bus import Bus
@@ -27,9 +30,11 @@ from rhot.process.service import Service
 from rhot.topics import Topic
 from rhot.watch.follow import watching
 from rhot.watch.rig_monitor import RigMonitor
+from rhot.watch.rig_state import RigState
 from services.viewer.guide.captions import Captions
 from services.viewer.guide.section import GuideSection
 from services.viewer.live.model import ViewModel
+from services.viewer.live.views import View
 from services.viewer.pages import RigPage, announced, others
 from services.viewer.panel.banner import Banner
 from services.viewer.panel.fault_texts import starting
@@ -43,7 +48,7 @@ from services.viewer.recording.section import RecordingSection
 from services.viewer.scene.layers import LAYERS, LayerName
 from services.viewer.scene.scene import LiveScene
 from services.viewer.server import open_server
-from services.viewer.setup import read_setup
+from services.viewer.setup import Setup, read_setup
 from services.viewer.visits.layer import Layer
 from services.viewer.visits.section import Section, Seen
 from services.viewer.visits.visits import Visits
@@ -63,8 +68,21 @@ class _Page:
     layers: Mapping[LayerName, Layer]
     history: History
     captions: Captions
+    # Whether it shows a recording, not the rig.
+    replayed: bool
     # Tells what is stale: while a replay is paused, its time stands still.
     clock_s: Callable[[], float]
+
+    def draw(self, view: View, now_s: float) -> None:
+        """What all see."""
+        self.scene.show(view, {name for name, layer in self.layers.items() if layer.wanted})
+        self.history.take(view, now_s)
+
+    def tell(self, view: View, now_s: float, state: RigState, now_ns: int) -> None:
+        """Each visitor's texts."""
+        # Of a recording, services that were not recorded are not missed.
+        faults = [one for one in state.faults if one.teller or not self.replayed]
+        self.visits.update(Seen(view, faults, now_s, now_ns, starting(state.services)))
 
 
 async def serve(service: Service) -> None:
@@ -73,11 +91,7 @@ async def serve(service: Service) -> None:
     replay = ReplayPage(service, link, lambda page: _show(page, link, lambda: ""))
     for running in (link.run(), replay.run()):
         service.tasks.create_task(running)
-
-    def replay_address() -> str:
-        return _address(service, replay.port) if replay.port else ""
-
-    await _show(service, link, replay_address)
+    await _show(service, link, lambda: _address(service, replay.port) if replay.port else "")
 
 
 def _address(service: Service, port: int) -> str:
@@ -87,55 +101,63 @@ def _address(service: Service, port: int) -> str:
 async def _show(service: Service, link: RecorderLink, replay_address: Callable[[], str]) -> None:
     """One page, for ever: of the rig, or of what is replayed under another name."""
     config = service.config
-    # Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
-    names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
-    names += [f"hand.{hand}.json" for hand in config.hand]
-    files = [config.calibration_dir / name for name in names]
-    setup = load_and_watch(service, files, lambda: read_setup(config))
+    setup = load_and_watch(service, _watched(config), lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
-    with contextlib.ExitStack() as stack:
-        server = stack.enter_context(open_server(config.viewer))
+    with open_server(config.viewer) as server:
         own = RigPage(config.rig.name, config.viewer, server.get_port(), socket.gethostname())
-        if not _replays(service):
-            stack.enter_context(announced(own))
-        layers = {name: Layer(f"/{name}") for name in LAYERS}
-        history = History(config)
-        sections: list[Section] = [
-            LiveSection(
-                config,
-                setup.notes,
-                PictureFeed(service),
-                layers,
-                lambda: others(own),
-                replayed=_replays(service),
-            ),
-            PlotsSection(config, history),
-            RecordingSection(link, config.rig.name, replay_address),
-        ]
-        # Nobody answers for cameras of what is replayed.
-        sections += [] if _replays(service) else [GuideSection(service)]
-        page = _Page(
-            Visits(server, Banner, sections),
-            LiveScene(server, config, setup.cameras, setup.paints, setup.looks, setup.models),
-            layers,
-            history,
-            Captions(server),
-            link.now_s if _replays(service) else time.monotonic,
-        )
+        page = _page(service, server, setup, link, own, replay_address)
         service.values["port"] = own.port
         log.info("live view at %s", _address(service, own.port))
         service.ready()
         try:
-            while True:
-                await page.visits.anybody.wait()
-                await _show_live(service, page)
+            with contextlib.nullcontext() if page.replayed else announced(own):
+                while True:
+                    await page.visits.anybody.wait()
+                    await _show_live(service, page)
         finally:
             page.visits.close()
 
 
-def _replays(service: Service) -> bool:
-    return service.instance == INSTANCE
+def _watched(config: RigConfig) -> list[Path]:
+    """The files that a page begins anew with.
+
+    Not the colours, which this page itself changes: a marker is drawn in a colour it had before.
+    """
+    names = ["rig.json", "objects.json", *(f"{camera.name}.lens.json" for camera in config.camera)]
+    names += [f"hand.{hand}.json" for hand in config.hand]
+    return [config.calibration_dir / name for name in names]
+
+
+def _page(
+    service: Service,
+    server: viser.ViserServer,
+    setup: Setup,
+    link: RecorderLink,
+    own: RigPage,
+    replay_address: Callable[[], str],
+) -> _Page:
+    """The page with its tabs: those of a rig, or those of a recording."""
+    config, replayed = service.config, service.instance == INSTANCE
+    layers = {name: Layer(f"/{name}") for name in LAYERS}
+    feed, history = PictureFeed(service), History(config)
+    sections: list[Section] = [
+        LiveSection(config, setup.notes, feed, layers, lambda: others(own), replayed=replayed),
+        PlotsSection(config, history),
+        RecordingSection(link, config.rig.name, replay_address),
+    ]
+    # Nobody answers for cameras of what is replayed.
+    if not replayed:
+        sections.append(GuideSection(service))
+    return _Page(
+        Visits(server, Banner, sections),
+        LiveScene(server, config, setup.cameras, setup.paints, setup.looks, setup.models),
+        layers,
+        history,
+        Captions(server),
+        replayed,
+        link.now_s if replayed else time.monotonic,
+    )
 
 
 async def _show_live(service: Service, page: _Page) -> None:
@@ -152,17 +174,10 @@ async def _show_live(service: Service, page: _Page) -> None:
         while page.visits.anybody.is_set():
             now_s, tick_s = page.clock_s(), time.monotonic()
             view = model.view(now_s)
-            page.scene.show(view, {name for name, layer in page.layers.items() if layer.wanted})
-            page.history.take(view, now_s)
+            page.draw(view, now_s)
             if tick_s >= text_due_s:
-                text_due_s = tick_s + _TEXT_S
-                now_ns = clock.now_ns()
-                state = rig.state(now_ns)
-                faults, waits = state.faults, starting(state.services)
-                if _replays(service):
-                    # Services that were not recorded are not missed.
-                    faults = [one for one in faults if one.teller]
-                page.visits.update(Seen(view, faults, now_s, now_ns, waits))
+                text_due_s, now_ns = tick_s + _TEXT_S, clock.now_ns()
+                page.tell(view, now_s, rig.state(now_ns), now_ns)
             # By the clock: what drawing takes is not added to each picture's time.
             due_s = max(due_s, tick_s) + 1.0 / service.config.viewer.rate_hz
             await asyncio.sleep(due_s - time.monotonic())

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from rhot.errors import RhotError
-from rhot.files.config import RigConfig, shape_problem
+from rhot.files.config import RigConfig
 from rhot.files.shapes import solid_of
+from rhot.files.table_rules import shape_problem
 from services.cli.check.problems import Problem, error
 
 

@@ -17,13 +17,11 @@ import msgspec
 from rhot.errors import ConfigError
 from rhot.files.config import (
     RigConfig,
-    joints_problem,
     load_rig,
-    shape_problem,
-    sharing_problem,
     with_joints,
 )
 from rhot.files.config_errors import explain
+from rhot.files.table_rules import joints_problem, shape_problem, sharing_problem
 from rhot.hand import LANDMARKS
 from services.cli.check.problems import Problem, error
 
@@ -113,7 +111,7 @@ def _clean_dict(
 
 
 def _rules(config: RigConfig, path: Path, known: list[Problem]) -> list[Problem]:
-    """The rules of rhot.files.config._check, which names one mistake at a time, for all of them.
+    """The rules that `load_rig` names one breach of at a time, for all breaches.
 
     known are the problems so far.
     """

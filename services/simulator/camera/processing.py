@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rhot.files.rig_tables import Simulator
+from rhot.files.simulator_table import Simulator
 
 Bytes = npt.NDArray[np.uint8]
 

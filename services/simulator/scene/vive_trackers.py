@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rhot.files.rig_tables import Simulator
+from rhot.files.simulator_table import Simulator
 from rhot.geometry.transforms import (
     Array,
     inverse,

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from rhot.files.config import RigConfig
 from rhot.watch.object_words import ADVICE, WORDS, holding, touching
-from services.viewer.live.model import ObjectView, View
+from services.viewer.live.views import ObjectView, View
 
 
 def object_lines(config: RigConfig, view: View) -> list[str]:

@@ -13,7 +13,7 @@ import viser
 from rhot.files.config import RigConfig
 from rhot.hand import HandName
 from rhot.messages.camera import SeenInPicture
-from services.viewer.live.model import View
+from services.viewer.live.views import View
 from services.viewer.panel import texts
 from services.viewer.pictures.feed import PictureFeed, Take
 from services.viewer.pictures.marks import Marks

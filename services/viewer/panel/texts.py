@@ -15,9 +15,9 @@ from rhot.files.config import RigConfig
 from rhot.hand import DIGIT_ANGLES, DIGITS, HandName
 from rhot.messages import HandPose
 from rhot.messages.health import Health, StreamHealth
-from services.viewer.live.model import View
 from services.viewer.live.object_texts import object_lines
 from services.viewer.live.palette import LEGEND
+from services.viewer.live.views import View
 from services.viewer.panel.words import sentence, service_words, stream_words, text
 
 # Rows of the rates table: a rig of two Pis has some twenty streams.

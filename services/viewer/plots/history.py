@@ -15,7 +15,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGIT_ANGLES, DIGITS
 from rhot.messages.health import Health
-from services.viewer.live.model import View
+from services.viewer.live.views import View
 
 # Half a minute on 350 pixels; more samples than pixels would not be seen.
 SPAN_S, _RATE_HZ = 30.0, 12.0

@@ -9,8 +9,8 @@ import viser
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel
-from services.viewer.live.model import HandView
 from services.viewer.live.palette import BACKGROUND, LIMIT, LINE, SOURCE_RGB
+from services.viewer.live.views import HandView
 from services.viewer.scene.limit_lines import HandLimits
 from services.viewer.scene.shapes import (
     BONES,

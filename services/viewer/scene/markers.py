@@ -12,8 +12,8 @@ import numpy as np
 import viser
 
 from rhot.geometry.transforms import Array
-from services.viewer.live.model import PointView
 from services.viewer.live.palette import SOURCE_RGB, UNKNOWN, Rgb
+from services.viewer.live.views import PointView
 from services.viewer.scene.shapes import ellipsoids, f32
 from services.viewer.scene.spheres import HIDDEN_M, add_spheres, place, put, reveal
 

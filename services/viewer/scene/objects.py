@@ -21,9 +21,9 @@ from rhot.geometry.transforms import (
     rotation_x,
     transform,
 )
-from services.viewer.live.model import ObjectView
 from services.viewer.live.object_texts import label
 from services.viewer.live.palette import SOURCE_RGB, TOUCHED, TRACKER
+from services.viewer.live.views import ObjectView
 from services.viewer.scene.object_looks import ObjectLook
 from services.viewer.scene.spheres import reveal
 

@@ -19,8 +19,8 @@ import viser
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName, default_hand
-from services.viewer.live.model import HandView, PointView, View
 from services.viewer.live.palette import Rgb
+from services.viewer.live.views import HandView, PointView, View
 from services.viewer.scene.hand import Limits, Stick, Trails
 from services.viewer.scene.layers import DEFAULT, LayerName, path
 from services.viewer.scene.markers import Markers

@@ -15,8 +15,8 @@ from typing import Any
 import viser
 
 from rhot.hand import HandName
-from services.viewer.live.model import HandView
 from services.viewer.live.palette import SKIN, TOUCH
+from services.viewer.live.views import HandView
 from services.viewer.scene.skin_shape import LitSkin, SkinShape, fit_skin
 from services.viewer.scene.spheres import put, reveal
 

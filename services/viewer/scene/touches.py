@@ -7,8 +7,8 @@ import viser
 
 from rhot.hand import JOINT_INDEX, HandName
 from rhot.messages.objects import HandPart
-from services.viewer.live.model import View
 from services.viewer.live.palette import CONTACT, TOUCH
+from services.viewer.live.views import View
 from services.viewer.scene.spheres import HIDDEN_M, add_spheres, place, reveal
 
 # Two hands with five tips and a palm each, as many as a message may hold for one object.

@@ -14,7 +14,7 @@ from typing import Protocol
 import viser
 
 from rhot.watch.rig_state import StandingFault
-from services.viewer.live.model import View
+from services.viewer.live.views import View
 
 
 @dataclass(frozen=True)

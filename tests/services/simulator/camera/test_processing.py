@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.files.rig_tables import Simulator
+from rhot.files.simulator_table import Simulator
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.camera.processing import processed
 from services.simulator.render.renderer import Renderer

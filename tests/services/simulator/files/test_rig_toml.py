@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from rhot.files import rig_tables as tables
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import HandTable, ObjectTable, World
+from rhot.files.simulator_table import Simulator
 from rhot.hand import LANDMARKS
 from services.simulator.files.rig_toml import rig_toml
 
@@ -100,7 +101,7 @@ OTHER_TABLES = {
     ),
     "objects": st.builds(tables.Objects, source=TEXTS, rate_hz=numbers(TINY, 1000.0)),
     "simulator": st.builds(
-        tables.Simulator,
+        Simulator,
         scene=TEXTS,
         seed=numbers(0, 2**63 - 1, whole=True),
         speed=numbers(TINY, 10.0),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rhot.errors import CalibrationError, ConfigError
-from rhot.files.rig_tables import CameraTable, HandTable, ObjectTable, Simulator, World
+from rhot.files.rig_tables import CameraTable, HandTable, ObjectTable, World
+from rhot.files.simulator_table import Simulator
 from rhot.geometry.transforms import angle_between, apply, rotation_x, transform
 from rhot.hand import TIPS
 from services.simulator.scene.catalog import SCENES

@@ -154,7 +154,7 @@ async def test_pictures_are_asked_for_only_while_the_page_shows_one(
         page = await open_page(service, browse)
         await until(lambda: tracker.pictures_asked >= 2)
         page.browser.close()
-        await until(lambda: not service.bus._tasks)
+        await until(lambda: not service.bus._tasks._running)
         count = tracker.pictures_asked
         await asyncio.sleep(0.8)
         assert tracker.pictures_asked <= count + 1

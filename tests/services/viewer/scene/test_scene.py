@@ -15,7 +15,8 @@ from rhot.files.rig_tables import Viewer
 from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector
 from rhot.hand import JOINTS, default_hand, forward
 from rhot.messages import FingerAngles, HandPose
-from services.viewer.live.model import View, ViewModel
+from services.viewer.live.model import ViewModel
+from services.viewer.live.views import View
 from services.viewer.scene.layers import DEFAULT
 from services.viewer.scene.scene import LiveScene
 from services.viewer.scene.skin_shape import fit_skin
