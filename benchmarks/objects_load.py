@@ -149,6 +149,14 @@ async def collect(objects: Any, payloads: list[tuple[bytes, int]]) -> None:
         payloads += [(sample.payload, sample.received_ns)]
 
 
+def report(figures: dict[str, float], path: Path | None) -> None:
+    """Print the table, and write it."""
+    for name, value in figures.items():
+        print(f"{name:<22} {value:>12g}")
+    if path:
+        path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+
+
 def main() -> None:
     """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -159,11 +167,7 @@ def main() -> None:
     if options.send:
         send(options.send, options.seconds)
         return
-    figures = asyncio.run(load(options.seconds))
-    for name, value in figures.items():
-        print(f"{name:<22} {value:>12g}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    report(asyncio.run(load(options.seconds)), options.json)
 
 
 if __name__ == "__main__":

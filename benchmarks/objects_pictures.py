@@ -7,8 +7,6 @@ noise, outliers and lateness of benchmarks/objects_registration.py on the tracke
 
 from __future__ import annotations
 
-import argparse
-import json
 import shutil
 import subprocess
 import sys
@@ -18,6 +16,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from objects_registration import as_command
 
 from rhot.files.calibration import load_objects, load_rig_cameras
 from rhot.files.config import load_rig
@@ -103,17 +102,5 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
     return figures
 
 
-def main() -> int:
-    """Run, print, and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="recordings")
-    options = parser.parse_args()
-    figures = measure(options.seeds)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(as_command(__doc__, measure, SEEDS))

@@ -16,6 +16,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -198,17 +199,17 @@ def _summary(runs: list[Run]) -> dict[str, Any]:
     }
 
 
-def main() -> int:
-    """Run, print, and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def as_command(about: str, measured: Callable[[int], dict[str, Any]], seeds: int) -> int:
+    """A benchmark of so many recordings of each kind, as a command: measure, print, and write."""
+    parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, help="write the figures to this file")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="recordings of each kind")
+    parser.add_argument("--seeds", type=int, default=seeds, help="recordings of each kind")
     options = parser.parse_args()
-    figures = measure(options.seeds)
+    figures = measured(options.seeds)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(as_command(__doc__, measure, SEEDS))

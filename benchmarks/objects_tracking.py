@@ -20,14 +20,13 @@ from __future__ import annotations
 import argparse
 import asyncio
 import gzip
-import json
 import math
 import os
 import sys
 from pathlib import Path
 
 import numpy as np
-from objects_load import load
+from objects_load import load, report
 
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import Objects as ObjectsTable
@@ -160,11 +159,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    figures = measure(options.seconds)
-    for name, value in figures.items():
-        print(f"{name:<22} {value:>12g}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    report(measure(options.seconds), options.json)
 
 
 if __name__ == "__main__":

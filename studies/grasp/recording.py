@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from rhot.errors import CaptureError
+from studies.grasp.json_file import read_json
 
 JOINTS = ("mcp", "pip", "dip", "tip")
 ANGLES = ("mcp", "pip", "dip")
@@ -71,11 +71,4 @@ def save_recording(path: Path, recording: GraspRecording) -> None:
 
 def load_recording(path: Path) -> GraspRecording:
     """Raises CaptureError that says what is wrong and where."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=GraspRecording)
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read: {error.strerror}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise CaptureError(
-            f"{path}: is no recording of a finger as a grasp study writes it ({error})"
-        ) from None
+    return read_json(path, GraspRecording, "no recording of a finger as a grasp study writes it")

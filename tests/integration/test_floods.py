@@ -20,7 +20,7 @@ from rhot import clock, topics
 from rhot.bus.bus import Bus, open_bus
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import MarkerFrame
-from rhot.messages.health import Health
+from testing.sample_health import beat
 from testing.secured_rig import SecuredRig
 from testing.synthetic_points import COLORS, MovingHand, SyntheticRig, frames
 
@@ -59,21 +59,7 @@ FRAME = MarkerFrame(
     size_px=(640, 480),
     markers=[],
 )
-HEALTH = Health(
-    service="stranger",
-    instance="NAME",
-    stamp_ns=clock.now_ns(),
-    version="1",
-    pid=1,
-    uptime_s=1.0,
-    state="running",
-    streams=[],
-    errors=0,
-    last_error="",
-    cpu_percent=0.0,
-    rss_mb=1.0,
-    values={},
-)
+HEALTH = beat("stranger", "NAME", stamp_ns=clock.now_ns(), streams=[])
 
 
 class Flooded:

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rhot.errors import CalibrationError
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.messages import MarkerFrame
+from services.calibrator.bundle.picture_size import check_size
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -79,7 +79,7 @@ def sightings(
     for frame in frames:
         if frame.camera not in cameras:
             continue
-        _check_size(frame, cameras[frame.camera])
+        check_size(frame, cameras[frame.camera])
         number = names.index(frame.camera)
         counts[number] += 1
         begin_ns = frame.stamp_ns - frame.clock_offset_ns
@@ -116,13 +116,3 @@ def _gather(
         color, cameras, counts, camera, stamps_ns, numbers[:, :2], rays, numbers[:, 2]
     )
     return found.only(np.isfinite(rays).all(axis=1))
-
-
-def _check_size(frame: MarkerFrame, camera: Camera) -> None:
-    if tuple(frame.size_px) == tuple(camera.size_px):
-        return
-    recorded, calibrated = ("{}x{}".format(*size) for size in (frame.size_px, camera.size_px))
-    raise CalibrationError(
-        f"camera {frame.camera!r} sends pictures of {recorded}, its lens was calibrated at "
-        f"{calibrated}: set that size, or run `rhot calibrate stereo` at this one"
-    )

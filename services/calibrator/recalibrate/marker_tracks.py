@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rhot.errors import CalibrationError
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.messages import MarkerFrame
 from services.calibrator.bundle.lens_model import lens_vector, rays_from_pixels
+from services.calibrator.bundle.picture_size import check_size
 from services.calibrator.recalibrate.track import Track
 
 # Half the step of the numerical derivative by time, s: short against a frame.
@@ -64,7 +64,7 @@ def build_tracks(frames: Iterable[MarkerFrame], cameras: Mapping[str, Camera]) -
         camera = cameras.get(frame.camera)
         if camera is None:
             continue
-        _check_size(frame, camera)
+        check_size(frame, camera)
         begin_ns = frame.stamp_ns if begin_ns is None else begin_ns
         # Relative to the first frame: float64 cannot hold nanoseconds since 1970.
         start_s = (frame.stamp_ns - frame.clock_offset_ns - begin_ns) * 1e-9
@@ -80,16 +80,6 @@ def build_tracks(frames: Iterable[MarkerFrame], cameras: Mapping[str, Camera]) -
         tracks.append({color: _track(lens, samples) for color, samples in by_color.items()})
     colors = sorted({color for by_color in rows.values() for color in by_color})
     return MarkerTracks(colors, tracks, np.unique(instants_s))
-
-
-def _check_size(frame: MarkerFrame, camera: Camera) -> None:
-    if tuple(frame.size_px) == tuple(camera.size_px):
-        return
-    recorded, calibrated = ("{}x{}".format(*size) for size in (frame.size_px, camera.size_px))
-    raise CalibrationError(
-        f"camera {frame.camera!r}: the recording is {recorded}, its lens was calibrated at "
-        f"{calibrated}; record at that size, or run `rhot calibrate stereo` at this one"
-    )
 
 
 def _track(lens: Array, rows: list[tuple[float, float, float]]) -> Track:

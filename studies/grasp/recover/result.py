@@ -11,8 +11,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from rhot.errors import CaptureError
 from rhot.geometry.transforms import Array
+from studies.grasp.json_file import read_json
 from studies.grasp.recover.laws import LawSupport
 
 Numbers = list[float | None]
@@ -82,11 +82,4 @@ def save_recovery(path: Path, recovery: Recovery) -> None:
 
 def load_recovery(path: Path) -> Recovery:
     """Raises CaptureError."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Recovery)
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read: {error.strerror}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise CaptureError(
-            f"{path}: is nothing that `rhot grasp recover` wrote ({error}); recover again"
-        ) from None
+    return read_json(path, Recovery, "nothing that `rhot grasp recover` wrote; recover again")

@@ -4,25 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
-from rhot.messages.health import Health
 from rhot.process.health.namesakes import Namesakes
+from testing.sample_health import beat
 
-OTHER = Health(
-    service="fusion",
-    instance="main",
-    stamp_ns=1,
-    version="1",
-    pid=77,
-    host="laptop",
-    session="bb",
-    uptime_s=5.0,
-    state="running",
-    streams=[],
-    errors=0,
-    last_error="",
-    cpu_percent=0.0,
-    rss_mb=1.0,
-)
+OTHER = beat("fusion", stamp_ns=1, pid=77, host="laptop", session="bb", streams=[])
 
 
 def test_own_beats_are_nobody_elses():

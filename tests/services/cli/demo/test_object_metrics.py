@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from rhot.messages.objects import Contact, Grasp, HandPart, ObjectContacts, ObjectPose
@@ -11,6 +9,7 @@ from rhot.messages.simulator import ObjectTruth, Truth
 from services.cli.demo.metrics import DemoMetrics
 from services.cli.demo.object_metrics import object_text
 from services.cli.demo.summary import summary_text
+from testing.sample_hands import object_pose
 
 START_NS, FRAME_NS = 1_700_000_000_000_000_000, 33_333_333
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -21,20 +20,12 @@ def truth(index: int) -> Truth:
     return Truth(stamp_ns=START_NS + index * FRAME_NS, hands={}, objects={"cup": cup})
 
 
-def pose(index: float, **fields: Any) -> ObjectPose:
-    values: dict[str, Any] = {
-        "object": "cup",
-        "serial": "LHR-1",
-        "seq": 1,
+def pose(index: float, **fields: object) -> ObjectPose:
+    where = {
         "stamp_ns": START_NS + round(index * FRAME_NS),
         "position_m": (0.01 * index, 0.002, 0.5),
-        "orientation_wxyz": IDENTITY,
-        "velocity_m_s": (0.0, 0.0, 0.0),
-        "angular_velocity_rad_s": (0.0, 0.0, 0.0),
-        "tracking": "ok",
-        "registered": True,
     }
-    return ObjectPose(**(values | fields))
+    return object_pose(**(where | fields))
 
 
 def contacts(seq: int, since: dict[HandPart, int], held_ns: int = 0) -> ObjectContacts:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,6 +11,7 @@ from rhot.messages.simulator import ObjectTruth, Truth
 pytest.importorskip("matplotlib", reason="matplotlib is of the extra `study`")
 
 from services.cli.plot.objects import drawings, objects_figure
+from testing.sample_hands import object_pose
 
 ORIGIN_NS = 1_700_000_000_000_000_000
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -22,20 +21,9 @@ def stamp(i: int) -> int:
     return ORIGIN_NS + i * 10_000_000
 
 
-def pose(i: int, **fields: Any) -> ObjectPose:
-    values: dict[str, Any] = {
-        "object": "cup",
-        "serial": "LHR-1",
-        "seq": i,
-        "stamp_ns": stamp(i),
-        "position_m": (0.001 * i, 0.003, 0.5),
-        "orientation_wxyz": IDENTITY,
-        "velocity_m_s": (0.0, 0.0, 0.0),
-        "angular_velocity_rad_s": (0.0, 0.0, 0.0),
-        "tracking": "ok",
-        "registered": True,
-    }
-    return ObjectPose(**(values | fields))
+def pose(i: int, **fields: object) -> ObjectPose:
+    where = {"seq": i, "stamp_ns": stamp(i), "position_m": (0.001 * i, 0.003, 0.5)}
+    return object_pose(**(where | fields))
 
 
 TRUTH = [
