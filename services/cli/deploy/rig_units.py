@@ -29,6 +29,8 @@ def master_units(config: RigConfig) -> list[str]:
         units.append("rhot-simulator.service")
     if config.object:
         units.append("rhot-object-tracker.service")
+    if config.metrics.enabled:
+        units.append("rhot-metrics.service")
     units += [f"rhot-bridge@{name}.service" for name in config.bridges.enabled]
     return units
 

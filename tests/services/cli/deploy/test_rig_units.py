@@ -19,14 +19,23 @@ def asked(question, path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
-ONE_CAMERA = '[[camera]]\nname = "left"\nhost = "pi-left"\n'
+# One camera, and all that a rig.toml must switch on.
+SWITCHED_ON = """
+[[camera]]
+name = "left"
+host = "pi-left"
+[metrics]
+enabled = true
+[bridges.vmc]
+enabled = true
+"""
 
 
 @pytest.mark.parametrize("name", ["sim.toml", "rig.example.toml", ""])
 def test_a_master_runs_what_rhot_up_runs(name, tmp_path):
     path = config_dir() / name if name else tmp_path / "rig.toml"
     if not name:
-        path.write_text(ONE_CAMERA)
+        path.write_text(SWITCHED_ON)
     rig = load_rig(path)
     children = children_of(rig, path, viewer=True)
     names = (child.name.replace("_", "-").replace("/", "@") for child in children)
