@@ -15,6 +15,8 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
+from services.fusion.monitors.moved_camera import displaced_px
+from services.fusion.output.paint_to_bone import turned_vectors
 from services.fusion.step import FusionStep
 
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
@@ -37,6 +39,9 @@ def warm_up(
         for n, camera in enumerate(cameras.values()):
             stamp_ns = 10**18 + round((seq + 0.3 * n) * 1e9 / 30.0)
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, config.colors)))
+    # What only a pose that comes back, or a second of heights, would call.
+    turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
+    displaced_px(np.zeros(1))
     return messages + len(step.flush())
 
 

@@ -12,11 +12,13 @@ through three takes the cubic's place.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 
@@ -43,6 +45,7 @@ class InterpolatedRay:
     )
 
 
+@njit(cache=True)
 def polynomial_weights(times_s: Array, at_s: float) -> Array:
     """Weights (n,) of n samples at times (n,) in the polynomial through them at at_s (Lagrange).
 
@@ -59,90 +62,131 @@ def polynomial_weights(times_s: Array, at_s: float) -> Array:
     return weights
 
 
-def parabolas_apart(times_s: Array, rays: Array, at_s: float) -> Array:
+@njit(cache=True)
+def parabolas_apart(times_s: Array, rays: Array, at_s: float, apart: Array) -> None:
     """The parabola through the last three of four rays (4, 2) less that through the first three.
 
-    At at_s: (2,), from the third divided difference. Nothing on samples and on parabolas; the
+    At at_s: apart (2,), from the third divided difference. Nothing on samples and on parabolas; the
     cubic lies between the two, and what it misses where an acceleration jumps is a share of it.
     """
-    apart = times_s[:, None] - times_s[None, :] + np.eye(4)  # (4, 4)
-    third = (1.0 / np.prod(apart, axis=1)) @ rays  # (2,)
-    span = (at_s - times_s[1]) * (at_s - times_s[2]) * (times_s[3] - times_s[0])
-    return np.asarray(span * third)
+    apart[:] = 0.0
+    for i in range(4):
+        product = 1.0
+        for j in range(4):
+            if i != j:
+                product *= times_s[i] - times_s[j]
+        for axis in range(2):
+            apart[axis] += rays[i, axis] / product
+    apart *= (at_s - times_s[1]) * (at_s - times_s[2]) * (times_s[3] - times_s[0])
+
+
+class RaySamples(NamedTuple):
+    """Where a track keeps its samples, in order of time; as many as are there, at the front."""
+
+    times_s: Array  # (SAMPLES,)
+    rays: Array  # (SAMPLES, 2)
+    sigmas: Array  # (SAMPLES,)
+
+
+@njit(cache=True)
+def _insert(
+    samples: RaySamples, count: int, time_s: float, ray: tuple[float, float], sigma: float
+) -> int:
+    """RayTrack.add to `count` samples; how many there are then."""
+    times_s, rays, sigmas = samples
+    index = int(np.searchsorted(times_s[:count], time_s, side="right"))
+    if index > 0 and times_s[index - 1] == time_s:
+        return count
+    if count < len(times_s):
+        for k in range(count, index, -1):
+            times_s[k], rays[k], sigmas[k] = times_s[k - 1], rays[k - 1], sigmas[k - 1]
+        count += 1
+    elif index == 0:
+        return count
+    else:
+        index -= 1
+        for k in range(index):
+            times_s[k], rays[k], sigmas[k] = times_s[k + 1], rays[k + 1], sigmas[k + 1]
+    times_s[index], rays[index, 0], rays[index, 1], sigmas[index] = time_s, ray[0], ray[1], sigma
+    return count
+
+
+@njit(cache=True)
+def interpolate(
+    samples: RaySamples,
+    count: int,
+    time_s: float,
+    period_s: float,
+    reach: int,
+    ray: Array,
+    bend: Array,
+) -> tuple[int, float]:
+    """RayTrack.at of `count` samples, of which `reach` on each side are used: into ray and bend
+    (2,). From how many samples, 0 where they do not give it, and the sigma.
+    """
+    times_s, rays, sigmas = samples
+    after = int(np.searchsorted(times_s[:count], time_s, side="right"))
+    if not 0 < after < count or times_s[after] - times_s[after - 1] > _GAP_FRAMES * period_s:
+        return 0, 0.0
+    begin, end = max(after - reach, 0), min(after + reach, count)
+    weights = polynomial_weights(times_s[begin:end], time_s)
+    variance = 0.0
+    ray[:] = 0.0
+    bend[:] = 0.0
+    for k in range(begin, end):
+        weight = weights[k - begin]
+        variance += (weight * sigmas[k]) ** 2
+        ray[0] += weight * rays[k, 0]
+        ray[1] += weight * rays[k, 1]
+    if end - begin == 4:
+        parabolas_apart(times_s[begin:end], rays[begin:end], time_s, bend)
+    return end - begin, math.sqrt(variance)
 
 
 class RayTrack:
     """One landmark in one camera: its last rays in order of time."""
 
     def __init__(self) -> None:
-        self._times: list[float] = []
-        self._rays: list[Array] = []
-        self._sigmas: list[float] = []
+        self.samples = RaySamples(np.empty(SAMPLES), np.empty((SAMPLES, 2)), np.empty(SAMPLES))
+        self.count = 0
 
-    def add(self, time_s: float, ray: Array, sigma: float) -> None:
+    def add(self, time_s: float, ray: Sequence[float] | Array, sigma: float) -> None:
         """Insert a sample in order of time.
 
         One at an instant already known, or older than all of a full track, is ignored.
         """
-        index = bisect_right(self._times, time_s)
-        known = index > 0 and self._times[index - 1] == time_s
-        if known or (index == 0 and len(self._times) >= SAMPLES):
-            return
-        self._times.insert(index, time_s)
-        self._rays.insert(index, np.asarray(ray, dtype=np.float64))
-        self._sigmas.insert(index, sigma)
-        if len(self._times) > SAMPLES:
-            del self._times[0], self._rays[0], self._sigmas[0]
-
-    def newest(self, n: int) -> list[tuple[float, Array, float]]:
-        """The last n samples, newest first: time, ray (2,), sigma."""
-        newest_first = slice(None, -n - 1, -1)
-        return list(
-            zip(
-                self._times[newest_first],
-                self._rays[newest_first],
-                self._sigmas[newest_first],
-                strict=True,
-            )
-        )
+        both = float(ray[0]), float(ray[1])
+        self.count = _insert(self.samples, self.count, float(time_s), both, float(sigma))
 
     def at(self, time_s: float, pairing: Pairing, period_s: float) -> InterpolatedRay | None:
         """The ray at an instant; period_s is the camera's frame time, which tells a gap.
 
         None if the samples do not give it.
         """
-        if not self._times:
-            return None
-        after = bisect_right(self._times, time_s)
-        around = [k for k in (after - 1, after) if 0 <= k < len(self._times)]
         if pairing == "nearest":
-            return self._nearest(around, time_s, period_s)
-        if len(around) < 2 or self._times[after] - self._times[after - 1] > _GAP_FRAMES * period_s:
-            return None
-        if pairing == "hermite":
-            around = [k for k in range(after - 2, after + 2) if 0 <= k < len(self._times)]
-        times_s = np.array([self._times[k] for k in around])
-        weights = polynomial_weights(times_s, time_s)
-        rays = np.array([self._rays[k] for k in around])
-        sigmas = np.array([self._sigmas[k] for k in around])
-        sigma = float(np.sqrt(np.sum((weights * sigmas) ** 2)))
-        bend = parabolas_apart(times_s, rays, time_s) if len(around) == 4 else np.zeros(2)
-        return InterpolatedRay(weights @ rays, sigma, len(around), bend)
+            return self._nearest(time_s, period_s)
+        ray, bend = np.empty(2), np.empty(2)
+        number, sigma = interpolate(
+            self.samples, self.count, float(time_s), period_s, FRAMES_AFTER[pairing], ray, bend
+        )
+        return InterpolatedRay(ray, sigma, number, bend) if number else None
 
-    def _nearest(self, around: list[int], time_s: float, period_s: float) -> InterpolatedRay | None:
-        """The nearest of the samples `around` an instant, as it is.
+    def _nearest(self, time_s: float, period_s: float) -> InterpolatedRay | None:
+        """The nearest sample to an instant, as it is.
 
         Its sigma grows by how far it may have moved, judging by its neighbour.
         """
-        k = min(around, key=lambda k: abs(self._times[k] - time_s))
-        away_s = abs(self._times[k] - time_s)
+        times, rays, sigmas = (column[: self.count] for column in self.samples)
+        if not len(times):
+            return None
+        k = int(np.argmin(np.abs(times - time_s)))
+        away_s = float(abs(times[k] - time_s))
         if away_s > 0.75 * period_s:
             return None
-        other = k - 1 if k > 0 else min(1, len(self._times) - 1)
-        elapsed_s = abs(self._times[k] - self._times[other])
+        other = k - 1 if k > 0 else min(1, len(times) - 1)
+        elapsed_s = float(abs(times[k] - times[other]))
         speed = 0.0
         if elapsed_s > 0.0:
-            speed = float(np.linalg.norm(self._rays[k] - self._rays[other])) / elapsed_s
-        return InterpolatedRay(
-            self._rays[k], float(np.hypot(self._sigmas[k], speed * away_s)), 1, np.zeros(2)
-        )
+            speed = float(np.linalg.norm(rays[k] - rays[other])) / elapsed_s
+        sigma = float(np.hypot(sigmas[k], speed * away_s))
+        return InterpolatedRay(rays[k].copy(), sigma, 1, np.zeros(2))

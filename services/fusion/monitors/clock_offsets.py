@@ -140,7 +140,11 @@ class ClockOffsetEstimator:
         """
         self.note_announced(view)
         for landmark, time_s, ray, sigma in zip(
-            view.landmarks.tolist(), times_s.tolist(), view.rays, view.sigmas.tolist(), strict=True
+            view.landmarks.tolist(),
+            times_s.tolist(),
+            view.rays.tolist(),
+            view.sigmas.tolist(),
+            strict=True,
         ):
             self._tracks[landmark][view.camera].add(time_s, ray, sigma)
         if len(times_s):

@@ -9,9 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
-from services.fusion.intake.ray_interpolation import InterpolatedRay, RayTrack
+from services.fusion.geometry.rectified_pair import RectifiedPair
+from services.fusion.intake.ray_interpolation import (
+    FRAMES_AFTER,
+    RaySamples,
+    RayTrack,
+    interpolate,
+)
 
 # A landmark moves if its speed is this many times its uncertainty.
 _MOVING = 8.0
@@ -23,6 +31,8 @@ _MISSED = 0.5
 # How many of the first camera's newest samples are tried: so many that clocks which are two frames
 # apart still leave one with samples of the second around it.
 _NEWEST = 7
+# Samples on each side of an instant that a cubic goes through.
+_REACH = FRAMES_AFTER["hermite"]
 # Neighbours of a sample whose distances differ by more than this share do not give its speed.
 _UNEVEN = 0.1
 
@@ -52,37 +62,59 @@ def epipolar_error(
     sample. (A slope of the same interpolation shares its noise; where that is 2 px, and not the .1
     px that is announced, the difference looks like a clock error of up to half a frame.)
     """
-    newest = first.newest(_NEWEST)
-    for after, (time_s, ray, sigma), before in zip(newest, newest[1:], newest[2:], strict=False):
-        other = second.at(time_s + shift_s, "hermite", period_s)
+    found = _newest_error(
+        (pair.R_rectified_from_first, pair.R_rectified_from_second),
+        (first.samples, second.samples),
+        (first.count, second.count),
+        shift_s,
+        period_s,
+    )
+    return EpipolarError(*found[1:]) if found[0] else None
+
+
+@njit(cache=True)
+def _newest_error(
+    rotations: tuple[Array, Array],
+    samples: tuple[RaySamples, RaySamples],
+    counts: tuple[int, int],
+    shift_s: float,
+    period_s: float,
+) -> tuple[bool, float, float, float, float, float]:
+    """epipolar_error, and before it whether there is one."""
+    R_first, R_second = rotations
+    times_s, rays, sigmas = samples[0]
+    ray, bend = np.empty(2), np.empty(2)
+    for k in range(counts[0] - 2, max(counts[0] - _NEWEST, 0), -1):
+        time_s = times_s[k]
+        number, other_sigma = interpolate(
+            samples[1], counts[1], time_s + shift_s, period_s, _REACH, ray, bend
+        )
         # The error of a parabola through three points is proportional to the speed of a swinging
         # hand: it would pass for a late clock.
-        if other is None or other.samples < 4:
+        if number < 4:
             continue
-        span_s = after[0] - before[0]
-        if abs(after[0] + before[0] - 2.0 * time_s) > _UNEVEN * span_s:
+        span_s = times_s[k + 1] - times_s[k - 1]
+        if abs(times_s[k + 1] + times_s[k - 1] - 2.0 * time_s) > _UNEVEN * span_s:
             continue
-        R = pair.R_rectified_from_first
-        speed = (_height(R, after[1]) - _height(R, before[1])) / span_s
-        speed_sigma = math.hypot(after[2], before[2]) / span_s
-        now, missed = _height_and_bend(pair.R_rectified_from_second, other)
-        return EpipolarError(
-            time_s=time_s,
-            height=_height(R, ray) - now,
-            speed=speed if abs(speed) > _MOVING * speed_sigma else 0.0,
-            span_s=span_s,
-            variance=sigma**2 + other.sigma**2 + (_MISSED * missed) ** 2,
+        speed = (_height(R_first, rays[k + 1]) - _height(R_first, rays[k - 1])) / span_s
+        speed_sigma = math.hypot(sigmas[k + 1], sigmas[k - 1]) / span_s
+        now = _height(R_second, ray)
+        missed = _height(R_second, ray + bend) - now
+        return (
+            True,
+            time_s,
+            _height(R_first, rays[k]) - now,
+            speed if abs(speed) > _MOVING * speed_sigma else 0.0,
+            span_s,
+            sigmas[k] ** 2 + other_sigma**2 + (_MISSED * missed) ** 2,
         )
-    return None
+    return False, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-def _height_and_bend(R_rectified_from_camera: Array, ray: InterpolatedRay) -> tuple[float, float]:
-    """The height of an interpolated ray, and by how much its bend would change that."""
-    height = _height(R_rectified_from_camera, ray.ray)
-    return height, _height(R_rectified_from_camera, ray.ray + ray.bend) - height
-
-
-def _height(R_rectified_from_camera: Array, ray: Array) -> float:
-    """y/z of a ray (2,) in the rectified frame; infinite if it points backwards."""
-    rectified = rectify_ray(R_rectified_from_camera, ray)
-    return math.inf if rectified is None else float(rectified[1])
+@njit(cache=True)
+def _height(R: Array, ray: Array) -> float:
+    """y/z of a ray (2,) of a camera in its pair's frame (R (3, 3) turns it there); infinite if it
+    points backwards.
+    """
+    ahead = R[2, 0] * ray[0] + R[2, 1] * ray[1] + R[2, 2]
+    return (R[1, 0] * ray[0] + R[1, 1] * ray[1] + R[1, 2]) / ahead if ahead > 0.0 else np.inf

@@ -7,9 +7,11 @@ the hand moves is a wrong marker or a clock: neither is a moved camera.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 
@@ -50,10 +52,14 @@ class MovedCameraMonitor:
                 series.popleft()
             if not series:
                 del known[landmark]
-        medians = [np.array(series)[:, 1] for series in known.values() if len(series) >= _ENOUGH]
-        displaced = [px for px in map(_displaced_px, medians) if px > 0.0]
+        enough = [
+            np.array([height_px for _, height_px in series])
+            for series in known.values()
+            if len(series) >= _ENOUGH
+        ]
+        displaced = [px for px in map(displaced_px, enough) if px > 0.0]
         limit = _SHARE_ON if self._moved_px[pair] is None else _SHARE_OFF
-        told = len(medians) > 0 and len(displaced) > limit * len(medians)
+        told = len(enough) > 0 and len(displaced) > limit * len(enough)
         self._moved_px[pair] = float(np.median(displaced)) if told else None
 
     def height_px(self, pair: int) -> float | None:
@@ -61,10 +67,12 @@ class MovedCameraMonitor:
         return self._moved_px[pair]
 
 
-def _displaced_px(heights: Array) -> float:
+@njit(cache=True)
+def displaced_px(heights: Array) -> float:
     """How far off a landmark's heights (n,) are, if that is more than chance; else 0."""
-    median = float(np.median(heights))
-    deviation = float(np.median(np.abs(heights - median)))
-    newest = float(np.median(heights[-_NEWEST:]))
-    least = max(MOVED_PX, _SIGMAS * _ERROR * deviation / np.sqrt(len(heights)))
-    return abs(median) if min(median * np.sign(median), newest * np.sign(median)) > least else 0.0
+    median = np.median(heights)
+    deviation = np.median(np.abs(heights - median))
+    newest = np.median(heights[-_NEWEST:])
+    least = max(MOVED_PX, _SIGMAS * _ERROR * deviation / math.sqrt(len(heights)))
+    sign = np.sign(median)
+    return abs(median) if min(median * sign, newest * sign) > least else 0.0

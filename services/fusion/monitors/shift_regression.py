@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
@@ -70,59 +71,68 @@ def fit_shift(rows: Heights, near_s: float, height_sigma: float) -> Shift:
 
     height_sigma: of a landmark's constant height difference, before anything is known.
     """
-    if len(rows.heights) == 0 or int(rows.instants[-1] - rows.instants[0]) < _INSTANTS_MIN:
-        return NOTHING
-    own = rows.landmarks - int(rows.landmarks.min())
+    return Shift(*_fit(Heights._make(map(np.ascontiguousarray, rows)), near_s, height_sigma))
+
+
+@njit(cache=True)
+def _fit(rows: Heights, near_s: float, height_sigma: float) -> tuple[float, float, float, float]:
+    """fit_shift of contiguous columns."""
+    if len(rows.heights) == 0 or rows.instants[-1] - rows.instants[0] < _INSTANTS_MIN:
+        return 0.0, math.inf, 0.0, 1.0
+    own = rows.landmarks - rows.landmarks.min()
     ridge = 1.0 / height_sigma**2
     shift_s, scale, speeds = near_s, 1.0, rows.speeds
-    weights = rows.weights / rows.variances
+    weights: Array = rows.weights / rows.variances
+    recent = rows.weights > 0.1 * rows.weights.max()
+    total: Array = np.empty(0)
+    apart, heights, constant = speeds, rows.heights, speeds
     for n in range(_ROUNDS):
         heights = rows.heights + rows.shifts * speeds  # (n,) as if the clocks agreed
-        total = np.bincount(own, weights) + ridge  # (L,)
+        total = np.asarray(np.bincount(own, weights) + ridge)  # (L,)
         constant = np.bincount(own, weights * (heights - shift_s * speeds)) / total
         relative = np.abs(heights - shift_s * speeds - constant[own]) / np.sqrt(rows.variances)
-        scale = max(1.0, 1.48 * float(np.median(relative[rows.weights > 0.1 * rows.weights.max()])))
-        fits = np.clip(1.0 - (relative / (_TUKEY * scale)) ** 2, 0.0, None) ** 2
-        weights = rows.weights * fits / (scale**2 * rows.variances)  # (n,)
+        scale = max(1.0, 1.48 * np.median(relative[recent]))
+        fits = np.maximum(1.0 - (relative / (_TUKEY * scale)) ** 2, 0.0) ** 2
+        weights = np.asarray(rows.weights * fits / (scale**2 * rows.variances))  # (n,)
         if n:
             noise = scale * np.sqrt(rows.variances)
             speeds = np.where(np.abs(rows.speeds) * rows.spans > _MOVING * noise, rows.speeds, 0.0)
             heights = rows.heights + rows.shifts * speeds
-        total = np.bincount(own, weights) + ridge
+        total = np.asarray(np.bincount(own, weights) + ridge)
         mean_speed = np.bincount(own, weights * speeds) / total
         mean_height = np.bincount(own, weights * heights) / total
         apart = speeds - mean_speed[own]  # (n,)
-        information = float(weights @ (speeds * apart))
+        information = np.sum(weights * (speeds * apart))
         if not information > 0.0:
-            return NOTHING._replace(
-                height=_overall(np.asarray(total - ridge), mean_height), scale=scale
-            )
-        shift_s = float(weights @ (heights * apart)) / information
+            return 0.0, math.inf, _overall(total - ridge, mean_height), scale
+        shift_s = np.sum(weights * (heights * apart)) / information
         constant = mean_height - shift_s * mean_speed
     residuals = heights - shift_s * speeds - constant[own]
     variance = _variance(rows.instants, weights * apart * residuals, weights * apart**2)
     variance *= _UNKNOWN_KIND - (_UNKNOWN_KIND - 1.0) / scale
-    return Shift(shift_s, variance, _overall(np.asarray(total - ridge), constant), scale)
+    return shift_s, variance, _overall(total - ridge, constant), scale
 
 
+@njit(cache=True)
 def _overall(known: Array, constant: Array) -> float:
     """The mean of landmarks' constants (L,), by how well they are known."""
-    return float(known @ constant / max(float(known.sum()), 1e-300))
+    return np.sum(known * constant) / max(known.sum(), 1e-300)
 
 
+@njit(cache=True)
 def _variance(instants: Ints, scores: Array, information: Array) -> float:
     """The variance of a shift, from its rows' scores and information (n,): Newey and West's."""
-    numbers = instants - int(instants[0])
+    numbers = instants - instants[0]
     of_instant = np.bincount(numbers, scores)  # (N,)
     known = np.bincount(numbers, information)  # (N,)
-    total = float(known.sum())
+    total = known.sum()
     # Of how many instants it would be if they told alike.
-    n = total**2 / float(known @ known)
+    n = total**2 / np.sum(known * known)
     if n < _INSTANTS_MIN:
         return math.inf
-    meat = float(of_instant @ of_instant)
+    meat = np.sum(of_instant * of_instant)
     for lag in range(1, min(_LAGS, len(of_instant) - 1) + 1):
-        products = float(of_instant[lag:] @ of_instant[:-lag])
+        products = np.sum(of_instant[lag:] * of_instant[:-lag])
         meat += 2.0 * (1.0 - lag / (_LAGS + 1.0)) * products
     meat *= (1.0 + _INSTANTS_GUESS / n) ** 2
     return max(meat / total**2, _CORRELATED / total)

@@ -32,7 +32,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.camera import Camera
-from rhot.geometry.transforms import Array, rotation_from_quaternion
+from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
@@ -108,9 +108,19 @@ class PaintToBone:
         )
         offsets = np.array([paint.offset_m for paint in paints]).reshape(-1, 3)
         limbs_m = np.linalg.norm(offsets, axis=1)
-        # Outward normal of a dab's skin in its joint's frame (L, 3), and how deep its middle lies
-        # under the landmark (L,).
-        self._normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
+        # Which rows and names of each hand are extended.
+        self._extended_of: dict[HandName, list[tuple[int, str]]] = {
+            hand: [
+                (row, landmark.name)
+                for row, landmark in enumerate(landmarks)
+                if landmark.hand == hand and self.extended[row]
+            ]
+            for hand in hands
+        }
+        # In its joint's frame (L, 3): the way a painted tip points, the outward normal of a dab's
+        # skin; and how deep a dab's middle lies under the landmark (L,).
+        normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
+        self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
         self._sags_m = np.array(
             [
                 dab_sag_m(0.5 * dab_m, limb_m)
@@ -141,25 +151,16 @@ class PaintToBone:
             f"{finger.name}_tip": _direction_sigma(pose.wrist_sigma_rad, finger.sigma_rad)
             for finger in pose.fingers
         }
-        rows, directions, sigmas_rad = [], [], []
-        for row, landmark in enumerate(self._landmarks):
-            joint = joints.get(landmark.name)
-            if landmark.hand != pose.hand or joint is None or not self.extended[row]:
-                continue
-            quaternion = np.array(joint.orientation_wxyz)
-            if 0.4 < np.abs(quaternion).max() < 1.1:
-                R = rotation_from_quaternion(quaternion)
-                is_tip = self._radii_m[row] > 0.0
+        rows, quaternions, sigmas_rad = [], [], []
+        for row, name in self._extended_of.get(pose.hand, []):
+            joint = joints.get(name)
+            if joint is not None and 0.4 < max(map(abs, joint.orientation_wxyz)) < 1.1:
                 rows.append(row)
-                directions.append(-R[:, 2] if is_tip else R @ self._normals[row])
-                sigmas_rad.append(sigmas.get(landmark.name, 0.0))
-        return Directions(
-            pose.hand,
-            pose.stamp_ns,
-            np.array(rows, dtype=np.int64),
-            np.array(directions).reshape(-1, 3),
-            np.array(sigmas_rad),
-        )
+                quaternions.append(joint.orientation_wxyz)
+                sigmas_rad.append(sigmas.get(name, 0.0))
+        told = np.array(rows, dtype=np.int64)
+        directions = turned_vectors(self._outwards[told], np.array(quaternions).reshape(-1, 4))
+        return Directions(pose.hand, pose.stamp_ns, told, directions, np.array(sigmas_rad))
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
@@ -188,6 +189,30 @@ class PaintToBone:
             self._viewpoint_rig,
         )
         return positions, covariances
+
+
+@njit(cache=True)
+def turned_vectors(vectors: Array, quaternions: Array) -> Array:
+    """Vectors (n, 3), each turned by its quaternion wxyz (n, 4) of any length; (n, 3).
+
+    As rhot.geometry.transforms.rotation_from_quaternion, for all at once.
+    """
+    turned = np.empty_like(vectors)
+    for n in range(vectors.shape[0]):
+        q = quaternions[n]
+        length = math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+        w, x, y, z = q[0] / length, q[1] / length, q[2] / length, q[3] / length
+        a, b, c = vectors[n]
+        turned[n, 0] = (
+            (1 - 2 * (y * y + z * z)) * a + 2 * (x * y - w * z) * b + 2 * (x * z + w * y) * c
+        )
+        turned[n, 1] = (
+            2 * (x * y + w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z - w * x) * c
+        )
+        turned[n, 2] = (
+            2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
+        )
+    return turned
 
 
 @njit(cache=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from services.fusion.intake import ray_interpolation
 from services.fusion.kalman import frame_update, recent_observations, telling, track_history
+from services.fusion.monitors import epipolar_error, moved_camera, shift_regression
 from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
@@ -17,6 +19,11 @@ LIVE = (
     hand_plausibility._coherent,
     hand_points._usable,
     hand_points._rounded,
+    paint_to_bone.turned_vectors,
+    ray_interpolation._insert,
+    epipolar_error._newest_error,
+    moved_camera.displaced_px,
+    shift_regression._fit,
 )
 
 
@@ -31,5 +38,5 @@ def test_after_warming_up_nothing_new_is_compiled(fuse):
     setup = SyntheticRig()
     warm_up(setup.config(), setup.rig(), point_hands())
     before = [len(compiled.signatures) for compiled in LIVE]
-    fuse(setup, frames(setup, MovingHand(), 0.5))
+    fuse(setup, frames(setup, MovingHand(), 1.5))
     assert before == [len(compiled.signatures) for compiled in LIVE]

@@ -6,11 +6,21 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot.geometry.transforms import quaternion_from_rotation, rotation_from_vector
+from rhot.geometry.transforms import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
 from rhot.hand import JOINTS, default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.paint_to_bone import SIGMA_DAB, SIGMA_UNKNOWN, PaintToBone, dab_sag_m
+from services.fusion.output.paint_to_bone import (
+    SIGMA_DAB,
+    SIGMA_UNKNOWN,
+    PaintToBone,
+    dab_sag_m,
+    turned_vectors,
+)
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M = 0.0068
@@ -230,3 +240,12 @@ def test_a_finger_that_was_not_measured_makes_an_unsure_tip():
         )
         assert known <= measured <= table
     assert known < measured < table
+
+
+def test_the_compiled_turn_agrees_with_the_plain_one():
+    random = np.random.default_rng(5)
+    vectors, quaternions = random.normal(size=(20, 3)), random.normal(size=(20, 4))
+    plain = [
+        rotation_from_quaternion(q) @ vector for q, vector in zip(quaternions, vectors, strict=True)
+    ]
+    np.testing.assert_allclose(turned_vectors(vectors, quaternions), plain, atol=1e-12)
