@@ -15,6 +15,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
+from services.fusion.alignment.offset_search import HeightTrack, interpolated
 from services.fusion.monitors.moved_camera import displaced_px
 from services.fusion.output.paint_to_bone import turned_vectors
 from services.fusion.step import FusionStep
@@ -39,9 +40,10 @@ def warm_up(
         for n, camera in enumerate(cameras.values()):
             stamp_ns = 10**18 + round((seq + 0.3 * n) * 1e9 / 30.0)
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, config.colors)))
-    # What only a pose that comes back, or a second of heights, would call.
+    # What only a pose that comes back, or some seconds of heights, would call.
     turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
     displaced_px(np.zeros(1))
+    interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     return messages + len(step.flush())
 
 

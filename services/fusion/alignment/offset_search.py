@@ -17,9 +17,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.arrays import Bools
+from services.fusion.arrays import Bools, Ints
 from services.fusion.monitors.shift_regression import Heights, fit_shift
 
 # The grid of the search, s: a hand's motion changes little within it, and the regression finds the
@@ -211,15 +212,28 @@ def interpolated(track: HeightTrack, at_s: Array, samples: int = 4) -> tuple[Arr
     inside = (at_s >= times[half - 1]) & (at_s <= times[-half])
     widest_s = gap_s + (samples - 2) * gap_s / _GAP_FRAMES
     inside &= times[after + half - 1] - times[after - half] <= widest_s
-    near = np.stack([after + k for k in range(-half, half)])  # (samples, m)
-    t, found = times[near], np.zeros(len(at_s))
-    for i in range(samples):
-        weight = np.ones(len(at_s))
-        for j in range(samples):
-            if i != j:
-                weight *= (at_s - t[j]) / (t[i] - t[j])
-        found += weight * heights[near[i]]
+    found = np.empty(len(at_s))
+    _through(times, heights, at_s, after - half, samples, found)
     return found, inside
+
+
+# Samples of one instant give NaN, as in numpy, and no ZeroDivisionError.
+@njit(cache=True, error_model="numpy")
+def _through(
+    times: Array, heights: Array, at_s: Array, begin: Ints, samples: int, found: Array
+) -> None:
+    """At each of at_s (m,) the polynomial through so many samples from begin (m,) on, into found.
+
+    Lagrange's, as ray_interpolation.polynomial_weights has it, for all instants at once.
+    """
+    for n in range(len(at_s)):
+        found[n] = 0.0
+        for i in range(begin[n], begin[n] + samples):
+            weight = 1.0
+            for j in range(begin[n], begin[n] + samples):
+                if i != j:
+                    weight *= (at_s[n] - times[j]) / (times[i] - times[j])
+            found[n] += weight * heights[i]
 
 
 def _refined(

@@ -8,10 +8,15 @@ markers, or markers on one spot, tell nothing: what was reported stays.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from rhot.geometry.camera import Camera
-from services.fusion.geometry.rectified_pair import rectified_pairs, rectify_rays
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Ints
+from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import View
 
 # Views this far apart in time, at most, are compared: a hand does not turn over within three
@@ -65,25 +70,60 @@ class MirrorMonitor:
                 self._compare(pair, first, second)
 
     def _compare(self, pair: tuple[int, int], first: View, second: View) -> None:
-        _, in_first, in_second = np.intersect1d(
-            first.landmarks, second.landmarks, assume_unique=True, return_indices=True
-        )
-        if len(in_first) < _MIN_MARKERS:
-            return
         geometry = self._pairs[pair]
-        a = rectify_rays(geometry.R_rectified_from_first, first.rays[in_first])  # (n, 2)
-        b = rectify_rays(geometry.R_rectified_from_second, second.rays[in_second])
-        a = a - a.mean(axis=0)
-        b = b - b.mean(axis=0)
-        # Both views' spread along each axis (2,).
-        spread = np.sqrt(np.sum(a**2, axis=0) * np.sum(b**2, axis=0))
-        least_px2 = _MIN_SPREAD_PX2 * len(in_first)
-        if not np.all(np.isfinite(spread)) or spread.min() * geometry.focal_px**2 < least_px2:
+        told, *reversed_order = _order(
+            (first.landmarks, second.landmarks),
+            (first.rays, second.rays),
+            (geometry.R_rectified_from_first, geometry.R_rectified_from_second),
+            _MIN_SPREAD_PX2 / geometry.focal_px**2,
+        )
+        if not told:
             return
-        reversed_order = np.sum(a * b, axis=0) < _MIRRORED * spread  # (2,)
         share = self._shares[pair]
-        share += _NEW * (reversed_order - share)
+        share += _NEW * (np.array(reversed_order) - share)
         if share.max() > _SHARE_ON:
             self._axis[pair] = _AXES[int(share.argmax())]
         elif share.max() < _SHARE_OFF:
             self._axis.pop(pair, None)
+
+
+@njit(cache=True)
+def _order(
+    landmarks: tuple[Ints, Ints],
+    rays: tuple[Array, Array],
+    rotations: tuple[Array, Array],
+    least_spread: float,
+) -> tuple[bool, bool, bool]:
+    """Whether the common landmarks of two views tell their order, and whether it is reversed along
+    each axis; landmarks (n,) ascending, rays (n, 2), rotations (3, 3) into the pair's frame.
+
+    least_spread: of a landmark, squared, in the rays' units.
+    """
+    common = 0
+    places = np.empty((2, min(len(landmarks[0]), len(landmarks[1])), 2))
+    second = 0
+    for first in range(len(landmarks[0])):
+        while second < len(landmarks[1]) and landmarks[1][second] < landmarks[0][first]:
+            second += 1
+        if second == len(landmarks[1]) or landmarks[1][second] != landmarks[0][first]:
+            continue
+        for view, row in enumerate((first, second)):
+            x, y = rays[view][row]
+            R = rotations[view]
+            ahead = R[2, 0] * x + R[2, 1] * y + R[2, 2]
+            if not ahead > 0.0:
+                return False, False, False
+            for axis in range(2):
+                places[view, common, axis] = (R[axis, 0] * x + R[axis, 1] * y + R[axis, 2]) / ahead
+        common += 1
+    if common < _MIN_MARKERS:
+        return False, False, False
+    is_reversed = np.zeros(2, dtype=np.bool_)
+    for axis in range(2):
+        a, b = places[0, :common, axis], places[1, :common, axis]
+        a, b = a - a.mean(), b - b.mean()
+        spread = math.sqrt(np.sum(a * a) * np.sum(b * b))  # of both views
+        if not least_spread * common <= spread < np.inf:
+            return False, False, False
+        is_reversed[axis] = np.sum(a * b) < _MIRRORED * spread
+    return True, is_reversed[0], is_reversed[1]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from services.fusion.alignment import offset_search
 from services.fusion.intake import ray_interpolation
 from services.fusion.kalman import frame_update, recent_observations, telling, track_history
-from services.fusion.monitors import epipolar_error, moved_camera, shift_regression
+from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
 from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
@@ -24,6 +25,8 @@ LIVE = (
     epipolar_error._newest_error,
     moved_camera.displaced_px,
     shift_regression._fit,
+    mirrored_view._order,
+    offset_search._through,
 )
 
 
@@ -38,5 +41,5 @@ def test_after_warming_up_nothing_new_is_compiled(fuse):
     setup = SyntheticRig()
     warm_up(setup.config(), setup.rig(), point_hands())
     before = [len(compiled.signatures) for compiled in LIVE]
-    fuse(setup, frames(setup, MovingHand(), 1.5))
+    fuse(setup, frames(setup, MovingHand(), 3.5))
     assert before == [len(compiled.signatures) for compiled in LIVE]
