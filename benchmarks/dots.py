@@ -6,9 +6,8 @@ are found are none. 8 dots are on thumb and index finger, 15 on the three outer 
 fingers. Seeds are given, as by clicks. Reported, of the dots of which a third shows or more: the
 share that is right (within 1.3 radii), lost, another's, or elsewhere; and the longest exchange of
 names. Beside the tracker of dots: each dot takes the nearest blob, and the optimal assignment of
-all dots to blobs within 60 px. Constants were chosen on `grab` and `splay` with seeds 0 to 4 at 8
-dots; here are other seeds, two recordings on which only the dots' joint motion was fitted, and 15
-dots.
+all dots to blobs within 60 px. Constants of motion were chosen on `grab` with even seeds of 0 to 4;
+here are other seeds, three other recordings, and 15 dots.
 """
 
 from __future__ import annotations

@@ -18,14 +18,6 @@ from rhot.hand import CHAIN_JOINTS, DIGITS, JOINTS, default_hand, forward
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-# What a dot's acceleration is made of, in units of the whole hand's: the hand's turning, each
-# finger's shift, the turning of each of its joints (of the thumb's so much of that), and its own;
-# turnings per _ARM_M of distance. Fitted to the accelerations of four Leap recordings at 30 Hz
-# (maximum likelihood, their 20 joints): .5 to 1.2 nats a dot and axis more likely than fingers
-# whose bones move each on its own, also on two of them with figures fitted to the other two.
-_HAND_TURN, _FINGER_SHIFT, _JOINT_TURN, _THUMB_SHARE, _OWN = 0.85, 0.07, 1.0, 0.8, 0.03
-_ARM_M = 0.08
-
 
 @dataclass(frozen=True, eq=False)
 class Chains:
@@ -35,11 +27,8 @@ class Chains:
     digits: Indices  # (n,) row of DIGITS, -1 of palm and wrist
     bones: Indices  # (b, 2) indices of the nearer and the further landmark
     lengths_m: Array  # (b,) of an average adult
-    # (s, 2) pairs whose distance has an upper limit: the bones, then neighbouring fingers' roots.
-    spans: Indices
-    spans_m: Array  # (s,) of an average adult's straight hand
-    triples: Indices  # (t, 3) bones of a finger, each the next one's parent
-    acceleration: Array  # (n, n) covariance of the dots' accelerations, the whole hand's is 1
+    # (s,) of an average adult's straight hand: the bones, then from each finger's root to the next.
+    spans_m: Array
 
 
 def chains_of(landmarks: Sequence[str]) -> Chains:
@@ -61,21 +50,12 @@ def chains_of(landmarks: Sequence[str]) -> Chains:
     lengths = np.linalg.norm(places[pairs[:, 1]] - places[pairs[:, 0]], axis=1)
     digits = np.array([digit_of[name] for name in names], np.int64)
     count = len(bones)
-    # The thumb's joints do not turn about parallel axes.
-    triples = [
-        (k, k + 1, k + 2)
-        for k in range(count - 2)
-        if digits[pairs[k, 0]] == digits[pairs[k + 2, 0]] > 0
-    ]
     return Chains(
         landmarks=names,
         digits=digits,
         bones=pairs[:count],
         lengths_m=lengths[:count],
-        spans=pairs,
         spans_m=lengths,
-        triples=np.array(triples, np.int64).reshape(-1, 3),
-        acceleration=_acceleration(names, digits, places),
     )
 
 
@@ -88,22 +68,3 @@ def digit_row(landmark: str) -> int:
 def finger_landmarks(digit: str) -> tuple[str, ...]:
     """The four joints of a finger's chain from its root to its tip."""
     return tuple(JOINTS[index] for index in CHAIN_JOINTS[DIGITS.index(digit)])
-
-
-def _acceleration(names: Sequence[str], digits: Indices, places: Array) -> Array:
-    """Covariance of accelerations (n, n) of dots at places (n, 3) of a straight hand."""
-    # Columns are what moves on its own: of the hand three turns and a shift, then of each finger.
-    columns = [np.ones(len(names)), *(_HAND_TURN * (places - places.mean(axis=0)) / _ARM_M).T]
-    rest, _ = forward(default_hand("right"), np.eye(3), np.zeros(3), np.zeros((5, 4)))
-    for row in sorted(set(digits.tolist()) - {-1}):
-        own = digits == row
-        share = _THUMB_SHARE if row == 0 else 1.0
-        columns.append(share * _FINGER_SHIFT * own)
-        joints = CHAIN_JOINTS[row]
-        for joint in joints[:-1].tolist():
-            # A joint turns what lies beyond it.
-            beyond = np.array([JOINTS.index(name) > joint for name in names]) & own
-            arms = np.linalg.norm(places - rest[joint], axis=1) / _ARM_M
-            columns.append(share * _JOINT_TURN * arms * beyond)
-    shares = np.stack(columns, axis=1)
-    return np.asarray(shares @ shares.T + _OWN**2 * np.eye(len(names)))

@@ -1,8 +1,8 @@
-"""The likely assignments of a picture's patches to the dots of one hypothesis. Pure.
+"""The likely assignments of a picture's patches to the dots of several accounts. Pure.
 
 First each dot's patch by the past alone, and by the shift of all that most dots agree on (a hand
 that jerks takes all its dots along); both are refined until each dot has the patch that the others
-expect it at. Then what differs from the best by one exchange.
+expect it at. Then what differs from the best by one exchange. The likeliest are updated exactly.
 """
 
 from __future__ import annotations
@@ -10,75 +10,113 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.assignment import assign
-from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, View
+from services.pi_tracker.dots.hypothesis import Ahead, Hypothesis, Patches, Surroundings, View
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 # Sharper accelerations are looked at only where a picture is explained badly: innovations squared
-# for each degree of freedom (their mean is 1), or dots that are lost.
-_CALM = 3.0
+# for each degree of freedom (their mean is below 1), or dots that are lost.
+_CALM = 2.0
 # Rounds of refinement. Exchanges that may cost this much (nats) are looked at, and so many at most.
-_ROUNDS, _EXCHANGE_NATS, _MAX_EXCHANGES = 3, 12.0, 8
+_ROUNDS, _EXCHANGE_NATS, _MAX_EXCHANGES = 4, 10.0, 8
+# So many are updated, and none that is so much (nats) less likely than the best.
+_UPDATED, _WORSE_NATS = 24, 24.0
 
 
 def extend(
-    parent: Hypothesis, patches: Patches, around: Surroundings, elapsed_s: float, least: float
+    parents: list[Hypothesis], patches: Patches, around: Surroundings, elapsed_s: float
 ) -> list[Hypothesis]:
-    """What a hypothesis may become, the likely ones, in no order; at least one.
+    """What hypotheses may become, the likely ones, in no order; at least one."""
+    skeleton = around.skeleton
+    ahead = motion.coasted(skeleton, motion.together([p.state for p in parents]), elapsed_s)
+    found: list[tuple[float, View, Indices]] = []
+    for levels in _views(parents, ahead, patches, around):
+        found += _children(levels)
+    found.sort(key=lambda one: -one[0])
+    likely = [one for one in found[:_UPDATED] if one[0] > found[0][0] - _WORSE_NATS]
+    before = motion.together([view.ahead.state for _, view, _ in likely])
+    measured = zip(*(view.measured(patch) for _, view, patch in likely), strict=True)
+    seen, places, variances = (np.array(part) for part in measured)
+    after = motion.updated(skeleton, before, seen, places, variances)
+    return [
+        view.become(patch, after.state.take([k]), float(after.nats[k]))
+        for k, (_, view, patch) in enumerate(likely)
+    ]
 
-    least: what scores less than this is of no use any more.
-    """
-    children: list[Hypothesis] = []
-    for acceleration, prior in around.accelerations:
-        view = View(parent, patches, around, elapsed_s, acceleration, prior)
-        children += _children(view, max(least, max(map(_score, children), default=-np.inf) - 12.0))
-        best = max(children, key=_score)
-        lost = sum(now < 0 <= was for now, was in zip(best.patch, parent.patch, strict=True))
-        if best.squared <= _CALM and not lost:
+
+def _views(
+    parents: list[Hypothesis], state: motion.State, patches: Patches, around: Surroundings
+) -> list[list[View]]:
+    """Of each parent a view for each acceleration; state: the parents' when nothing accelerates."""
+    pixels, slopes = around.skeleton.project(state.means, state.rotations, state.sides)
+    size = around.skeleton.size
+    found: list[list[View]] = []
+    for k, parent in enumerate(parents):
+        rows = slopes[k].reshape(-1, size)
+        found.append([])
+        for added, prior in around.levels:
+            own = state.take([k])
+            own = own._replace(covs=own.covs + added)
+            ahead = Ahead(pixels[k], rows @ own.covs[0, :size, :size] @ rows.T, own)
+            found[-1].append(View(parent, ahead, patches, around.false_density, prior))
+    return found
+
+
+def _children(levels: list[View]) -> list[tuple[float, View, Indices]]:
+    """Assignments of one account with a score, by more accelerations the worse they are."""
+    found: list[tuple[float, View, Indices]] = []
+    best, calm, whole = -np.inf, False, False
+    for view in levels:
+        for patch in _assignments(view):
+            score, squared = view.roughly(patch)
+            found.append((score, view, patch))
+            if score > best:
+                best, calm = score, squared <= _CALM
+                whole = not np.any((patch < 0) & (np.array(view.parent.patch) >= 0))
+        if calm and whole:
             break
-    return children
+    return found
 
 
-def _children(view: View, least: float) -> list[Hypothesis]:
-    if not len(view.patches.areas):
-        return [view.extended(np.full(len(view.state.positions), -1, np.int64))]
-    found: dict[tuple[int, ...], Hypothesis] = {}
+def _assignments(view: View) -> list[Indices]:
+    """The likely ones, each once."""
+    found: dict[tuple[int, ...], tuple[float, Indices]] = {}
 
     def add(patch: Indices) -> None:
         patch = view.with_merged(patch)
-        key = tuple(patch.tolist())
-        if key not in found:
-            found[key] = view.extended(patch)
+        found.setdefault(tuple(patch.tolist()), (view.roughly(patch)[0], patch))
 
-    for patch in _starts(view):
-        add(patch)
-    best = max(found.values(), key=_score)
-    for patch in _exchanges(view, np.array(best.patch), max(least - best.score, -_EXCHANGE_NATS)):
-        add(patch)
-    return list(found.values())
-
-
-def _starts(view: View) -> list[Indices]:
-    places, spreads = view.marginal()
-    starts = [assign(view.gains(places, spreads))]
-    shifted = places + _common_shift(view, places, spreads)
+    if not len(view.patches.areas):
+        return [np.full(len(view.parent.patch), -1, np.int64)]
+    places, covs = view.marginal()
     # Where all have moved alike, each is within about a tenth of its own gate.
-    starts.append(assign(view.gains(shifted, 0.1 * spreads)))
-    refined = []
-    for patch in starts:
+    shifted = places + _common_shift(view, places, covs)
+    for start in ((places, covs), (shifted, 0.1 * covs)):
+        patch = assign(view.gains(*start))
         for _ in range(_ROUNDS):
             better = assign(view.gains(*view.given(patch)))
             if np.array_equal(better, patch):
                 break
             patch = better
-        refined.append(patch)
-    return refined
+        add(patch)
+    # What an exchange leads to may be exchanged once more.
+    best: tuple[int, ...] = ()
+    for _ in range(2):
+        now = max(found, key=lambda key: found[key][0])
+        if now == best:
+            break
+        best = now
+        for patch in _exchanges(view, found[best][1]):
+            add(patch)
+    return [patch for _, patch in found.values()]
 
 
-def _common_shift(view: View, places: Array, spreads: Array) -> Array:
+def _common_shift(view: View, places: Array, covs: Array) -> Array:
     """The shift (2,) that brings most dots to patches."""
+    spreads = 0.5 * (covs[:, 0, 0] + covs[:, 1, 1])
     shifts = view.patches.places[None] - places[:, None]  # (n, m, 2)
     near = np.sum(shifts**2, axis=2) < 16.0 * spreads[:, None]
     candidates = shifts[near]
@@ -91,10 +129,8 @@ def _common_shift(view: View, places: Array, spreads: Array) -> Array:
     return best
 
 
-def _exchanges(view: View, patch: Indices, least: float) -> list[Indices]:
-    """Assignments that differ by one exchange, that gain about `least` or more."""
-    if least > 0.0:
-        return []
+def _exchanges(view: View, patch: Indices) -> list[Indices]:
+    """Assignments that differ by one exchange, that cost little."""
     gains = view.gains(*view.given(patch))
     count, columns = gains.shape
     # A dot that shares a patch gains nothing by it that another would lose.
@@ -117,7 +153,9 @@ def _exchanges(view: View, patch: Indices, least: float) -> list[Indices]:
             elif dot < other:
                 delta = taken + float(gains[other, patch[dot]]) - own - float(now[other])
                 moves.append((delta, [(dot, int(patch[other])), (other, int(patch[dot]))]))
-    likely = sorted((move for move in moves if move[0] > least), key=lambda move: -move[0])
+    likely = sorted(
+        (move for move in moves if move[0] > -_EXCHANGE_NATS), key=lambda move: -move[0]
+    )
     result = []
     for _, changes in likely[:_MAX_EXCHANGES]:
         changed = patch.copy()
@@ -125,7 +163,3 @@ def _exchanges(view: View, patch: Indices, least: float) -> list[Indices]:
             changed[dot] = to
         result.append(changed)
     return result
-
-
-def _score(hypothesis: Hypothesis) -> float:
-    return hypothesis.score

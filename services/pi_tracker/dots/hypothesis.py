@@ -3,7 +3,7 @@
 After Reid, An Algorithm for Tracking Multiple Targets (IEEE Trans. Automatic Control 24, 1979):
 several accounts are kept, each is extended by the likely assignments of a picture, and what was
 decided wrongly is undone as soon as later pictures speak against it (tracker.py). The score is a
-log likelihood: of the motion, of what is missing and what is false, and of bones that do not grow.
+log likelihood: of the hand's posture and motion (motion.py), of what is missing and what is false.
 Pure.
 """
 
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.chains import Chains
-from services.pi_tracker.dots.shape import strain
+from services.pi_tracker.dots.skeleton import Skeleton
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 # Probability that a dot is found in a picture: where it was in the last one, and where it was not.
 _FOUND, _FOUND_AGAIN = 0.97, 0.6
@@ -29,20 +29,15 @@ _MERGED = float(np.log(0.8))
 # A patch that was no dot is still there in the next picture with this probability, and within so
 # many px (sigma) of where it was.
 _STILL_FALSE, _FALSE_STEP_PX = 0.9, 6.0
-# Paint moves on the skin, and light on the paint: sigma as a share of a dot's diameter. Of the
-# centre of a patch that several dots share, at least.
-_WANDER, _SHARED = 0.05, 0.35
+# Dots move on the skin, and light on the paint, and no hand is quite the model's: sigma as a share
+# of a dot's diameter. Of the centre of a patch that several dots share, at least.
+_WANDER, _SHARED = 0.12, 0.35
 # Where half a disc is hidden its centre moves by .24 of the root of its area, as in
 # detect/marker_finder.py; areas vary by less than the second without anything being hidden.
 _HIDDEN, _AREA_NOISE = 0.34, 0.25
 # A dot's area varies by so much (sigma of its logarithm) below and above what it was of late, and
 # no patch is judged by more than so many nats on it.
 _AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (2.0, 4.0)
-# Weight of a longer length in a bone's longest one; a shorter one counts after this time (the hand
-# goes away from the camera).
-_LONGER_WEIGHT, _LENGTH_MEMORY_S = 0.3, 10.0
-# No bone is so many times longer than the others say by an average adult's proportions.
-_LONGEST_RATIO = 1.4
 # Weight of a new area.
 _AREA_WEIGHT = 0.1
 
@@ -61,9 +56,9 @@ class Patches(NamedTuple):
 class Surroundings:
     """What all accounts share."""
 
-    chains: Chains
-    # The hand's acceleration, px/s^2: as of late first, then sharper ones; log probability of each.
-    accelerations: tuple[tuple[float, float], ...]
+    skeleton: Skeleton
+    # What accelerations add to a covariance, and the log probability of each: at rest first.
+    levels: tuple[tuple[Array, float], ...]
     false_density: float  # patches that are no dots, per px^2
 
 
@@ -72,14 +67,21 @@ class Hypothesis:
     """One account of n dots after a picture."""
 
     score: float
-    state: motion.State
-    lengths: Array  # (b,) the longest each bone was, px
+    state: motion.State  # one
+    branch: int  # which of the postures at the start it came from
     areas: Array  # (n,) px^2
     unseen: Indices  # (n,) pictures in a row in which each was not seen
     patch: tuple[int, ...]  # of each dot in the last picture, -1 for none
     before: tuple[int, ...]  # in the one before
     false: Array  # (k, 2) patches of the last picture that are no dots
-    squared: float = 0.0  # innovation squared for each of its degrees of freedom
+
+
+class Ahead(NamedTuple):
+    """Where an account's dots are expected: pixels (n, 2), their covariance (2n, 2n), its state."""
+
+    places: Array
+    cov: Array
+    state: motion.State
 
 
 class View:
@@ -88,21 +90,16 @@ class View:
     def __init__(
         self,
         parent: Hypothesis,
+        ahead: Ahead,
         patches: Patches,
-        around: Surroundings,
-        elapsed_s: float,
-        acceleration_px_s2: float,
+        false_density: float,
         prior: float,
     ) -> None:
-        """acceleration_px_s2: the hand's; prior: log probability of that."""
-        self.parent, self.patches, self._around = parent, patches, around
-        self._elapsed_s, self._prior = elapsed_s, prior
-        acceleration = acceleration_px_s2**2 * around.chains.acceleration
-        state = motion.predict(parent.state, elapsed_s, acceleration)
-        self.state = motion.bound_bones(state, around.chains.spans, 1.2 * parent.lengths)
+        """prior: log probability of the acceleration that `ahead` has."""
+        self.parent, self.ahead, self.patches, self.prior = parent, ahead, patches, prior
         found = np.where(parent.unseen == 0, _FOUND, _FOUND_AGAIN)
         self._found, self._missed = np.log(found), np.log1p(-found)
-        false = _false_density(patches.places, parent.false, around.false_density)
+        false = _false_density(patches.places, parent.false, false_density)
         # The parts of a blob are false together, as one.
         part = patches.wholes >= 0
         parts = np.count_nonzero(patches.wholes[:, None] == patches.wholes[None], axis=1)
@@ -121,32 +118,44 @@ class View:
         offset = _HIDDEN * hidden * np.sqrt(parent.areas)[:, None]
         self._variances = patches.sigmas[None] ** 2 + (_WANDER * diameters[:, None]) ** 2
         self._variances += offset**2
+        least = (_WANDER * diameters) ** 2
+        self._least = self._variances.min(axis=1) if len(patches.areas) else least
 
-    def gains(self, places: Array, spreads: Array) -> Array:
+    def gains(self, places: Array, covs: Array) -> Array:
         """What each dot gains by each patch over being missing, nats (n, m).
 
-        places (n, 2) and spreads (n,): where each is expected, and the variance of that and of a
-        measurement.
+        places (n, 2) and covs (n, 2, 2): where each is expected, and the covariance of that and of
+        a measurement.
         """
         away = self.patches.places[None] - places[:, None]  # (n, m, 2)
-        squares = np.sum(away**2, axis=2)
-        spread = spreads[:, None] + self._variances - self._variances.min(axis=1, keepdims=True)
-        gains = -0.5 * squares / spread - np.log(2.0 * np.pi * spread) - self._area_nats
+        more = self._variances - self._least[:, None]
+        xx, xy, yy = covs[:, :1, 0] + more, covs[:, :1, 1], covs[:, 1:, 1] + more
+        det = xx * yy - xy**2
+        x, y = away[..., 0], away[..., 1]
+        squares = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / det
+        gains = -0.5 * (squares + np.log(det)) - np.log(2.0 * np.pi) - self._area_nats
         gains += (self._found - self._missed)[:, None] - self._false
         return np.asarray(gains)
 
     def marginal(self) -> tuple[Array, Array]:
-        """Where each dot is expected by the past alone, (n, 2), and the variance (n,)."""
-        count = len(self._found)
-        return self.state.positions, np.diag(self.state.cov)[:count] + self._least_variances()
+        """Where each dot is expected by the past alone, (n, 2), and the covariance (n, 2, 2)."""
+        return self.ahead.places, self._own(self.ahead.cov)
 
     def given(self, patch: Indices) -> tuple[Array, Array]:
-        """The same by an assignment of all the other dots."""
+        """The same by an assignment of all the other dots; of a measured dot, without its own."""
         dots = np.flatnonzero(patch >= 0)
         if not len(dots):
             return self.marginal()
-        innovation = self._innovation(dots, patch)
-        return motion.expected(self.state, innovation, self._least_variances())
+        residuals, inverse = self._innovation(dots, patch)
+        cross = self.ahead.cov[:, _pairs(dots)]
+        gain = cross @ inverse
+        places = self.ahead.places + (gain @ residuals).reshape(-1, 2)
+        covs = self._own(self.ahead.cov - gain @ cross.T)
+        blocks = np.linalg.inv(_blocks(inverse))
+        measured = self.ahead.places[dots] + residuals.reshape(-1, 2)
+        left_out = (blocks @ (inverse @ residuals).reshape(-1, 2, 1))[..., 0]
+        places[dots], covs[dots] = measured - left_out, blocks
+        return places, covs
 
     def with_merged(self, patch: Indices) -> Indices:
         """The assignment, with dots that have no patch on one that they share with another."""
@@ -154,57 +163,41 @@ class View:
         taken = np.unique(patch[patch >= 0])
         if not len(free) or not len(taken):
             return patch
-        places, spreads = self.given(patch)
+        places, covs = self.given(patch)
         away = self.patches.places[taken][None] - places[free][:, None]
-        spread = spreads[free][:, None]
+        spread = 0.5 * (covs[free, 0, 0] + covs[free, 1, 1])[:, None]
+        diameters = self._diameters[free][:, None]
         # The probability that a dot expected so lies within about a dot of another one.
-        inside = np.minimum(0.5 * (0.8 * self._diameters[free][:, None]) ** 2 / spread, 1.0)
-        gain = (
-            _MERGED
-            + np.log(inside)
-            - 0.5
-            * np.sum(away**2, axis=2)
-            / np.maximum(spread, (_SHARED * self._diameters[free][:, None]) ** 2)
-        )
-        gain -= self._missed[free][:, None]
+        inside = np.minimum(0.5 * (0.8 * diameters) ** 2 / spread, 1.0)
+        squares = np.sum(away**2, axis=2) / np.maximum(spread, (_SHARED * diameters) ** 2)
+        gain = _MERGED + np.log(inside) - 0.5 * squares - self._missed[free][:, None]
         best = gain.argmax(axis=1)
         merged = gain[np.arange(len(free)), best] > 0.0
         result = patch.copy()
         result[free[merged]] = taken[best[merged]]
         return result
 
-    def extended(self, patch: Indices) -> Hypothesis:
-        """The hypothesis that this assignment leads to."""
-        dots = np.flatnonzero(patch >= 0)
-        missed = patch < 0
-        score = self.parent.score + self._prior + float(self._missed[missed].sum())
-        state, squared = self.state, 1.0
-        shared = self._shared(patch)
-        if len(dots):
-            innovation = self._innovation(dots, patch)
-            score += innovation.log_likelihood + self._claims(dots, patch, shared)
-            state = motion.update(state, innovation)
-            squared = innovation.squared / (2 * len(dots))
-        lengths, nats = self._lengths(patch, shared)
-        seen = ~missed & ~shared
-        areas = self.parent.areas.copy()
-        areas[seen] += _AREA_WEIGHT * (self.patches.areas[patch[seen]] - areas[seen])
-        return Hypothesis(
-            score=score - nats,
-            state=state,
-            lengths=lengths,
-            areas=areas,
-            unseen=np.where(missed, self.parent.unseen + 1, 0),
-            patch=tuple(patch.tolist()),
-            before=self.parent.patch,
-            false=np.delete(self.patches.places, patch[dots], axis=0),
-            squared=squared,
-        )
+    def roughly(self, patch: Indices) -> tuple[float, float]:
+        """The score of an assignment, and its squared innovation for each degree of freedom.
 
-    def _claims(self, dots: Indices, patch: Indices, shared: npt.NDArray[np.bool_]) -> float:
-        """Log likelihood of claiming patches that would be false ones otherwise."""
+        Linearised where the dots are expected.
+        """
+        score, dots = self.claims(patch), np.flatnonzero(patch >= 0)
+        if not len(dots):
+            return score, 1.0
+        residuals, inverse = self._innovation(dots, patch)
+        squared = float(residuals @ inverse @ residuals)
+        score += 0.5 * float(np.linalg.slogdet(inverse)[1]) - 0.5 * squared
+        return score - len(dots) * float(np.log(2.0 * np.pi)), squared / (2 * len(dots))
+
+    def claims(self, patch: Indices) -> float:
+        """The score, but for where dots are: of claiming patches that would be false ones."""
+        dots, shared = np.flatnonzero(patch >= 0), self._shared(patch)
+        nats = self.parent.score + self.prior + float(self._missed[patch < 0].sum())
+        if not len(dots):
+            return nats
         claimed = np.unique(patch[dots])
-        nats = float(self._found[dots].sum()) - float(self._false[claimed].sum())
+        nats += float(self._found[dots].sum()) - float(self._false[claimed].sum())
         alone = dots[~shared[dots]]
         nats -= float(self._area_nats[alone, patch[alone]].sum())
         extra = len(dots) - len(claimed)
@@ -215,50 +208,65 @@ class View:
             nats += extra * (_MERGED - float(np.log(_FOUND)) + float(np.log(within).mean()))
         return nats
 
-    def _shared(self, patch: Indices) -> npt.NDArray[np.bool_]:
+    def measured(self, patch: Indices) -> tuple[Mask, Array, Array]:
+        """Which dots (n,) an assignment measures, their places (n, 2) and variances (n,)."""
+        seen, shared = patch >= 0, self._shared(patch)
+        dots = np.flatnonzero(seen)
+        places, variances = np.zeros((len(patch), 2)), np.ones(len(patch))
+        places[dots] = self.patches.places[patch[dots]]
+        variances[dots] = self._variances[dots, patch[dots]]
+        variances[shared] += (_SHARED * self._diameters[shared]) ** 2
+        # A part of which the others are nobody's is no part.
+        wholes = self.patches.wholes[patch[dots]]
+        for dot, whole in zip(dots.tolist(), wholes.tolist(), strict=True):
+            if whole >= 0 and np.count_nonzero(wholes == whole) == 1:
+                places[dot] = self.patches.whole_places[patch[dot]]
+                variances[dot] += (0.25 * self._diameters[dot]) ** 2
+        return seen, places, variances
+
+    def become(self, patch: Indices, state: motion.State, nats: float) -> Hypothesis:
+        """The hypothesis that an assignment leads to, with its state and likelihood of places."""
+        missed = patch < 0
+        areas, alone = self.parent.areas.copy(), ~missed & ~self._shared(patch)
+        areas[alone] += _AREA_WEIGHT * (self.patches.areas[patch[alone]] - areas[alone])
+        return Hypothesis(
+            score=self.claims(patch) + nats,
+            state=state,
+            branch=self.parent.branch,
+            areas=areas,
+            unseen=np.where(missed, self.parent.unseen + 1, 0),
+            patch=tuple(patch.tolist()),
+            before=self.parent.patch,
+            false=np.delete(self.patches.places, patch[~missed], axis=0),
+        )
+
+    def _shared(self, patch: Indices) -> Mask:
         """Which dots (n,) share their patch."""
         counts = np.bincount(patch[patch >= 0], minlength=len(self.patches.areas) or 1)
         return np.asarray((patch >= 0) & (counts[patch] > 1))
 
-    def _measured(self, dots: Indices, patch: Indices) -> tuple[Array, Array]:
-        """Measured places (m, 2) of dots and their variances (m,)."""
-        own = patch[dots]
-        places, variances = self.patches.places[own].copy(), self._variances[dots, own].copy()
-        shared = self._shared(patch)[dots]
-        variances[shared] += (_SHARED * self._diameters[dots[shared]]) ** 2
-        # A part of which the others are nobody's is no part.
-        wholes = self.patches.wholes[own]
-        for number in np.flatnonzero(wholes >= 0).tolist():
-            if np.count_nonzero(wholes == wholes[number]) == 1:
-                places[number] = self.patches.whole_places[own[number]]
-                variances[number] += (0.25 * self._diameters[dots[number]]) ** 2
-        return places, variances
+    def _innovation(self, dots: Indices, patch: Indices) -> tuple[Array, Array]:
+        """Residuals (2m,) of m dots, and the inverse of their covariance."""
+        _, places, variances = self.measured(patch)
+        own = _pairs(dots)
+        cov = self.ahead.cov[own[:, None], own] + np.diag(np.repeat(variances[dots], 2))
+        residuals = (places - self.ahead.places)[dots].ravel()
+        return residuals, np.asarray(np.linalg.inv(cov), np.float64)
 
-    def _innovation(self, dots: Indices, patch: Indices) -> motion.Innovation:
-        return motion.innovate(self.state, dots, *self._measured(dots, patch))
+    def _own(self, cov: Array) -> Array:
+        """Each dot's covariance (n, 2, 2), a measurement's included."""
+        return _blocks(cov) + self._least[:, None, None] * np.eye(2)
 
-    def _least_variances(self) -> Array:
-        return np.asarray(self._variances.min(axis=1))
 
-    def _lengths(self, patch: Indices, shared: npt.NDArray[np.bool_]) -> tuple[Array, float]:
-        """The bones' longest lengths with this assignment, and what it costs to be longer."""
-        chains = self._around.chains
-        lengths = self.parent.lengths * float(np.exp(-self._elapsed_s / _LENGTH_MEMORY_S))
-        seen = patch >= 0
-        if not seen.any():
-            return lengths, 0.0
-        places = self.patches.places[patch]
-        unsure = np.where(shared, self._diameters, 0.0)
-        nats = strain(chains, places, seen, unsure, self.parent.lengths)
-        near, far = chains.spans[:, 0], chains.spans[:, 1]
-        alone = seen & ~shared
-        bones = places[far] - places[near]
-        longer = np.maximum(np.hypot(bones[:, 0], bones[:, 1]) - lengths, 0.0)
-        lengths += _LONGER_WEIGHT * longer * (alone[near] & alone[far])
-        if len(lengths) > 2:
-            usual = float(np.median(lengths / chains.spans_m))
-            lengths = np.minimum(lengths, _LONGEST_RATIO * usual * chains.spans_m)
-        return lengths, nats
+def _pairs(dots: Indices) -> Indices:
+    """Rows of x and y of each dot."""
+    return np.asarray((2 * dots[:, None] + np.arange(2)).ravel(), np.int64)
+
+
+def _blocks(matrix: Array) -> Array:
+    """The (2, 2) blocks on the diagonal of a matrix (2n, 2n)."""
+    count = len(matrix) // 2
+    return np.asarray(matrix.reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count)])
 
 
 def normalised(hypotheses: list[Hypothesis]) -> list[Hypothesis]:

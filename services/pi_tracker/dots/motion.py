@@ -1,9 +1,8 @@
-"""All dots in one Kalman filter: constant velocity, accelerations that dots of one hand share.
+"""How a hand moves, and what measured dots say of it: an extended Kalman filter of its posture.
 
-The state of n dots is (2n, 2): n positions and n velocities, columns x and y; both axes have one
-covariance (2n, 2n). A hand moves as a whole and fingers bend about their joints, so where one dot
-goes says where the others go (chains.py): a dot that is hidden is carried by its neighbours, and a
-patch is judged against where the others say that its dot is. Pure.
+Postures are skeleton.py's. What moves (place, turn, angles) has a velocity, which fades; people's
+lengths do not move. A hand rests or jerks, and so do fingers: each acceleration is one of a few
+levels, and fingers close together. Several states are updated at once. Pure.
 """
 
 from __future__ import annotations
@@ -13,131 +12,185 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from services.pi_tracker.dots.skeleton import Skeleton, turned
+
 Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 # Velocities fade with this time constant: a hand that turns round is nearer to resting than to
 # going on.
 _VELOCITY_TIME_S = 0.25
+# Sigmas of accelerations, calm and sharper: of the hand's place (m/s^2) and turn (rad/s^2), and of
+# its angles (rad/s^2). Chosen on `grab` with seeds 2 and 4 of benchmarks/dots.py, and on tips that
+# cross slowly (test_tracker.py), which calm fingers of 25 rad/s^2 let exchange their names.
+_HAND, _ANGLES = ((2.0, 15.0), (20.0, 150.0)), (8.0, 50.0, 300.0)
+# Log probability of each step to what is sharper.
+_SHARP = -1.7
+# Shares of a flexion's acceleration: its own, its finger's (the thumb's is half) and of all
+# fingers; and of an abduction.
+_OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
+# Speeds at the start: m/s, rad/s.
+_START_M_S, _START_RAD_S = 0.5, 2.0
+# What is usual counts in each picture by a share, as pictures that follow each other say the same.
+_USUAL_SHARE = 0.1
+# Joints yield beyond what they do by so much, rad.
+_LIMIT_SIGMA = 0.12
+# Linearised anew so often; fingers swing by half a radian from picture to picture.
+_ROUNDS = 3
 
 
 class State(NamedTuple):
-    """Mean (2n, 2) px and px/s, and covariance (2n, 2n) of each axis."""
+    """k states: means (k, d), rotations (k, 3, 3), sides (k,) and covariances (k, d, d).
 
-    mean: Array
-    cov: Array
+    d is the posture's size and that of what moves: velocities.
+    """
 
-    @property
-    def positions(self) -> Array:
-        """(n, 2)"""
-        return self.mean[: len(self.mean) // 2]
+    means: Array
+    rotations: Array
+    sides: Array
+    covs: Array
 
-
-class Innovation(NamedTuple):
-    """What m measured dots say against their prediction."""
-
-    dots: Indices  # (m,)
-    residuals: Array  # (m, 2) px
-    inverse: Array  # (m, m) of the residuals' covariance
-    log_det: float
-
-    @property
-    def squared(self) -> float:
-        """Squared Mahalanobis distance; of 2m degrees of freedom."""
-        return float(np.sum(self.residuals * (self.inverse @ self.residuals)))
-
-    @property
-    def log_likelihood(self) -> float:
-        """Log density per px^(2m)."""
-        count = len(self.dots)
-        return -0.5 * self.squared - self.log_det - count * float(np.log(2.0 * np.pi))
+    def take(self, rows: list[int]) -> State:
+        """Some of them."""
+        return State(*(part[rows] for part in self))
 
 
-def start(positions: Array, sigmas: Array, speed: float) -> State:
-    """Dots at positions (n, 2) with sigmas (n,), and any velocity about `speed` px/s."""
-    count = len(positions)
-    mean = np.concatenate([positions, np.zeros((count, 2))])
-    # They move together, mostly.
-    velocity = speed**2 * (0.8 + 0.2 * np.eye(count))
-    cov = np.zeros((2 * count, 2 * count))
-    cov[:count, :count] = np.diag(sigmas**2)
-    cov[count:, count:] = velocity
-    return State(mean, cov)
+class Update(NamedTuple):
+    """k states with their measurements: squared innovations (k,), log likelihoods (k,)."""
+
+    state: State
+    squared: Array
+    nats: Array
 
 
-def predict(state: State, elapsed_s: float, acceleration: Array) -> State:
-    """The state after a time; acceleration (n, n) is a covariance in (px/s^2)^2."""
-    count = len(state.mean) // 2
+def together(states: list[State]) -> State:
+    """All in one."""
+    return State(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
+
+
+def start(skeleton: Skeleton, posture: Array, rotation: Array, side: float, cov: Array) -> State:
+    """A hand at a posture (size,) of a covariance, with any velocity."""
+    speeds = np.full(skeleton.moving, _START_RAD_S)
+    speeds[:3] = _START_M_S
+    size, count = skeleton.size, skeleton.size + skeleton.moving
+    mean, covs = np.zeros((1, count)), np.zeros((1, count, count))
+    mean[0, :size] = posture
+    covs[0, :size, :size] = cov
+    covs[0, size:, size:] = np.diag(speeds**2)
+    return State(mean, rotation[None], np.array([side]), covs)
+
+
+def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:
+    """The states after a time without any acceleration."""
+    size, moving = skeleton.size, skeleton.moving
     fade = float(np.exp(-elapsed_s / _VELOCITY_TIME_S))
     # How far a velocity that fades carries.
     reach_s = _VELOCITY_TIME_S * (1.0 - fade)
-    mean = state.mean.copy()
-    mean[:count] += reach_s * state.mean[count:]
-    mean[count:] *= fade
-    pp, pv, vv = state.cov[:count, :count], state.cov[:count, count:], state.cov[count:, count:]
-    cov = np.empty_like(state.cov)
-    cov[:count, :count] = pp + reach_s * (pv + pv.T) + reach_s**2 * vv
-    cov[:count, count:] = fade * (pv + reach_s * vv)
-    cov[count:, count:] = fade**2 * vv
+    step = np.eye(size + moving)
+    now, speed = np.arange(moving), size + np.arange(moving)
+    step[now, speed], step[speed, speed] = reach_s, fade
+    return _folded(state._replace(means=state.means @ step.T, covs=step @ state.covs @ step.T))
+
+
+def _accelerated(skeleton: Skeleton, hand: int, angles: int, elapsed_s: float) -> Array:
+    """What accelerations of these levels add to a covariance (d, d) in a time."""
+    moving, size = skeleton.moving, skeleton.size
+    sigmas = np.repeat(_HAND[hand], 3)
+    squares = np.zeros((moving, moving))
+    squares[:6, :6] = np.diag(sigmas**2)
+    squares[6:, 6:] = _ANGLES[angles] ** 2 * _angle_shares(skeleton)
+    cov = np.zeros((size + moving, size + moving))
     # A constant acceleration for the whole time.
-    cov[:count, :count] += 0.25 * elapsed_s**4 * acceleration
-    cov[:count, count:] += 0.5 * elapsed_s**3 * acceleration
-    cov[count:, count:] += elapsed_s**2 * acceleration
-    cov[count:, :count] = cov[:count, count:].T
-    return State(mean, cov)
+    cov[:moving, :moving] = 0.25 * elapsed_s**4 * squares
+    cov[:moving, size:] = 0.5 * elapsed_s**3 * squares
+    cov[size:, :moving] = cov[:moving, size:].T
+    cov[size:, size:] = elapsed_s**2 * squares
+    return cov
 
 
-def innovate(state: State, dots: Indices, measured: Array, variances: Array) -> Innovation:
-    """Dots (m,) measured at (m, 2) with variances (m,) of each coordinate."""
-    cov = state.cov[dots[:, None], dots] + np.diag(variances)
-    inverse: Array = np.asarray(np.linalg.inv(cov), np.float64)
-    log_det = float(np.linalg.slogdet(cov)[1])
-    return Innovation(dots, measured - state.mean[dots], inverse, log_det)
+def levels(skeleton: Skeleton, elapsed_s: float) -> tuple[tuple[Array, float], ...]:
+    """What accelerations of the hand and of its fingers add to a covariance (d, d) in a time.
 
-
-def update(state: State, innovation: Innovation) -> State:
-    """The state with the measurements taken in."""
-    cross = state.cov[:, innovation.dots]  # (2n, m)
-    gain = cross @ innovation.inverse
-    cov = state.cov - gain @ cross.T
-    return State(state.mean + gain @ innovation.residuals, 0.5 * (cov + cov.T))
-
-
-def expected(state: State, innovation: Innovation, variances: Array) -> tuple[Array, Array]:
-    """Where each dot (n, 2) must be measured by all the others, and the variance (n,) of that.
-
-    Of a measured dot its own measurement counts nothing; variances (n,) are what each would be
-    measured with.
+    With the log probability of each; at rest first.
     """
-    count = len(state.mean) // 2
-    cross = state.cov[:count, innovation.dots]
-    gain = cross @ innovation.inverse
-    places = state.mean[:count] + gain @ innovation.residuals
-    spread = np.diag(state.cov)[:count] - np.sum(gain * cross, axis=1) + variances
-    own = np.diag(innovation.inverse)  # (m,)
-    left_out = (innovation.inverse @ innovation.residuals) / own[:, None]
-    measured = state.mean[innovation.dots] + innovation.residuals
-    places[innovation.dots] = measured - left_out
-    spread[innovation.dots] = 1.0 / own
-    return places, np.maximum(spread, variances)
+    return tuple(
+        (_accelerated(skeleton, hand, angles, elapsed_s), _SHARP * (hand + angles))
+        for hand in range(len(_HAND))
+        for angles in range(len(_ANGLES))
+    )
 
 
-def bound_bones(state: State, bones: Indices, lengths: Array) -> State:
-    """The state, knowing that bones (b, 2) are no longer than lengths (b,) px.
+def _angle_shares(skeleton: Skeleton) -> Array:
+    """Covariance (angles, angles) of accelerations, one that is sharp having about 1."""
+    flexion = np.tile([0.0, 1.0, 1.0, 0.8], skeleton.fingers)
+    finger = np.repeat(np.eye(skeleton.fingers), 4, axis=0)
+    columns = np.concatenate(
+        [
+            np.diag(np.where(flexion > 0.0, _OWN, _SPLAY)),
+            _FINGER * flexion[:, None] * finger,
+            (_ALL * flexion * np.where(skeleton.thumb, 0.5, 1.0))[:, None],
+        ],
+        axis=1,
+    )
+    return np.asarray(columns @ columns.T)
 
-    A bone whose variance has grown beyond that is measured as what it is, with that variance.
+
+def updated(
+    skeleton: Skeleton, state: State, seen: Mask, places: Array, variances: Array
+) -> Update:
+    """k states with dots that are `seen` (k, n) at places (k, n, 2) of variances (k, n), px.
+
+    Also with what hands do: usual angles, and joints' ends. The log likelihood is that of the dots'
+    places, per px^2 each, times how usual the posture is.
     """
-    near, far = bones[:, 0], bones[:, 1]
-    diagonal = np.diag(state.cov)
-    spread = diagonal[near] + diagonal[far] - 2.0 * state.cov[near, far]
-    for number in np.flatnonzero(spread > 0.5 * lengths**2).tolist():
-        parent, child = int(near[number]), int(far[number])
-        bone = state.mean[child] - state.mean[parent]
-        size = float(np.hypot(*bone))
-        target = bone * min(1.0, float(lengths[number]) / max(size, 1e-9))
-        cross = state.cov[:, child] - state.cov[:, parent]
-        variance = float(cross[child] - cross[parent])
-        gain = cross / (variance + 0.5 * float(lengths[number]) ** 2)
-        mean = state.mean + np.outer(gain, target - bone)
-        state = State(mean, state.cov - np.outer(gain, cross))
-    return state
+    count, dots = seen.shape
+    first, usual = 2 * dots, len(skeleton.targets)
+    total = first + usual + skeleton.angles
+    rows = np.zeros((count, total, state.means.shape[1]))
+    rows[:, first : first + usual, : skeleton.size] = skeleton.rows
+    spread = np.ones((count, total))
+    spread[:, :first] = np.repeat(np.where(seen, variances, 1.0), 2, axis=1)
+    spread[:, first : first + usual] = skeleton.variances / _USUAL_SHARE
+    offsets = np.zeros((count, total))
+    shift, now = np.zeros_like(state.means), state
+    for _ in range(_ROUNDS):
+        pixels, slopes = skeleton.project(now.means, now.rotations, now.sides)
+        slopes *= seen[:, :, None, None]
+        rows[:, :first, : skeleton.size] = slopes.reshape(count, first, -1)
+        offsets[:, :first] = ((places - pixels) * seen[..., None]).reshape(count, first)
+        usually = now.means[:, : skeleton.size] @ skeleton.rows.T
+        offsets[:, first : first + usual] = skeleton.targets - usually
+        _limit(skeleton, now, rows, offsets, spread)
+        residuals = offsets + np.einsum("kmd,kd->km", rows, shift)
+        cross = state.covs @ rows.swapaxes(1, 2)
+        cov = rows @ cross
+        cov[:, np.arange(total), np.arange(total)] += spread
+        inverse = np.linalg.inv(cov)
+        gain = cross @ inverse
+        shift = np.einsum("kdm,km->kd", gain, residuals)
+        now = _folded(state._replace(means=state.means + shift))
+    squared = np.einsum("km,kmn,kn->k", residuals, inverse, residuals)
+    # Dots have a density, postures a weight.
+    log_det = np.linalg.slogdet(cov)[1] - np.log(spread[:, first:]).sum(axis=1)
+    nats = -0.5 * (squared + log_det) - seen.sum(axis=1) * np.log(2.0 * np.pi)
+    covs = state.covs - gain @ cross.swapaxes(1, 2)
+    return Update(now._replace(covs=0.5 * (covs + covs.swapaxes(1, 2))), squared, nats)
+
+
+def _limit(skeleton: Skeleton, now: State, rows: Array, offsets: Array, spread: Array) -> None:
+    """Enter the rows of joints that are beyond their ends; those of the others say nothing."""
+    angles = now.means[:, 6 : skeleton.moving]
+    inside = np.clip(angles, skeleton.least, skeleton.most)
+    beyond, own = inside != angles, np.arange(skeleton.angles)
+    first = rows.shape[1] - skeleton.angles
+    rows[:, first + own, 6 + own] = beyond
+    offsets[:, first:] = inside - angles
+    spread[:, first:] = np.where(beyond, _LIMIT_SIGMA**2, 1.0)
+
+
+def _folded(state: State) -> State:
+    """Turns taken into the rotations."""
+    means = state.means.copy()
+    rotations = turned(means[:, 3:6]) @ state.rotations
+    means[:, 3:6] = 0.0
+    return state._replace(means=means, rotations=rotations)

@@ -1,15 +1,15 @@
 """Dots of one colour on a hand, told apart: patches of a picture in, named dots out.
 
 Identity at the start comes from seeds, which are given points, or from the constellation (start.py,
-constellation.py), afterwards from motion and from bones that do not grow (hypothesis.py). Several
-accounts are kept side by side; what is told is the likeliest one's, so that a mix-up is undone as
-soon as the next pictures speak against it. Pure: time is an argument.
+constellation.py), afterwards from the hand whose dots they are: its posture is followed
+(skeleton.py, motion.py). Several accounts are kept side by side (hypothesis.py), from several
+postures that the first picture allows (posture.py); what is told is the likeliest one's, so that a
+mix-up is undone as soon as the next pictures speak against it. Pure: time is an argument.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -18,37 +18,27 @@ from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.extend import extend
-from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, normalised
-from services.pi_tracker.dots.reclaim import Unclaimed, reclaimed
-from services.pi_tracker.dots.repair import repaired
+from services.pi_tracker.dots.hypothesis import (
+    Hypothesis,
+    Patches,
+    Surroundings,
+    normalised,
+)
+from services.pi_tracker.dots.skeleton import Skeleton
+from services.pi_tracker.dots.start.posture import postures
 from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 
 Array = npt.NDArray[np.float64]
 
-# So many accounts are kept, and none that is so much (nats) less likely than the best.
-_KEPT, _WORSE_NATS = 12, 12.0
-# The hand's acceleration, m/s^2: at the start, least and most. (Real hands: 8..20 within a frame.)
-_ACCELERATION, _LEAST, _MOST = 3.0, 0.5, 60.0
-# Sharper ones, m/s^2, and the log probability that one begins: a finger that sets off, a jerk.
-_SHARPER = ((6.0, -3.0), (40.0, -6.0))
-# It grows fast where dots surprise and falls slowly where they do not: powers of the innovations'
-# mean square.
-_GROWTH, _DECAY = 0.3, 0.15
-# A hand's speed when tracking starts, m/s.
-_START_SPEED = 0.5
+# So many accounts are kept, of those that agree in the last two pictures so many, and none that is
+# so much (nats) less likely than the best.
+_KEPT, _ALIKE, _WORSE_NATS = 12, 3, 14.0
 # Of the number of false patches: weight of a new picture, and what it never falls below.
 _FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
+# At the start no dot is known better than to this share of the root of its area.
+_WANDER = 0.15
 # A gap longer than this tells nothing of where dots have gone meanwhile.
 _LONGEST_GAP_S = 0.5
-
-
-@dataclass
-class _Scale:
-    """What is learnt of the picture: px per m of the hand, its acceleration, false patches."""
-
-    px_per_m: float
-    acceleration: float
-    false_patches: float = 0.0
 
 
 class DotTracker:
@@ -76,9 +66,9 @@ class DotTracker:
             )
         # Of the dots that there are, once tracking has started.
         self._chains: Chains = chains_of(self.landmarks)
-        self._scale = _Scale(1.0, 1.0)
+        self._skeleton: Skeleton
         self._hypotheses: list[Hypothesis] = []
-        self._unclaimed = Unclaimed()
+        self._false_patches = 0.0
         self._time_s = 0.0
         # What a person should know of the start; empty if all is well.
         self.notes: list[str] = []
@@ -91,18 +81,10 @@ class DotTracker:
         elapsed_s = min(max(time_s - self._time_s, 1e-3), _LONGEST_GAP_S)
         self._time_s = time_s
         arrays = _arrays(patches)
-        around = self._around()
-        children: list[Hypothesis] = []
-        best = -np.inf
-        for one in self._hypotheses:
-            children += extend(one, arrays, around, elapsed_s, best - _WORSE_NATS)
-            best = max(child.score for child in children)
-        self._hypotheses = _pruned(children)
-        likeliest = self._hypotheses[0]
-        ages = self._unclaimed.note(likeliest.false)
-        found = reclaimed(likeliest, self._chains, arrays.places, arrays.areas, ages)
-        self._hypotheses = _pruned([*self._hypotheses, *found, *repaired(likeliest, self._chains)])
-        self._learn(len(patches))
+        around = self._around(elapsed_s)
+        self._hypotheses = _pruned(extend(self._hypotheses, arrays, around, elapsed_s))
+        false = len(patches) - len({p for p in self._hypotheses[0].patch if p >= 0})
+        self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)
 
     @property
@@ -119,47 +101,36 @@ class DotTracker:
             self._begin(found, patches, time_s)
 
     def _begin(self, found: Start, patches: Sequence[Patch], time_s: float) -> None:
-        chains, self.notes, self._time_s = found.chains, found.notes, time_s
-        self._chains = chains
-        scale = found.px_per_m
-        self._scale = _Scale(scale, _ACCELERATION * scale)
+        self._chains, self.notes, self._time_s = found.chains, found.notes, time_s
+        self._skeleton = Skeleton(found.chains.landmarks, self._size_px)
         areas = np.array([p.area_px for p in patches]) if patches else np.array([100.0])
         typical = float(np.median(areas))
         own = [typical if p < 0 else patches[p].area_px for p in found.patch]
-        state = motion.start(found.places, found.sigmas, _START_SPEED * scale)
-        lengths = np.maximum(found.lengths(), 0.9 * scale * chains.spans_m)
         missing = np.array([p < 0 for p in found.patch], np.int64)
         places = _arrays(patches).places
         false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
+        sigmas = np.maximum(found.sigmas, _WANDER * np.sqrt(typical))
         self._hypotheses = [
-            Hypothesis(0.0, state, lengths, np.array(own), missing, found.patch, found.patch, false)
+            Hypothesis(
+                score, state, branch, np.array(own), missing, found.patch, found.patch, false
+            )
+            for branch, (score, state) in enumerate(postures(self._skeleton, found.places, sigmas))
         ]
 
-    def _around(self) -> Surroundings:
+    def _around(self, elapsed_s: float) -> Surroundings:
         width, height = self._size_px
-        density = (self._scale.false_patches + _FEWEST_FALSE) / (width * height)
-        usual, scale = self._scale.acceleration, self._scale.px_per_m
-        sharper = [(level * scale, prior) for level, prior in _SHARPER if level * scale > usual]
-        return Surroundings(self._chains, ((usual, 0.0), *sharper), density)
-
-    def _learn(self, count: int) -> None:
-        """Take the likeliest account for the truth."""
-        best, scale = self._hypotheses[0], self._scale
-        power = _GROWTH if best.squared > 1.0 else _DECAY
-        grown = scale.acceleration * max(best.squared, 0.05) ** power
-        scale.acceleration = float(np.clip(grown, _LEAST * scale.px_per_m, _MOST * scale.px_per_m))
-        false = count - len({p for p in best.patch if p >= 0})
-        scale.false_patches += _FALSE_WEIGHT * (false - scale.false_patches)
+        density = (self._false_patches + _FEWEST_FALSE) / (width * height)
+        return Surroundings(self._skeleton, motion.levels(self._skeleton, elapsed_s), density)
 
     def _dots(self, patches: Sequence[Patch]) -> dict[str, Dot]:
         best = self._hypotheses[0]
         weights = np.exp([one.score for one in self._hypotheses])
         weights /= weights.sum()
-        sigmas = np.sqrt(np.diag(best.state.cov))
+        places, sigmas = self._expected(best)
         dots: dict[str, Dot] = {}
         for number, name in enumerate(self._chains.landmarks):
             index = best.patch[number]
-            x, y = best.state.mean[number].tolist()
+            x, y = places[number].tolist()
             if index < 0:
                 area = float(best.areas[number])
                 dots[name] = Dot(x, y, float(sigmas[number]), 0.0, "carried", area, -1)
@@ -169,17 +140,30 @@ class DotTracker:
                 for weight, one in zip(weights, self._hypotheses, strict=True)
                 if one.patch[number] == index
             )
-            dots[name] = _seen(best, number, patches, agree, float(sigmas[number]))
+            dots[name] = _seen(best, number, patches, agree, (x, y), float(sigmas[number]))
         return dots
+
+    def _expected(self, best: Hypothesis) -> tuple[Array, Array]:
+        """Where the hand has its dots (n, 2), and their sigmas (n,), px."""
+        state = best.state
+        pixels, slopes = self._skeleton.project(state.means, state.rotations, state.sides)
+        size = self._skeleton.size
+        covs = slopes[0] @ state.covs[0, :size, :size] @ slopes[0].swapaxes(1, 2)
+        return pixels[0], np.sqrt(0.5 * np.trace(covs, axis1=1, axis2=2))
 
 
 def _seen(
-    best: Hypothesis, number: int, patches: Sequence[Patch], agree: float, sigma_px: float
+    best: Hypothesis,
+    number: int,
+    patches: Sequence[Patch],
+    agree: float,
+    expected_px: tuple[float, float],
+    sigma_px: float,
 ) -> Dot:
     index = best.patch[number]
     patch = patches[index]
     if best.patch.count(index) > 1:
-        x, y = best.state.mean[number].tolist()
+        x, y = expected_px
         return Dot(x, y, sigma_px, 0.3 * agree * patch.quality, "merged", patch.area_px, index)
     parts = {k for k, one in enumerate(patches) if one.whole == patch.whole and patch.whole >= 0}
     alone = len(parts & set(best.patch)) == 1
@@ -210,11 +194,14 @@ def _arrays(patches: Sequence[Patch]) -> Patches:
 
 
 def _pruned(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The best, best first; of those that agree in the last two pictures only one."""
-    kept: dict[tuple[tuple[int, ...], tuple[int, ...]], Hypothesis] = {}
+    """The best, best first; of those that agree in the last two pictures, of different starts."""
+    kept: list[Hypothesis] = []
+    alike: dict[tuple[tuple[int, ...], tuple[int, ...]], set[int]] = {}
     for one in sorted(hypotheses, key=lambda one: -one.score):
-        kept.setdefault((one.patch, one.before), one)
+        branches = alike.setdefault((one.patch, one.before), set())
+        if one.branch not in branches and len(branches) < _ALIKE:
+            branches.add(one.branch)
+            kept.append(one)
         if len(kept) >= _KEPT:
             break
-    best = normalised(list(kept.values()))
-    return [one for one in best if one.score > -_WORSE_NATS]
+    return [one for one in normalised(kept) if one.score > -_WORSE_NATS]

@@ -23,8 +23,6 @@ _SEED_DIAMETERS = 2.0
 _SURE_NATS = 0.6
 # Without seeds no dot is smaller than this share of the median patch.
 _SPECK = 0.3
-# Of px per m where there is no bone to measure it on: a hand of 0.2 m fills a third of the picture.
-_HAND_M = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +33,7 @@ class Start:
     patch: tuple[int, ...]
     places: Array
     sigmas: Array
-    px_per_m: float
     notes: list[str] = field(default_factory=list)
-
-    def lengths(self) -> Array:
-        """(s,) px, of spans whose ends both have a patch; else 0."""
-        near, far = self.chains.spans[:, 0], self.chains.spans[:, 1]
-        bones = self.places[far] - self.places[near]
-        known = np.array(self.patch) >= 0
-        return np.where(known[near] & known[far], np.hypot(bones[:, 0], bones[:, 1]), 0.0)
 
 
 def from_seeds(
@@ -74,18 +64,7 @@ def from_seeds(
         for k, name in enumerate(names)
         if not found[k]
     ]
-    scale = px_per_m(own, starts)
-    return Start(own, tuple(patch.tolist()), starts, sigmas, scale, notes)
-
-
-def px_per_m(chains: Chains, places: Array) -> float:
-    """How large the hand is in the picture: that of the bones least foreshortened."""
-    if not len(chains.bones):
-        spread = float(np.ptp(places, axis=0).max()) if len(places) > 1 else 200.0
-        return max(spread, 50.0) / _HAND_M
-    bones = places[chains.bones[:, 1]] - places[chains.bones[:, 0]]
-    ratios = np.hypot(bones[:, 0], bones[:, 1]) / chains.lengths_m
-    return max(float(np.quantile(ratios, 0.75)), 1.0)
+    return Start(own, tuple(patch.tolist()), starts, sigmas, notes)
 
 
 def from_shape(chains: Chains, patches: Sequence[Patch]) -> Start | None:
@@ -117,8 +96,7 @@ def from_shape(chains: Chains, patches: Sequence[Patch]) -> Start | None:
             "the dots could be named in another way as well: see whether they are right, or start "
             "with fingers apart and straight, or give the dots' places (`rhot track --seed`)"
         )
-    scale = px_per_m(chains, starts)
-    return Start(chains, tuple(own.tolist()), starts, sigmas, scale, notes)
+    return Start(chains, tuple(own.tolist()), starts, sigmas, notes)
 
 
 def finger_joints(fingers: Sequence[str]) -> list[str]:

@@ -1,55 +1,61 @@
-"""The filter of all dots: against an estimate of all at once, and what neighbours say of a dot."""
+"""The filter of a hand's posture: a closing finger followed, a hidden dot carried along."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.chains import chains_of, finger_landmarks
+from services.pi_tracker.dots.chains import finger_landmarks
+from services.pi_tracker.dots.skeleton import Skeleton, turned
+from services.pi_tracker.dots.start.posture import postures
 
-CHAINS = chains_of(finger_landmarks("index"))
-PLACES = np.array([[0.0, 0.0], [60.0, 0.0], [95.0, 0.0], [120.0, 0.0]])
-
-
-def _predicted() -> motion.State:
-    state = motion.start(PLACES, np.full(4, 1.0), 300.0)
-    return motion.predict(state, 1 / 30, 3000.0**2 * CHAINS.acceleration)
+NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
+SKELETON = Skeleton(NAMES, (1280, 720))
+ROTATION, SIDE = turned(np.array([[1.2, 0.4, -0.3]])), np.array([1.0])
 
 
-def test_what_the_others_say_of_a_dot_is_the_estimate_without_it() -> None:
-    state = _predicted()
-    measured = PLACES + np.array([12.0, 3.0])
-    dots, variances = np.arange(4), np.full(4, 1.0)
-    places, spreads = motion.expected(
-        state, motion.innovate(state, dots, measured, variances), variances
-    )
-    for dot in range(4):
-        others = np.delete(dots, dot)
-        without = motion.update(
-            state, motion.innovate(state, others, measured[others], variances[others])
+def _seen(bend: float) -> np.ndarray:
+    """Pixels of a hand whose index finger bends so much more than usual, rad."""
+    posture = np.zeros((1, SKELETON.size))
+    posture[0, :3] = 0.01, 0.02, 0.4
+    posture[0, 6 : SKELETON.moving] = SKELETON.usual
+    posture[0, 11:14] += bend * np.array([1.0, 1.0, 0.6])
+    return SKELETON.project(posture, ROTATION, SIDE)[0][0]
+
+
+@pytest.fixture(scope="module")
+def begun() -> list[tuple[float, motion.State]]:
+    return postures(SKELETON, _seen(-0.3), np.full(8, 1.0))
+
+
+def test_the_first_picture_allows_several_postures_that_all_show_it(
+    begun: list[tuple[float, motion.State]],
+) -> None:
+    assert begun[0][0] == 0.0
+    assert len(begun) > 1
+    for _, state in begun:
+        pixels, _ = SKELETON.project(state.means, state.rotations, state.sides)
+        assert np.linalg.norm(pixels[0] - _seen(-0.3), axis=1).max() < 4.0
+
+
+def test_a_hidden_tip_goes_along_with_its_finger(begun: list[tuple[float, motion.State]]) -> None:
+    state = motion.together([one for _, one in begun])
+    seen = np.ones((len(begun), 8), bool)
+    seen[:, 7] = False
+    total = np.zeros(len(begun))
+    for frame in range(1, 11):
+        ahead = motion.coasted(SKELETON, state, 1 / 30)
+        added, _ = motion.levels(SKELETON, 1 / 30)[1]
+        places = np.broadcast_to(_seen(-0.3 + 0.1 * frame), (len(begun), 8, 2))
+        after = motion.updated(
+            SKELETON, ahead._replace(covs=ahead.covs + added), seen, places, np.ones(seen.shape)
         )
-        assert np.allclose(places[dot], without.positions[dot])
-        assert np.isclose(spreads[dot], without.cov[dot, dot] + 1.0)
-
-
-def test_a_hidden_dot_goes_along_with_its_hand() -> None:
-    state = _predicted()
-    seen = np.array([0, 1, 3])
-    moved = PLACES + np.array([40.0, -25.0])
-    found = motion.update(state, motion.innovate(state, seen, moved[seen], np.full(3, 1.0)))
-    assert np.linalg.norm(found.positions[2] - moved[2]) < 5.0
-    assert found.cov[2, 2] > found.cov[1, 1]
-
-
-def test_the_spread_of_a_bone_stays_below_its_length() -> None:
-    state = motion.start(PLACES, np.full(4, 1.0), 0.0)
-    lengths = np.array([70.0, 45.0, 35.0])
-    for _ in range(200):
-        state = motion.predict(state, 1 / 30, 9000.0**2 * CHAINS.acceleration)
-        state = motion.update(
-            state, motion.innovate(state, np.array([0]), state.positions[:1], np.ones(1))
-        )
-        state = motion.bound_bones(state, CHAINS.bones, lengths)
-        for (near, far), length in zip(CHAINS.bones, lengths, strict=True):
-            spread = state.cov[near, near] + state.cov[far, far] - 2.0 * state.cov[near, far]
-            assert -1e-6 < spread <= 0.5 * length**2 + 1e-6
+        state, total = after.state, total + after.nats
+    best = int(total.argmax())
+    pixels, _ = SKELETON.project(state.means, state.rotations, state.sides)
+    # It has moved by 130 px, and the bend of the last joint was not seen.
+    moved = np.linalg.norm(_seen(0.7)[7] - _seen(-0.3)[7])
+    assert moved > 60.0
+    assert np.linalg.norm(pixels[best, 7] - _seen(0.7)[7]) < 0.25 * moved
+    assert np.linalg.eigvalsh(state.covs[best]).min() > 0.0

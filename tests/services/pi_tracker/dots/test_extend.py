@@ -1,11 +1,10 @@
-"""Dots that jump out of their gates are found again, in their finger's order."""
+"""Dots of fingers that move sharply keep their names, and specks are none of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from services.pi_tracker.dots.dot import Patch
-from services.pi_tracker.dots.reclaim import Unclaimed
 from services.pi_tracker.dots.tracker import DotTracker
 
 NAMES = ("wrist", "index_proximal", "index_intermediate", "index_distal", "index_tip")
@@ -45,11 +44,3 @@ def test_a_speck_that_was_there_before_is_no_lost_dot() -> None:
         dots = tracker.step(_patches([*CLOSING[0][:4], speck]), number / 30.0)
         assert dots["index_tip"].state == "carried"
         assert np.hypot(dots["index_tip"].x_px - 371, dots["index_tip"].y_px - 168) < 30.0
-
-
-def test_patches_age_while_they_stay() -> None:
-    unclaimed = Unclaimed()
-    assert unclaimed.note(np.array([[10.0, 10.0]])).tolist() == [1]
-    assert unclaimed.note(np.array([[14.0, 10.0], [90.0, 10.0]])).tolist() == [2, 1]
-    assert unclaimed.note(np.empty((0, 2))).tolist() == []
-    assert unclaimed.note(np.array([[14.0, 10.0]])).tolist() == [1]

@@ -1,0 +1,180 @@
+"""The hand behind the dots: where a camera sees each of them, for given angles and lengths.
+
+Many postures at a time (k of them), with derivatives. The hand is rhot.hand's, of an average adult;
+bones and roots of fingers may differ from it, and are learnt as dots are followed. A left hand is a
+right one mirrored. Pure.
+
+A posture is a vector of p numbers: the hand's middle in the camera's frame (3, m), its turn since
+its rotation (3, rad), the angles of each finger (4, rad), the logarithms of its bones' lengths to
+the average adult's (3 for each finger), and shifts (m) of fingers' roots and of dots on the palm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from rhot.geometry.transforms import rotation_from_quaternion
+from rhot.hand import CHAIN_JOINTS, JOINTS, default_hand, forward
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+
+# A camera's focal length by its picture's longer side, if nobody knows: that of phones and webcams.
+_FOCAL = 0.75
+# No joint is nearer to a camera than this, m.
+_NEAREST_M = 0.05
+# Usual angles and their spread, rad: abduction and three flexions of the thumb, of a finger; wide,
+# so that they decide only what nobody sees.
+_USUAL = ((0.1, 0.1, 0.3, 0.4), (0.0, 0.5, 0.7, 0.4))
+_SPREAD = ((0.35, 0.45, 0.45, 0.6), (0.2, 0.6, 0.7, 0.5))
+# What joints of real hands do (the four Leap recordings), rad: least and most.
+_LEAST = ((-0.6, -0.9, -0.5, -0.5), (-0.4, -0.5, -0.15, -0.3))
+_MOST = ((0.8, 0.9, 1.2, 1.6), (0.4, 1.7, 2.0, 1.5))
+# A finger's last joint follows the one before, RHOT eq. (4), within so much, rad.
+_COUPLING, _COUPLING_SIGMA = 2.0 / 3.0, 0.35
+# How people differ (and where on the skin dots are): of log lengths; of fingers' roots, of the
+# thumb's and of dots on palm and wrist, m.
+_LENGTH_SIGMA, _ROOT_SIGMA, _LOOSE_SIGMA = 0.12, 0.007, 0.015
+
+
+class Skeleton:
+    """The fingers that n dots are on, seen by a camera."""
+
+    def __init__(self, landmarks: Sequence[str], size_px: tuple[int, int]) -> None:
+        """landmarks are of rhot.hand.JOINTS; size_px is the picture's."""
+        joints = [JOINTS.index(name) for name in landmarks]
+        rows = np.array([r for r in range(5) if set(joints) & set(CHAIN_JOINTS[r].tolist())], int)
+        chained = CHAIN_JOINTS[rows].ravel().tolist()
+        loose = [joint for joint in joints if joint not in chained]
+        where = [*chained, *loose]
+        # Of each dot, its point among the fingers' joints and the loose ones.
+        self._points = np.array([where.index(joint) for joint in joints], np.int64)
+        self.fingers, self.angles = len(rows), 4 * len(rows)
+        # Of a posture: what moves, and all.
+        self.moving = 6 + self.angles
+        self._roots = self.moving + 3 * len(rows)
+        self.size = self._roots + 3 * len(rows) + 3 * len(loose)
+        self.focal_px = _FOCAL * max(size_px)
+        self.middle_px = 0.5 * (np.array(size_px) - 1.0)
+        model = default_hand("right")
+        rest, _ = forward(model, np.eye(3), np.zeros(3), np.zeros((5, 4)))
+        centre = rest[CHAIN_JOINTS[1:, 0]].mean(axis=0)
+        digits = [model.digits[row] for row in rows]
+        self._bases = np.array([d.base_m for d in digits]).reshape(-1, 3) - centre
+        turns = [rotation_from_quaternion(d.base_wxyz) for d in digits]
+        self._turns = np.array(turns).reshape(-1, 3, 3)
+        self._lengths = np.array([d.lengths_m for d in digits]).reshape(-1, 3)
+        self._loose = rest[loose].reshape(-1, 3) - centre
+        kind = np.minimum(rows, 1)
+        self.usual, self.spread = np.array(_USUAL)[kind].ravel(), np.array(_SPREAD)[kind].ravel()
+        self.least, self.most = np.array(_LEAST)[kind].ravel(), np.array(_MOST)[kind].ravel()
+        self.thumb = np.repeat(rows == 0, 4)  # (angles,)
+        roots = np.where(rows == 0, _LOOSE_SIGMA, _ROOT_SIGMA)
+        self.person = np.concatenate(
+            [
+                np.full(3 * len(rows), _LENGTH_SIGMA),
+                np.repeat(roots, 3),
+                np.full(3 * len(loose), _LOOSE_SIGMA),
+            ]
+        )
+        # What is usual as linear rows (r, size) with targets and variances: angles, couplings.
+        last = 6 + 4 * np.flatnonzero(rows > 0) + 3
+        count = self.angles + len(last)
+        self.rows = np.zeros((count, self.size))
+        self.rows[np.arange(self.angles), 6 + np.arange(self.angles)] = 1.0
+        below = np.arange(self.angles, count)
+        self.rows[below, last], self.rows[below, last - 1] = 1.0, -_COUPLING
+        self.targets = np.concatenate([self.usual, np.zeros(len(last))])
+        self.variances = np.concatenate([self.spread, np.full(len(last), _COUPLING_SIGMA)]) ** 2
+
+    def project(self, postures: Array, rotations: Array, sides: Array) -> tuple[Array, Array]:
+        """Pixels (k, n, 2) of the dots, and their derivatives (k, n, 2, size).
+
+        postures (k, size or more); rotations (k, 3, 3), camera from hand; sides (k,): 1 of a right
+        hand, -1 of a left one.
+        """
+        points, slopes = self.place(postures, rotations, sides)
+        depth = np.maximum(points[..., 2], _NEAREST_M)[..., None]
+        over = points[..., :2] / depth
+        pixels = self.focal_px * over + self.middle_px
+        flat = slopes[..., :2, :] - over[..., None] * slopes[..., 2:3, :]
+        return pixels, self.focal_px / depth[..., None] * flat
+
+    def place(self, postures: Array, rotations: Array, sides: Array) -> tuple[Array, Array]:
+        """Places (k, n, 3) of the dots in the camera's frame, m, and derivatives (.., size)."""
+        points, slopes = self._in_hand(postures)
+        frames = rotations.copy()
+        frames[:, :, 0] *= sides[:, None]
+        points, slopes = points @ frames.swapaxes(1, 2), frames[:, None] @ slopes
+        slopes[..., :3] = np.eye(3)
+        # A turn w shifts a point p by w x p.
+        for axis in range(3):
+            slopes[..., 3 + axis] = np.cross(np.eye(3)[axis], points)
+        return points + postures[:, None, :3], slopes
+
+    def _in_hand(self, postures: Array) -> tuple[Array, Array]:
+        """The same in the hand's frame about its middle, by angles, lengths and shifts alone."""
+        count, own, fingers = len(postures), self._roots, self.fingers
+        angles = postures[:, 6 : self.moving].reshape(count, fingers, 4)
+        logs = postures[:, self.moving : own].reshape(count, fingers, 3)
+        shifts = postures[:, own : self.size].reshape(count, -1, 3)
+        joints = np.zeros((count, fingers, 4, 3))
+        slopes = np.zeros((count, fingers, 4, 3, self.size))
+        cosines, sines = np.cos(angles), np.sin(angles)
+        turn = self._turns @ _about_y(cosines[..., 0], sines[..., 0])
+        joints[:, :, 0] = at = self._bases + shifts[:, :fingers]
+        axes = [(np.broadcast_to(self._turns[:, :, 1], at.shape), at)]
+        bones = []
+        for k in range(3):
+            axes.append((-turn[..., 0], at))
+            turn = turn @ _about_minus_x(cosines[..., k + 1], sines[..., k + 1])
+            lengths = self._lengths[:, k] * np.exp(logs[..., k])
+            bones.append(-lengths[..., None] * turn[..., 2])
+            joints[:, :, k + 1] = at = at + bones[-1]
+        each = np.arange(fingers)
+        for j in range(4):
+            for k in range(j):
+                slopes[:, each, j, :, self.moving + 3 * each + k] = bones[k].swapaxes(0, 1)
+            for k in range(j + 1):
+                axis, start = axes[k]
+                turning = np.cross(axis, joints[:, :, j] - start).swapaxes(0, 1)
+                slopes[:, each, j, :, 6 + 4 * each + k] = turning
+            for k in range(3):
+                slopes[:, each, j, k, own + 3 * each + k] = 1.0
+        loose = self._loose + shifts[:, fingers:]
+        bare = np.zeros((count, loose.shape[1], 3, self.size))
+        for number in range(loose.shape[1]):
+            first = own + 3 * (fingers + number)
+            bare[:, number, :, first : first + 3] = np.eye(3)
+        points = np.concatenate([joints.reshape(count, -1, 3), loose], axis=1)
+        every = np.concatenate([slopes.reshape(count, -1, 3, self.size), bare], axis=1)
+        return points[:, self._points], every[:, self._points]
+
+
+def turned(vectors: Array) -> Array:
+    """Rotations (k, 3, 3) by vectors (k, 3), rad."""
+    angles = np.linalg.norm(vectors, axis=1) + 1e-12
+    x, y, z = (vectors / angles[:, None]).T
+    zero = np.zeros_like(x)
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    wide = angles[:, None, None]
+    return np.asarray(np.eye(3) + np.sin(wide) * skew + (1.0 - np.cos(wide)) * skew @ skew)
+
+
+def _about_y(cosines: Array, sines: Array) -> Array:
+    turn = np.zeros((*cosines.shape, 3, 3))
+    turn[..., 0, 0] = turn[..., 2, 2] = cosines
+    turn[..., 1, 1] = 1.0
+    turn[..., 0, 2], turn[..., 2, 0] = sines, -sines
+    return turn
+
+
+def _about_minus_x(cosines: Array, sines: Array) -> Array:
+    turn = np.zeros((*cosines.shape, 3, 3))
+    turn[..., 0, 0] = 1.0
+    turn[..., 1, 1] = turn[..., 2, 2] = cosines
+    turn[..., 1, 2], turn[..., 2, 1] = sines, -sines
+    return turn
