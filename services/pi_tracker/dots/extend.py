@@ -7,6 +7,8 @@ expect it at. Then what differs from the best by one exchange. The likeliest are
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -49,29 +51,40 @@ def extend(
 
 def _views(
     parents: list[Hypothesis], state: motion.State, patches: Patches, around: Surroundings
-) -> list[list[View]]:
+) -> Iterator[Iterator[View]]:
     """Of each parent a view for each acceleration; state: the parents' when nothing accelerates."""
     pixels, slopes = around.skeleton.project(state.means, state.rotations, state.sides)
-    size = around.skeleton.size
-    found: list[list[View]] = []
     for k, parent in enumerate(parents):
-        rows = slopes[k].reshape(-1, size)
-        found.append([])
-        for added, prior in around.levels:
-            own = state.take([k])
-            own = own._replace(covs=own.covs + added)
-            ahead = Ahead(pixels[k], rows @ own.covs[0, :size, :size] @ rows.T, own)
-            found[-1].append(View(parent, ahead, patches, around.false_density, prior))
-    return found
+        rows = slopes[k].reshape(-1, around.skeleton.size)
+        yield _levels(parent, pixels[k], rows, state.take([k]), patches, around)
 
 
-def _children(levels: list[View]) -> list[tuple[float, View, Indices]]:
+def _levels(
+    parent: Hypothesis,
+    pixels: Array,
+    rows: Array,
+    still: motion.State,
+    patches: Patches,
+    around: Surroundings,
+) -> Iterator[View]:
+    """One parent's views, made as they are asked for: a calm picture needs the first alone.
+
+    Its dots' pixels (n, 2) and their derivatives (2n, size), and its state, when nothing
+    accelerates.
+    """
+    size = around.skeleton.size
+    for added, prior in around.levels:
+        own = still._replace(covs=still.covs + added)
+        ahead = Ahead(pixels, rows @ own.covs[0, :size, :size] @ rows.T, own)
+        yield View(parent, ahead, patches, around.false_density, prior)
+
+
+def _children(levels: Iterable[View]) -> list[tuple[float, View, Indices]]:
     """Assignments of one account with a score, by more accelerations the worse they are."""
     found: list[tuple[float, View, Indices]] = []
     best, calm, whole = -np.inf, False, False
     for view in levels:
-        for patch in _assignments(view):
-            score, squared = view.roughly(patch)
+        for score, squared, patch in _assignments(view):
             found.append((score, view, patch))
             if score > best:
                 best, calm = score, squared <= _CALM
@@ -81,16 +94,19 @@ def _children(levels: list[View]) -> list[tuple[float, View, Indices]]:
     return found
 
 
-def _assignments(view: View) -> list[Indices]:
-    """The likely ones, each once."""
-    found: dict[tuple[int, ...], tuple[float, Indices]] = {}
+def _assignments(view: View) -> list[tuple[float, float, Indices]]:
+    """The likely ones, each once, with its score and squared innovation (View.roughly)."""
+    found: dict[tuple[int, ...], tuple[float, float, Indices]] = {}
 
     def add(patch: Indices) -> None:
         patch = view.with_merged(patch)
-        found.setdefault(tuple(patch.tolist()), (view.roughly(patch)[0], patch))
+        key = tuple(patch.tolist())
+        if key not in found:
+            found[key] = (*view.roughly(patch), patch)
 
     if not len(view.patches.areas):
-        return [np.full(len(view.parent.patch), -1, np.int64)]
+        add(np.full(len(view.parent.patch), -1, np.int64))
+        return list(found.values())
     places, covs = view.marginal()
     # Where all have moved alike, each is within about a tenth of its own gate.
     shifted = places + _common_shift(view, places, covs)
@@ -109,9 +125,9 @@ def _assignments(view: View) -> list[Indices]:
         if now == best:
             break
         best = now
-        for patch in _exchanges(view, found[best][1]):
+        for patch in _exchanges(view, found[best][2]):
             add(patch)
-    return [patch for _, patch in found.values()]
+    return list(found.values())
 
 
 def _common_shift(view: View, places: Array, covs: Array) -> Array:
