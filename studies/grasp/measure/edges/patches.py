@@ -3,8 +3,9 @@
 From picture to picture a small error stays and adds up; a joint is a centre of rotation only to one
 who knows how both its bones moved over the whole recording. So each phalanx' skin is kept as a
 picture of its own, laid out along its bone, and found again, by itself, in the mean of all. Shading
-stays with the lamp as a finger turns, and it changes across a finger, hardly along it: what is
-smooth across is taken out (Legendre polynomials), and skin tells places along a bone best.
+stays with the lamp as a finger turns, and flesh that folds beside a joint shades the skin about it
+as far as the joint is bent, which looks like skin that slides: what is smooth across a finger is
+taken out (Legendre polynomials), and at last only what is fine counts, pores and creases.
 """
 
 from __future__ import annotations
@@ -139,9 +140,11 @@ def placed(
     windows: Sequence[Window | None],
     followed: tuple[Silhouette, Array],
     now: tuple[Silhouette, Array],
+    fine_px: float | None = None,
 ) -> Placed:
     """Where skin is. followed: shape and poses (f, 6) at which pictures were kept; now: those that
-    are known better.
+    are known better; fine_px: only what is finer than so many px (sigma) is compared, which has to
+    be known to about as many beforehand.
     """
     before = np.stack([_starts(followed[0], vector) for vector in followed[1]])  # (f, 4, 3)
     starts = np.stack([_starts(now[0], vector) for vector in now[1]])
@@ -153,7 +156,7 @@ def placed(
         found.centres[segment] = window.centre
         own = _within(starts[:, segment], before[:, segment], window)
         shown = np.stack([_unfolded(window, segment, now[0], bend) for bend in bends])
-        images = [one[segment].astype(np.float32) for one in kept]
+        images = [_fine(one[segment].astype(np.float32), fine_px) for one in kept]
         turned, weights = _registered(images, window, own, shown)
         found.poses[:, segment] = _without(turned, before[:, segment], window)
         found.weights[:, segment] = weights
@@ -163,6 +166,13 @@ def placed(
     found.poses[..., 0] += c * x - s * y
     found.poses[..., 1] += s * x + c * y
     return found
+
+
+def _fine(image: Picture, fine_px: float | None) -> Picture:
+    """A picture less its blurred self."""
+    if fine_px is None:
+        return image
+    return image - np.asarray(cv2.GaussianBlur(image, (0, 0), fine_px), dtype=np.float32)
 
 
 def _within(starts: Array, before: Array, window: Window) -> Array:

@@ -36,6 +36,26 @@ def test_a_picture_that_is_off_is_found_where_the_others_say(followed):
     assert (again.weights[:, 1] > 0.4).all()
 
 
+def test_a_shade_that_slides_does_not_move_fine_skin(followed):
+    """As flesh folds beside a joint, light moves along the bone, and the skin does not."""
+    shape, windows, poses, kept = followed
+    rows, columns = np.mgrid[: kept[0][1].shape[0], : kept[0][1].shape[1]]
+    shaded = []
+    for number, one in enumerate(kept):
+        x, y = columns - 40.0 - 4.0 * number, rows - 0.3 * len(rows)
+        shade = 40.0 * np.exp(-0.5 * np.square(np.hypot(x, y) / 10.0))
+        shaded.append((one[0], (one[1] + shade).astype(np.float16), *one[2:]))
+
+    def moved(fine_px):
+        still, slid = (
+            placed(pictures, windows, (shape, poses), (shape, poses), fine_px).poses[:, 1, :2]
+            for pictures in (kept, shaded)
+        )
+        return float(np.hypot(*(slid - still).T).max())
+
+    assert moved(2.0) < 0.2 < 0.5 < moved(None)
+
+
 def test_skin_seen_in_one_picture_tells_nothing(followed):
     shape, windows, poses, kept = followed
     alone = placed(kept[:1], windows, (shape, poses[:1]), (shape, poses[:1]))
