@@ -48,7 +48,7 @@ def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
         # ended (eclipse-zenoh/zenoh#2787): a router grew by 7.4 MB whenever a process that sends
         # pictures started again, and lost them without a word once no more could be locked (#2788).
         # Without, a simulated picture of 460 kB takes 0.5 to 1 ms longer and 0.4 to 0.8 ms more
-        # processor time; on a machine with ten times too much to do 1.1 % were lost (with it .06 %).
+        # processor time; with ten times too much to do 1.1 % were lost (.06 % with it).
         "shared_memory": {"enabled": False},
     }
 
