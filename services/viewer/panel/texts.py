@@ -101,7 +101,7 @@ def angles(pose: HandPose) -> str:
     """Joint angles in degrees, one row a finger; of the thumb its own joints from the wrist on."""
     rows = [_row(("", "spread", "base", "middle", "tip", "misfit"), head=True)]
     for digit, names, finger in zip(DIGITS, DIGIT_ANGLES, pose.fingers, strict=True):
-        degrees = [f"{_degrees(getattr(finger.angles_rad, name)):.0f}&deg;" for name in names]
+        degrees = [f"{_degrees(getattr(finger.angles_rad, name))}&deg;" for name in names]
         off = f"{min(finger.residual_m * 1e3, 999.0):.1f} mm" if finger.status != "solved" else ""
         mark = "" if finger.status == "solved" else f" ({text(finger.status.replace('_', ' '))})"
         rows.append(_row((digit + mark, *degrees, off)))
@@ -163,9 +163,10 @@ def preview(camera: str, jpeg_base64: str | None, marks: str = "") -> str:
     )
 
 
-def _degrees(angle_rad: float) -> float:
-    # Angles come over the network: anything beyond a full turn is shown as such.
-    return float(np.rad2deg(min(max(angle_rad, -7.0), 7.0))) + 0.0
+def _degrees(angle_rad: float) -> int:
+    # Angles come over the network: anything beyond a full turn is shown as such. Whole numbers have
+    # no "-0".
+    return round(float(np.rad2deg(min(max(angle_rad, -7.0), 7.0))))
 
 
 def _row(cells: Sequence[str], *, head: bool = False) -> str:

@@ -116,6 +116,18 @@ def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]
     assert "999.0 mm" in said
 
 
+def test_next_to_nothing_is_nothing(make_pose: Callable[..., HandPose]) -> None:
+    pose = make_pose()
+    finger = msgspec.structs.replace(
+        pose.fingers[1], angles_rad=FingerAngles(abduction=-1e-3, mcp=-0.0, pip=1e-3, dip=0.0)
+    )
+    said = texts.angles(
+        msgspec.structs.replace(pose, fingers=[pose.fingers[0], finger, *pose.fingers[2:]])
+    )
+    assert "-0&deg;" not in said
+    assert said.count(">0&deg;") >= 4
+
+
 def test_rates_against_expectation(make_health: Callable[..., Health]) -> None:
     assert "waiting for the services' health" in texts.rates([])
     good = texts.rates([make_health()])
