@@ -58,6 +58,8 @@ def export(
     if up not in UPS:
         raise ConfigError(f"--up {up}: valid: {', '.join(UPS)}")
     folder = folder_beside(recording, out)
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"--out {folder}: is a file; give a folder, new or there already")
     motions = [name for name, wanted in zip(FORMATS, (bvh, trc, mot, gltf), strict=True) if wanted]
     formats = [name for name, wanted in (("csv", csv), ("parquet", parquet)) if wanted]
     with interruptible("rhot export", folder):

@@ -27,6 +27,12 @@ def test_an_unknown_table_is_told_with_those_there_are(result):
         export(result, only=["bones"])
 
 
+def test_a_file_in_the_folders_place_is_told(result, tmp_path):
+    (tmp_path / "angles.csv").touch()
+    with pytest.raises(ConfigError, match="is a file; give a folder"):
+        export(result, out=tmp_path / "angles.csv")
+
+
 def test_what_is_not_there_is_told(tmp_path):
     with pytest.raises(CaptureError, match=r"none: no such folder or file"):
         export(tmp_path / "none")
