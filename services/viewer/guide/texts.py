@@ -12,7 +12,7 @@ from rhot.messages.camera import ExposureControl
 from rhot.watch.rig_state import StandingFault
 from services.viewer.guide.files import Done
 from services.viewer.guide.steps import Step, StepName
-from services.viewer.panel.words import text
+from services.viewer.panel.words import sentence, text
 
 _STYLE = "font-size:0.85em;line-height:1.4;padding:0 0.6em;overflow-wrap:anywhere"
 _GREEN, _AMBER, _RED, _GREY = "#1e8449", "#b9770e", "#c0392b", "#7f8c8d"
@@ -146,7 +146,7 @@ def _capital(value: str) -> str:
 
 
 def _said(value: str) -> str:
-    return text(value, _LONGEST)
+    return sentence(value, _LONGEST)
 
 
 def _box(content: str) -> str:

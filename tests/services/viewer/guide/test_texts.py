@@ -63,6 +63,11 @@ def test_what_fails_and_what_to_do_is_said_harmlessly() -> None:
     assert "3/15 positions" in texts.collecting(now)
 
 
+def test_commands_are_set_apart() -> None:
+    silent = texts.exposure("left", None, "no tracker answers; `rhot top` shows it", [])
+    assert "<code>rhot top</code>" in silent
+
+
 def test_an_exposure_is_judged_by_what_its_tracker_finds() -> None:
     fixed = ExposureControl(exposure_us=8000.0, gain=2.0)
     good = texts.exposure("left", fixed, "", [])
