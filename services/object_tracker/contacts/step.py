@@ -78,7 +78,7 @@ class _Hand:
     """One hand at one object."""
 
     def __init__(self) -> None:
-        self.touches = {part: TouchTracker() for part in PARTS}
+        self.touches = {part: TouchTracker(opens=part != "palm") for part in PARTS}
         self.grasp = GraspTracker()
         self.distances: list[PartDistance] = []
         self.seen_ns = dict.fromkeys(PARTS, 0)

@@ -69,6 +69,50 @@ def test_a_finger_that_leaves_slowly_touches_once():
     assert 2.0 < seconds_of(touch.until_ns) < 2.4
 
 
+def _ajar(time_s):
+    """Opens by 7 mm after 2 s, stands there, and leaves with its hand after 3 s."""
+    return (
+        gap(time_s, end_s=9.0) + min(0.007, 0.02 * max(0.0, time_s - 2.0)) + gap(time_s, -1.0, 3.0)
+    )
+
+
+def test_a_finger_that_opens_a_little_ended_when_it_did_and_not_when_its_hand_leaves():
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        states, touch = follow(lambda t: _ajar(t) - 0.002 + rng.normal(0.0, 0.0005), seconds=4.0)
+        changes = np.diff([int(touching) for _, touching, _, _ in states])
+        assert sorted(changes[changes != 0]) == [-1, 1]
+        assert seconds_of(touch.until_ns) == pytest.approx(2.0, abs=0.08)
+
+
+def test_a_palm_does_not_open():
+    _, touch = follow(lambda t: _ajar(t) - 0.002, seconds=4.0, touch=TouchTracker(opens=False))
+    assert seconds_of(touch.until_ns) > 2.2
+
+
+def test_a_palm_that_seems_to_wander_stays_touched_and_leaves_with_its_hand():
+    states, touch = follow(
+        lambda t: gap(t) - 0.003 + 0.006 * min(1.0, max(0.0, 2.0 * (t - 1.2))),
+        sigma_m=0.003,
+        touch=TouchTracker(opens=False),
+    )
+    changes = np.diff([int(touching) for _, touching, _, _ in states])
+    assert sorted(changes[changes != 0]) == [-1, 1]
+    assert seconds_of(touch.until_ns) == pytest.approx(2.0, abs=0.05)
+
+
+def test_what_is_carried_and_seen_badly_stays_touched():
+    touch = TouchTracker()
+    for time_s in np.arange(0.0, 3.0, FRAME).tolist():
+        far_m = max(0.0, 0.012 - 0.1 * abs(time_s - 2.0))
+        sigma_m = 0.0015 + 0.25 * far_m
+        distance_m = gap(time_s, end_s=9.0) + far_m
+        touch.step(START + round(time_s * 1e9), distance_m, sigma_m, held=time_s > 1.2)
+        if time_s > 1.3:
+            assert touch.touching
+    assert seconds_of(touch.since_ns) == pytest.approx(1.0, abs=0.03)
+
+
 def test_what_is_there_at_the_first_sight_touches_since_then():
     states, _ = follow(lambda _t: 0.0003, seconds=0.5)
     begun = next(state for state in states if state[1])
