@@ -75,6 +75,9 @@ class GraspTracker:
         pairs = opposed(touching)
         if pairs:
             since_ns = min(max(touches[a].since_ns, touches[b].since_ns) for a, b in pairs)
+            if since_ns <= self.until_ns:
+                # Parts that have just let go, and still touch, must oppose anew for as long.
+                since_ns = stamp_ns
         else:
             since_ns = stamp_ns
         if not (pairs or (self.carried and touching)):

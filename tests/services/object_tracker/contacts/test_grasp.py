@@ -89,6 +89,16 @@ def test_one_frame_of_opposition_is_none_and_one_without_it_ends_none():
     assert held.tracker.until_ns == 0
 
 
+def test_what_still_touches_after_a_grasp_must_oppose_anew_for_as_long():
+    held = Held()
+    assert held.run(10, {"thumb": 0, "index": 175, "palm": 140})
+    assert not held.run(5, {"index": 175, "palm": 140})
+    # The index slides on and lies against the palm for a frame.
+    assert not held.run(1, {"index": 200, "palm": 20})
+    assert not held.run(4, {"palm": 20})
+    assert held.tracker.until_ns > 0
+
+
 def test_a_touched_thing_that_moves_with_the_hand_is_held():
     held = Held()
     assert not held.run(10, {"index": 0})
