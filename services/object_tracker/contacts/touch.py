@@ -27,8 +27,8 @@ _OFF_SPREADS, _OFF_MIN_M, _OFF_MAX_M = 4.0, 0.004, 0.006
 _SPREAD_M = 0.001
 # A finger that stands still: fingers close at 50 to 300 mm/s, slow ones end at 20. It may leave at
 # the first, and come at the second, less the further it is from the surface: at 8 to 25 mm/s some
-# had 5 mm to go when they "stood". With 25 mm/s for both, one of 47 grasps (even seeds) was told
-# 80 ms early by a finger that still came; with 15 and 18 none.
+# had 5 mm to go when they "stood". With 25 mm/s for both, one of 47 grasps (even seeds) was wrong;
+# with 15 and 18 none.
 _STILL_M_S, _COMING_M_S = 0.025, 0.018
 # Of the line that says where it is now, and how fast. With three samples: 1 % more missed; with
 # five the slope of a finger at rest is 3 mm/s wrong, and a touch is told 15 ms later.
@@ -50,7 +50,7 @@ _HELD_FACTOR, _HELD_SIGMAS = 1.6, 4.0
 _PALM_SIGMAS = 2.5
 # A finger that opens by 3 to 9 mm, waits, and leaves with its hand: how long ago it may have
 # opened, and how far above its lowest moments of _REST_S it then was. Chosen on 8 rendered hands
-# and 47 from landmarks, even seeds: the largest error of an end was 236 and 1002 ms without, 43 and
+# and 47 from landmarks, even seeds: the largest error of an end was 236 and 1002 ms without, 76 and
 # 97 ms with; 2 mm is as good on landmarks, and one of 47 rendered ends worse.
 _LOOK_BACK_S, _REST_S, _OPENED_M = 1.5, 0.17, 0.0015
 # What a kink so long ago is sought in, before and after it.
