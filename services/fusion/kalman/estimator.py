@@ -30,7 +30,7 @@ from services.fusion.kalman.frame_update import (
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
 from services.fusion.kalman.one_camera import LastLocated
 from services.fusion.kalman.recent_observations import alone_before
-from services.fusion.kalman.telling import empty_telling, tell
+from services.fusion.kalman.telling import SEEN_FRAMES, empty_telling, tell
 from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
 from services.fusion.method import Counts, Estimates
@@ -77,9 +77,6 @@ START_RESIDUAL = 4.0
 # A point this uncertain is of no use to anybody (the width of a hand); a track that young is not
 # shown yet. Of one that a single camera sees, across its ray: bones tell the solver the rest.
 SHOW_SIGMA_M = 0.05
-# A camera counts as seeing a landmark if its last observation is not older than this many frames:
-# one frame, and jitter.
-SEEN_FRAMES = 1.6
 
 
 class KalmanMethod:
@@ -103,7 +100,7 @@ class KalmanMethod:
 
     def reset(self) -> None:
         """Forget all observations."""
-        self._state = empty_state(self._hands, len(self._periods_s), len(MODELS))
+        self._state = empty_state(self._hands, self._centres_rig, len(MODELS))
         self._located = LastLocated(sum(map(len, self._hands)))
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
@@ -195,7 +192,7 @@ class KalmanMethod:
 
     def _drop(self, now_s: float) -> None:
         """End the tracks that are lost."""
-        history, rest, recent = self._state
+        history, rest, recent, _ = self._state
         self.counts.dropped += drop_lost_tracks(
             history.size,
             rest.probability,

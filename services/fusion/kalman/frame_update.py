@@ -22,6 +22,7 @@ from services.fusion.kalman.recent_observations import (
 )
 from services.fusion.kalman.rest.rest_detection import update_rest
 from services.fusion.kalman.rest.rigid_body import RestState, empty_rest
+from services.fusion.kalman.shape.kept_shape import ShapeMemory, empty_memory
 from services.fusion.kalman.track_history import TrackHistory, empty_history
 from services.fusion.kalman.track_insertion import ACCEPTED, insert
 
@@ -36,15 +37,20 @@ class FilterState(NamedTuple):
     history: TrackHistory
     rest: RestState
     recent: RecentObservations
+    shape: ShapeMemory
 
 
-def empty_state(hands: list[Ints], cameras: int, models: int) -> FilterState:
-    """Nothing observed yet; hands: the indices of each hand's landmarks, 0 to L - 1 in all."""
+def empty_state(hands: list[Ints], centres_rig: Array, models: int) -> FilterState:
+    """Nothing observed yet by cameras at centres_rig (C, 3).
+
+    hands: the indices of each hand's landmarks, 0 to L - 1 in all.
+    """
     landmarks = sum(map(len, hands))
     return FilterState(
         empty_history(landmarks, models),
         empty_rest(hands),
-        no_observations(landmarks, cameras),
+        no_observations(landmarks, len(centres_rig)),
+        empty_memory(landmarks, centres_rig.mean(axis=0)),
     )
 
 

@@ -30,7 +30,7 @@ def test_every_observation_is_remembered_and_told_of():
 
     Expected: three codes; only what fits counts as seen.
     """
-    state = empty_state([np.arange(3)], 2, 2)
+    state = empty_state([np.arange(3)], np.zeros((2, 3)), 2)
     for landmark in (0, 1):
         start_track(state.history, landmark, 0.0, PLACES[landmark], np.array([0.01, 0.1, 1.0]))
     q = PLACES @ CAMERAS.R[1].T + CAMERAS.t[1]
@@ -63,7 +63,7 @@ def test_a_track_ends_unseen_or_when_a_second_camera_sees_something_else():
 
 
 def test_remembered_observations_are_not_remembered_twice():
-    state = empty_state([np.arange(1)], 2, 2)
+    state = empty_state([np.arange(1)], np.zeros((2, 3)), 2)
     for time_s, new in ((0.1, True), (9.0, False)):
         frame = FrameRays(
             0, np.zeros(1, int), np.array([time_s]), np.zeros((1, 2)), np.full(1, 1e-4), 0.0
