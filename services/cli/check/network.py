@@ -56,7 +56,22 @@ def check_bus(config: RigConfig, path: Path) -> list[Problem]:
             f"the rig has other hosts: {', '.join(remote)}; add e.g. tls/master.local:7448"
         )
         problems.append(error(path, text))
+    ways = {_way(endpoint) for endpoint in config.bus.listen}
+    if ways and config.bus.connect and ways.isdisjoint(map(_way, config.bus.connect)):
+        text = (
+            f"[bus] connect: the router of this rig listens nowhere that services look for it "
+            f"({', '.join(config.bus.connect)}; listen: {', '.join(config.bus.listen)}), so that "
+            "they would wait for ever; give both the same protocol and port, unless another router "
+            "answers there"
+        )
+        problems.append(warning(path, text))
     return problems
+
+
+def _way(endpoint: str) -> tuple[str, str]:
+    """What a listener and those who connect to it have in common: protocol, and port or socket."""
+    protocol, _, address = endpoint.partition("/")
+    return protocol, address if protocol in _LOCAL else host_and_port(endpoint)[1]
 
 
 def _is_endpoint(endpoint: str) -> bool:

@@ -241,6 +241,15 @@ def test_a_router_open_to_the_network_is_a_warning(rig):
     assert any("is no endpoint" in text for text in texts(rig))
 
 
+def test_a_router_that_listens_where_nobody_looks(rig):
+    assert not any("wait for ever" in text for text in texts(rig, "warning"))
+    append(rig, '[bus]\nlisten = ["tcp/127.0.0.1:7450", "tls/0.0.0.0:7448"]')
+    (told,) = [text for text in texts(rig, "warning") if "wait for ever" in text]
+    assert "tcp/127.0.0.1:7447" in told
+    append(rig, 'connect = ["tls/master.local:7448"]')
+    assert not any("wait for ever" in text for text in texts(rig, "warning"))
+
+
 def test_an_unknown_scene_and_a_port_used_twice(rig):
     replace(rig, 'scene = "piano"', 'scene = "pianio"')
     append(rig, "[viewer]\nport = 7447")
