@@ -39,7 +39,7 @@ check: $(STAMP)
 bench: $(STAMP)
 	@for script in $(filter-out benchmarks/soak%,$(wildcard benchmarks/*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
-# A simulated rig under random faults: memory, latency, recoveries; writes soak.md and soak.png.
+# A simulated rig under random faults: memory, latency, recoveries; writes soak.md, soak.png and soak.json.
 MINUTES ?= 30
 soak: $(STAMP)
 	$(BIN)/python benchmarks/soak.py --minutes $(MINUTES) $(ARGS)

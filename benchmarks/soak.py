@@ -8,13 +8,15 @@ every other kind of fault comes three times and pictures are asked for a dozen t
 garbage message or picture allocates, or a first time that somebody does not read, is no growth.
 From there on the same faults come at random, all processes of the rig stay alive, and their memory
 counts; testing/memory_growth.py says how. A pose counts if no finger of it is only predicted.
-Writes OUT.md and OUT.png and prints the report; exit code 1 if something falls short.
+Writes OUT.md, OUT.png and OUT.json (samples of each process' memory: s, MB), and prints the report;
+exit code 1 if something falls short.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import random
 import resource
 import shutil
@@ -179,6 +181,8 @@ def main() -> None:
         shutil.rmtree(folder, ignore_errors=True)
     report = markdown(soak.run, f"benchmarks/soak.py --minutes {options.minutes:g}")
     options.out.with_suffix(".md").write_text(report, encoding="utf-8")
+    samples = {f"{process} {pid}": rows for (process, pid), rows in soak.run.memory.items()}
+    options.out.with_suffix(".json").write_text(json.dumps(samples), encoding="utf-8")
     plot(soak.run, options.out.with_suffix(".png"))
     print(report)
     sys.exit(1 if shortfalls(soak.run) else 0)
