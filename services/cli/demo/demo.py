@@ -36,8 +36,8 @@ from services.cli.option_groups import grouped
 from services.cli.options import VerboseOption
 from services.cli.terminal import Terminal
 
-# Without a pose by then something is wrong. numba's first compilation takes minutes of a processor's
-# time, and two cores that had other work did not finish within four minutes.
+# Without a pose by then something is wrong. numba's first compilation takes minutes of a core's
+# time, and two cores that had other work did not finish within four.
 _FIRST_POSE_S = 480.0
 # A hand that takes a cup shows hand, object and touch.
 SCENE = "grab"
