@@ -2,7 +2,7 @@
 
 Only rays are turned into it, never pictures: the cameras may be toed in, tilted, or of different
 focal lengths. A point then has the same height y/z in both cameras, and its disparity is the
-difference of x/z. Rays that point backwards in the frame give no height: None, or NaN.
+difference of x/z. Rays that point backwards in the frame give no height: infinity, or NaN.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
@@ -68,10 +69,17 @@ def rectified_pairs(cameras: tuple[Camera, ...]) -> dict[tuple[int, int], Rectif
     return found
 
 
-def rectify_ray(R_rectified_from_camera: Array, ray: Array) -> Array | None:
-    """x/z, y/z (2,) in the rectified frame of a camera's ray (2,); None if it points backwards."""
-    direction = R_rectified_from_camera @ np.array([ray[0], ray[1], 1.0])  # (3,)
-    return direction[:2] / direction[2] if direction[2] > 0.0 else None
+@njit(cache=True)
+def rectify_ray(R_rectified_from_camera: Array, ray: Array) -> tuple[float, float]:
+    """x/z and y/z in the rectified frame of a camera's ray (2,); infinite where it is backwards."""
+    R = R_rectified_from_camera
+    ahead = R[2, 0] * ray[0] + R[2, 1] * ray[1] + R[2, 2]
+    if not ahead > 0.0:
+        return np.inf, np.inf
+    return (
+        (R[0, 0] * ray[0] + R[0, 1] * ray[1] + R[0, 2]) / ahead,
+        (R[1, 0] * ray[0] + R[1, 1] * ray[1] + R[1, 2]) / ahead,
+    )
 
 
 def rectify_rays(R_rectified_from_camera: Array, rays: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.rectified_pair import RectifiedPair
+from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
 from services.fusion.intake.ray_interpolation import (
     FRAMES_AFTER,
     RaySamples,
@@ -96,25 +96,17 @@ def _newest_error(
         span_s = times_s[k + 1] - times_s[k - 1]
         if abs(times_s[k + 1] + times_s[k - 1] - 2.0 * time_s) > _UNEVEN * span_s:
             continue
-        speed = (_height(R_first, rays[k + 1]) - _height(R_first, rays[k - 1])) / span_s
+        before, after = rectify_ray(R_first, rays[k - 1])[1], rectify_ray(R_first, rays[k + 1])[1]
+        speed = (after - before) / span_s
         speed_sigma = math.hypot(sigmas[k + 1], sigmas[k - 1]) / span_s
-        now = _height(R_second, ray)
-        missed = _height(R_second, ray + bend) - now
+        now = rectify_ray(R_second, ray)[1]
+        missed = rectify_ray(R_second, ray + bend)[1] - now
         return (
             True,
             time_s,
-            _height(R_first, rays[k]) - now,
+            rectify_ray(R_first, rays[k])[1] - now,
             speed if abs(speed) > _MOVING * speed_sigma else 0.0,
             span_s,
             sigmas[k] ** 2 + other_sigma**2 + (_MISSED * missed) ** 2,
         )
     return False, 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-@njit(cache=True)
-def _height(R: Array, ray: Array) -> float:
-    """y/z of a ray (2,) of a camera in its pair's frame (R (3, 3) turns it there); infinite if it
-    points backwards.
-    """
-    ahead = R[2, 0] * ray[0] + R[2, 1] * ray[1] + R[2, 2]
-    return (R[1, 0] * ray[0] + R[1, 1] * ray[1] + R[1, 2]) / ahead if ahead > 0.0 else np.inf

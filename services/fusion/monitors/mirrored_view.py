@@ -16,7 +16,7 @@ from numba import njit
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
-from services.fusion.geometry.rectified_pair import rectified_pairs
+from services.fusion.geometry.rectified_pair import rectified_pairs, rectify_ray
 from services.fusion.intake.observations import View
 
 # Views this far apart in time, at most, are compared: a hand does not turn over within three
@@ -108,13 +108,10 @@ def _order(
         if second == len(landmarks[1]) or landmarks[1][second] != landmarks[0][first]:
             continue
         for view, row in enumerate((first, second)):
-            x, y = rays[view][row]
-            R = rotations[view]
-            ahead = R[2, 0] * x + R[2, 1] * y + R[2, 2]
-            if not ahead > 0.0:
+            x, y = rectify_ray(rotations[view], rays[view][row])
+            if not x < np.inf:
                 return False, False, False
-            for axis in range(2):
-                places[view, common, axis] = (R[axis, 0] * x + R[axis, 1] * y + R[axis, 2]) / ahead
+            places[view, common, 0], places[view, common, 1] = x, y
         common += 1
     if common < _MIN_MARKERS:
         return False, False, False

@@ -9,6 +9,8 @@ of rays that do not meet.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rhot.files.rig_tables import Disparity
@@ -41,12 +43,10 @@ def locate(
     error: how far the two rays' heights differ, in sigmas.
     """
     nothing = Triangulation(TriangulationStatus.BEHIND, np.zeros(3), np.zeros((3, 3)), float("inf"))
-    first = rectify_ray(pair.R_rectified_from_first, rays[0])
-    second = rectify_ray(pair.R_rectified_from_second, rays[1])
-    if first is None or second is None:
+    x1, y1 = rectify_ray(pair.R_rectified_from_first, rays[0])
+    x2, y2 = rectify_ray(pair.R_rectified_from_second, rays[1])
+    if not math.isfinite(x1 + x2):
         return nothing
-    x1, y1 = first
-    x2, y2 = second
     disparity_px = pair.focal_px * (x1 - x2)
     if disparity_px < _MIN_DISPARITY_PX:
         return nothing
