@@ -77,27 +77,11 @@ class Hypothesis:
     false: Array  # (k, 2) patches of the last picture that are no dots
 
 
-class Ahead(NamedTuple):
-    """Where an account's dots are expected: pixels (n, 2), their covariance (2n, 2n), its state."""
-
-    places: Array
-    cov: Array
-    state: motion.State
-
-
 class View:
     """A hypothesis looking at the next picture: assignments, and how likely each is."""
 
-    def __init__(
-        self,
-        parent: Hypothesis,
-        ahead: Ahead,
-        patches: Patches,
-        false_density: float,
-        prior: float,
-    ) -> None:
-        """prior: log probability of the acceleration that `ahead` has."""
-        self.parent, self.ahead, self.patches, self.prior = parent, ahead, patches, prior
+    def __init__(self, parent: Hypothesis, patches: Patches, false_density: float) -> None:
+        self.parent, self.patches = parent, patches
         found = np.where(parent.unseen == 0, _FOUND, _FOUND_AGAIN)
         self._found, self._missed = np.log(found), np.log1p(-found)
         false = _false_density(patches.places, parent.false, false_density)
@@ -117,84 +101,25 @@ class View:
         hidden = np.clip(1.0 - np.exp(ratio), 0.0, 0.9)
         hidden[hidden < _AREA_NOISE] = 0.0
         offset = _HIDDEN * hidden * np.sqrt(parent.areas)[:, None]
-        self._variances = patches.sigmas[None] ** 2 + (_WANDER * diameters[:, None]) ** 2
-        self._variances += offset**2
-        least = (_WANDER * diameters) ** 2
-        self._least = self._variances.min(axis=1) if len(patches.areas) else least
+        # (n, m): of each patch as a dot's; (n,): what is added where it shares one.
+        self.variances = patches.sigmas[None] ** 2 + (_WANDER * diameters[:, None]) ** 2
+        self.variances += offset**2
+        self.sharing = (_SHARED * diameters) ** 2
 
-    def gains(self, places: Array, covs: Array) -> Array:
-        """What each dot gains by each patch over being missing, nats (n, m).
+    def alone(self) -> Array:
+        """What each dot gains by each patch over being missing, but for where it is, (n, m)."""
+        return (self._found - self._missed)[:, None] - self._false - self._area_nats
 
-        places (n, 2) and covs (n, 2, 2): where each is expected, and the covariance of that and of
-        a measurement.
-        """
-        away = self.patches.places[None] - places[:, None]  # (n, m, 2)
-        more = self._variances - self._least[:, None]
-        xx, xy, yy = covs[:, :1, 0] + more, covs[:, :1, 1], covs[:, 1:, 1] + more
-        det = xx * yy - xy**2
-        x, y = away[..., 0], away[..., 1]
-        squares = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / det
-        gains = -0.5 * (squares + np.log(det)) - np.log(2.0 * np.pi) - self._area_nats
-        gains += (self._found - self._missed)[:, None] - self._false
+    def beside(self) -> Array:
+        """What each dot gains by a patch that another has, too, but for where it is, (n,)."""
+        within = np.pi * (0.8 * self._diameters) ** 2
+        gains = self._found - self._missed + _MERGED - np.log(_FOUND) + np.log(within)
         return np.asarray(gains)
-
-    def marginal(self) -> tuple[Array, Array]:
-        """Where each dot is expected by the past alone, (n, 2), and the covariance (n, 2, 2)."""
-        return self.ahead.places, self._own(self.ahead.cov)
-
-    def given(self, patch: Indices) -> tuple[Array, Array]:
-        """The same by an assignment of all the other dots; of a measured dot, without its own."""
-        dots = np.flatnonzero(patch >= 0)
-        if not len(dots):
-            return self.marginal()
-        residuals, inverse = self._innovation(dots, patch)
-        cross = self.ahead.cov[:, _pairs(dots)]
-        gain = cross @ inverse
-        places = self.ahead.places + (gain @ residuals).reshape(-1, 2)
-        covs = self._own(self.ahead.cov - gain @ cross.T)
-        blocks = np.linalg.inv(_blocks(inverse))
-        measured = self.ahead.places[dots] + residuals.reshape(-1, 2)
-        left_out = (blocks @ (inverse @ residuals).reshape(-1, 2, 1))[..., 0]
-        places[dots], covs[dots] = measured - left_out, blocks
-        return places, covs
-
-    def with_merged(self, patch: Indices) -> Indices:
-        """The assignment, with dots that have no patch on one that they share with another."""
-        free = np.flatnonzero(patch < 0)
-        taken = np.unique(patch[patch >= 0])
-        if not len(free) or not len(taken):
-            return patch
-        places, covs = self.given(patch)
-        away = self.patches.places[taken][None] - places[free][:, None]
-        spread = 0.5 * (covs[free, 0, 0] + covs[free, 1, 1])[:, None]
-        diameters = self._diameters[free][:, None]
-        # The probability that a dot expected so lies within about a dot of another one.
-        inside = np.minimum(0.5 * (0.8 * diameters) ** 2 / spread, 1.0)
-        squares = np.sum(away**2, axis=2) / np.maximum(spread, (_SHARED * diameters) ** 2)
-        gain = _MERGED + np.log(inside) - 0.5 * squares - self._missed[free][:, None]
-        best = gain.argmax(axis=1)
-        merged = gain[np.arange(len(free)), best] > 0.0
-        result = patch.copy()
-        result[free[merged]] = taken[best[merged]]
-        return result
-
-    def roughly(self, patch: Indices) -> tuple[float, float]:
-        """The score of an assignment, and its squared innovation for each degree of freedom.
-
-        Linearised where the dots are expected.
-        """
-        score, dots = self.claims(patch), np.flatnonzero(patch >= 0)
-        if not len(dots):
-            return score, 1.0
-        residuals, inverse = self._innovation(dots, patch)
-        squared = float(residuals @ inverse @ residuals)
-        score += 0.5 * float(np.linalg.slogdet(inverse)[1]) - 0.5 * squared
-        return score - len(dots) * float(np.log(2.0 * np.pi)), squared / (2 * len(dots))
 
     def claims(self, patch: Indices) -> float:
         """The score, but for where dots are: of claiming patches that would be false ones."""
         dots, shared = np.flatnonzero(patch >= 0), self._shared(patch)
-        nats = self.parent.score + self.prior + float(self._missed[patch < 0].sum())
+        nats = self.parent.score + float(self._missed[patch < 0].sum())
         if not len(dots):
             return nats
         claimed = np.unique(patch[dots])
@@ -215,8 +140,8 @@ class View:
         dots = np.flatnonzero(seen)
         places, variances = np.zeros((len(patch), 2)), np.ones(len(patch))
         places[dots] = self.patches.places[patch[dots]]
-        variances[dots] = self._variances[dots, patch[dots]]
-        variances[shared] += (_SHARED * self._diameters[shared]) ** 2
+        variances[dots] = self.variances[dots, patch[dots]]
+        variances[shared] += self.sharing[shared]
         # A part of which the others are nobody's is no part.
         wholes = self.patches.wholes[patch[dots]]
         for dot, whole in zip(dots.tolist(), wholes.tolist(), strict=True):
@@ -245,29 +170,6 @@ class View:
         """Which dots (n,) share their patch."""
         counts = np.bincount(patch[patch >= 0], minlength=len(self.patches.areas) or 1)
         return np.asarray((patch >= 0) & (counts[patch] > 1))
-
-    def _innovation(self, dots: Indices, patch: Indices) -> tuple[Array, Array]:
-        """Residuals (2m,) of m dots, and the inverse of their covariance."""
-        _, places, variances = self.measured(patch)
-        own = _pairs(dots)
-        cov = self.ahead.cov[own[:, None], own] + np.diag(np.repeat(variances[dots], 2))
-        residuals = (places - self.ahead.places)[dots].ravel()
-        return residuals, np.asarray(np.linalg.inv(cov), np.float64)
-
-    def _own(self, cov: Array) -> Array:
-        """Each dot's covariance (n, 2, 2), a measurement's included."""
-        return _blocks(cov) + self._least[:, None, None] * np.eye(2)
-
-
-def _pairs(dots: Indices) -> Indices:
-    """Rows of x and y of each dot."""
-    return np.asarray((2 * dots[:, None] + np.arange(2)).ravel(), np.int64)
-
-
-def _blocks(matrix: Array) -> Array:
-    """The (2, 2) blocks on the diagonal of a matrix (2n, 2n)."""
-    count = len(matrix) // 2
-    return np.asarray(matrix.reshape(count, 2, count, 2)[np.arange(count), :, np.arange(count)])
 
 
 def normalised(hypotheses: list[Hypothesis]) -> list[Hypothesis]:

@@ -112,7 +112,7 @@ class Skeleton:
         slopes[..., :3] = np.eye(3)
         # A turn w shifts a point p by w x p.
         for axis in range(3):
-            slopes[..., 3 + axis] = np.cross(np.eye(3)[axis], points)
+            slopes[..., 3 + axis] = _cross(np.eye(3)[axis], points)
         return points + postures[:, None, :3], slopes
 
     def _in_hand(self, postures: Array) -> tuple[Array, Array]:
@@ -140,7 +140,7 @@ class Skeleton:
                 slopes[:, each, j, :, self.moving + 3 * each + k] = bones[k].swapaxes(0, 1)
             for k in range(j + 1):
                 axis, start = axes[k]
-                turning = np.cross(axis, joints[:, :, j] - start).swapaxes(0, 1)
+                turning = _cross(axis, joints[:, :, j] - start).swapaxes(0, 1)
                 slopes[:, each, j, :, 6 + 4 * each + k] = turning
             for k in range(3):
                 slopes[:, each, j, k, own + 3 * each + k] = 1.0
@@ -162,6 +162,14 @@ def turned(vectors: Array) -> Array:
     skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
     wide = angles[:, None, None]
     return np.asarray(np.eye(3) + np.sin(wide) * skew + (1.0 - np.cos(wide)) * skew @ skew)
+
+
+def _cross(first: Array, second: Array) -> Array:
+    """Cross products (..., 3); numpy's own takes five times as long for a few."""
+    product = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    for k, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
+        product[..., k] = first[..., a] * second[..., b] - first[..., b] * second[..., a]
+    return product
 
 
 def _about_y(cosines: Array, sines: Array) -> Array:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from rhot.hand import DIGITS
+from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Patch
+from services.pi_tracker.dots.skeleton import Skeleton, turned
 from services.pi_tracker.dots.tracker import DotTracker
 
 NAMES = ("wrist", "index_proximal", "index_intermediate", "index_distal", "index_tip")
@@ -44,3 +47,24 @@ def test_a_speck_that_was_there_before_is_no_lost_dot() -> None:
         dots = tracker.step(_patches([*CLOSING[0][:4], speck]), number / 30.0)
         assert dots["index_tip"].state == "carried"
         assert np.hypot(dots["index_tip"].x_px - 371, dots["index_tip"].y_px - 168) < 30.0
+
+
+def test_fingers_that_all_close_within_a_fifth_of_a_second_keep_their_names() -> None:
+    """15 dots, the last pictures without the little finger's, which its neighbours hide."""
+    names = [name for digit in DIGITS for name in finger_landmarks(digit)[1:]]
+    skeleton, order = Skeleton(names, (1280, 720)), np.random.default_rng(1).permutation(15)
+    tracker = None
+    for number, bend in enumerate((0.0, 0.0, 0.0, 0.1, 0.4, 0.8, 1.1, 1.2, 1.1, 0.9, 0.7)):
+        posture = np.zeros((1, skeleton.size))
+        posture[0, :3] = 0.02, 0.01, 0.4
+        posture[0, 6 : skeleton.moving] = np.tile([0.0, 0.2, 0.2, 0.15], 5)
+        posture[0, 10 : skeleton.moving] += bend * np.tile([0.0, 1.0, 1.0, 0.6], 4)
+        turn = turned(np.array([[1.4, 0.5, 0.1]]))
+        truth = skeleton.project(posture, turn, np.ones(1))[0][0]
+        shown = [dot for dot in order if dot < 12 or not 5 <= number <= 7]
+        if tracker is None:
+            tracker = DotTracker(
+                names, (1280, 720), {n: (x, y) for n, (x, y) in zip(names, truth, strict=True)}
+            )
+        dots = tracker.step(_patches(truth[shown]), number / 30.0)
+        assert [dots[names[k]].patch for k in shown] == list(range(len(shown))), number

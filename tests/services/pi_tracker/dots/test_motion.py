@@ -39,6 +39,23 @@ def test_the_first_picture_allows_several_postures_that_all_show_it(
         assert np.linalg.norm(pixels[0] - _seen(-0.3), axis=1).max() < 4.0
 
 
+def test_a_left_hand_and_a_right_one_are_among_them(
+    begun: list[tuple[float, motion.State]],
+) -> None:
+    assert {float(state.sides[0]) for _, state in begun} == {-1.0, 1.0}
+
+
+def test_what_was_learnt_of_a_person_fades_to_what_people_are(
+    begun: list[tuple[float, motion.State]],
+) -> None:
+    state, own = begun[0][1], np.arange(SKELETON.moving, SKELETON.size)
+    means = state.means.copy()
+    means[:, own] = 3.0 * SKELETON.person
+    after = motion.coasted(SKELETON, state._replace(means=means), 20.0)
+    assert np.abs(after.means[0, own] / SKELETON.person).max() < 1e-3
+    assert np.allclose(np.sqrt(after.covs[0, own, own]), SKELETON.person, rtol=1e-3)
+
+
 def test_a_hidden_tip_goes_along_with_its_finger(begun: list[tuple[float, motion.State]]) -> None:
     state = motion.together([one for _, one in begun])
     seen = np.ones((len(begun), 8), bool)
