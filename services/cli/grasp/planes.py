@@ -76,6 +76,14 @@ class Straight(NamedTuple):
             picture=picture,
         )
 
+    def as_lens(self) -> Lens | None:
+        """As a calibration has it; None of one without distortion."""
+        if self.matrix is None:
+            return None
+        rows = [tuple(row) for row in self.matrix.tolist()]
+        distortion = tuple(self.distortion.tolist())
+        return Lens(size_px=self.size_px, matrix=(rows[0], rows[1], rows[2]), distortion=distortion)
+
     def distort(self, points_px: Array) -> Array:
         """Back; (n, 2)."""
         if self.matrix is None:

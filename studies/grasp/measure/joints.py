@@ -35,12 +35,15 @@ class Place(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """One picture: its number and instant, the places that were seen, and why others were not."""
+    """One picture: its number and instant, the places that were seen, and why others were not;
+    notes (place, what is to be known of it) hold for all pictures and stand in the first.
+    """
 
     frame: int
     time_s: float
     places: dict[str, Place]
     lost: dict[str, str]
+    notes: tuple[tuple[str, str], ...] = ()
 
 
 def joints_of(finger: Finger) -> dict[Joint, str]:

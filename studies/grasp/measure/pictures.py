@@ -31,12 +31,14 @@ _FPS = 30.0
 class Pictures:
     """A video or a folder of pictures, read from the start as often as asked for.
 
-    fps: a rate to take whatever a video says. end: how a video broke off, once it was read.
+    fps: a rate to take whatever a video says. about_lens: how a lens was found whose focal length
+    is not known. end: how a video broke off, once it was read.
     """
 
     path: Path
     fps: float | None = None
     lens: Lens | None = None
+    about_lens: str = ""
     end: str = field(default="", init=False)
 
     def frames(self) -> Iterator[Frame]:
@@ -59,6 +61,10 @@ class Pictures:
                     )
                 yield frame if rectifier is None else rectifier.rectify(frame)
 
+    def matrix(self) -> np.ndarray | None:
+        """The camera's (3, 3), where the focal length is known."""
+        return None if self.lens is None or self.about_lens else np.array(self.lens.matrix)
+
     def _next(self, reader: Reader, first: Frame | None) -> Frame | None:
         try:
             return reader.read()
@@ -76,6 +82,8 @@ class Pictures:
     def notes(self) -> list[str]:
         """What is to be said of the pictures, once they were read."""
         notes = [] if not self.end else [f"the video breaks off: {self.end}"]
+        if self.about_lens:
+            notes.append(self.about_lens)
         if self.path.is_dir() and self.fps is None:
             notes.append(f"pictures have no times: {_FPS:g} a second assumed (--fps)")
         return notes

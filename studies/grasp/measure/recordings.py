@@ -38,7 +38,7 @@ Length = tuple[float, float]
 # What a base line that was given as two points of the picture is called among the places.
 GIVEN_BASE = Segment("base_start", "base_end")
 _NOTES = {
-    "edges": "bones are as long as all pictures together say, the last one as it was clicked",
+    "edges": "bones are as long as all pictures together say",
     "edges-paper": "joints are the centroids of the paper's regions",
 }
 # A normal distribution's sigma is so much of its median absolute deviation.
@@ -100,7 +100,9 @@ def recordings(
     plans = {finger: _plan(finger, names, wanted) for finger in fingers_in(list(names))}
     lengths = {finger: median_lengths(plan, pictures) for finger, plan in plans.items()}
     if method != "dots":
-        lengths = {finger: _as_clicked(own) for finger, own in lengths.items()}
+        lengths = {
+            finger: _as_placed(plans[finger], pictures, own) for finger, own in lengths.items()
+        }
     if not any(lengths.values()):
         raise CaptureError(
             f"no hand: in none of {len(pictures)} pictures were two neighbouring joints seen; see "
@@ -118,6 +120,7 @@ def recordings(
             side_note,
             scale.note,
             _NOTES.get(method, ""),
+            *_of_places(plan, pictures[0]),
         ]
         frames = [_frame(plan, seen, lengths[finger]) for seen in pictures]
         bones, sigmas = _bones(plan, lengths[finger])
@@ -145,6 +148,11 @@ def _plan(finger: Finger, names: Sequence[str], wanted: Wanted) -> FingerPlan:
     return FingerPlan(joints, Segment(*pairs[0]) if pairs else None)
 
 
+def _of_places(plan: FingerPlan, first: Seen) -> list[str]:
+    """What the first picture says of this finger's places."""
+    return [f"{name}: {note}" for name, note in first.notes if name in plan.joints.values()]
+
+
 def base_note(plan: FingerPlan) -> str:
     """What the base line is, in words."""
     if plan.base is None:
@@ -168,10 +176,22 @@ def median_lengths(plan: FingerPlan, pictures: Sequence[Seen]) -> dict[Joint, Le
     return found
 
 
-def _as_clicked(lengths: Mapping[Joint, Length]) -> dict[Joint, Length]:
-    """Edges keep the lengths of the first picture's clicks: they are as sure as those."""
-    click_px = float(np.hypot(CLICK_SIGMA_PX, CLICK_SIGMA_PX))
-    return {joint: (px, float(np.hypot(sigma, click_px))) for joint, (px, sigma) in lengths.items()}
+def _as_placed(
+    plan: FingerPlan, pictures: Sequence[Seen], lengths: Mapping[Joint, Length]
+) -> dict[Joint, Length]:
+    """Edges have one length for all pictures, which spread says nothing of: it is as sure as its
+    two ends are, in the unit of their places.
+    """
+    found: dict[Joint, Length] = {}
+    for joint, (length, spread) in lengths.items():
+        _, (start, end) = segments_of(plan)[joint]
+        ends = [
+            float(np.hypot(seen.places[start].sigma_px, seen.places[end].sigma_px))
+            for seen in pictures
+            if start in seen.places and end in seen.places
+        ]
+        found[joint] = (length, float(np.hypot(spread, np.median(ends))))
+    return found
 
 
 def scale_for(wanted: Wanted, lengths: Mapping[Finger, Mapping[Joint, Length]]) -> Scale:

@@ -91,4 +91,5 @@ def _together(seen: Sequence[Seen]) -> Seen:
     for one in seen:
         places.update(one.places)
         lost.update(one.lost)
-    return Seen(seen[0].frame, seen[0].time_s, places, lost)
+    notes = tuple(note for one in seen for note in one.notes)
+    return Seen(seen[0].frame, seen[0].time_s, places, lost, notes)

@@ -30,7 +30,7 @@ def reference_of(text: str, pictures: Pictures) -> Known:
     return plane_of(
         reference._replace(points_px=corrected),
         first.size_px,
-        matrix=None if pictures.lens is None else np.array(pictures.lens.matrix),
+        matrix=pictures.matrix(),
         picture=bgr_image(first),
     )
 

@@ -42,14 +42,11 @@ def measure(
 ) -> None:
     """Measure a finger's joint angles in a video: one JSON and one CSV for each finger."""
     # Not above: OpenCV takes longer to import than other commands take to run.
-    from rhot.files.calibration import Lens, load
     from services.cli.progress import Progress
-    from studies.grasp.measure.pictures import Pictures
     from studies.grasp.measure.run import see
     from studies.grasp.measure.seeds import for_method
 
-    lens = load(scaled.lens, Lens, "rhot calibrate lens") if scaled.lens else None
-    pictures = Pictures(video, scaled.fps, lens)
+    pictures = _pictures(video, scaled)
     color = _color(look)
     wanted = _wanted(video, subject, at, scaled, pictures)
     seeds = _seeds(at)
@@ -72,6 +69,20 @@ def measure(
     for finger, finding in findings.items():
         typer.echo(_summary(finger, finding))
     typer.echo(f"written: {out}")
+
+
+def _pictures(video: Path, scaled: ScaleOptions) -> Pictures:
+    """The video, to be corrected for its lens if that is known or seen by straight edges."""
+    from rhot.files.calibration import Lens, load
+    from services.cli.grasp.planes import straight_of
+    from studies.grasp.measure.pictures import Pictures
+
+    if scaled.straight is None:
+        lens = load(scaled.lens, Lens, "rhot calibrate lens") if scaled.lens else None
+        return Pictures(video, scaled.fps, lens)
+    size_px = Pictures(video, scaled.fps).first().size_px
+    found = straight_of(size_px, scaled.lens, scaled.straight)
+    return Pictures(video, scaled.fps, found.as_lens(), found.about)
 
 
 def _findings(

@@ -76,6 +76,14 @@ class ScaleOptions:
         Path | None,
         typer.Option(metavar="FILE.lens.json", help="lens calibration: pictures are corrected"),
     ] = None
+    straight: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="instead of --lens: points along edges that are straight in the world, as "
+            "[[[x, y], ...], ...], pixels of the first picture",
+        ),
+    ] = None
     length: Annotated[
         list[str] | None,
         typer.Option(metavar="BONE_mm=MM", help="a known length, as index_proximal_mm=43.6"),

@@ -18,7 +18,6 @@ import numpy as np
 from studies.grasp.measure.edges.contrast import tukey
 from studies.grasp.measure.edges.equations import System
 from studies.grasp.measure.edges.follow import EDGE_INFORMATION, Followed
-from studies.grasp.measure.edges.patches import Placed
 from studies.grasp.measure.edges.segments import Array
 from studies.grasp.measure.edges.silhouette import (
     BONES,
@@ -31,6 +30,7 @@ from studies.grasp.measure.edges.silhouette import (
     normals_of,
     shown,
 )
+from studies.grasp.measure.edges.skin.patches import Placed
 
 _LIMITS_PX = (5.0, 4.0, 4.0, 3.0, 3.0, 2.5, 2.5, 2.5)
 # Pictures after each other err alike: so many count as one beside what is known beforehand.

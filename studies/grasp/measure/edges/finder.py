@@ -20,9 +20,10 @@ from studies.grasp.measure.edges.contrast import colours_of
 from studies.grasp.measure.edges.follow import Followed, Follower
 from studies.grasp.measure.edges.learn import Learnt, learn, learn_base, widths_beside
 from studies.grasp.measure.edges.outline import Link, frame_of
-from studies.grasp.measure.edges.patches import placed
 from studies.grasp.measure.edges.segments import Array, edges_near
-from studies.grasp.measure.edges.silhouette import joints_at
+from studies.grasp.measure.edges.silhouette import POSE, Silhouette, joints_at
+from studies.grasp.measure.edges.skin.patches import placed
+from studies.grasp.measure.edges.tip import round_end, tip_of
 from studies.grasp.measure.joints import B1, B2, Finger, Place, Seen, joints_of
 from studies.grasp.measure.seeds import Seeds
 
@@ -64,6 +65,7 @@ class EdgeFinder:
         self._follower: Follower | None = None
         self._followed: list[Followed] = []
         self._instants: list[_Instant] = []
+        self._tip_note = ""
 
     def look(self, frame: Frame) -> None:
         """The next picture. Raises CaptureError of seeds that are not on a finger in the first."""
@@ -88,7 +90,26 @@ class EdgeFinder:
         for fine_px in _SKIN_ROUNDS:
             skin = placed(kept, follower.windows, then, (found.shape, found.poses), fine_px)
             found = adjust(follower.shape, self._followed, self._clicks, skin, found)
-        return found
+        return self._ended(follower, then, found)
+
+    def _ended(
+        self, follower: Follower, then: tuple[Silhouette, Array], found: Adjusted
+    ) -> Adjusted:
+        """The last bone from the DIP joint to the tip that the click means (tip.py)."""
+        kept = [one.tip for one in self._followed]
+        end = round_end(kept, follower.tip_window, then, (found.shape, found.poses))
+        _, _, dip, _ = joints_at(found.poses[0], found.shape.lengths)
+        turn = found.poses[0, 5]
+        along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        (x, y), self._tip_note = tip_of(along @ (self._clicks.joints[3] - dip), end)
+        # The outline is not laid into a picture again.
+        shape = found.shape.changed(
+            found.shape.distances,
+            np.append(found.shape.lengths[:2], np.hypot(x, y)),
+            found.shape.flesh,
+        )
+        poses = found.poses + np.append(np.zeros(POSE - 1), np.arctan2(y, x))
+        return found._replace(shape=shape, poses=poses)
 
     def _learnt(self, image: np.ndarray) -> Learnt:
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
@@ -136,7 +157,8 @@ class EdgeFinder:
                 places[name] = Place(x, y, sigma, min(1.0, share / _WELL))
         if self._clicks.base is not None:
             places |= self._base_places(found, number, self._clicks.base)
-        return Seen(instant.frame, instant.time_s, places, lost)
+        notes = ((self._names[-1], self._tip_note),) if number == 0 else ()
+        return Seen(instant.frame, instant.time_s, places, lost, notes)
 
     def _base_places(self, found: Adjusted, number: int, base: Array) -> dict[str, Place]:
         """B1 and B2, which move with the back of the hand."""

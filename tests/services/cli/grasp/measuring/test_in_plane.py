@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -77,6 +78,22 @@ def test_angles_and_bones_are_those_of_the_plane(filmed, tmp_path):
     assert run(folder, tmp_path / "b", *lens).exit_code == 0
     plain, _ = off_deg(load_recording(tmp_path / "b" / "index.json"), truth)
     assert plain.max() > 2.0 * rms.max()
+
+
+def test_straight_edges_stand_for_a_calibrated_lens(filmed, tmp_path):
+    folder, shown = filmed
+    (tmp_path / "edges.json").write_bytes(msgspec.json.encode(scene_file(shown).straight_lines))
+    straight = ("--straight", tmp_path / "edges.json", "--reference", rectangle(shown))
+    result = run(folder, tmp_path / "a", *straight)
+    assert result.exit_code == 0, result.output
+    recording = load_recording(tmp_path / "a" / "index.json")
+    assert any("edges were bent by" in note for note in recording.notes)
+    truth = truth_of(shown)[0]
+    assert np.allclose(recording.lengths, truth.lengths, rtol=0.015)
+    rms, _ = off_deg(recording, truth)
+    assert rms.max() < 1.0
+    both = run(folder, tmp_path / "b", *straight, "--lens", folder / "lens.json")
+    assert "give one" in str(both.exception)
 
 
 @pytest.mark.parametrize(

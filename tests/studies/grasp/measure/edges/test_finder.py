@@ -73,3 +73,18 @@ def test_edges_of_nothing():
     flat = np.full((60, 80), 90, np.uint8)
     assert len(edges_near(flat, np.array([(20.0, 20.0), (60.0, 30.0)]), 10.0).points) == 0
     assert len(edges_near(flat, np.array([(200.0, 20.0), (210.0, 30.0)]), 10.0).points) == 0
+
+
+@pytest.mark.parametrize(("phalanges", "turn"), [([5], -0.6), ([4, 5], 0.35), ([4, 5], -0.35)])
+def test_phalanges_looked_for_where_they_are_not_are_found(plain, phalanges, turn):
+    """The last one or two are expected 20 degrees off and more."""
+    _, frames, seeds = plain
+    vectors = []
+    for expected in (0.0, turn):
+        finder = EdgeFinder("index", seeds)
+        for frame in frames[:3]:
+            finder.look(frame)
+        finder._follower._vector[phalanges] += expected
+        finder.look(frames[3])
+        vectors.append(finder._followed[-1].vector[2:])
+    assert np.degrees(np.abs(vectors[1] - vectors[0])).max() < 1.0

@@ -25,7 +25,7 @@ from studies.grasp.measure.edges.silhouette import (
     bends_of,
     joints_at,
 )
-from studies.grasp.measure.edges.texture import sampled
+from studies.grasp.measure.edges.skin.texture import sampled
 
 # The skin that is compared: shares of a bone, of the back of the hand and of half the width.
 # Beyond .65 of that a finger turns away from the camera and shading is steep.
@@ -115,7 +115,7 @@ def kept_of(
     """The light of a picture in each window at a pose."""
     grey = np.ascontiguousarray(colours[..., 0])
     pieces = []
-    for start, window in zip(_starts(shape, vector), windows, strict=True):
+    for start, window in zip(starts_of(shape, vector), windows, strict=True):
         if window is None:
             pieces.append(np.zeros((1, 1), np.float16))
             continue
@@ -129,7 +129,7 @@ def kept_of(
     return tuple(pieces)
 
 
-def _starts(shape: Silhouette, vector: Array) -> Array:
+def starts_of(shape: Silhouette, vector: Array) -> Array:
     """Each segment's frame at a pose, (4, 3): origin px, turn rad."""
     joints = joints_at(vector, shape.lengths)
     return np.column_stack([joints[[0, 0, 1, 2]], vector[2:]])
@@ -146,15 +146,15 @@ def placed(
     are known better; fine_px: only what is finer than so many px (sigma) is compared, which has to
     be known to about as many beforehand.
     """
-    before = np.stack([_starts(followed[0], vector) for vector in followed[1]])  # (f, 4, 3)
-    starts = np.stack([_starts(now[0], vector) for vector in now[1]])
+    before = np.stack([starts_of(followed[0], vector) for vector in followed[1]])  # (f, 4, 3)
+    starts = np.stack([starts_of(now[0], vector) for vector in now[1]])
     found = Placed(starts.copy(), np.zeros(starts.shape[:2]), np.zeros((SEGMENTS, 2)))
     bends = np.stack([np.append(bends_of(vector), 0.0) for vector in now[1]])
     for segment, window in enumerate(windows):
         if window is None:
             continue
         found.centres[segment] = window.centre
-        own = _within(starts[:, segment], before[:, segment], window)
+        own = within(starts[:, segment], before[:, segment], window.low)
         shown = np.stack([_unfolded(window, segment, now[0], bend) for bend in bends])
         images = [_fine(one[segment].astype(np.float32), fine_px) for one in kept]
         turned, weights = _registered(images, window, own, shown)
@@ -175,11 +175,11 @@ def _fine(image: Picture, fine_px: float | None) -> Picture:
     return image - np.asarray(cv2.GaussianBlur(image, (0, 0), fine_px), dtype=np.float32)
 
 
-def _within(starts: Array, before: Array, window: Window) -> Array:
-    """Frames (f, 3) of the picture as frames of the kept ones."""
+def within(starts: Array, before: Array, low: Array) -> Array:
+    """Frames (f, 3) of the picture as frames of the kept ones, whose corner is at low (2,) px."""
     offset, c, s = starts[:, :2] - before[:, :2], np.cos(before[:, 2]), np.sin(before[:, 2])
-    x = c * offset[:, 0] + s * offset[:, 1] - window.low[0]
-    y = -s * offset[:, 0] + c * offset[:, 1] - window.low[1]
+    x = c * offset[:, 0] + s * offset[:, 1] - low[0]
+    y = -s * offset[:, 0] + c * offset[:, 1] - low[1]
     return np.column_stack([x, y, starts[:, 2] - before[:, 2]])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.grasp.measure.edges.finder import EdgeFinder
-from studies.grasp.measure.edges.patches import placed
+from studies.grasp.measure.edges.skin.patches import placed
 
 
 @pytest.fixture(scope="module")

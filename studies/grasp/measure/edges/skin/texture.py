@@ -44,7 +44,9 @@ class Pyramid(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """Pose (6,), its information (6, 6) by the noise alone, and the RMS misfit in levels."""
+    """Pose (6,), its information (6, 6) by the noise alone, and the misfit, RMS in levels, of
+    the segment that fits worst.
+    """
 
     vector: Array
     information: Array
@@ -108,11 +110,11 @@ def moved(
 ) -> Moved:
     """The pose at which a picture shows what was remembered, from a start near it."""
     vector = start.copy()
-    information, scale = np.eye(POSE), 1.0
+    information, scales = np.eye(POSE), np.ones(SEGMENTS)
     for (_, steps), level, before in zip(_LEVELS, pyramid.levels, memory, strict=True):
         for _ in range(steps):
-            vector, information, scale = _step(level, before, skin, shape, vector)
-    return Moved(vector, information, scale)
+            vector, information, scales = _step(level, before, skin, shape, vector)
+    return Moved(vector, information, float(scales.max()))
 
 
 def _step(
@@ -121,7 +123,7 @@ def _step(
     skin: Skin,
     shape: Silhouette,
     vector: Array,
-) -> tuple[Array, Array, float]:
+) -> tuple[Array, Array, Array]:
     points, derivative = carried(vector, shape.lengths, skin.segment, skin.local)
     now, dx, dy = (sampled(plane, points) for plane in level)
     rows = np.concatenate(
@@ -129,18 +131,32 @@ def _step(
     )
     miss = before - now
     seen = _unfolded(skin, shape, vector)
-    weights, step, scale = seen, np.zeros(rows.shape[1]), 1.0
-    normal = np.eye(rows.shape[1])
+    weights, step = seen, np.zeros(rows.shape[1])
+    normal, scales = np.eye(rows.shape[1]), np.ones(SEGMENTS)
     for _ in range(2):
         weighted = rows * weights[:, None]
         normal = weighted.T @ rows + 1e-3 * np.eye(rows.shape[1])
         step = np.linalg.solve(normal, weighted.T @ miss)
         rest = miss - rows @ step
-        scale = 1.4826 * float(np.median(np.abs(rest[seen > 0.0]))) + _LEAST_SCALE
-        weights = seen * tukey(rest, 4.0 * scale)
+        scales = _scales(rest, skin.segment, seen)
+        relative = rest / scales[skin.segment]
+        weights = seen * tukey(relative, 4.0) / scales[skin.segment] ** 2
     held = normal[:POSE, POSE:] @ np.linalg.solve(normal[POSE:, POSE:], normal[POSE:, :POSE])
-    information = (normal[:POSE, :POSE] - held) / scale**2
-    return vector + np.clip(step[:POSE], -_LARGEST, _LARGEST), information, scale
+    information = normal[:POSE, :POSE] - held
+    return vector + np.clip(step[:POSE], -_LARGEST, _LARGEST), information, scales
+
+
+def _scales(rest: Array, segment: np.ndarray, seen: Array) -> Array:
+    """Robust RMS of what is left of each segment's points (n,) that are seen, (4,) in levels.
+
+    Of all together the few points of a fingertip that lies wrong would be the outliers.
+    """
+    found = np.full(SEGMENTS, _LEAST_SCALE)
+    for number in range(SEGMENTS):
+        own = rest[(segment == number) & (seen > 0.0)]
+        if len(own):
+            found[number] += 1.4826 * float(np.median(np.abs(own)))
+    return found
 
 
 def sampled(plane: Picture, points: Array) -> Array:
