@@ -11,6 +11,8 @@ from rhot.messages import Count, Message, Name, Unit
 
 # What the calibrator measures with pictures, markers and points that come over the bus.
 CalibrationStep = Literal["lens", "stereo", "hand", "objects"]
+# How a hand is measured: by exercises that a person follows, or while it is simply used.
+HandWay = Literal["exercises", "use"]
 CalibrationAction = Literal["start", "stop", "save"]
 CalibrationPhase = Literal["idle", "collecting", "computing", "done", "saved", "failed"]
 Sentence = Annotated[str, msgspec.Meta(max_length=1000)]
@@ -20,14 +22,15 @@ class CalibrationOrder(Message, frozen=True, kw_only=True, forbid_unknown_fields
     """Start one step, stop it, or save what it has found.
 
     camera is whose lens is calibrated; square_mm and count (positions to show) are of the board
-    that lens and stereo use, hand is whose exercises are done. What a step does not need is not
-    looked at.
+    that lens and stereo use, hand is the one that is measured, and way how. What a step does not
+    need is not looked at.
     """
 
     action: CalibrationAction
     step: CalibrationStep = "hand"
     camera: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]{0,64}$")] = ""
     hand: HandName = "right"
+    way: HandWay = "exercises"
     square_mm: Annotated[float, msgspec.Meta(ge=1.0, le=1000.0)] = 25.0
     count: Annotated[int, msgspec.Meta(ge=5, le=200)] = 15
 
@@ -44,7 +47,8 @@ class CalibrationState(Message, frozen=True, kw_only=True):
 
     progress is of the collecting; to_do is what a person should do next, seen what has been seen so
     far. Of a result: whether it is good, its figures, what to do about it, and once it is saved the
-    files. number counts the steps that were started.
+    files. A hand in use has a result while it is still being collected. number counts the steps
+    that were started.
     """
 
     phase: CalibrationPhase = "idle"

@@ -75,12 +75,18 @@ def page_url(page_of: Callable[..., str], tmp_path: Path) -> str:
     return page_of(tmp_path / "rig.toml", "calibrator")
 
 
-def lens_step(chromium: Any, page_url: str, errors: list[str]) -> Any:
-    """A visitor's page that shows the lens step."""
+def calibration_tab(chromium: Any, page_url: str, errors: list[str]) -> Any:
+    """A visitor's page that shows the guided calibration."""
     page = chromium.new_page(viewport={"width": 1280, "height": 800})
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(page_url)
     page.get_by_role("tab", name="Calibration").click(**WAIT)
+    return page
+
+
+def lens_step(chromium: Any, page_url: str, errors: list[str]) -> Any:
+    """A visitor's page that shows the lens step, before it is begun."""
+    page = calibration_tab(chromium, page_url, errors)
     for _ in range(2):
         page.get_by_role("button", name="next").click(**WAIT)
     page.get_by_text("Show the printed chessboard to one camera").wait_for(**WAIT)
@@ -147,7 +153,8 @@ def test_a_lens_is_practised_and_another_visitor_saves_it(
     page.get_by_text("a board with squares of 25 mm is carried before the camera").wait_for(**WAIT)
     begin(page, PRACTISED)
     page.get_by_text(re.compile(rf"\d/{PRACTISED} positions")).first.wait_for(**WAIT)
-    other = lens_step(chromium, practice_url, errors)
+    # Who opens the page now is shown the step that is measured, and what comes of it.
+    other = calibration_tab(chromium, practice_url, errors)
     page.close()
     other.get_by_text("error of pictures that were left out").wait_for(**WAIT)
     rows = other.locator("table tr")

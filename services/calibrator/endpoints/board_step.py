@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from services.calibrator.board.board import Board
 from services.calibrator.board.picture_folder import PictureSet
 from services.calibrator.endpoints.board_positions import BoardCollection
 from services.calibrator.endpoints.desk import Desk
+from services.calibrator.endpoints.picture_folder import picture_folder
 from services.calibrator.endpoints.practice import Performer, practising
 from services.calibrator.guided.boards import lens_found, rig_found
 from services.calibrator.guided.found import Found
@@ -32,8 +32,8 @@ async def board_step(desk: Desk) -> Found:
         names = [camera.name for camera in desk.config.camera]
         if len(names) < 2:
             raise CalibrationError("one camera has no place to others: rig.toml needs two of them")
-    with tempfile.TemporaryDirectory(prefix="board-") as folder:
-        kept = _Kept(Path(folder), names)
+    with picture_folder() as folder:
+        kept = _Kept(folder, names)
         shown = SimBoard(camera=names[0] if len(names) == 1 else "")
         async with practising(desk, SimStage(board=shown)) as performer:
             board = await _collect(desk, names, kept, performer)

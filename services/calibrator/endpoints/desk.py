@@ -9,16 +9,18 @@ from dataclasses import dataclass
 from rhot.bus.bus import Bus
 from rhot.files.config import RigConfig
 from rhot.messages.calibration import CalibrationOrder
+from services.calibrator.guided.found import Found
 
 
 @dataclass(frozen=True)
 class Desk:
-    """change takes fields of CalibrationState."""
+    """change takes fields of CalibrationState, offer what may be saved while it goes on."""
 
     bus: Bus
     config: RigConfig
     order: CalibrationOrder
     change: Callable[..., None]
+    offer: Callable[[Found], None]
 
     def tell(self, progress: float, to_do: str, seen: list[str]) -> None:
         """What a person should do now, and what was seen so far."""

@@ -59,38 +59,54 @@ class Guide:
         self._task = asyncio.create_task(self._run(order))
 
     async def _stop(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait({self._task})
-        self._found, self._task = None, None
+        await self._end()
+        self._found = None
         self._state = CalibrationState(number=self._state.number)
 
+    async def _end(self) -> None:
+        """End the step that goes on; what it has found stays."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.wait({task})
+
     async def _save(self) -> None:
-        if self._found is None or self._state.phase not in ("done", "saved"):
+        found = self._found
+        if found is None or self._state.phase not in ("collecting", "done", "saved"):
             raise RefusedError("there is nothing to save: finish a step first")
+        if found.only_good and not found.good:
+            raise RefusedError(f"not saved, since it is not good yet. {' '.join(found.advice)}")
+        if self._state.phase == "collecting":
+            await self._end()
+            self._finished()
         folder = self._config.calibration_dir
-        for name, made in self._found.files.items():
+        for name, made in found.files.items():
             await asyncio.to_thread(save, folder / name, made)
-        self._change(phase="saved", files=list(self._found.files))
+        self._change(phase="saved", files=list(found.files))
 
     async def _run(self, order: CalibrationOrder) -> None:
         try:
-            found = await _job(Desk(self._bus, self._config, order, self._change))
+            found = await _job(Desk(self._bus, self._config, order, self._change, self._offer))
         except RhotError as error:
             self._change(phase="failed", to_do=str(error)[:1000])
         except Exception as error:
             log.exception("calibration of %s", order.step)
             self._change(phase="failed", to_do=f"this should not happen: {error!r}"[:1000])
         else:
-            self._found = found
-            self._change(
-                phase="done",
-                progress=1.0,
-                to_do="",
-                good=found.good,
-                figures=found.figures,
-                advice=[text[:1000] for text in found.advice[:32]],
-            )
+            self._offer(found)
+            self._finished()
+
+    def _finished(self) -> None:
+        self._change(phase="done", progress=1.0, to_do="", seen=[])
+
+    def _offer(self, found: Found) -> None:
+        """What can be saved from now on."""
+        self._found = found
+        self._change(
+            good=found.good,
+            figures=found.figures,
+            advice=[text[:1000] for text in found.advice[:32]],
+        )
 
     def _change(self, **fields: object) -> None:
         self._state = msgspec.structs.replace(self._state, **fields)
@@ -101,8 +117,9 @@ async def _job(desk: Desk) -> Found:
     match desk.order.step:
         case "hand":
             from services.calibrator.endpoints.hand_step import hand_step
+            from services.calibrator.endpoints.hand_use_step import hand_use_step
 
-            return await hand_step(desk)
+            return await (hand_use_step if desk.order.way == "use" else hand_step)(desk)
         case "lens" | "stereo":
             from services.calibrator.endpoints.board_step import board_step
 

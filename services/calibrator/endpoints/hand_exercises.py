@@ -40,11 +40,12 @@ async def follow_exercises(
 
     Raises CalibrationError if no points come.
     """
+    tell(Exercising(-1, 0.0, []))
+    await asyncio.sleep(READY_S)
+    # Not before: points that came meanwhile would count as the first seconds of the exercises.
     points = bus.every(topics.POINTS, 256, hand=which)
     messages: list[HandPoints] = []
     try:
-        tell(Exercising(-1, 0.0, []))
-        await asyncio.sleep(READY_S)
         passed_s, began_ns = 0.0, 0
         # By the hand's own time, from its first point on: a recording must hold all of them.
         while passed_s <= CYCLE_S:

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import viser
 
 from rhot.files.config import RigConfig
 from rhot.hand import HandName
-from rhot.messages.calibration import CalibrationOrder, CalibrationState, CalibrationStep
+from rhot.messages.calibration import (
+    CalibrationOrder,
+    CalibrationState,
+    CalibrationStep,
+    HandWay,
+)
 from services.viewer.guide import texts
 from services.viewer.guide.callbacks import on_loop
-from services.viewer.guide.link import CalibratorLink
+from services.viewer.guide.link import WORKING, CalibratorLink
 from services.viewer.guide.steps import Step
 
-_WORKING = ("collecting", "computing")
+# How a hand is measured, as a person calls it.
+_WAYS: dict[str, HandWay] = {"follow the exercises": "exercises", "just use the hand": "use"}
+_BUSY = "Another step is being measured now."
+_LOST = "The calibrator was started again: what it had collected is lost. Press Start."
 
 
 class CalibratorStep:
@@ -25,10 +33,13 @@ class CalibratorStep:
         gui = client.gui
         self._config, self._link = config, link
         self._step: Step | None = None
+        # Why this visitor was refused something, and the phase in which that was.
+        self._refused: tuple[str, object] = ("", None)
         self._camera = gui.add_dropdown(
             "camera", tuple(camera.name for camera in config.camera) or ("none",)
         )
         self._hand = gui.add_dropdown("hand", tuple(config.hand) or ("right",))
+        self._way = gui.add_dropdown("how", tuple(_WAYS))
         self._square = gui.add_number(
             "square, mm",
             25.0,
@@ -44,14 +55,18 @@ class CalibratorStep:
         self._stop = gui.add_button("Stop")
         self._progress = gui.add_progress_bar(0.0)
         self._now = gui.add_html("")
+        self._note = gui.add_html("")
         self._result = gui.add_html("")
         self._save = gui.add_button("Save", color="green")
-        self._again = gui.add_button("Do it again")
+        # Where another camera, hand or way is chosen, too.
+        self._again = gui.add_button("Back to the start")
+        self._figures = gui.add_html("")
         self._command = gui.add_html("")
         self._start.on_click(self._ordering("start"))
-        self._again.on_click(self._ordering("start"))
+        self._again.on_click(self._ordering("stop"))
         self._stop.on_click(self._ordering("stop"))
         self._save.on_click(self._ordering("save"))
+        self._way.on_update(on_loop(lambda _: self.update()))
         self.show(None)
 
     def show(self, step: Step | None) -> None:
@@ -60,12 +75,12 @@ class CalibratorStep:
         self.update()
 
     @property
-    def working(self) -> bool:
-        """Whether the step that is shown is measured now."""
+    def alone(self) -> bool:
+        """Whether the step that is shown is measured now, or was: nothing else counts then."""
         state, step = self._link.state, self._step
         if state is None or state.order is None or step is None:
             return False
-        return state.order.step == step.name and state.phase in _WORKING
+        return state.order.step == step.name and state.phase in (*WORKING, "done", "saved")
 
     def update(self) -> None:
         """Bring everything up to date with what the calibrator says."""
@@ -79,15 +94,19 @@ class CalibratorStep:
                 "The calibrator does not answer: is rhot-calibrator running? The same on the "
                 "command line:"
             )
-            _content(self._command, texts.by_command(step.command(self._config), why))
+            _content(self._command, texts.by_command(self._by_command(step), why))
             return
         own = state.order is not None and state.order.step == step.name
-        if own and state.phase in _WORKING:
+        self._save.disabled = state.phase == "saved"
+        color: Literal["green", "gray"] = "green" if state.good or state.phase == "done" else "gray"
+        if self._save.color != color:
+            self._save.color = color
+        if own and state.phase in WORKING:
             self._show_working(state)
         elif own and state.phase in ("done", "saved"):
             _content(self._result, texts.result(state))
-            self._visible(self._result, self._save, self._again)
-            self._save.disabled = state.phase == "saved"
+            self._save.disabled |= texts.saves_only_good(state) and not state.good
+            self._visible(self._result, self._save, self._again, *self._refusal(state))
         else:
             self._show_start(step, state, failed=own and state.phase == "failed")
 
@@ -96,43 +115,63 @@ class CalibratorStep:
         progress.value = round(100.0 * state.progress, 1)
         self._progress.animated = state.phase == "computing"
         _content(self._now, texts.collecting(state))
-        self._visible(self._progress, self._now, self._stop)
+        shown = [self._progress, self._now, self._stop, *self._refusal(state)]
+        if state.figures:
+            # It can be saved already, or is refused with the reason.
+            _content(self._figures, texts.figures(state))
+            shown += [self._figures, self._save]
+        self._visible(*shown)
+
+    def _refusal(self, state: CalibrationState) -> list[Any]:
+        """Why this visitor was refused something, until the calibrator does something else."""
+        why, of = self._refused
+        if not why or of != (state.number, state.phase, state.good):
+            return []
+        _content(self._note, texts.note(why))
+        return [self._note]
 
     def _show_start(self, step: Step, state: CalibrationState, *, failed: bool) -> None:
         options: dict[str, list[Any]] = {
             "lens": [self._camera, self._square, self._count],
             "stereo": [self._square, self._count],
-            "hand": [self._hand] if len(self._config.hand) > 1 else [],
+            "hand": [self._way, *([self._hand] if len(self._config.hand) > 1 else [])],
         }
         shown = [self._start, self._command, *options.get(step.name, [])]
-        busy = state.phase in _WORKING
+        busy = state.phase in WORKING
         self._start.disabled = busy
-        note = "Another step is being measured now." if busy else self._link.error
+        refusal = self._refusal(state)
         if failed:
             _content(self._now, texts.collecting(state))
             shown.append(self._now)
-        elif note:
-            _content(self._now, texts.note(note))
+        elif busy or (self._link.lost and not refusal):
+            _content(self._now, texts.note(_BUSY if busy else _LOST))
             shown.append(self._now)
-        _content(
-            self._command,
-            texts.by_command(step.command(self._config), "The same on the command line:"),
-        )
-        self._visible(*shown)
+        same = texts.by_command(self._by_command(step), "The same on the command line:")
+        _content(self._command, same)
+        self._visible(*shown, *refusal)
+
+    def _by_command(self, step: Step) -> str:
+        command = step.command(self._config)
+        if step.name == "hand" and _WAYS[str(self._way.value)] == "use":
+            command = command.replace(" --config", " --watch --config")
+        return command
 
     def _visible(self, *shown: Any) -> None:
         every = (
             self._camera,
             self._hand,
+            self._way,
             self._square,
             self._count,
             self._start,
             self._stop,
             self._progress,
             self._now,
+            self._note,
             self._result,
             self._save,
             self._again,
+            self._figures,
             self._command,
         )
         for handle in every:
@@ -159,10 +198,17 @@ class CalibratorStep:
                 step=names[self._step.name],
                 camera=str(self._camera.value),
                 hand=hand,
+                way=_WAYS[str(self._way.value)],
                 square_mm=min(max(float(self._square.value), 1.0), 1000.0),
                 count=min(max(int(self._count.value), 5), 200),
-            )
+            ),
+            self._was_refused,
         )
+
+    def _was_refused(self, why: str) -> None:
+        state = self._link.state
+        self._refused = (why, state and (state.number, state.phase, state.good))
+        self.update()
 
 
 def _content(handle: viser.GuiHtmlHandle, content: str) -> None:

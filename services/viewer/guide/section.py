@@ -72,8 +72,9 @@ class GuideTab:
             self._exposure.update(seen)
         elif step.name in OF_THE_CALIBRATOR:
             self._measured.update()
-        # Who follows what to do now needs no more than that; on a phone there is no room for more.
-        alone = step.name in OF_THE_CALIBRATOR and self._measured.working
+        # Who follows what to do now, or reads what came of it, needs no more than that; on a phone
+        # there is no room for more.
+        alone = step.name in OF_THE_CALIBRATOR and self._measured.alone
         for handle in (self._overview, self._text):
             if handle.visible == alone:
                 handle.visible = not alone

@@ -94,12 +94,13 @@ STEPS: tuple[Step, ...] = (
     Step(
         "hand",
         "Hand",
-        "Hold the painted hand towards both cameras and follow twelve short exercises, "
-        "four seconds each. They tell how long your bones are.",
+        "Measure how long your bones are. Follow twelve short exercises of four seconds each: that "
+        "is the most exact. Or just use the painted hand for a minute, in view of both cameras.",
         drawings.HAND,
         lambda config: [f"hand.{name}.json" for name in config.hand],
         lambda config: f"rhot calibrate hand {_hand(config)} --config rig.toml",
-        practice="Press Start: its hand does the exercises, twice as fast as you would.",
+        practice="Press Start: its hand does the exercises, twice as fast as you would, "
+        "or moves as it likes.",
     ),
     Step(
         "objects",

@@ -78,20 +78,36 @@ def result(state: CalibrationState) -> str:
         head = f'<span style="color:{_GREEN};font-size:1.15em"><b>&#10003; Good</b></span>'
     else:
         head = f'<span style="color:{_AMBER};font-size:1.15em"><b>Poor</b></span>'
-    rows = "".join(
-        f'<tr><td>{_said(one.name)}</td><td style="text-align:right;white-space:nowrap">'
-        f"<b>{_said(one.value)}</b></td></tr>"
-        for one in state.figures
-    )
     advice = "".join(f"<p>{_said(_capital(one))}</p>" for one in state.advice)
     if state.phase == "saved":
         names = ", ".join(text(name) for name in state.files)
         end = f'<span style="color:{_GREEN}">Saved: {names}. The rig uses it now.</span>'
     elif state.good:
         end = "Press <b>Save</b> to use it."
+    elif saves_only_good(state):
+        end = "It is not saved like this. Do it again."
     else:
         end = "Better do it again; <b>Save</b> uses it all the same."
-    return _box(f'{head}<table style="width:100%">{rows}</table>{advice}{end}')
+    return _box(f"{head}{_table(state)}{advice}{end}")
+
+
+def figures(state: CalibrationState) -> str:
+    """What is known so far."""
+    return _box(_table(state))
+
+
+def saves_only_good(state: CalibrationState) -> bool:
+    """Whether a poor result cannot be saved: of a hand in use, which can simply go on."""
+    return state.order is not None and (state.order.step, state.order.way) == ("hand", "use")
+
+
+def _table(state: CalibrationState) -> str:
+    rows = "".join(
+        f'<tr><td>{_said(one.name)}</td><td style="text-align:right;white-space:nowrap">'
+        f"<b>{_said(one.value)}</b></td></tr>"
+        for one in state.figures
+    )
+    return f'<table style="width:100%">{rows}</table>' if rows else ""
 
 
 def by_command(command: str, why: str) -> str:
@@ -105,7 +121,7 @@ def by_command(command: str, why: str) -> str:
 
 def note(said: str) -> str:
     """Why nothing can be started now."""
-    return _box(f'<span style="color:{_AMBER}">{_said(said)}</span>')
+    return _box(f'<span style="color:{_AMBER}">{_said(_capital(said))}</span>')
 
 
 def exposure(

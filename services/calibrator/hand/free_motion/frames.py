@@ -29,7 +29,7 @@ _MIN_BEND = 0.15
 # Sizes that no hand has, against the tables'.
 _MIN_SCALE, _MAX_SCALE = 0.5, 1.6
 # Frames farther apart than this count as this much time: a hand that was away was not seen.
-_MAX_STEP_S = 0.2
+MAX_STEP_S = 0.2
 # A distance between two landmarks that differs from its neighbours' median in time by so much is
 # an error of measurement.
 _MAX_JUMP_M = 0.012
@@ -58,7 +58,7 @@ def seen_frames(messages: Sequence[HandPoints], table: HandModel) -> Seen:
         )
     basic = frames.weights[:, : len(BASIC_LANDMARKS), 0, 0] > 0.0
     whole = np.asarray(basic.all(axis=1))
-    steps = np.minimum(np.diff(stamps_s, append=stamps_s[-1]), _MAX_STEP_S)
+    steps = np.minimum(np.diff(stamps_s, append=stamps_s[-1]), MAX_STEP_S)
     seconds, of_seconds = float(steps[whole].sum()), float(stamps_s[-1])
     if seconds < MIN_SECONDS:
         rarest = BASIC_LANDMARKS[int(basic.mean(axis=0).argmin())].replace("_", " ")
@@ -72,19 +72,26 @@ def seen_frames(messages: Sequence[HandPoints], table: HandModel) -> Seen:
     frames = frames.take(_steady(frames))
     reach = np.linalg.norm(frames.points[:, 1 : len(TIPS) + 1] - frames.points[:, :1], axis=2)
     scale = _scale(reach, table)
-    near, far = np.percentile(reach, (2.0, 98.0), axis=0)
-    held = (far - near) / far < _MIN_BEND
-    held[0] = False  # a thumb's tip stays as far from the wrist
-    if held[1:].all():
+    held = fingers_held(reach)
+    if len(held) == len(TIPS) - 1:
         raise CalibrationError(
             f"the hand was held still: in {seconds:.0f} s no finger tip came nearer to the wrist "
             f"by more than {_MIN_BEND:.0%}; open and close it, bend the fingers together and one "
             "by one"
         )
-    not_bent = tuple(
-        tip.removesuffix("_tip") for tip, still in zip(TIPS, held, strict=True) if still
+    return Seen(names, frames.take(_diverse(frames)), seconds, of_seconds, scale, held)
+
+
+def fingers_held(reach: Array) -> tuple[str, ...]:
+    """Fingers that were never bent, by how far tips (n, 5) were from the wrist, m.
+
+    Never the thumb: its tip stays as far from the wrist.
+    """
+    near, far = np.percentile(reach[:, 1:], (2.0, 98.0), axis=0)
+    held = (far - near) / far < _MIN_BEND
+    return tuple(
+        tip.removesuffix("_tip") for tip, still in zip(TIPS[1:], held, strict=True) if still
     )
-    return Seen(names, frames.take(_diverse(frames)), seconds, of_seconds, scale, not_bent)
 
 
 def _frames(messages: Sequence[HandPoints], names: Sequence[str]) -> Frames:

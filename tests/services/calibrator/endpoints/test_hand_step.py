@@ -23,6 +23,7 @@ from rhot.messages.calibration import CalibrationOrder
 from services.calibrator.endpoints import hand_exercises
 from services.calibrator.endpoints.desk import Desk
 from services.calibrator.endpoints.hand_step import hand_step
+from services.calibrator.guided.found import Found
 from services.simulator.hands.calibration_exercises import guided
 from testing.synthetic_hands import hand_message, noisy_points, wrist_rotation
 
@@ -32,6 +33,10 @@ RIG = RigConfig(
 )
 ORDER = CalibrationOrder(action="start", step="hand", hand="right")
 SCALE, RATE_HZ = 1.1, 15.0
+
+
+def nobody(_: Found) -> None:
+    """Nothing of it can be saved before its end."""
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +78,7 @@ async def test_the_exercises_give_the_hand_that_did_them(
 
         async with asyncio.timeout(120.0):
             publishing = asyncio.create_task(publish())
-            found = await hand_step(Desk(ours, RIG, ORDER, change))
+            found = await hand_step(Desk(ours, RIG, ORDER, change, nobody))
             await publishing
     assert [prompt for prompt, _ in itertools.groupby(said[1:-1])] == [
         one.prompt for one in EXERCISES
@@ -91,7 +96,7 @@ async def test_without_points_it_says_so(router: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(hand_exercises, "_SILENT_S", 0.2)
     async with open_bus("desk", [router]) as bus:
         with pytest.raises(CalibrationError, match="is fusion running and the hand in view"):
-            await hand_step(Desk(bus, RIG, ORDER, lambda **_: None))
+            await hand_step(Desk(bus, RIG, ORDER, lambda **_: None, nobody))
         left = msgspec.structs.replace(ORDER, hand="left")
         with pytest.raises(CalibrationError, match=r"no \[hand.left.markers\]"):
-            await hand_step(Desk(bus, RIG, left, lambda **_: None))
+            await hand_step(Desk(bus, RIG, left, lambda **_: None, nobody))

@@ -33,7 +33,7 @@ practice._WATCH_S, practice._LEASE_S = 0.3, 4.0
 async def step(rig, endpoint):
     async with open_bus("desk", [endpoint]) as bus:
         order = CalibrationOrder(action="start", step="stereo")
-        desk = Desk(bus, load_rig(rig), order, lambda **_: None)
+        desk = Desk(bus, load_rig(rig), order, lambda **_: None, lambda _: None)
         async with practice.practising(desk, SimStage(board=SimBoard())):
             print("shown", flush=True)
             await asyncio.Event().wait()

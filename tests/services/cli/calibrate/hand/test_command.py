@@ -25,7 +25,7 @@ from services.calibrator.guided.hand_fitting import Wanted
 from services.cli.calibrate.calibrate import calibrate
 from services.cli.calibrate.hand.command import lengths_of
 from services.cli.calibrate.hand.recorded import recorded
-from services.cli.calibrate.hand.watch import hand_in_use
+from services.cli.calibrate.hand.watch import watched_hand
 from services.cli.terminal import Terminal
 from services.recorder.recorder import Recorder
 from services.simulator.hands.gestures import MOTIONS
@@ -130,7 +130,7 @@ async def test_a_hand_measures_itself_while_the_rig_is_used(
                 await asyncio.sleep(0.006)
 
         using = asyncio.create_task(use())
-        made = await hand_in_use("desk", [router], wanted, 25.0, Terminal(out=said), every_s=2.0)
+        made = await watched_hand("desk", [router], wanted, 25.0, Terminal(out=said), every_s=2.0)
         using.cancel()
     assert made.seconds >= 25.0
     assert made.size == pytest.approx(0.85, abs=0.04)
