@@ -97,9 +97,13 @@ class _Hand:
                     hand.stamp_ns, one.distance_m, one.sigma_m, self.grasp.carried
                 )
         self.expire(hand.stamp_ns)
+        if any(touch.sure for part, touch in self.touches.items() if part != "palm"):
+            self.touches["palm"].bear_out()
         wrist = _transform(hand.wrist.position_m, hand.wrist.orientation_wxyz)
         at = _transform(pose.position_m, pose.orientation_wxyz)
         self.grasp.step(hand.stamp_ns, self.distances, self.touches, at, wrist)
+        if self.grasp.carried:
+            self.touches["palm"].bear_out()
 
     def gone(self, stamp_ns: int) -> bool:
         """Whether it has not been near for so long that it need not be told of."""
@@ -194,8 +198,8 @@ def _contact(hand: HandName, one: PartDistance, touch: TouchTracker) -> Contact:
         distance_m=round(one.distance_m, _DIGITS),
         sigma_m=round(one.sigma_m, _DIGITS),
         point_m=(x, y, z),
-        touching=touch.touching,
-        since_ns=touch.since_ns,
+        touching=touch.sure,
+        since_ns=touch.since_ns if touch.sure else 0,
         until_ns=touch.until_ns,
     )
 

@@ -73,9 +73,24 @@ class TouchTracker:
         self._spread_m = _SPREAD_M
         self._highest_m = 0.0
         self._held_ns = 0
+        # Whether a touch is more than a distance that is some sigmas wrong.
+        self._borne_out = opens
         # Whether the part was away since its last touch: until then only that touch's own level
         # counts, or a slow leave would begin anew.
         self._armed = True
+
+    @property
+    def sure(self) -> bool:
+        """Whether it touches, and that may be told: of a palm once more than its distance says so.
+
+        Its place follows from the wrist's turn, whose errors stay for a second: of 20 rendered
+        hands that passed 10 mm beside a cup two were measured 3 mm from it for half a second.
+        """
+        return self.touching and self._borne_out
+
+    def bear_out(self) -> None:
+        """A finger touches as well, or the object moves with the hand."""
+        self._borne_out = True
 
     def step(self, stamp_ns: int, distance_m: float, sigma_m: float, held: bool = False) -> None:
         """The next distance; held: the object is carried by this hand, and rather stays touched."""
@@ -84,6 +99,8 @@ class TouchTracker:
         self._samples.append((stamp_ns, distance_m))
         now_m, speed_m_s = self._latest()
         if self.touching:
+            if now_m <= 0.0:
+                self.bear_out()
             off_m = min(max(_OFF_SPREADS * self._spread_m, _OFF_MIN_M), _OFF_MAX_M)
             if not self._opens:
                 off_m = max(off_m, _PALM_SIGMAS * sigma_m)
@@ -98,7 +115,7 @@ class TouchTracker:
     def end(self, stamp_ns: int) -> None:
         """Nothing is known any more: what touched no longer does, from stamp_ns on."""
         if self.touching:
-            self.touching, self.until_ns, self.since_ns = False, max(stamp_ns, self.since_ns), 0
+            self._over(stamp_ns)
         self._samples.clear()
         self._armed = True
 
@@ -125,6 +142,7 @@ class TouchTracker:
         else:
             self.since_ns, self._level_m = self._stamp(kink.time_s), kink.level_m
         self.since_ns = max(self.since_ns, self.until_ns)
+        self._borne_out = self._opens
         self._level_m, self._spread_m = min(self._level_m, on_m), _SPREAD_M
         self._highest_m = self._level_m + _DRIFT_M
 
@@ -138,11 +156,16 @@ class TouchTracker:
             return
         times_s, values_m = self._opening()
         kink = departure(times_s, values_m)
-        self.touching, self._armed = False, False
+        self._armed = False
         # Without a kink it jumped away: after the last sample that was near, or now.
         last_near_s = times_s[-1] if len(times_s) else 0.0
-        at_ns = self._stamp(last_near_s if kink is None else kink.time_s)
-        self.until_ns, self.since_ns = max(at_ns, self.since_ns), 0
+        self._over(self._stamp(last_near_s if kink is None else kink.time_s))
+
+    def _over(self, stamp_ns: int) -> None:
+        """It no longer touches; what was never told has no end either."""
+        if self._borne_out:
+            self.until_ns = max(stamp_ns, self.since_ns)
+        self.touching, self.since_ns = False, 0
 
     @property
     def _more(self) -> bool:

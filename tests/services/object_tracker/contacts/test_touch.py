@@ -168,3 +168,27 @@ def test_any_series_of_distances_is_borne(steps, held):
         else:
             assert touch.since_ns == 0
             assert touch.until_ns <= now_ns
+
+
+def test_a_palm_alone_that_seems_near_is_not_told_until_it_is_borne_out():
+    """Measured 3 mm off for a second, by errors of 2.5 mm: nothing more says that it touches."""
+    palm = TouchTracker(opens=False)
+    follow(lambda t: 0.003 + gap(t), 1.5, sigma_m=0.0025, touch=palm)
+    assert palm.touching
+    assert not palm.sure
+    palm.bear_out()
+    assert palm.sure
+    assert seconds_of(palm.since_ns) == pytest.approx(1.0, abs=0.04)
+
+
+def test_a_palm_that_was_never_borne_out_has_no_end():
+    palm = TouchTracker(opens=False)
+    follow(lambda t: 0.003 + gap(t), sigma_m=0.0025, touch=palm)
+    assert not palm.touching
+    assert palm.until_ns == 0
+
+
+def test_a_palm_that_is_pressed_into_its_object_is_told():
+    palm = TouchTracker(opens=False)
+    follow(lambda t: gap(t) - 0.001, 1.5, sigma_m=0.0025, touch=palm)
+    assert palm.sure
