@@ -38,6 +38,7 @@ from rhot.bus.queries import (
     only_answer,
 )
 from rhot.bus.security.credentials import plain
+from rhot.bus.standing_queue import StandingQueue
 from rhot.bus.stats import Direction, StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
@@ -150,9 +151,21 @@ class Bus:
         expected are the names, in the field that is left open, that the rig has: of others only
         some messages a second are taken.
         """
+        return self._subscribe(topic, n, names, self._keys(topic, expected, names))
+
+    def in_time(
+        self, topic: Topic[T], n: int, expected: Iterable[str] = (), **names: str
+    ) -> Subscription[T]:
+        """As every(), but a reader who cannot keep up skips what has waited (standing_queue.py)."""
+        keys = self._keys(topic, expected, names)
+        return self._subscribe(topic, n, names, keys, StandingQueue())
+
+    def _keys(
+        self, topic: Topic[Any], expected: Iterable[str], names: dict[str, str]
+    ) -> frozenset[str]:
+        """The keys of the expected names, in the field that is left open."""
         (open_field,) = set(topic.fields) - set(names) if expected else ("",)
-        keys = [topic.key(self.rig, **names, **{open_field: name}) for name in expected]
-        return self._subscribe(topic, n, names, frozenset(keys))
+        return frozenset(topic.key(self.rig, **names, **{open_field: name}) for name in expected)
 
     def raw(self, topic: Topic[T], n: int, **names: str) -> RawSubscription:
         """Undecoded samples through a queue of n that drops the oldest."""
@@ -170,9 +183,11 @@ class Bus:
         n: int | None,
         names: dict[str, str],
         expected: frozenset[str] = frozenset(),
+        standing: StandingQueue | None = None,
     ) -> Subscription[T]:
         stats = self._stats(topic, names, "in")
-        return self._declared(Subscription(self._loop, topic, stats, n, expected))
+        one = Subscription(self._loop, topic, stats, n, expected, standing)
+        return self._declared(one)
 
     def _declared(self, one: Listener, origin: zenoh.Locality = zenoh.Locality.ANY) -> Listener:
         """A subscription to its own key, from now on and until the session ends."""

@@ -14,6 +14,7 @@ import zenoh
 
 from rhot import clock
 from rhot.bus.buffer import Buffer
+from rhot.bus.standing_queue import StandingQueue
 from rhot.bus.stats import StreamStats
 from rhot.errors import UNDECODABLE, BusError
 from rhot.topics import Topic
@@ -121,13 +122,16 @@ class Subscription(Generic[T]):
         stats: StreamStats,
         capacity: int | None,
         expected: frozenset[str] = frozenset(),
+        standing: StandingQueue | None = None,
     ) -> None:
+        """standing: for a reader who is to answer in time rather than everything."""
         if topic.message is None:
             raise BusError(
                 f"topic {topic.template} carries {topic.media_type}, no message; use raw()"
             )
         self.stats = stats
         self._topic = topic
+        self._standing = standing
         self._raw = RawSubscription(loop, stats, capacity, objects_only=True, expected=expected)
         self._decoder = msgspec.json.Decoder(topic.message)
         # What a key says that its messages say as well: worked out once a key, not once a message.
@@ -165,7 +169,12 @@ class Subscription(Generic[T]):
         await self._raw.each(take)
 
     def _message_of(self, sample: Sample) -> T | None:
-        """A sample decoded, and counted; None if it is no message."""
+        """A sample decoded, and counted; None if it is no message, or has waited for too long."""
+        if self._standing is not None:
+            now_ns = clock.now_ns()
+            if self._standing.skips((now_ns - sample.received_ns) * 1e-9, now_ns * 1e-9):
+                self.stats.dropped += 1
+                return None
         message = self._decode(sample)
         if message is None:
             self.stats.rejected += 1

@@ -42,7 +42,8 @@ async def serve(service: Service) -> None:
     step = FusionStep(config, cameras, hands)
     await asyncio.to_thread(warm_up, config, cameras, hands)
     publishers = {hand: service.bus.publisher(topics.POINTS, hand=hand) for hand in config.hand}
-    frames = service.bus.every(topics.MARKERS, 64, [camera.name for camera in config.camera])
+    names = [camera.name for camera in config.camera]
+    frames = service.bus.in_time(topics.MARKERS, 64, names)
     state = _serve_session_and_clock(service)
     service.tasks.create_task(_note_poses(service, step))
     service.tasks.create_task(watch_computer(service))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 
 import msgspec
 
@@ -44,6 +45,32 @@ async def test_every_drops_the_oldest_and_counts(pair):
     kept = [message.seq for message in await next_of(subscription, 10)]
     assert kept == sorted(set(kept))
     assert kept[0] >= 40
+
+
+async def test_who_is_to_answer_in_time_skips_what_has_waited_once_it_cannot_keep_up(pair):
+    sender, receiver = pair
+    # Room for all of them: what is lost is skipped.
+    subscription = receiver.in_time(topics.POINTS, 8192)
+    publisher = await publisher_of(sender, topics.POINTS, hand="right")
+    taken: list[int] = []
+    sent = 0
+
+    def take(message: HandPoints) -> None:
+        """Four more come for each that is answered."""
+        nonlocal sent
+        taken.append(message.seq)
+        for _ in range(4):
+            sent += 1
+            publisher.put(points(sent))
+        time.sleep(0.02)
+        if subscription.stats.dropped >= 100:
+            subscription.undeclare()
+
+    publisher.put(points(sent))
+    async with asyncio.timeout(DEADLINE_S):
+        await subscription.each(take)
+    assert taken == sorted(set(taken))
+    assert taken[-1] - len(taken) >= 99
 
 
 async def test_latest_keeps_the_newest_of_each_key(pair):

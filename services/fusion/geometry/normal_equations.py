@@ -8,7 +8,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_equation(row: Array, value: float, A: Array, b: Array) -> None:
     """Add the equation row x = value, row (3,), to A (3, 3) and b (3,) in place."""
     for i in range(3):
@@ -17,7 +17,7 @@ def add_equation(row: Array, value: float, A: Array, b: Array) -> None:
             A[i, j] += row[i] * row[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_symmetric(A: Array, b: Array, x: Array) -> bool:
     """The solution (3,) to x; False if A is singular to working precision."""
     A_inverse = np.empty((3, 3))
@@ -27,14 +27,14 @@ def solve_symmetric(A: Array, b: Array, x: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def multiply(A_inverse: Array, b: Array, x: Array) -> None:
     """A^-1 b (3,) to x: the solution where the inverse is needed as well, for the covariance."""
     for i in range(3):
         x[i] = A_inverse[i, 0] * b[0] + A_inverse[i, 1] * b[1] + A_inverse[i, 2] * b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def invert_symmetric(A: Array, out: Array) -> bool:
     """Inverse of a symmetric (3, 3) by cofactors; False if it is singular to working precision."""
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]

@@ -40,7 +40,7 @@ def extrinsics(cameras: tuple[Camera, ...]) -> Extrinsics:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def project(p_rig: Array, R: Array, t: Array, ray: Array, H: Array) -> bool:
     """Ray (2,) of a point (3,) in the rig frame, and the Jacobian H (2, 3) of ray by point.
 

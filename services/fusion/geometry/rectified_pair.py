@@ -69,7 +69,7 @@ def rectified_pairs(cameras: tuple[Camera, ...]) -> dict[tuple[int, int], Rectif
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rectify_ray(R_rectified_from_camera: Array, ray: Array) -> tuple[float, float]:
     """x/z and y/z in the rectified frame of a camera's ray (2,); infinite where it is backwards."""
     R = R_rectified_from_camera

@@ -78,7 +78,7 @@ def triangulate(
     return Triangulation(status, position, cov, float(np.sqrt(chi_squared / degrees_of_freedom)))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _triangulate(
     rays: Array, sigmas: Array, cameras: Extrinsics, position: Array, cov: Array
 ) -> tuple[int, float]:
@@ -100,7 +100,7 @@ def _triangulate(
     return _OK, chi_squared
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _linear_point(rays: Array, cameras: Extrinsics, position: Array) -> bool:
     """The linear least-squares point of rays (n, 2), to position (3,); False if they are parallel.
 
@@ -119,7 +119,7 @@ def _linear_point(rays: Array, cameras: Extrinsics, position: Array) -> bool:
     return solve_symmetric(A, b, position)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _normal_equations(
     rays: Array, sigmas: Array, cameras: Extrinsics, position: Array, A: Array, b: Array
 ) -> float:

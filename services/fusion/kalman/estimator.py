@@ -207,18 +207,18 @@ class KalmanMethod:
         told = empty_telling(len(self._state.history.size), len(self._periods_s))
         tell(self._state, time_s, self._seen_since_s, MODELS, told)
         means, covs, largest_sigma, seen_by, (found, measured, detected, alone) = told
-        self._located.note(found & measured, means[:, :3], time_s)
+        self._located.note(found & measured, means, time_s)
         if not measured.all():
             self._tell_alone(time_s, found & alone, seen_by, (means, covs, largest_sigma))
             for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
                 # The middle one of three: the larger one across the ray.
                 if seen_by[row].any():
-                    largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row, :3, :3])[1])
+                    largest_sigma[row] = np.sqrt(np.linalg.eigvalsh(covs[row])[1])
         found &= (largest_sigma > 0.0) & (largest_sigma <= SHOW_SIGMA_M)
         return Estimates(
             found=found,
-            positions_m=means[:, :3],
-            covariances_m2=covs[:, :3, :3],
+            positions_m=means,
+            covariances_m2=covs,
             seen_by=seen_by,
             measured=measured,
             detected=detected,
@@ -229,15 +229,15 @@ class KalmanMethod:
     ) -> None:
         """What one camera sees alone (L,), by where two saw it last (one_camera.py).
 
-        told: means (L, 6), covariances (L, 6, 6) and largest sigmas (L,), changed in place.
+        told: means (L, 3), covariances (L, 3, 3) and largest sigmas (L,), changed in place.
         """
         means, covs, largest_sigma = told
         for row in np.flatnonzero(alone).tolist():
-            estimate = means[row, :3], covs[row, :3, :3]
+            estimate = means[row], covs[row]
             centre = self._centres_rig[int(seen_by[row].argmax())]
             by_one = self._located.told(row, time_s, estimate, centre)
             if by_one is not None:
-                means[row, :3], covs[row, :3, :3] = by_one
+                means[row], covs[row] = by_one
                 largest_sigma[row] = np.sqrt(covs[row, [0, 1, 2], [0, 1, 2]].max())
 
     def rest_probabilities(self) -> Array:

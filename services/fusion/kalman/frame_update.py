@@ -54,7 +54,7 @@ def empty_state(hands: list[Ints], centres_rig: Array, models: int) -> FilterSta
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_frame(
     state: FilterState,
     frame: FrameRays,
@@ -83,7 +83,7 @@ def update_frame(
     return codes
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def drop_lost_tracks(
     size: Ints, probability: Array, accepted_s: Array, observed_s: Array, before_s: float
 ) -> int:

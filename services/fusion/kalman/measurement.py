@@ -43,7 +43,7 @@ class Innovation(NamedTuple):
     K: Array  # (9, 2) Kalman gain
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def innovate(predicted: Gaussian, measured: Measurement, out: Innovation) -> float:
     """The innovation of a predicted state (9,), not applied yet; returns its log-likelihood.
 
@@ -73,7 +73,7 @@ def innovate(predicted: Gaussian, measured: Measurement, out: Innovation) -> flo
     return -0.5 * (mahalanobis_squared(nu, S_inverse) + math.log(determinant)) - LOG_2PI
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _invert_innovation_cov(
     state: Array, measured: Measurement, H: Array, PHt: Array, S_inverse: Array
 ) -> float:
@@ -97,13 +97,13 @@ def _invert_innovation_cov(
     return determinant
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _row_times_column(H: Array, PHt: Array, k: int, n: int) -> float:
     """Element (k, n) of H P H^T, which the position alone makes up."""
     return H[k, 0] * PHt[0, n] + H[k, 1] * PHt[1, n] + H[k, 2] * PHt[2, n]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mahalanobis_squared(nu: Array, S_inverse: Array) -> float:
     """nu^T S^-1 nu of an innovation (2,), the normalised innovation squared: 2 in expectation."""
     return (
@@ -113,7 +113,7 @@ def mahalanobis_squared(nu: Array, S_inverse: Array) -> float:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update(state: Gaussian, innovation: Innovation) -> None:
     """The posterior, in place: x += K nu, P -= K H P, kept symmetric."""
     H, nu, K = innovation.H, innovation.nu, innovation.K
@@ -127,3 +127,37 @@ def update(state: Gaussian, innovation: Innovation) -> None:
         for j in range(i, 9):
             P[i, j] -= K[i, 0] * HP[0, j] + K[i, 1] * HP[1, j]
             P[j, i] = P[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def adjoint_update(rows: Array, count: int, innovation: Innovation) -> int:
+    """The step back over one measurement, in place: from after its update to before it.
+
+    rows (n, 9), of which count are known: the adjoint, and a factor G^T of the information G G^T.
+    Every row g becomes (I - K H)^T g; of the adjoint H^T S^-1 nu is taken off, and the information
+    gains H^T S^-1 H: two rows more. Returns how many are known then; a measurement that was passed
+    over tells nothing.
+    """
+    H, nu, S_inverse, K = innovation.H, innovation.nu, innovation.S_inverse, innovation.K
+    S00, S01, S11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 1]
+    if not S00 > 0.0:
+        return count
+    for n in range(count):
+        w0, w1 = 0.0, 0.0
+        for i in range(9):
+            w0 += K[i, 0] * rows[n, i]
+            w1 += K[i, 1] * rows[n, i]
+        if n == 0:
+            w0 += S00 * nu[0] + S01 * nu[1]
+            w1 += S01 * nu[0] + S11 * nu[1]
+        for i in range(3):
+            rows[n, i] -= H[0, i] * w0 + H[1, i] * w1
+    # The Cholesky factor of S^-1.
+    L00 = math.sqrt(S00)
+    L10 = S01 / L00
+    L11 = math.sqrt(max(S11 - L10 * L10, 0.0))
+    rows[count : count + 2, 3:] = 0.0
+    for i in range(3):
+        rows[count, i] = H[0, i] * L00 + H[1, i] * L10
+        rows[count + 1, i] = H[1, i] * L11
+    return count + 2

@@ -33,7 +33,7 @@ PASSED_OVER = 0.0
 STRIKE, OUT = 2, 4
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_probabilities(prior: Array, log_likelihoods: Array, posterior: Array) -> float:
     """Bayes' rule over models (M,), written to posterior (M,); returns the total log-likelihood."""
     models = prior.shape[0]
@@ -50,7 +50,7 @@ def update_probabilities(prior: Array, log_likelihoods: Array, posterior: Array)
     return best + math.log(total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def count_strikes(before: Ints, took: Bools, likeliest: int, after: Ints) -> None:
     """How often each model (M,) has passed over lately what the likeliest took.
 
@@ -64,7 +64,7 @@ def count_strikes(before: Ints, took: Bools, likeliest: int, after: Ints) -> Non
             after[m] += STRIKE
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def choose_parents(probability: Array, strikes: Ints, parent: Ints) -> None:
     """From which model's estimate each model (M,) goes on: its own, or the likeliest's if out."""
     likeliest = int(np.argmax(probability))

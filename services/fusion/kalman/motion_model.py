@@ -48,13 +48,13 @@ class Step(NamedTuple):
     Q: Array  # (3, 3) process noise
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def empty_step() -> Step:
     """To be filled by discretize."""
     return Step(np.empty((3, 3)), np.empty((3, 3)))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def transition(dt_s: float, velocity_rate: float, acceleration_rate: float, F: Array) -> None:
     """Transition F (3, 3) over dt of a velocity and an acceleration that fade; written in place.
 
@@ -77,7 +77,7 @@ def transition(dt_s: float, velocity_rate: float, acceleration_rate: float, F: A
     F[2, 2] = 1.0 - (b * fade_b - a * fade_a) / apart
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def discretize(dt_s: float, model: Array, step: Step) -> None:
     """A model (4,) over dt_s; written in place."""
     density, a, b = model[0], model[1], model[2]
@@ -92,7 +92,7 @@ def discretize(dt_s: float, model: Array, step: Step) -> None:
     transition(dt_s, a, b, F)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def discretize_next(dt_s: float, models: Array, m: int, step: Step) -> None:
     """Model m of models (M, 4) over dt_s, where step is still that of model m - 1; in place.
 
@@ -105,7 +105,7 @@ def discretize_next(dt_s: float, models: Array, m: int, step: Step) -> None:
         discretize(dt_s, models[m], step)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def predict(last: Gaussian, step: Step, predicted: Gaussian) -> None:
     """The estimate (9,), (9, 9) a step after the last: x = F x, P = F P F^T + Q; in place."""
     F, Q = step.F, step.Q
@@ -121,37 +121,31 @@ def predict(last: Gaussian, step: Step, predicted: Gaussian) -> None:
                 predicted.cov[3 * i + axis, 3 * j + axis] += Q[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def propagate_cov(P: Array, axes: int, F: Array, out: Array) -> None:
     """F P F^T (3 axes, 3 axes) of positions, velocities, accelerations along `axes` directions."""
+    pv, pa, vv, va, av, aa = F[0, 1], F[0, 2], F[1, 1], F[1, 2], F[2, 1], F[2, 2]
     for i in range(axes):  # F P
         for j in range(3 * axes):
             p, v, a = P[i, j], P[i + axes, j], P[i + 2 * axes, j]
-            out[i, j] = p + F[0, 1] * v + F[0, 2] * a
-            out[i + axes, j] = F[1, 1] * v + F[1, 2] * a
-            out[i + 2 * axes, j] = F[2, 1] * v + F[2, 2] * a
+            out[i, j] = p + pv * v + pa * a
+            out[i + axes, j] = vv * v + va * a
+            out[i + 2 * axes, j] = av * v + aa * a
     for i in range(3 * axes):  # (F P) F^T
         for j in range(axes):
             p, v, a = out[i, j], out[i, j + axes], out[i, j + 2 * axes]
-            out[i, j] = p + F[0, 1] * v + F[0, 2] * a
-            out[i, j + axes] = F[1, 1] * v + F[1, 2] * a
-            out[i, j + 2 * axes] = F[2, 1] * v + F[2, 2] * a
+            out[i, j] = p + pv * v + pa * a
+            out[i, j + axes] = vv * v + va * a
+            out[i, j + 2 * axes] = av * v + aa * a
 
 
-@njit(cache=True)
-def adjoint_predict(adjoint: Array, information: Array, F: Array) -> None:
-    """The smoother's step back over F (3, 3): F^T adjoint (9,), F^T information F (9, 9)."""
-    for i in range(3):
-        p, v, a = adjoint[i], adjoint[i + 3], adjoint[i + 6]
-        adjoint[i + 3] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
-        adjoint[i + 6] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a
-    for i in range(3):
-        for j in range(9):
-            p, v, a = information[i, j], information[i + 3, j], information[i + 6, j]
-            information[i + 3, j] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
-            information[i + 6, j] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a
-    for i in range(9):
-        for j in range(3):
-            p, v, a = information[i, j], information[i, j + 3], information[i, j + 6]
-            information[i, j + 3] = F[0, 1] * p + F[1, 1] * v + F[2, 1] * a
-            information[i, j + 6] = F[0, 2] * p + F[1, 2] * v + F[2, 2] * a
+@njit(cache=True, error_model="numpy")
+def adjoint_predict(rows: Array, count: int, F: Array) -> None:
+    """The smoother's step back over F (3, 3): F^T of each of the first count rows (n, 9)."""
+    # Read once: whatever is written might be F, as far as a compiler knows.
+    pv, pa, vv, va, av, aa = F[0, 1], F[0, 2], F[1, 1], F[1, 2], F[2, 1], F[2, 2]
+    for n in range(count):
+        for i in range(3):
+            p, v, a = rows[n, i], rows[n, i + 3], rows[n, i + 6]
+            rows[n, i + 3] = pv * p + vv * v + av * a
+            rows[n, i + 6] = pa * p + va * v + aa * a

@@ -47,7 +47,7 @@ class Fit(NamedTuple):
     log_likelihood: float  # of all models, weighted as before the observation
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def filter_node(
     history: TrackHistory,
     landmark: int,
@@ -105,7 +105,7 @@ def filter_node(
     return Fit(visible, bool(took.any()), bool(took[likeliest]), log_likelihood)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _pass_over(innovation: Innovation) -> None:
     """An observation that a model does not take: it tells the smoother nothing."""
     innovation.H[:] = 0.0

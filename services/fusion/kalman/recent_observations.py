@@ -40,7 +40,7 @@ def no_observations(landmarks: int, cameras: int) -> RecentObservations:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def remember(recent: RecentObservations, frame: FrameRays) -> None:
     """Keep a frame's observations, in place of the oldest."""
     camera = frame.camera
@@ -56,7 +56,7 @@ def remember(recent: RecentObservations, frame: FrameRays) -> None:
         )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def alone_before(
     accepted_s: Array, landmarks: Ints, camera: int, times_s: Array, hold_s: float
 ) -> Bools:
@@ -71,7 +71,7 @@ def alone_before(
     return alone
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sights(
     accepted_s: Array, observed_s: Array, time_s: float, since_s: Array
 ) -> tuple[Bools, Bools, Bools, Bools]:
@@ -86,7 +86,7 @@ def sights(
     return seen_by, seen >= 2, detected >= 2, seen == 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def largest_sigmas(means: Array, covs: Array, found: Bools) -> Array:
     """The largest sigma of each position (L,); what is not a number is not found (L,) any more."""
     largest = np.zeros(found.size)

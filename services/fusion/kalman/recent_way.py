@@ -23,13 +23,13 @@ MEMORY_S = 0.15
 SLOW_M_S = 0.1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unknown_way(way: Array) -> None:
     """A way (3, 3) of which nothing is known yet: all directions alike; in place."""
     way[:] = np.eye(3) * (SLOW_M_S**2 / 3.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_way(before: Array, state: Array, dt_s: float, after: Array) -> None:
     """The way (3, 3) dt_s later, with the velocity of a state (9,); written to after (3, 3)."""
     velocity = state[3:6]
@@ -40,7 +40,7 @@ def update_way(before: Array, state: Array, dt_s: float, after: Array) -> None:
         after[i, i] += (1.0 - keep) * SLOW_M_S**2 / 3.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_noise_along(way: Array, step: Step, ratio: float, predicted: Gaussian) -> None:
     """The noise of a step (3, 3) along a way (3, 3), times ratio: to a prediction, in place."""
     Q = step.Q

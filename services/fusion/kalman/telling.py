@@ -27,8 +27,8 @@ SEEN_FRAMES = 1.6
 class Telling(NamedTuple):
     """All L landmarks at an instant; arrays that `tell` fills."""
 
-    means: Array  # (L, 6) position and velocity, rig frame
-    covs: Array  # (L, 6, 6)
+    means: Array  # (L, 3) positions, rig frame
+    covs: Array  # (L, 3, 3)
     largest_sigmas: Array  # (L,) of the position's axes
     seen_by: Bools  # (L, C)
     are: Bools  # (4, L): found; seen by two cameras; detected by two; seen by one alone
@@ -37,15 +37,15 @@ class Telling(NamedTuple):
 def empty_telling(landmarks: int, cameras: int) -> Telling:
     """Nothing told yet."""
     return Telling(
-        np.zeros((landmarks, 6)),
-        np.zeros((landmarks, 6, 6)),
+        np.zeros((landmarks, 3)),
+        np.zeros((landmarks, 3, 3)),
         np.zeros(landmarks),
         np.zeros((landmarks, cameras), dtype=np.bool_),
         np.zeros((4, landmarks), dtype=np.bool_),
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tell(state: FilterState, time_s: float, since_s: Array, models: Array, told: Telling) -> None:
     """Fill told with the estimates at an instant.
 
@@ -63,7 +63,7 @@ def tell(state: FilterState, time_s: float, since_s: Array, models: Array, told:
     before = (np.zeros_like(told.means), np.zeros_like(told.covs))
     were = smooth_all(history, time_s - span_s, models, before[0], before[1])
     mix_rest(rest, time_s - span_s, were, before[0], before[1])
-    learn_deformation(shape, rest.hand, were, before[0][:, :3], time_s - span_s, span_s)
+    learn_deformation(shape, rest.hand, were, before[0], time_s - span_s, span_s)
     hold_shapes(shape, rest.hand, found & were & measured, before, (told.means, told.covs))
     told.largest_sigmas[:] = largest_sigmas(told.means, told.covs, found)
     told.seen_by[:] = seen_by

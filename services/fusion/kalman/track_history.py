@@ -76,7 +76,7 @@ def empty_history(landmarks: int, models: int) -> TrackHistory:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def start_track(
     history: TrackHistory, landmark: int, time_s: float, p_rig: Array, sigmas: Array
 ) -> None:
@@ -104,7 +104,7 @@ def start_track(
                 history.cov[landmark, node, m, 3 * k + axis, 3 * k + axis] = sigmas[k] ** 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def nodes_until(history: TrackHistory, landmark: int, time_s: float) -> int:
     """How many nodes of a track are not later than time_s."""
     index = history.size[landmark]
@@ -113,19 +113,19 @@ def nodes_until(history: TrackHistory, landmark: int, time_s: float) -> int:
     return index
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def newest_node(history: TrackHistory, landmark: int) -> int:
     """The latest node of a track; there must be one."""
     return history.order[landmark, history.size[landmark] - 1]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def filtered(history: TrackHistory, landmark: int, node: int, m: int) -> Gaussian:
     """Model m's estimate after a node; views, to read or to write."""
     return Gaussian(history.state[landmark, node, m], history.cov[landmark, node, m])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def innovation_of(history: TrackHistory, landmark: int, node: int, m: int) -> Innovation:
     """Model m's innovation at a node; views, to read or to write."""
     return Innovation(

@@ -13,9 +13,8 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.frame_rays import Observation
-from services.fusion.kalman.motion_model import Gaussian
 from services.fusion.kalman.multiple_models import filter_node
-from services.fusion.kalman.smoother import smooth_landmark
+from services.fusion.kalman.smoother import Place, smooth_one
 from services.fusion.kalman.track_history import (
     NODES,
     TrackHistory,
@@ -30,7 +29,7 @@ ACCEPTED, GATED, LATE, NOT_SEEN = 0, 1, 2, 3
 _RESTART_SIZES = (4, 6)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def insert(
     history: TrackHistory,
     landmark: int,
@@ -61,7 +60,7 @@ def insert(
     return ACCEPTED if fit.taken else GATED
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _insert_node(history: TrackHistory, landmark: int, index: int, observed: Observation) -> int:
     """Make room at `index` in the order of time, dropping the oldest of a full track.
 
@@ -89,7 +88,7 @@ def _insert_node(history: TrackHistory, landmark: int, index: int, observed: Obs
     return index
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _remove_node(history: TrackHistory, landmark: int, index: int) -> None:
     """Take a node out of the order of time; its row becomes the first free one."""
     order = history.order[landmark]
@@ -101,7 +100,7 @@ def _remove_node(history: TrackHistory, landmark: int, index: int) -> None:
     history.size[landmark] = newest
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _restart_from_smoothed_prior(
     history: TrackHistory, landmark: int, cameras: Extrinsics, models: Array, gate: float
 ) -> None:
@@ -111,11 +110,11 @@ def _restart_from_smoothed_prior(
     make the estimate too sure.
     """
     node = history.order[landmark, 0]
-    prior = Gaussian(np.empty(6), np.empty((6, 6)))
-    if history.camera[landmark, node] >= 0 or not smooth_landmark(
+    prior = Place(np.empty(3), np.empty((3, 3)))
+    if history.camera[landmark, node] >= 0 or not smooth_one(
         history, landmark, history.time_s[landmark, node], models, prior
     ):
         return
-    history.state[landmark, node, :, :3] = prior.mean[:3]
+    history.state[landmark, node, :, :3] = prior.mean
     for index in range(1, history.size[landmark]):
         filter_node(history, landmark, index, cameras, models, gate)

@@ -20,7 +20,7 @@ from services.fusion.kalman.motion_model import Gaussian
 from services.fusion.kalman.rest.rigid_body import RestState, place_in_body
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_body(
     rest: RestState,
     landmark: int,
@@ -70,7 +70,7 @@ def update_body(
     return -0.5 * (mahalanobis_squared + math.log(determinant)) - LOG_2PI
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _image_jacobian(H: Array, J: Array) -> Array:
     """H J (2, 6): the Jacobian of a ray by translation and rotation of the body."""
     HJ = np.empty((2, 6))
@@ -80,7 +80,7 @@ def _image_jacobian(H: Array, J: Array) -> Array:
     return HJ
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _anchor_cross_cov(anchor_cov: Array, H: Array) -> Array:
     """P H^T (3, 2), the cross-covariance of anchor and ray, from P (3, 3)."""
     PHt = np.empty((3, 2))
@@ -92,7 +92,7 @@ def _anchor_cross_cov(anchor_cov: Array, H: Array) -> Array:
     return PHt
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _body_cross_cov(cov: Array, HJ: Array, dt_s: float) -> Array:
     """P H^T (18, 2), that of body and ray, from P (18, 18); H = [HJ, dt HJ, dt^2 / 2 HJ]."""
     half = 0.5 * dt_s * dt_s
@@ -105,7 +105,7 @@ def _body_cross_cov(cov: Array, HJ: Array, dt_s: float) -> Array:
     return PHt
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _clock_noise(HJ: Array, rate: Array, clock_variance: float) -> Array:
     """Covariance (2, 2) of a ray by its camera's clock error (s^2), for a body's rate (6,)."""
     drift = np.zeros(2)
@@ -119,7 +119,7 @@ def _clock_noise(HJ: Array, rate: Array, clock_variance: float) -> Array:
     return noise
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add_innovation_cov(
     S: Array, H: Array, anchor_PHt: Array, HJ: Array, body_PHt: Array, dt_s: float
 ) -> None:
@@ -139,7 +139,7 @@ def _add_innovation_cov(
                 )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _update(state: Gaussian, PHt: Array, S_inverse: Array, nu: Array) -> None:
     """The posterior of a state (n,), (n, n), in place: x += K nu, P -= K (P H^T)^T.
 

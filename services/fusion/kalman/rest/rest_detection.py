@@ -59,7 +59,7 @@ REACH_S = 0.1
 FRESH_S, FADE_S = 0.05, 0.1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_rest(
     rest: RestState, history: TrackHistory, frame: FrameRays, codes: Ints, cameras: Extrinsics
 ) -> None:
@@ -74,7 +74,7 @@ def update_rest(
                     rest.sustained[frame.landmarks[n]] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _advance_to_frame(
     rest: RestState, history: TrackHistory, hand: int, frame: FrameRays, codes: Ints
 ) -> bool:
@@ -103,7 +103,7 @@ def _advance_to_frame(
     return bool(time_s >= rest.time_s[hand] - REACH_S)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _start_trial(rest: RestState, hand: int, time_s: float, centre: Array) -> None:
     """Drop the anchors of markers that do not rest, and where too few rest the body.
 
@@ -117,7 +117,7 @@ def _start_trial(rest: RestState, hand: int, time_s: float, centre: Array) -> No
             rest.probability[landmark] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _count_resting(rest: RestState, hand: int) -> int:
     """How many markers of a hand are taken to rest."""
     count = 0
@@ -126,7 +126,7 @@ def _count_resting(rest: RestState, hand: int) -> int:
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _update_hand(
     rest: RestState,
     history: TrackHistory,
@@ -155,7 +155,7 @@ def _update_hand(
                 _update_rest_probability(rest, history, landmark, observed, cameras, updating)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _update_rest_probability(
     rest: RestState,
     history: TrackHistory,
@@ -190,7 +190,7 @@ def _update_rest_probability(
     rest.observed_s[landmark] = max(observed.time_s, rest.observed_s[landmark])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _place_anchor(rest: RestState, history: TrackHistory, landmark: int) -> None:
     """Place a marker in its body where the likeliest model of its track has it."""
     node = newest_node(history, landmark)

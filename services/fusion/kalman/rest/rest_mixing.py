@@ -16,11 +16,11 @@ from services.fusion.kalman.rest.rest_detection import FADE_S, FRESH_S, REACH_S,
 from services.fusion.kalman.rest.rigid_body import RestState, place_in_body
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mix_rest(rest: RestState, time_s: float, found: Bools, means: Array, covs: Array) -> None:
-    """Mix the tracks' estimates at an instant (L, 6), (L, 6, 6) with the bodies', in place.
+    """Mix the tracks' estimates at an instant (L, 3), (L, 3, 3) with the bodies', in place.
 
-    Only positions change, of landmarks found (L,) whose rest has lasted.
+    Those of landmarks found (L,) change whose rest has lasted.
     """
     place = np.empty(3)
     J = np.empty((3, 6))
@@ -49,7 +49,7 @@ def mix_rest(rest: RestState, time_s: float, found: Bools, means: Array, covs: A
             means[landmark, i] += share * (place[i] - means[landmark, i])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _share(rest: RestState, landmark: int, time_s: float) -> float:
     """The body's weight in the mixture, 0 to 1.
 

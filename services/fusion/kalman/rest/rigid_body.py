@@ -82,7 +82,7 @@ def empty_rest(hands: list[Ints]) -> RestState:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def start_body(rest: RestState, hand: int, time_s: float, centre: Array) -> None:
     """A body without motion about a point (3,), and without anchors."""
     rest.trial_s[hand] = time_s
@@ -99,7 +99,7 @@ def start_body(rest: RestState, hand: int, time_s: float, centre: Array) -> None
             rest.sustained[landmark] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_lost(rest: RestState, hand: int) -> bool:
     """Whether a body's state says nothing any more; so does one that is not finite."""
     sane = 0
@@ -109,7 +109,7 @@ def is_lost(rest: RestState, hand: int) -> bool:
     return sane < 6
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def place_in_body(rest: RestState, landmark: int, dt_s: float, place: Array, J: Array) -> None:
     """Place (3,) of a marker dt_s after its hand's time; written in place, as is J.
 
@@ -135,7 +135,7 @@ def place_in_body(rest: RestState, landmark: int, dt_s: float, place: Array, J: 
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_body(rest: RestState, hand: int, time_s: float) -> None:
     """Predict the body to a later instant, and move its anchors with it."""
     dt_s = time_s - rest.time_s[hand]
@@ -155,7 +155,7 @@ def advance_body(rest: RestState, hand: int, time_s: float) -> None:
     rest.time_s[hand] = time_s
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _predict_body(motion: Array, cov: Array, dt_s: float) -> None:
     """Motion (3, 6) and its covariance (18, 18) dt_s later, in place: F x, F P F^T + Q."""
     step = empty_step()

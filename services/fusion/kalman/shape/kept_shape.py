@@ -52,7 +52,7 @@ def empty_memory(landmarks: int, eye: Array) -> ShapeMemory:
     return ShapeMemory(np.full(1, -np.inf), places, np.full(landmarks, FIRST_M**2), eye)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def learn_deformation(
     memory: ShapeMemory, hand: Ints, known: Bools, places: Array, time_s: float, span_s: float
 ) -> None:
@@ -81,7 +81,7 @@ def learn_deformation(
         memory.places[row] = places[row] if known[row] else np.full(3, np.nan)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fit_alike(before: Array, now: Array) -> tuple[RigidFit, Array]:
     """Places before moved onto places now (n, 3) by least squares, and their arms before (n, 3)."""
     fit = start_fit(before)
@@ -94,7 +94,7 @@ def _fit_alike(before: Array, now: Array) -> tuple[RigidFit, Array]:
     return fit, arms
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def hold_shape(
     deformed: Array, before: Array, before_covs: Array, places: Array, covs: Array
 ) -> None:
@@ -105,11 +105,14 @@ def hold_shape(
     count = places.shape[0]
     fit = start_fit(before)
     arms = before - fit.centre
-    weights = np.empty((count, 3, 3))
+    weights, total = np.empty((count, 3, 3)), np.empty((3, 3))
     larger = 1.0
     for step in range(STEPS):
         for n in range(count):
-            total = covs[n] + larger * _of_shape(deformed[n], before_covs[n])
+            for i in range(3):
+                for j in range(3):
+                    total[i, j] = covs[n, i, j] + larger * before_covs[n, i, j]
+                total[i, i] += larger * (TIMES * deformed[n] + FLOOR_M**2)
             if not invert_symmetric(total, weights[n]):
                 return
         squares = step_fit(fit, arms, places, weights)
@@ -124,19 +127,13 @@ def hold_shape(
         share = covs[n] @ weights[n]  # (3, 3) how much the shape counts
         by_pose = share @ J  # (3, 6)
         off = fit.centre + arm - places[n]
-        shape_cov = larger * _of_shape(deformed[n], before_covs[n])
+        shape_cov = larger * (before_covs[n] + (TIMES * deformed[n] + FLOOR_M**2) * np.eye(3))
         told = share @ shape_cov + by_pose @ pose_cov @ by_pose.T
         places[n] += share @ off
         covs[n] = 0.5 * (told + told.T)
 
 
-@njit(cache=True)
-def _of_shape(deformed: float, cov: Array) -> Array:
-    """The covariance (3, 3) of a landmark's place in the shape."""
-    return cov + (TIMES * deformed + FLOOR_M**2) * np.eye(3)
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def hold_shapes(
     memory: ShapeMemory,
     hand: Ints,
@@ -146,25 +143,14 @@ def hold_shapes(
 ) -> None:
     """Weigh all landmarks seen (L,) now and before against their hands' shapes; now, in place.
 
-    before, now: means (L, 6) and covariances (L, 6, 6), of which positions count.
+    before, now: places (L, 3) and their covariances (L, 3, 3).
     """
     for number in range(hand.max() + 1):
         rows = np.flatnonzero(seen & (hand == number))
         if rows.size < LEAST:
             continue
-        shape, shape_covs = _positions(before[0], before[1], rows)
-        places, covs = _positions(now[0], now[1], rows)
-        hold_shape(memory.deformed[rows], shape, shape_covs, places, covs)
+        places, covs = now[0][rows], now[1][rows]
+        hold_shape(memory.deformed[rows], before[0][rows], before[1][rows], places, covs)
         for n in range(rows.size):
-            now[0][rows[n], :3] = places[n]
-            now[1][rows[n], :3, :3] = covs[n]
-
-
-@njit(cache=True)
-def _positions(means: Array, covs: Array, rows: Ints) -> tuple[Array, Array]:
-    """Positions (n, 3) and covariances (n, 3, 3) of some rows."""
-    places, variances = np.empty((rows.size, 3)), np.empty((rows.size, 3, 3))
-    for n in range(rows.size):
-        places[n] = means[rows[n], :3]
-        variances[n] = covs[rows[n], :3, :3]
-    return places, variances
+            now[0][rows[n]] = places[n]
+            now[1][rows[n]] = covs[n]

@@ -46,8 +46,8 @@ class OneTrack:
         return int(insert(self.history, 0, observed, gate, self.cameras, self.models))
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Mean (6,) and covariance (6, 6) at an instant."""
-        means, covs = np.zeros((1, 6)), np.zeros((1, 6, 6))
+        """Mean (3,) and covariance (3, 3) of the position at an instant."""
+        means, covs = np.zeros((1, 3)), np.zeros((1, 3, 3))
         assert smooth_all(self.history, time_s, self.models, means, covs)[0]
         return means[0], covs[0]
 

@@ -96,9 +96,10 @@ def test_no_time_changes_nothing(estimate):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_the_step_back_is_the_transpose(estimate, model):
-    adjoint, information = estimate[0].copy(), estimate[1].copy()
+    rows = np.vstack([estimate[0], estimate[1], np.ones(9)])
     F = over(0.05, model).F
-    adjoint_predict(adjoint, information, F)
+    adjoint_predict(rows, 10, F)
     F = np.kron(F, np.eye(3))
-    np.testing.assert_allclose(adjoint, F.T @ estimate[0], atol=1e-12)
-    np.testing.assert_allclose(information, F.T @ estimate[1] @ F, atol=1e-12)
+    np.testing.assert_allclose(rows[0], F.T @ estimate[0], atol=1e-12)
+    np.testing.assert_allclose(rows[1:10], estimate[1] @ F, atol=1e-12)
+    np.testing.assert_array_equal(rows[10], 1.0)
