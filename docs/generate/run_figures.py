@@ -73,9 +73,7 @@ RUNS = {
     ),
     "held_out": _script("held_out", "", "--family skin", 8),
     "latency": _script("latency", "", "--seconds 2 --rates 60", 2.5),
-    "objects_grasp_pictures": _script(
-        "objects_grasp_pictures", "--passes 6", "--hands 1 --passes 1", 10
-    ),
+    "objects_grasp_pictures": _script("objects_grasp_pictures", "", "--hands 1 --passes 1", 13),
     "objects_pictures": _script("objects_pictures", "", "--seeds 1", 5),
     "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
     "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),

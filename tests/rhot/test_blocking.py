@@ -102,6 +102,7 @@ def test_ctrl_c_ends_the_block_quietly_wherever_it_is(streaming, ctrl_c):
 def test_run_ends_an_asyncio_program_quietly(ctrl_c):
     async def forever():
         await asyncio.sleep(SECONDS)
+        pytest.fail("Ctrl-C did not end it")
 
     ctrl_c.start()
     assert rhot.run(forever()) is None

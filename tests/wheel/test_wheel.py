@@ -84,7 +84,7 @@ def wheel(repository, tmp_path_factory) -> Path:
 
 def test_it_has_the_trackers_compiled_form_for_this_machine(wheel):
     if not compilers(MACHINE):
-        pytest.skip("no C compiler")
+        pytest.skip("no C compiler; apt-get install gcc")
     assert wheel.name.endswith(f"-py3-none-linux_{MACHINE}.whl")
     assert f"services/pi_tracker/compiled/{file_name(MACHINE)}" in zipfile.ZipFile(wheel).namelist()
 
@@ -98,7 +98,7 @@ def test_without_a_compiler_it_installs_everywhere_and_says_so(repository, tmp_p
 
 def test_a_wheel_for_machines_of_which_one_is_missing_installs_on_both(repository, tmp_path):
     if not compilers(MACHINE):
-        pytest.skip("no C compiler")
+        pytest.skip("no C compiler; apt-get install gcc")
     built, _ = build(repository, tmp_path, RHOT_COMPILE_FOR=f"pdp11 {MACHINE}")
     assert built.name.endswith("-py3-none-any.whl")
     names = zipfile.ZipFile(built).namelist()

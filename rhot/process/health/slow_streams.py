@@ -69,7 +69,8 @@ class SlowStreams:
 
 def _text(stream: StreamHealth) -> str:
     kept = "received" if stream.direction == "in" else "sent"
-    text = f"{stream.key}: {stream.rate_hz:.1f} Hz {kept} of {stream.expected_hz:.1f} expected"
+    rates = f"{stream.rate_hz:.1f} a second {kept} instead of {stream.expected_hz:.1f}"
+    text = f"{stream.key}: {rates}"
     lost = [
         f"{count} {what}"
         for count, what in ((stream.dropped, "dropped"), (stream.rejected, "rejected"))

@@ -11,9 +11,9 @@ from rhot.watch.rig_monitor import RigMonitor
 from rhot.watch.rig_state import StandingFault
 from testing.sample_health import NOW_NS, SECOND_NS, beat, fault
 
-SLOW_POSES = "rhot/sim/hand/*/pose: 0.0 Hz received of 30.0 expected"
-SLOW_MARKERS = "rhot/sim/camera/*/markers: 12.0 Hz received of 60.0 expected"
-SLOW_OBJECTS = "rhot/sim/object/*/pose: 0.0 Hz received of 120.0 expected"
+SLOW_POSES = "rhot/sim/hand/*/pose: 0.0 a second received instead of 30.0"
+SLOW_MARKERS = "rhot/sim/camera/*/markers: 12.0 a second received instead of 60.0"
+SLOW_OBJECTS = "rhot/sim/object/*/pose: 0.0 a second received instead of 120.0"
 
 
 def told(code: str, teller: str = "", subject: str = "", text: str = "wrong") -> StandingFault:

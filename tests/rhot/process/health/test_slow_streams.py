@@ -33,7 +33,7 @@ def test_the_text_says_which_and_how_slow():
         texts = slow.beat([stream(12.0, dropped=4)])
     assert texts == {
         "in camera/left/markers": (
-            "camera/left/markers: 12.0 Hz received of 30.0 expected, 4 dropped"
+            "camera/left/markers: 12.0 a second received instead of 30.0, 4 dropped"
         )
     }
     assert slow.any_slow

@@ -58,11 +58,11 @@ def test_problems_push_notes_aside_and_nothing_is_lost():
 
 def test_what_follows_is_told_apart():
     both = found(
-        fault("stream_slow", "rhot/sim/hand/*/points: 0.0 Hz received of 30.0 expected"),
+        fault("stream_slow", "rhot/sim/hand/*/points: 0.0 a second received instead of 30.0"),
         fault("camera_moved", "left has moved", "left"),
     )
-    assert "0.0 Hz" not in banner(both, NOW_NS)
-    assert "points of the hands: 0.0 Hz received" in following(both)
+    assert "0.0 a second" not in banner(both, NOW_NS)
+    assert "points of the hands: 0.0 a second received instead of 30.0" in following(both)
     assert "rhot/sim" not in following(both)
     assert headline(both) == "1 problem"
     assert headline(found(fault("disk_low"), fault("computer_hot"))) == "2 notes"

@@ -19,8 +19,8 @@ def test_every_stream_has_words():
 
 
 def test_keys_in_sentences():
-    told = "rhot/sim/object/*/pose: 27.0 Hz received of 120.0 expected"
-    assert plain(told) == "poses of the objects: 27.0 Hz received of 120.0 expected"
+    told = "rhot/sim/object/*/pose: 27.0 a second received instead of 120.0"
+    assert plain(told) == "poses of the objects: 27.0 a second received instead of 120.0"
     assert plain("see rhot/desk/hand/left/pose.") == "see pose of the left hand."
     for other in ("run rhot up rig.toml", "calibration/rig.json", "rhot/desk/nothing/of/ours"):
         assert plain(other) == other
