@@ -76,6 +76,14 @@ def test_what_stays_or_shrinks_is_no_growth() -> None:
     assert shrunk.step_mb == pytest.approx(-1.0, abs=0.2)
 
 
+@pytest.mark.parametrize("period_s", [600.0, 900.0])
+def test_a_heap_that_fills_and_empties_is_no_growth(period_s: float) -> None:
+    filled = leak(1.5) - 1.5 * period_s / 3600.0 * np.floor(TIMES_S / period_s)
+    assert not is_told(growth(filled + noise(8)))
+    # One that gives back what it had before goes on growing.
+    assert is_told(growth(leak(2.0) + step(-1.0, 900.0) + noise(9)))
+
+
 def test_too_few_samples_are_refused() -> None:
     with pytest.raises(ValueError, match="at least 48"):
         memory_growth(TIMES_S[:47], np.zeros(47), LIMIT_MB_H)
