@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rhot.process.allocator import keep_large_blocks_apart
 from rhot.process.lifecycle import command
 
 
@@ -11,6 +12,7 @@ def main() -> None:
         "serve_on_request",
         "record only what the page asks for, unless [recorder] autostart",
     )
+    keep_large_blocks_apart()
     command("recorder", "services.recorder.service", __doc__, variants={"on-request": on_request})
 
 
