@@ -7,14 +7,19 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rhot.process.lifecycle import EXIT_AGAIN
+from rhot.process.lifecycle import EXIT_AGAIN, EXIT_OK
+
+# A service that is told to end and has not by then hangs, also on a busy machine.
+_END_S = 30.0
+_LAST_LINES = 30
 
 # Software rendering, and nothing that talks to anybody.
 FLAGS = (
@@ -70,34 +75,66 @@ def in_background() -> Iterator[Callable[[Callable[[threading.Event], None]], th
 
 
 @pytest.fixture
-def page_of(router: str, repository: Path) -> Iterator[Callable[..., str]]:
+def page_of(router: str, repository: Path, tmp_path: Path) -> Iterator[Callable[..., str]]:
     """`page_of(rig_toml, *words)` starts a viewer, and beside it a service for each of words, which
     are its name and options as one string; the page's address. They must end well.
     """
-    started: list[subprocess.Popen[str]] = []
+    started: list[_Started] = []
 
     def start(rig: Path, *beside: str) -> str:
         for words in (*beside, "viewer"):
             service, *options = words.split()
             command = [sys.executable, "-m", f"services.{service}", *options]
-            process = subprocess.Popen(
-                [*command, "--config", str(rig), "--connect", router],
-                stdout=subprocess.PIPE,
-                text=True,
-                cwd=repository,
-                env={**os.environ, "OMP_NUM_THREADS": "1"},
-            )
-            stack.enter_context(process)
-            started.append(process)
-        output = started[-1].stdout
-        assert output is not None
-        line = next(line for line in output if "live view at" in line)
-        return line.split("live view at ")[1].split('"')[0].strip()
+            # Not a pipe that nobody reads: who fills it waits for ever.
+            log = tmp_path / f"{len(started)}_{service}.log"
+            with log.open("wb") as output:
+                process = subprocess.Popen(
+                    [*command, "--config", str(rig), "--connect", router],
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    cwd=repository,
+                    env={**os.environ, "OMP_NUM_THREADS": "1"},
+                )
+            started.append(_Started(words, process, log))
+        return _address(started[-1])
 
-    with ExitStack() as stack:
-        yield start
-        for process in started:
-            process.terminate()
-            process.communicate(timeout=30.0)
-    # A viewer ends by itself with a new calibration, to be started again; perhaps just now.
-    assert {process.returncode for process in started} <= {0, EXIT_AGAIN}
+    yield start
+    for one in started:
+        one.process.terminate()
+    wrong = [said for one in started if (said := one.ended_wrongly())]
+    assert not wrong, "\n\n".join(wrong)
+
+
+@dataclass(frozen=True)
+class _Started:
+    """A service's process, and the file that it writes its log to."""
+
+    words: str
+    process: subprocess.Popen[bytes]
+    log: Path
+
+    def ended_wrongly(self) -> str:
+        """How it ended, with the end of its log, unless it ended well; it has ended now."""
+        try:
+            code = self.process.wait(timeout=_END_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            return self.told(f"did not end in {_END_S:.0f} s")
+        # A service ends by itself with a new calibration, to be started again; perhaps just now.
+        return "" if code in (EXIT_OK, EXIT_AGAIN) else self.told(f"ended with code {code}")
+
+    def told(self, what: str) -> str:
+        """What it did, and the end of its log."""
+        lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+        return "\n".join([f"{self.words} {what}; its log ends:", *lines[-_LAST_LINES:]])
+
+
+def _address(viewer: _Started) -> str:
+    """Where a viewer's page is, once it says so."""
+    while viewer.process.poll() is None:
+        for line in viewer.log.read_text(encoding="utf-8").splitlines():
+            if "live view at " in line:
+                return line.split("live view at ")[1].split('"')[0].strip()
+        time.sleep(0.05)
+    pytest.fail(viewer.told(f"ended with code {viewer.process.returncode}"))

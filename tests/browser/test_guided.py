@@ -6,9 +6,7 @@ where the simulator carries the board before its own camera.
 from __future__ import annotations
 
 import re
-import shutil
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,13 +18,22 @@ import zenoh
 from rhot import topics
 from rhot.bus.bus import client_config
 from rhot.files.calibration import load_lens
+from testing.calibration_page import (
+    PRACTISED,
+    WAIT,
+    begin,
+    calibration_tab,
+    figure,
+    press,
+    result_of,
+    simulated_rig,
+    wait_for_change,
+    wait_for_pictures,
+)
 from testing.synthetic_boards import BenchSetup
 
 pytestmark = pytest.mark.browser
-WAIT = {"timeout": 120e3}
 POSITIONS = 14
-# Fewer than a person is asked for; more make it more accurate, not another thing.
-PRACTISED = 8
 InBackground = Callable[[Callable[[threading.Event], None]], threading.Event]
 RIG = """
 [rig]
@@ -75,15 +82,6 @@ def page_url(page_of: Callable[..., str], tmp_path: Path) -> str:
     return page_of(tmp_path / "rig.toml", "calibrator")
 
 
-def calibration_tab(chromium: Any, page_url: str, errors: list[str]) -> Any:
-    """A visitor's page that shows the guided calibration."""
-    page = chromium.new_page(viewport={"width": 1280, "height": 800})
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(page_url)
-    page.get_by_role("tab", name="Calibration").click(**WAIT)
-    return page
-
-
 def lens_step(chromium: Any, page_url: str, errors: list[str]) -> Any:
     """A visitor's page that shows the lens step, before it is begun."""
     page = calibration_tab(chromium, page_url, errors)
@@ -93,14 +91,6 @@ def lens_step(chromium: Any, page_url: str, errors: list[str]) -> Any:
     return page
 
 
-def begin(page: Any, count: int) -> None:
-    """Press Start, for so many positions."""
-    positions = page.get_by_label("positions")
-    positions.fill(str(count))
-    positions.press("Enter")
-    page.get_by_role("button", name="Start").click(**WAIT)
-
-
 def test_a_lens_is_calibrated_from_start_to_saved(
     chromium: Any, page_url: str, board_shown: None, tmp_path: Path
 ) -> None:
@@ -108,13 +98,10 @@ def test_a_lens_is_calibrated_from_start_to_saved(
     page = lens_step(chromium, page_url, errors)
     page.get_by_text("0 of 3 steps done").wait_for(**WAIT)
     begin(page, 7)
-    page.get_by_text("7/7 positions").or_(page.get_by_text("compared with each other")).or_(
-        page.get_by_text("error of pictures that were left out")
-    ).first.wait_for(**WAIT)
-    page.get_by_text("error of pictures that were left out").wait_for(**WAIT)
-    assert page.locator("table tr", has_text="pictures used").inner_text().split()[-1] == "7"
+    result_of(page, "error of pictures that were left out")
+    assert figure(page, "pictures used") == "7"
     assert not (tmp_path / "calibration" / "left.lens.json").exists()
-    page.get_by_role("button", name="Save").click(**WAIT)
+    press(page, "Save")
     page.get_by_text("1 of 3 steps done").or_(page.get_by_text("Saved:")).first.wait_for(**WAIT)
     made = load_lens(tmp_path / "calibration", "left")
     assert made.matrix[0][0] == pytest.approx(263.0, rel=0.03)
@@ -123,23 +110,13 @@ def test_a_lens_is_calibrated_from_start_to_saved(
 
 
 @pytest.fixture
-def practice_url(page_of: Callable[..., str], router: str, repository: Path, tmp_path: Path) -> str:
+def practice_url(page_of: Callable[..., str], router: str, tmp_path: Path) -> str:
     """The page of a simulated rig of one camera, with all that the lens step needs, once the camera
     sends pictures.
     """
-    text = (repository / "config" / "sim.toml").read_text(encoding="utf-8")
-    head, _, rest = text.partition('[[camera]]\nname = "right"\nsource = "simulator"\n')
-    # A third of the pictures is enough for a board that is held still.
-    head = head.replace('source = "simulator"', 'source = "simulator"\nfps = 10')
-    rest = rest.partition("[[object]]")[0]
-    (tmp_path / "rig.toml").write_text(f"{head}{rest}\n[viewer]\nport = 0\n", encoding="utf-8")
-    shutil.copytree(repository / "config" / "calibration", tmp_path / "calibration")
-    url = page_of(tmp_path / "rig.toml", "simulator", "pi_tracker --camera left", "calibrator")
-    deadline = time.monotonic() + WAIT["timeout"] / 1e3
-    with zenoh.open(client_config([router])) as session:
-        while not any(reply.ok for reply in session.get(topics.FRAME.key("sim", camera="left"))):
-            assert time.monotonic() < deadline, "no picture of the simulated camera came"
-            time.sleep(0.2)
+    rig = simulated_rig(tmp_path, cameras=1)
+    url = page_of(rig, "simulator", "pi_tracker --camera left", "calibrator")
+    wait_for_pictures(router, ["left"])
     return url
 
 
@@ -156,15 +133,11 @@ def test_a_lens_is_practised_and_another_visitor_saves_it(
     # Who opens the page now is shown the step that is measured, and what comes of it.
     other = calibration_tab(chromium, practice_url, errors)
     page.close()
-    other.get_by_text("error of pictures that were left out").wait_for(**WAIT)
-    rows = other.locator("table tr")
-    assert rows.filter(has_text="pictures used").inner_text().split()[-1] == str(PRACTISED)
+    result_of(other, "error of pictures that were left out")
+    assert figure(other, "pictures used") == str(PRACTISED)
     assert lens.read_bytes() == before
-    other.get_by_role("button", name="Save").click(**WAIT)
-    # The viewer ends with a new lens, to be started again; nobody starts it here.
-    deadline = time.monotonic() + WAIT["timeout"] / 1e3
-    while lens.read_bytes() == before and time.monotonic() < deadline:
-        other.wait_for_timeout(100)
+    press(other, "Save")
+    wait_for_change(other, lens, before)
     made = load_lens(lens.parent, "left")
     # Of eight positions, which the simulator's camera sees with its noise.
     assert made.matrix[0][0] == pytest.approx(true.matrix[0][0], rel=0.01)

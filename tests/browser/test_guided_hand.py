@@ -5,7 +5,6 @@ processes, and points of a hand whose bones are known.
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -22,10 +21,10 @@ from rhot.hand import BASIC_LANDMARKS, default_hand
 from rhot.hand_exercises import CYCLE_S
 from services.simulator.hands.calibration_exercises import guided
 from services.simulator.hands.gestures import MOTIONS, Motion
+from testing.calibration_page import PHONE, WAIT, calibration_tab, choose, press, wait_for_change
 from testing.synthetic_hands import hand_message, noisy_points, wrist_rotation
 
 pytestmark = pytest.mark.browser
-WAIT = {"timeout": 120e3}
 SIZE, RATE_HZ = 0.85, 15.0
 # Of its size; what is left comes from a millimetre of noise.
 NEAR = 0.04
@@ -82,47 +81,31 @@ def page_url(page_of: Callable[..., str], tmp_path: Path) -> str:
     return page_of(tmp_path / "rig.toml", "calibrator")
 
 
-def hand_step(chromium: Any, page_url: str, size: tuple[int, int], errors: list[str]) -> Any:
-    """A visitor's page that shows the hand step; on a phone its sheet of controls is opened."""
-    page = chromium.new_page(viewport={"width": size[0], "height": size[1]})
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(page_url)
-    if size[0] < 576:
-        page.get_by_text("rhot").first.click(**WAIT)
-    page.get_by_role("tab", name="Calibration").click(**WAIT)
-    return page
-
-
-def chosen(page: Any, label: str, option: str) -> None:
-    page.get_by_label(label, exact=True).first.click(**WAIT)
-    page.get_by_role("option", name=option, exact=True).first.click(**WAIT)
-
-
 def test_a_hand_is_measured_by_exercises_and_then_while_it_is_used(
     chromium: Any, page_url: str, show: Callable[..., threading.Event], tmp_path: Path
 ) -> None:
     model, errors = default_hand("right", SIZE), list[str]()
-    page = hand_step(chromium, page_url, (1280, 800), errors)
-    chosen(page, "step", "Hand")
+    page = calibration_tab(chromium, page_url, errors)
+    choose(page, "step", "Hand")
     page.get_by_text("Follow twelve short exercises").wait_for(**WAIT)
-    page.get_by_role("button", name="Start").click(**WAIT)
+    press(page, "Start")
     page.get_by_text("In 3 seconds: open hand").wait_for(**WAIT)
     # In circles: one whole round of them counts, wherever it begins.
     exercising = show(guided(model, 3), 100.0 * CYCLE_S)
     page.get_by_text("left between hand and paint").wait_for(**WAIT)
     exercising.set()
     # Instead of saving it: the other way.
-    page.get_by_role("button", name="Back to the start").click(**WAIT)
-    chosen(page, "how", "just use the hand")
+    press(page, "Back to the start")
+    choose(page, "how", "just use the hand")
     page.get_by_text("rhot calibrate hand right --watch").wait_for(**WAIT)
-    page.get_by_role("button", name="Start").click(**WAIT)
+    press(page, "Start")
     page.get_by_text("in view of two cameras").first.wait_for(**WAIT)
-    page.get_by_role("button", name="Save").click(**WAIT)
+    press(page, "Save")
     page.get_by_text("Not saved, since it is not good yet").wait_for(**WAIT)
     file = tmp_path / "calibration" / "hand.right.json"
     assert not file.exists()
     # A second visitor, on a phone, joins what goes on, and is told nothing of the refusal.
-    other = hand_step(chromium, page_url, (390, 844), errors)
+    other = calibration_tab(chromium, page_url, errors, PHONE)
     other.get_by_role("button", name="Stop").wait_for(**WAIT)
     assert other.get_by_text("Not saved").count() == 0
     show(MOTIONS["random"](model, 8), 66.0)
@@ -133,10 +116,7 @@ def test_a_hand_is_measured_by_exercises_and_then_while_it_is_used(
     save = other.get_by_role("button", name="Save")
     assert save.bounding_box()["y"] + save.bounding_box()["height"] <= 844.0
     save.click(**WAIT)
-    deadline = time.monotonic() + WAIT["timeout"] / 1e3
-    # The viewer ends with a new hand, to be started again; nobody starts it here.
-    while not file.exists() and time.monotonic() < deadline:
-        other.wait_for_timeout(100)
+    wait_for_change(other, file, b"")
     made = load_hand(file.parent, "right")
     lengths, true = (sum(sum(one.lengths_m) for one in hand.digits) for hand in (made, model))
     assert lengths == pytest.approx(true, rel=NEAR)

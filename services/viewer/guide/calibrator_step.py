@@ -35,6 +35,8 @@ class CalibratorStep:
         self._step: Step | None = None
         # Why this visitor was refused something, and the phase in which that was.
         self._refused: tuple[str, object] = ("", None)
+        # This visitor pressed Start and was not answered yet; counted as the calibrator counts.
+        self._starting: int | None = None
         self._camera = gui.add_dropdown(
             "camera", tuple(camera.name for camera in config.camera) or ("none",)
         )
@@ -101,6 +103,8 @@ class CalibratorStep:
         color: Literal["green", "gray"] = "green" if state.good or state.phase == "done" else "gray"
         if self._save.color != color:
             self._save.color = color
+        if self._starting != state.number:
+            self._starting = None
         if own and state.phase in WORKING:
             self._show_working(state)
         elif own and state.phase in ("done", "saved"):
@@ -137,10 +141,13 @@ class CalibratorStep:
             "hand": [self._way, *([self._hand] if len(self._config.hand) > 1 else [])],
         }
         shown = [self._start, self._command, *options.get(step.name, [])]
-        busy = state.phase in WORKING
-        self._start.disabled = busy
+        busy, starting = state.phase in WORKING, self._starting is not None
+        self._start.disabled = busy or starting
         refusal = self._refusal(state)
-        if failed:
+        if starting:
+            _content(self._now, texts.note(texts.GETTING_READY))
+            shown.append(self._now)
+        elif failed:
             _content(self._now, texts.collecting(state))
             shown.append(self._now)
         elif busy or (self._link.lost and not refusal):
@@ -191,6 +198,7 @@ class CalibratorStep:
             "hand": "hand",
             "objects": "objects",
         }
+        self._starting = self._number if action == "start" else None
         hand: HandName = "left" if self._hand.value == "left" else "right"
         self._link.send(
             CalibrationOrder(
@@ -204,9 +212,15 @@ class CalibratorStep:
             ),
             self._was_refused,
         )
+        self.update()
+
+    @property
+    def _number(self) -> int | None:
+        state = self._link.state
+        return None if state is None else state.number
 
     def _was_refused(self, why: str) -> None:
-        state = self._link.state
+        state, self._starting = self._link.state, None
         self._refused = (why, state and (state.number, state.phase, state.good))
         self.update()
 

@@ -19,6 +19,8 @@ _GREEN, _AMBER, _RED, _GREY = "#1e8449", "#b9770e", "#c0392b", "#7f8c8d"
 _LONGEST = 600
 _SIMULATED = "This rig is simulated, so that you can practise."
 _BAR = "height:6px;border-radius:3px"
+# Of a step that was started and has not said yet what to do: its libraries are being loaded.
+GETTING_READY = "getting ready ..."
 
 
 def overview(steps: Sequence[Step], done: Mapping[StepName, Done | None], shown: StepName) -> str:
@@ -65,9 +67,8 @@ def collecting(state: CalibrationState) -> str:
         return _box(
             f'<span style="color:{_RED}"><b>This did not work.</b></span><br>{_said(state.to_do)}'
         )
-    now = (
-        f'<div style="font-size:1.25em;margin:0.2em 0"><b>{_said(_capital(state.to_do))}</b></div>'
-    )
+    to_do = _said(_capital(state.to_do or GETTING_READY))
+    now = f'<div style="font-size:1.25em;margin:0.2em 0"><b>{to_do}</b></div>'
     seen = "<br>".join(_said(line) for line in state.seen)
     return _box(now + seen)
 

@@ -61,6 +61,8 @@ def test_what_fails_and_what_to_do_is_said_harmlessly() -> None:
     now = CalibrationState(phase="collecting", to_do="hold still", seen=["3/15 positions"])
     assert "Hold still" in texts.collecting(now)
     assert "3/15 positions" in texts.collecting(now)
+    started = CalibrationState(phase="collecting")
+    assert "Getting ready ..." in texts.collecting(started)
 
 
 def test_commands_are_set_apart() -> None:
