@@ -29,6 +29,11 @@ class HandView:
     sources: tuple[str, ...]
     pose: HandPose
 
+    @property
+    def seen(self) -> bool:
+        """Whether cameras see anything of it; else all of it is expected."""
+        return any(source != "predicted" for source in self.sources)
+
     @cached_property
     def rotations(self) -> Array:
         """(26, 3, 3) of the joints; one whose orientation is none is not turned."""

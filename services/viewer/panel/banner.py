@@ -47,5 +47,5 @@ class Banner:
 
 
 def _hands(seen: Seen) -> str:
-    hands = [f"{hand} hand" for hand in seen.view.hands]
+    hands = [f"{hand} hand" for hand, shown in seen.view.hands.items() if shown.seen]
     return f"{' and '.join(hands)} tracked" if hands else "no hand in view"

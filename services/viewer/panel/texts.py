@@ -46,6 +46,8 @@ def status(config: RigConfig, view: View, notes: Sequence[str], *, replayed: boo
 
 def _hand_line(config: RigConfig, hand: HandName, view: View) -> str:
     if hand in view.hands:
+        if not view.hands[hand].seen:
+            return f"{hand} hand: not seen now; shown where it is expected"
         latency = view.latency_ms.get(hand)
         after = "" if latency is None else f", {latency:.0f} ms after the light"
         return f"{hand} hand: tracked{after}"
@@ -99,7 +101,9 @@ def legend() -> str:
 
 def angles(pose: HandPose) -> str:
     """Joint angles in degrees, one row a finger; of the thumb its own joints from the wrist on."""
-    rows = [_row(("", "spread", "base", "middle", "tip", "misfit"), head=True)]
+    # How far a tip is from its paint counts only of a finger that does not reach it.
+    missed = any(finger.status != "solved" for finger in pose.fingers)
+    rows = [_row(("", "spread", "base", "middle", "tip", "off by" if missed else ""), head=True)]
     for digit, names, finger in zip(DIGITS, DIGIT_ANGLES, pose.fingers, strict=True):
         degrees = [f"{_degrees(getattr(finger.angles_rad, name))}&deg;" for name in names]
         off = f"{min(finger.residual_m * 1e3, 999.0):.1f} mm" if finger.status != "solved" else ""

@@ -85,6 +85,11 @@ def test_what_is_there_is_said(
     model.object(make_object(registered=False), 0.0)
     said = texts.status(config, model.view(0.0), [])
     assert "right hand: tracked, 31 ms after the light" in said
+    pose = make_pose()
+    joints = [msgspec.structs.replace(joint, source="predicted") for joint in pose.joints]
+    model.pose(msgspec.structs.replace(pose, joints=joints), 0.0, STAMP_NS)
+    unseen = texts.status(config, model.view(0.0), [])
+    assert "right hand: not seen now; shown where it is expected" in unseen
     assert "object cup: not registered" in said
     model.object(make_object(tracking="out_of_range"), 0.0)
     assert "object cup: out of the lighthouses" in texts.status(config, model.view(0.0), [])
@@ -100,6 +105,7 @@ def test_angles_are_degrees_of_every_finger(make_pose: Callable[..., HandPose]) 
     assert said.count("57&deg;") == 4  # pip 1 rad; the thumb has none
     assert said.count("29&deg;") == 5
     assert "mm" not in said
+    assert "off by" not in said
 
 
 def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]) -> None:
@@ -114,6 +120,7 @@ def test_angles_that_are_absurd_or_not_solved(make_pose: Callable[..., HandPose]
     assert "index (not converged)" in said
     assert "401&deg;" in said
     assert "999.0 mm" in said
+    assert "off by" in said
 
 
 def test_next_to_nothing_is_nothing(make_pose: Callable[..., HandPose]) -> None:
