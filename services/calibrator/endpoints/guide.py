@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable
 
 import msgspec
 
@@ -113,19 +114,26 @@ class Guide:
 
 
 async def _job(desk: Desk) -> Found:
-    """The step that is wanted. OpenCV and scipy are loaded with the first one."""
-    match desk.order.step:
+    """The step that is wanted. OpenCV and scipy are loaded with the first one: beside the loop, as
+    a busy machine takes seconds for them, and who asks meanwhile is to be answered.
+    """
+    step = await asyncio.to_thread(_step_of, desk.order)
+    return await step(desk)
+
+
+def _step_of(order: CalibrationOrder) -> Callable[[Desk], Awaitable[Found]]:
+    match order.step:
         case "hand":
             from services.calibrator.endpoints.hand_step import hand_step
             from services.calibrator.endpoints.hand_use_step import hand_use_step
 
-            return await (hand_use_step if desk.order.way == "use" else hand_step)(desk)
+            return hand_use_step if order.way == "use" else hand_step
         case "lens" | "stereo":
             from services.calibrator.endpoints.board_step import board_step
 
-            return await board_step(desk)
+            return board_step
         case "objects":
             from services.calibrator.endpoints.objects_step import objects_step
 
-            return await objects_step(desk)
-    raise CalibrationError(f"there is no step {desk.order.step!r}")
+            return objects_step
+    raise CalibrationError(f"there is no step {order.step!r}")
