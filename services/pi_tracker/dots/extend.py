@@ -22,8 +22,8 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 # Partial assignments that are kept, and none that is so much (nats) worse than the best: first
-# guesses. (15 dots of `grab`, seed 0: 92.6 % right by exchanges that were tried, 99.6 % so; given
-# the truth among what is tried, the tracker had kept to it.)
+# guesses. (15 dots of `grab`, seeds 2, 4 and 0: 72, 46 and 83 % right; with 192, and four times as
+# many kept, 74, 45 and 67 %; with 600 86, 56 and 80 %, in eight times the time.)
 _BEAM, _WORSE_NATS = 48, 16.0
 # So many whole ones are updated.
 _UPDATED = 24

@@ -30,8 +30,9 @@ _MERGED = float(np.log(0.8))
 # many px (sigma) of where it was.
 _STILL_FALSE, _FALSE_STEP_PX = 0.9, 6.0
 # Dots move on the skin, and light on the paint, and no hand is quite the model's: sigma as a share
-# of a dot's diameter (.16: 99.5, 98.5, 98.9 % of `grab` right, seeds 0, 2, 4 of benchmarks/dots.py;
-# .12: 96.6, 98.6, 99.5 %). Of the centre of a patch that several dots share, at least.
+# of a dot's diameter (with an earlier search .16: 99.5, 98.5, 98.9 % of `grab` right, seeds 0, 2, 4
+# of benchmarks/dots.py; .12: 96.6, 98.6, 99.5 %). Of the centre of a patch that several dots share,
+# at least.
 _WANDER, _SHARED = 0.16, 0.35
 # Where half a disc is hidden its centre moves by .24 of the root of its area, as in
 # detect/marker_finder.py; areas vary by less than the second without anything being hidden.

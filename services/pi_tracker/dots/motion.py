@@ -30,8 +30,8 @@ _SHARP = -1.7
 # fingers; and of an abduction.
 _OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
 # What was learnt of the person fades, too: it was learnt from a posture that may be wrong. (15 dots
-# of `splay`, seeds 2 and 4: 44 and 77 % right without, 90 and 99 % so; .4 s: 93 % of seed 2, but of
-# `grab` with seed 4 42 instead of 46 %.)
+# of `splay`, seeds 2 and 4, with an earlier search: 44 and 77 % right without, 90 and 99 % so;
+# .4 s: 93 % of seed 2, but of `grab` with seed 4 42 instead of 46 %.)
 _PERSON_TIME_S = 1.0
 # Speeds at the start: m/s, rad/s.
 _START_M_S, _START_RAD_S = 0.5, 2.0

@@ -31,9 +31,8 @@ from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 Array = npt.NDArray[np.float64]
 
 # So many accounts are kept, of those that agree in the last two pictures so many, and none that is
-# so much (nats) less likely than the best. (12 and 3 gave up right postures. These two, with the
-# start's reflections: 15 dots of `grab`, seeds 2 and 3: 74 and 51 -> 93 and 98 % right, with the
-# search of that time; with extend.py's 72 and 54, so they want to be chosen anew.)
+# so much (nats) less likely than the best. (12 and 3 gave up right postures of 15 dots of `grab`,
+# seeds 2 and 3, with an earlier search; with extend.py's they were not chosen anew.)
 _KEPT, _ALIKE, _WORSE_NATS = 16, 8, 14.0
 # Of the number of false patches: weight of a new picture, and what it never falls below.
 _FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
