@@ -130,8 +130,8 @@ class ClockAlignment:
         return had_one
 
     def _reference(self) -> int:
-        """The camera that others are compared with: one whose frames are admitted as they are."""
-        known = sorted(self._announced)
+        """The camera that others are compared with: one whose frames come, admitted as they are."""
+        known = [c for c in sorted(self._announced) if self._memory.newest_s(c) is not None]
         as_announced = [c for c in known if not self._astray[c] and c not in self._corrections]
         if as_announced:
             return min(as_announced, key=lambda c: (self._announced[c][1], c))

@@ -15,17 +15,24 @@ from services.fusion.intake.observations import View
 # So much of each camera is remembered, s: enough for a few turns of a hand.
 MEMORY_S = 6.0
 # Stamps that jump by more than this, or go back, are of a clock that was set: what was before does
-# not fit any more.
+# not fit any more. A camera that was silent for so long by another one's clock is forgotten, too.
 _JUMP_S = 0.5
 
 
 class HeightMemory:
-    """Frames of C cameras: their markers' instants, landmarks and rays."""
+    """Frames of C cameras: their markers' instants, landmarks and rays.
+
+    All that is remembered is of the same seconds, as the order of arrival tells: of a camera whose
+    cable is out, what it saw before would be compared with what the others see now, and of a motion
+    that repeats itself both fit, as much apart as its period.
+    """
 
     def __init__(self, cameras: int) -> None:
         self._frames: list[deque[tuple[float, Ints, Array, Array]]] = [
             deque() for _ in range(cameras)
         ]
+        # Of each camera, by its own clock: when each other one last sent.
+        self._heard_s = np.zeros((cameras, cameras))
         self._epoch_ns: int | None = None
 
     def add(self, view: View) -> None:
@@ -36,9 +43,20 @@ class HeightMemory:
         frames = self._frames[view.camera]
         if frames and not 0.0 < time_s - frames[-1][0] < _JUMP_S:
             frames.clear()
+        if not frames:
+            self._heard_s[view.camera] = time_s
         frames.append((time_s, view.landmarks, time_s + view.delay_s, view.rays))
         while time_s - frames[0][0] > MEMORY_S:
             frames.popleft()
+        self._forget_the_silent(view.camera, time_s)
+
+    def _forget_the_silent(self, camera: int, time_s: float) -> None:
+        """A camera sent a frame, of an instant by its clock: for how long have others not?"""
+        for other, frames in enumerate(self._frames):
+            if other != camera and frames:
+                self._heard_s[other, camera] = frames[-1][0]
+                if time_s - self._heard_s[camera, other] > _JUMP_S:
+                    frames.clear()
 
     def clear(self, camera: int) -> None:
         """Forget a camera's frames."""
