@@ -34,7 +34,7 @@ class TrackerStep:
     clock, if given, is read at the end of each stage, for times_ms. With a lens, frames are
     undistorted first (image/rectify.py). dots are colours that several landmarks share, with the
     names of their markers by landmark (RigConfig.dots); seeds are where landmarks are in the first
-    picture, px.
+    picture, px; remembers_dots keeps what looked_back() needs.
     """
 
     def __init__(
@@ -49,6 +49,8 @@ class TrackerStep:
         lens: Lens | None = None,
         dots: Mapping[str, Mapping[str, str]] | None = None,
         seeds: Mapping[str, tuple[float, float]] | None = None,
+        *,
+        remembers_dots: bool = False,
     ) -> None:
         # More OpenCV threads gain nothing on images this small, and cost the other cores.
         cv2.setNumThreads(1)
@@ -62,6 +64,7 @@ class TrackerStep:
         wanted = {} if dots is None else dots
         self._names = {color: wanted[color] for color in self._color_names if color in wanted}
         self._seeds = seeds or {}
+        self._remembers_dots = remembers_dots
         self._dots: dict[str, DotFinder] = {}
         # Duration of each stage of the last step in ms; empty without a clock.
         self.times_ms: dict[str, float] = {}
@@ -123,6 +126,24 @@ class TrackerStep:
             markers=markers,
         )
 
+    def looked_back(self, advance: Callable[[], None] = lambda: None) -> list[list[Marker]]:
+        """Of each step so far the markers that are dots of a shared colour, with hindsight.
+
+        Empty where there are none, or where they are not remembered. advance is called
+        looking_back.LOOKS times for each step and colour.
+        """
+        frames: list[list[Marker]] = []
+        for color, finder in self._dots.items():
+            told = [dot_markers(dots, self._names[color]) for dots in finder.looked_back(advance)]
+            frames = [a + b for a, b in zip(frames, told, strict=True)] if frames else told
+        rectifier = self._rectifier
+        return frames if rectifier is None else [rectifier.to_camera_pixels(f) for f in frames]
+
+    @property
+    def dot_names(self) -> set[str]:
+        """The markers that are dots of a shared colour."""
+        return {name for names in self._names.values() for name in names.values()}
+
     def _use_for_dots(self, table: ColorTable) -> None:
         for color, names in self._names.items():
             if color in self._dots:
@@ -130,7 +151,13 @@ class TrackerStep:
                 continue
             seeds = {name: self._seeds[name] for name in names if name in self._seeds}
             self._dots[color] = DotFinder(
-                table, color, self._settings, tuple(names), self.size_px, seeds
+                table,
+                color,
+                self._settings,
+                tuple(names),
+                self.size_px,
+                seeds,
+                remembers=self._remembers_dots,
             )
 
     def _find(self, frame: Frame) -> list[Marker]:

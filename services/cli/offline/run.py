@@ -25,6 +25,7 @@ from services.cli.offline.clocks.by_hand import offsets_of
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
+from services.cli.offline.looking_back import looked_back
 from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
 from services.cli.offline.results import ResultWriter
 from services.cli.offline.seeds import dot_notes, seeds_of
@@ -59,7 +60,7 @@ def run(
         # First, as it takes no time and a broken line should not come up after an hour of video.
         object_notes = _track_objects(job, writer)
         contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
-        counters = _find_markers(job, pipeline, recorded, progress)
+        counters = _find_markers(job, pipeline, trackers, recorded, progress)
         clocks = _find_clocks(job, recorded, cameras, by_hand)
         if by_hand:
             pipeline.believe_clocks()
@@ -83,25 +84,40 @@ def run(
 
 
 def _find_markers(
-    job: Job, pipeline: Pipeline, recorded: RecordedMarkers, progress: bool | None
+    job: Job,
+    pipeline: Pipeline,
+    trackers: Mapping[str, TrackerStep],
+    recorded: RecordedMarkers,
+    progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """The markers of all frames; the counts by camera."""
     counters = {name: CameraCounter() for name in job.cameras}
-    shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
-    try:
-        for markers in _marker_frames(job, pipeline):
-            counters[markers.camera].add(markers)
-            recorded.add(markers)
-            shown.advance()
-    finally:
-        shown.end()
+    found = _marker_frames(job, pipeline, progress)
+    if job.markers is None and job.config.dots:
+        found = looked_back(found, trackers, len(job.config.dots), recorded.folder, progress)
+    for markers in found:
+        counters[markers.camera].add(markers)
+        recorded.add(markers)
     return counters
 
 
-def _marker_frames(job: Job, pipeline: Pipeline) -> Iterator[MarkerFrame]:
+def _marker_frames(job: Job, pipeline: Pipeline, progress: bool | None) -> Iterator[MarkerFrame]:
     """The markers of each frame: of pictures, or those that somebody found already."""
+    shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
+    found = _recorded_markers(job)
     if job.markers is None:
-        yield from map(pipeline.find, merged([one.frames() for one in job.inputs]))
+        found = map(pipeline.find, merged([one.frames() for one in job.inputs]))
+    try:
+        for markers in found:
+            yield markers
+            shown.advance()
+    finally:
+        shown.end()
+
+
+def _recorded_markers(job: Job) -> Iterator[MarkerFrame]:
+    """Those that somebody found already. Raises CaptureError."""
+    if job.markers is None:
         return
     for number, frame in enumerate(read_lines(job.markers, MarkerFrame), start=1):
         if frame.camera not in job.cameras:
@@ -179,6 +195,7 @@ def tracker_step(
         lens=lens,
         dots=config.dots,
         seeds=seeds,
+        remembers_dots=True,
     )
 
 

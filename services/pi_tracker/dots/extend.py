@@ -17,16 +17,13 @@ import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, View
+from services.pi_tracker.dots.search import LIVE, Search
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-# Partial assignments that are kept, and none that is so much (nats) worse than the best: first
-# guesses. (15 dots of `grab`, seeds 2, 4 and 0: 72, 46 and 83 % right; with 192, and four times as
-# many kept, 74, 45 and 67 %; with 600 86, 56 and 80 %, in eight times the time.)
-_BEAM, _WORSE_NATS = 48, 16.0
-# So many whole ones are updated.
-_UPDATED = 24
+# Of partial assignments none is kept that is so much worse than the best (nats): a first guess.
+_WORSE_NATS = 16.0
 
 
 class _Tables(NamedTuple):
@@ -64,13 +61,17 @@ class _Beam(NamedTuple):
 
 
 def extend(
-    parents: list[Hypothesis], patches: Patches, around: Surroundings, elapsed_s: float
+    parents: list[Hypothesis],
+    patches: Patches,
+    around: Surroundings,
+    elapsed_s: float,
+    search: Search = LIVE,
 ) -> list[Hypothesis]:
     """What hypotheses may become, the likely ones, in no order; at least one."""
     skeleton = around.skeleton
     still = motion.coasted(skeleton, motion.together([p.state for p in parents]), elapsed_s)
     views = [View(parent, patches, around.false_density) for parent in parents]
-    beam = _searched(_begun(views, still, around), _tables(views, patches))
+    beam = _searched(_begun(views, still, around), _tables(views, patches), search)
     before = still.take(beam.view.tolist())
     added = np.array([cov for cov, _ in around.levels])
     before = before._replace(covs=before.covs + added[beam.level])
@@ -117,7 +118,7 @@ def _tables(views: list[View], patches: Patches) -> _Tables:
     )
 
 
-def _searched(beam: _Beam, tables: _Tables) -> _Beam:
+def _searched(beam: _Beam, tables: _Tables, search: Search) -> _Beam:
     """The likely whole assignments, the likeliest first; of each account each once."""
     dots = beam.patch.shape[1]
     left = np.ones(dots, bool)
@@ -126,13 +127,13 @@ def _searched(beam: _Beam, tables: _Tables) -> _Beam:
         # What the others gain at best.
         rest = np.maximum(gains.max(axis=2, initial=0.0), 0.0)
         bounds = beam.score + rest.sum(axis=1)
-        likely = _likely(bounds, _BEAM)
+        likely = _likely(bounds, search.beam)
         beam, gains, rest, bounds = beam.take(likely), gains[likely], rest[likely], bounds[likely]
         spread = np.einsum("iaia->i", beam.covs[0])
         dot = int(np.where(left, spread, np.inf).argmin())
         own = _options(beam, tables, gains[:, np.cumsum(left)[dot] - 1], dot)
         totals = own + (bounds - rest[:, np.cumsum(left)[dot] - 1])[:, None]
-        chosen = _likely(totals.ravel(), 2 * _BEAM)
+        chosen = _likely(totals.ravel(), 2 * search.beam)
         which, patch = np.divmod(chosen, own.shape[1])
         left[dot] = False
         beam = _given(beam.take(which), tables, dot, patch - 1, own[which, patch])
@@ -141,7 +142,7 @@ def _searched(beam: _Beam, tables: _Tables) -> _Beam:
     _, first = np.unique(
         np.concatenate([beam.view[:, None], beam.patch], axis=1), axis=0, return_index=True
     )
-    return beam.take(np.sort(first)[:_UPDATED])
+    return beam.take(np.sort(first)[: search.updated])
 
 
 def _likely(scores: Array, count: int) -> Indices:

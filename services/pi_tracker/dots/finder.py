@@ -7,7 +7,7 @@ colour go into the tracker of dots, which tells them apart.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
@@ -15,7 +15,9 @@ from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.looking_back import SeenPatches, look_back
 from services.pi_tracker.dots.parts import parts_of
+from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.tracker import DotTracker
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.image.blob import Blob
@@ -40,11 +42,16 @@ class DotFinder:
         landmarks: Sequence[str],
         size_px: tuple[int, int],
         seeds: Mapping[str, tuple[float, float]] | None = None,
+        *,
+        remembers: bool = False,
     ) -> None:
         """table has the colour, and others that are not to be taken for it.
 
-        landmarks and seeds are DotTracker's; size_px is the picture's.
+        landmarks and seeds are DotTracker's; size_px is the picture's. remembers keeps the patches
+        of all pictures, for looked_back().
         """
+        self._given = (tuple(landmarks), size_px, seeds)
+        self._seen: list[SeenPatches] | None = [] if remembers else None
         self._color, self._settings = color, settings
         self._noise = Noise()
         self.use(table)
@@ -64,7 +71,20 @@ class DotFinder:
             for blob in self._detector.detect(image, search_region.whole(image.size))
             if blob.color == self._class and is_paint_shaped(blob, self._settings.max_area_px)
         ]
-        return self.tracker.step(self._patches(image, blobs), frame.stamp_ns * 1e-9)
+        patches, time_s = self._patches(image, blobs), frame.stamp_ns * 1e-9
+        if self._seen is not None:
+            self._seen.append(SeenPatches(time_s, patches))
+        return self.tracker.step(patches, time_s)
+
+    def looked_back(self, advance: Callable[[], None] = lambda: None) -> list[dict[str, Dot]]:
+        """The dots of all pictures so far, with hindsight; none if nothing is remembered.
+
+        advance is called looking_back.LOOKS times for each picture.
+        """
+        return look_back(self._begun, self._seen or [], advance)
+
+    def _begun(self, search: Search) -> DotTracker:
+        return DotTracker(*self._given, search, remembers=True)
 
     def _patches(self, image: Picture, blobs: list[Blob]) -> list[Patch]:
         found: list[Patch] = []

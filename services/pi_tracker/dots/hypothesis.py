@@ -64,6 +64,14 @@ class Surroundings:
     false_density: float  # patches that are no dots, per px^2
 
 
+class Way(NamedTuple):
+    """What an account said of a picture, and of those before."""
+
+    before: Way | None
+    patch: tuple[int, ...]  # of each dot, -1 for none
+    nats: float  # how likely the picture was by it, given those before
+
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One account of n dots after a picture."""
@@ -76,6 +84,8 @@ class Hypothesis:
     patch: tuple[int, ...]  # of each dot in the last picture, -1 for none
     before: tuple[int, ...]  # in the one before
     false: Array  # (k, 2) patches of the last picture that are no dots
+    # Of all pictures so far, where they are looked back at; it grows with each.
+    way: Way | None = None
 
 
 class View:
@@ -156,15 +166,17 @@ class View:
         missed = patch < 0
         areas, alone = self.parent.areas.copy(), ~missed & ~self._shared(patch)
         areas[alone] += _AREA_WEIGHT * (self.patches.areas[patch[alone]] - areas[alone])
+        score, told, way = self.claims(patch) + nats, tuple(patch.tolist()), self.parent.way
         return Hypothesis(
-            score=self.claims(patch) + nats,
+            score=score,
             state=state,
             branch=self.parent.branch,
             areas=areas,
             unseen=np.where(missed, self.parent.unseen + 1, 0),
-            patch=tuple(patch.tolist()),
+            patch=told,
             before=self.parent.patch,
             false=np.delete(self.patches.places, patch[~missed], axis=0),
+            way=None if way is None else Way(way, told, score - self.parent.score),
         )
 
     def _shared(self, patch: Indices) -> Mask:

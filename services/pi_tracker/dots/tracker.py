@@ -22,18 +22,18 @@ from services.pi_tracker.dots.hypothesis import (
     Hypothesis,
     Patches,
     Surroundings,
+    Way,
     normalised,
 )
+from services.pi_tracker.dots.search import LIVE, Search
 from services.pi_tracker.dots.skeleton import Skeleton
 from services.pi_tracker.dots.start.posture import postures
 from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 
 Array = npt.NDArray[np.float64]
 
-# So many accounts are kept, of those that agree in the last two pictures so many, and none that is
-# so much (nats) less likely than the best. (12 and 3 gave up right postures of 15 dots of `grab`,
-# seeds 2 and 3, with an earlier search; with extend.py's they were not chosen anew.)
-_KEPT, _ALIKE, _WORSE_NATS = 16, 8, 14.0
+# No account is kept that is so much (nats) less likely than the best.
+_WORSE_NATS = 14.0
 # Of the number of false patches: weight of a new picture, and what it never falls below.
 _FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
 # At the start no dot is known better than to this share of the root of its area.
@@ -55,8 +55,15 @@ class DotTracker:
         landmarks: Sequence[str],
         size_px: tuple[int, int],
         seeds: Mapping[str, tuple[float, float]] | None = None,
+        search: Search = LIVE,
+        *,
+        remembers: bool = False,
     ) -> None:
-        """size_px is the picture's. Raises ValueError on a landmark that no hand has."""
+        """size_px is the picture's. remembers keeps the way(), which grows with each picture.
+
+        Raises ValueError on a landmark that no hand has.
+        """
+        self._search, self._remembers = search, remembers
         self.landmarks = tuple(landmarks)
         self._size_px = size_px
         self._seeds = dict(seeds or {})
@@ -83,10 +90,28 @@ class DotTracker:
         self._time_s = time_s
         arrays = _arrays(patches)
         around = self._around(elapsed_s)
-        self._hypotheses = _pruned(extend(self._hypotheses, arrays, around, elapsed_s))
+        found = extend(self._hypotheses, arrays, around, elapsed_s, self._search)
+        self._hypotheses = _pruned(found, self._search)
         false = len(patches) - len({p for p in self._hypotheses[0].patch if p >= 0})
         self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The landmarks that have a dot, in the order of a way's patches."""
+        return self._chains.landmarks
+
+    def way(self) -> list[Way]:
+        """What the account that is the likeliest by now said of each picture since the start.
+
+        Empty before, and where nothing is remembered.
+        """
+        found: list[Way] = []
+        way = self._hypotheses[0].way if self._hypotheses else None
+        while way is not None:
+            found.append(way)
+            way = way.before
+        return found[::-1]
 
     @property
     def dot_area_px2(self) -> float:
@@ -110,10 +135,11 @@ class DotTracker:
         missing = np.array([p < 0 for p in found.patch], np.int64)
         places = _arrays(patches).places
         false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
+        way = Way(None, found.patch, 0.0) if self._remembers else None
         sigmas = np.maximum(found.sigmas, _WANDER * np.sqrt(typical))
         self._hypotheses = [
             Hypothesis(
-                score, state, branch, np.array(own), missing, found.patch, found.patch, false
+                score, state, branch, np.array(own), missing, found.patch, found.patch, false, way
             )
             for branch, (score, state) in enumerate(postures(self._skeleton, found.places, sigmas))
         ]
@@ -194,15 +220,15 @@ def _arrays(patches: Sequence[Patch]) -> Patches:
     )
 
 
-def _pruned(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+def _pruned(hypotheses: list[Hypothesis], search: Search) -> list[Hypothesis]:
     """The best, best first; of those that agree in the last two pictures, of different starts."""
     kept: list[Hypothesis] = []
     alike: dict[tuple[tuple[int, ...], tuple[int, ...]], set[int]] = {}
     for one in sorted(hypotheses, key=lambda one: -one.score):
         branches = alike.setdefault((one.patch, one.before), set())
-        if one.branch not in branches and len(branches) < _ALIKE:
+        if one.branch not in branches and len(branches) < search.alike:
             branches.add(one.branch)
             kept.append(one)
-        if len(kept) >= _KEPT:
+        if len(kept) >= search.kept:
             break
     return [one for one in normalised(kept) if one.score > -_WORSE_NATS]

@@ -29,7 +29,7 @@ class RecordedMarkers:
     """Frames of all cameras in the order in which they are added; to be closed."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
         self._decoder = msgspec.json.Decoder(MarkerFrame)
         self._places = array("q")
@@ -50,7 +50,7 @@ class RecordedMarkers:
     def add(self, frame: MarkerFrame) -> None:
         """Take in a frame. Raises DiskFullError."""
         self._places.append(self._file.tell())
-        with writing(self._folder):
+        with writing(self.folder):
             self._file.write(msgspec.json.encode(frame) + b"\n")
         own_ns = frame.stamp_ns - frame.clock_offset_ns
         self._cameras.append(frame.camera)
@@ -88,7 +88,7 @@ class RecordedMarkers:
                 for camera, stamp in zip(self._cameras, self._stamps, strict=True)
             ]
             order = sorted(order, key=keys.__getitem__)  # type: ignore[assignment]
-        with writing(self._folder):
+        with writing(self.folder):
             self._file.flush()
         for k in order:
             self._file.seek(self._places[k])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from rhot.files.calibration import ColorRange, Colors
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
+from services.cli.offline.looking_back import looked_back
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
@@ -100,3 +104,27 @@ def test_new_ranges_leave_the_dots_their_names() -> None:
     assert set(before) == set(after) == set(DOTS["red"].values())
     for name, place in before.items():
         assert after[name] == pytest.approx(place, abs=1.0)
+
+
+def test_a_recording_is_told_again_with_hindsight() -> None:
+    """Frame by frame, in their order; markers of other colours stay as they are."""
+    seeds = {n: (x, y) for n, (x, y) in zip(NAMES, REST, strict=True)}
+    step = TrackerStep(
+        "side",
+        COLORS,
+        Tracker(),
+        SIZE,
+        ["blue", "red"],
+        dots=DOTS,
+        seeds=seeds,
+        remembers_dots=True,
+    )
+    live = [step.step(_frame(number, _places(number))) for number in range(12)]
+    again = list(looked_back(live, {"side": step}, 1, Path(tempfile.gettempdir()), False))
+    assert [frame.seq for frame in again] == list(range(12))
+    for number, frame in enumerate(again):
+        found = _by_name(frame.markers)
+        assert len(frame.markers) == len(found) == 9
+        assert found["blue"] == _by_name(live[number].markers)["blue"]
+        for name, (x, y) in zip(NAMES, _places(number), strict=True):
+            assert found[f"red.{name}"] == pytest.approx((x, y), abs=4.0), (number, name)
