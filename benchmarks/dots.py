@@ -1,5 +1,7 @@
 """Which dot of one colour is which? `python benchmarks/dots.py [--json FILE] [--clips N]`
 
+`--dots 8 --recording grab --first-seed 200 --clips 24` looks at other sides of one recording.
+
 Joints of real hands (Leap at 110 Hz, played at 30 Hz; $RHOT_DATA) in front of a camera that looks
 from anywhere: fingers hide dots, dots that touch run into one blob, some are not found, some that
 are found are none. 8 dots are on thumb and index finger, 15 on the three outer joints of all
@@ -165,12 +167,14 @@ def clip(recorded: RecordedJoints, dots: int, seed: int) -> list[DotFrame]:
     return dot_frames(scene_of(recorded, DOTS[dots], SIZE_PX, FPS, seed), seed)
 
 
-def run(recorded: dict[str, RecordedJoints], dots: int, clips: int) -> list[dict[str, Any]]:
+def run(
+    recorded: dict[str, RecordedJoints], dots: int, clips: int, first_seed: int = FIRST_SEED
+) -> list[dict[str, Any]]:
     """A row for each recording and method."""
     names = [finger_landmarks(DIGITS[digit])[joint] for digit, joint in DOTS[dots]]
     rows = []
     for name, one in recorded.items():
-        films = [clip(one, dots, FIRST_SEED + k) for k in range(clips)]
+        films = [clip(one, dots, first_seed + k) for k in range(clips)]
         for method, make in METHODS.items():
             total: dict[str, int] = {}
             started = time.perf_counter()
@@ -216,13 +220,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--clips", type=int, default=6, help="of each recording")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the clips")
+    parser.add_argument("--dots", type=int, choices=DOTS, help="only so many")
+    parser.add_argument("--recording", choices=RECORDINGS, help="only this one")
     options = parser.parse_args()
     folder = DATA / "hand_motion" / "leap"
     if not folder.is_dir():
         print(f"no {folder}; set RHOT_DATA to the folder of real recordings", file=sys.stderr)
         return 2
     recorded: dict[str, RecordedJoints] = {}
-    for name, file in RECORDINGS.items():
+    wanted = [options.recording] if options.recording else list(RECORDINGS)
+    for name, file in ((name, RECORDINGS[name]) for name in wanted):
         one = load_recording(folder / f"{file}.csv")
         if isinstance(one, RecordedJoints):
             recorded[name] = one
@@ -231,8 +239,8 @@ def main() -> int:
         f"{'exchanged':>11s}{'elsewhere':>11s}{'longest':>10s}{'ms':>9s}"
     )
     rows = []
-    for dots in DOTS:
-        for row in run(recorded, dots, options.clips):
+    for dots in [options.dots] if options.dots else list(DOTS):
+        for row in run(recorded, dots, options.clips, options.first_seed):
             rows.append(row)
             print(show(row), flush=True)
     if options.json:
