@@ -33,12 +33,11 @@ import numpy as np
 from rhot.hand import DIGITS
 from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.chains import finger_landmarks
-from services.pi_tracker.dots.dot import Patch
 from services.pi_tracker.dots.looking_back import SeenPatches, look_back
-from services.pi_tracker.dots.parts import parts_of
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints
+from testing.dot_patches import patches_of
 from testing.synthetic_dots import DotFrame, dot_frames, scene_of
 
 DATA = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -56,27 +55,12 @@ Seeds = dict[str, tuple[float, float]]
 Method = Callable[[DotFrame, float], dict[str, tuple[float, float] | None]]
 
 
-def patches(frame: DotFrame, dot_area_px2: float) -> list[Patch]:
-    """The blobs of a frame, those cut that may be several dots."""
-    found: list[Patch] = []
-    for number, blob in enumerate(frame.blobs):
-        rows, columns = np.nonzero(blob.mask)
-        x = 2.0 * (float(columns.mean()) + blob.rect[0]) + 0.5
-        y = 2.0 * (float(rows.mean()) + blob.rect[1]) + 0.5
-        parts = parts_of(blob, dot_area_px2)
-        if len(parts) == 1:
-            found.append(Patch(x, y, blob.area_px))
-        else:
-            found += [Patch(*place, area, 2.0, 0.5, number, (x, y)) for *place, area in parts]
-    return found
-
-
 def ours(names: list[str], seeds: Seeds, _: list[DotFrame]) -> Method:
     """The tracker of dots, live."""
     tracker = DotTracker(names, SIZE_PX, seeds)
 
     def step(frame: DotFrame, time_s: float) -> dict[str, tuple[float, float] | None]:
-        dots = tracker.step(patches(frame, tracker.dot_area_px2), time_s)
+        dots = tracker.step(patches_of(frame, tracker.dot_area_px2), time_s)
         return {
             name: None if dot.state == "carried" else (dot.x_px, dot.y_px)
             for name, dot in dots.items()
@@ -92,7 +76,7 @@ def plain(optimal: bool) -> Make:
         last = np.array([seeds[name] for name in names])
 
         def step(frame: DotFrame, _: float) -> dict[str, tuple[float, float] | None]:
-            places = np.array([(p.x_px, p.y_px) for p in patches(frame, 0.0)]).reshape(-1, 2)
+            places = np.array([(p.x_px, p.y_px) for p in patches_of(frame, 0.0)]).reshape(-1, 2)
             apart = np.linalg.norm(last[:, None] - places[None], axis=2)
             gains = np.where(apart < REACH_PX, 1e3 - apart, -np.inf)
             if optimal:
@@ -116,7 +100,7 @@ def hindsight(names: list[str], seeds: Seeds, frames: list[DotFrame]) -> Method:
     live = DotTracker(names, SIZE_PX, seeds)
     pictures = []
     for number, frame in enumerate(frames):
-        found = patches(frame, live.dot_area_px2)
+        found = patches_of(frame, live.dot_area_px2)
         pictures.append(SeenPatches(number / FPS, found))
         live.step(found, number / FPS)
     told = look_back(

@@ -18,19 +18,25 @@ def _by_name(markers: list[Marker]) -> dict[str, tuple[float, float]]:
     return {marker.color: (marker.x_px, marker.y_px) for marker in markers}
 
 
-@pytest.mark.parametrize("seeded", [True, False])
-def test_eight_dots_of_one_colour_are_eight_markers_beside_another_colour(seeded: bool) -> None:
-    places = dot_places(0)
-    seeds = {n: (x + 3.0, y + 2.0) for n, (x, y) in zip(NAMES, places, strict=True)}
-    step = TrackerStep(
+def _step(seeds: dict[str, tuple[float, float]] | None, *, remembers: bool = False) -> TrackerStep:
+    colors = ["blue", "red"]
+    return TrackerStep(
         "side",
         COLORS,
         Tracker(),
         SIZE,
-        ["blue", "red"],
+        colors,
         dots=DOTS,
-        seeds=seeds if seeded else None,
+        seeds=seeds,
+        remembers_dots=remembers,
     )
+
+
+@pytest.mark.parametrize("seeded", [True, False])
+def test_eight_dots_of_one_colour_are_eight_markers_beside_another_colour(seeded: bool) -> None:
+    places = dot_places(0)
+    seeds = {n: (x + 3.0, y + 2.0) for n, (x, y) in zip(NAMES, places, strict=True)}
+    step = _step(seeds if seeded else None)
     for number in range(21):
         truth = dot_places(number)
         found = _by_name(step.step(dot_picture(number, truth)).markers)
@@ -54,16 +60,7 @@ def test_new_ranges_leave_the_dots_their_names() -> None:
 def test_a_recording_is_told_again_with_hindsight() -> None:
     """Frame by frame, in their order; markers of other colours stay as they are."""
     seeds = {n: (x, y) for n, (x, y) in zip(NAMES, REST, strict=True)}
-    step = TrackerStep(
-        "side",
-        COLORS,
-        Tracker(),
-        SIZE,
-        ["blue", "red"],
-        dots=DOTS,
-        seeds=seeds,
-        remembers_dots=True,
-    )
+    step = _step(seeds, remembers=True)
     live = [step.step(dot_picture(number, dot_places(number))) for number in range(12)]
     again = list(looked_back(live, {"side": step}, 1, Path(tempfile.gettempdir()), False))
     assert [frame.seq for frame in again] == list(range(12))

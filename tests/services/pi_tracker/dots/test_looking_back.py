@@ -10,22 +10,12 @@ from rhot.hand import DIGITS
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.looking_back import LOOKS, SeenPatches, look_back
-from services.pi_tracker.dots.parts import parts_of
 from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints
+from testing.dot_patches import NAMES, REST, SIZE, patches_at, patches_of
 from testing.synthetic_dots import DotFrame, dot_frames, scene_of
-
-SIZE = (1280, 720)
-NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
-THUMB = np.array([[400.0, 500.0], [490.0, 470.0], [550.0, 440.0], [600.0, 415.0]])
-INDEX = np.array([[480.0, 300.0], [590.0, 260.0], [650.0, 250.0], [700.0, 245.0]])
-REST = np.concatenate([THUMB, INDEX])
-
-
-def _patches(places: np.ndarray) -> list[Patch]:
-    return [Patch(float(x), float(y), 300.0) for x, y in places]
 
 
 def _begin(search: Search) -> DotTracker:
@@ -34,9 +24,9 @@ def _begin(search: Search) -> DotTracker:
 
 def test_every_picture_has_its_dots_from_the_first_that_shows_them() -> None:
     moving = [REST + np.array([3.0, 1.0]) * k for k in range(12)]
-    pictures = [SeenPatches(0.0, _patches(REST[:5])), SeenPatches(1 / 30, [])]
-    pictures += [SeenPatches((k + 2) / 30, _patches(p)) for k, p in enumerate(moving)]
-    pictures[7] = SeenPatches(7 / 30, _patches(np.delete(moving[5], 6, axis=0)))
+    pictures = [SeenPatches(0.0, patches_at(REST[:5])), SeenPatches(1 / 30, [])]
+    pictures += [SeenPatches((k + 2) / 30, patches_at(p)) for k, p in enumerate(moving)]
+    pictures[7] = SeenPatches(7 / 30, patches_at(np.delete(moving[5], 6, axis=0)))
     looks = []
     told = look_back(_begin, pictures, lambda: looks.append(1))
     assert len(looks) == LOOKS * len(pictures)
@@ -49,36 +39,23 @@ def test_every_picture_has_its_dots_from_the_first_that_shows_them() -> None:
 
 
 def test_nothing_that_starts_is_no_error() -> None:
-    pictures = [SeenPatches(k / 30, _patches(REST[:3])) for k in range(4)]
+    pictures = [SeenPatches(k / 30, patches_at(REST[:3])) for k in range(4)]
     assert look_back(_begin, pictures) == [{}, {}, {}, {}]
     assert look_back(_begin, []) == []
 
 
 def test_dots_that_share_a_patch_are_told_so_and_less_surely() -> None:
-    still = [_patches(REST) for _ in range(8)]
+    still = [patches_at(REST) for _ in range(8)]
     touching = REST.copy()
     touching[3] = touching[7] = (640.0, 330.0)
     steps = np.linspace(0.0, 1.0, 8)
-    coming = [_patches(REST + s * (touching - REST)) for s in steps[:-1]]
-    merged = [Patch(640.0, 330.0, 520.0), *_patches(np.delete(touching, [3, 7], axis=0))]
+    coming = [patches_at(REST + s * (touching - REST)) for s in steps[:-1]]
+    merged = [Patch(640.0, 330.0, 520.0), *patches_at(np.delete(touching, [3, 7], axis=0))]
     seen = [*still, *coming, merged, merged]
     told = look_back(_begin, [SeenPatches(k / 30, own) for k, own in enumerate(seen)])
     tips = [told[-1][name] for name in ("thumb_tip", "index_tip")]
     assert [(tip.state, tip.patch) for tip in tips] == [("merged", 0), ("merged", 0)]
     assert all(tip.sigma_px > 5.0 and tip.quality < 0.5 for tip in tips)
-
-
-def _seen(frame: DotFrame, dot_area_px2: float) -> list[Patch]:
-    found: list[Patch] = []
-    for number, blob in enumerate(frame.blobs):
-        rows, columns = np.nonzero(blob.mask)
-        x, y = 2.0 * (columns.mean() + blob.rect[0]) + 0.5, 2.0 * (rows.mean() + blob.rect[1]) + 0.5
-        parts = parts_of(blob, dot_area_px2)
-        if len(parts) == 1:
-            found.append(Patch(float(x), float(y), blob.area_px))
-        else:
-            found += [Patch(*place, area, 2.0, 0.5, number, (x, y)) for *place, area in parts]
-    return found
 
 
 def _exchanged(told: list[dict[str, Dot]], frames: list[DotFrame]) -> int:
@@ -105,7 +82,7 @@ def test_names_that_were_exchanged_for_long_are_put_right(rhot_data: Path) -> No
     tracker = DotTracker(NAMES, SIZE, seeds)
     live, pictures = [], []
     for k, frame in enumerate(frames):
-        pictures.append(SeenPatches(k / 30, _seen(frame, tracker.dot_area_px2)))
+        pictures.append(SeenPatches(k / 30, patches_of(frame, tracker.dot_area_px2)))
         live.append(tracker.step(pictures[-1].patches, k / 30))
     told = look_back(lambda s: DotTracker(NAMES, SIZE, seeds, s, remembers=True), pictures)
     assert _exchanged(live, frames) > 150

@@ -9,22 +9,14 @@ from rhot.hand import DIGITS
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.tracker import DotTracker
+from testing.dot_patches import NAMES, REST, SIZE, patches_at
 
 JOINTS_OF_FINGERS = tuple(name for digit in DIGITS for name in finger_landmarks(digit))
-SIZE = (1280, 720)
-NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
-THUMB = np.array([[400.0, 500.0], [490.0, 470.0], [550.0, 440.0], [600.0, 415.0]])
-INDEX = np.array([[480.0, 300.0], [590.0, 260.0], [650.0, 250.0], [700.0, 245.0]])
-REST = np.concatenate([THUMB, INDEX])
-
-
-def _patches(places: np.ndarray) -> list[Patch]:
-    return [Patch(float(x), float(y), 300.0) for x, y in places]
 
 
 def _tracker(names: tuple[str, ...] = NAMES, rest: np.ndarray = REST) -> DotTracker:
     tracker = DotTracker(names, SIZE, {n: (x, y) for n, (x, y) in zip(names, rest, strict=True)})
-    tracker.step(_patches(rest), 0.0)
+    tracker.step(patches_at(rest), 0.0)
     return tracker
 
 
@@ -41,7 +33,7 @@ def test_seeds_name_the_patches_beside_them_whatever_their_order() -> None:
     seeds = {n: (x + 4.0, y - 3.0) for n, (x, y) in zip(NAMES, REST, strict=True)}
     tracker = DotTracker(NAMES, SIZE, seeds)
     order = np.random.default_rng(1).permutation(8)
-    dots = tracker.step(_patches(REST[order]), 0.0)
+    dots = tracker.step(patches_at(REST[order]), 0.0)
     assert list(dots) == list(NAMES)
     assert _errors(dots, REST).max() == 0.0
     assert [order[dots[name].patch] for name in NAMES] == list(range(8))
@@ -51,10 +43,10 @@ def test_seeds_name_the_patches_beside_them_whatever_their_order() -> None:
 def test_a_seed_without_a_dot_is_told_and_waits() -> None:
     seeds = {n: (x, y) for n, (x, y) in zip(NAMES, REST, strict=True)}
     tracker = DotTracker(NAMES, SIZE, seeds)
-    dots = tracker.step(_patches(REST[:7]), 0.0)
+    dots = tracker.step(patches_at(REST[:7]), 0.0)
     assert dots["index_tip"].state == "carried"
     assert "no dot at the seed of index tip" in tracker.notes[0]
-    dots = tracker.step(_patches(REST), 1 / 30)
+    dots = tracker.step(patches_at(REST), 1 / 30)
     assert dots["index_tip"].state == "seen"
 
 
@@ -76,9 +68,9 @@ def test_tips_that_cross_keep_their_names() -> None:
         truth[7] += share * np.array([-90.0, 150.0])
         truth[6] += share * np.array([-30.0, 60.0])
         apart = np.linalg.norm(truth[3] - truth[7])
-        patches = _patches(truth)
+        patches = patches_at(truth)
         if apart < 16.0:
-            patches = _patches(np.delete(truth, [3, 7], axis=0)) + _patches(
+            patches = patches_at(np.delete(truth, [3, 7], axis=0)) + patches_at(
                 0.5 * (truth[3:4] + truth[7:8])
             )
         dots = tracker.step(patches, frame / 30)
@@ -91,7 +83,7 @@ def test_a_hand_that_jerks_by_more_than_its_dots_are_apart_keeps_them() -> None:
     for frame in range(1, 12):
         if frame == 6:
             truth = REST + np.array([70.0, -20.0])
-        dots = tracker.step(_patches(truth), frame / 30)
+        dots = tracker.step(patches_at(truth), frame / 30)
         assert _errors(dots, truth).max() < 1.0
 
 
@@ -100,7 +92,7 @@ def test_a_lost_dot_is_found_again_and_no_false_patch_is_taken_for_it() -> None:
     for frame in range(1, 60):
         truth = REST + np.array([3.0, 1.0]) * min(frame, 40)
         seen = truth if not 20 <= frame < 35 else np.delete(truth, 5, axis=0)
-        patches = _patches(seen)
+        patches = patches_at(seen)
         if 10 <= frame < 50:
             patches.append(Patch(300.0, 300.0, 280.0))
         dots = tracker.step(patches, frame / 30)
@@ -112,7 +104,7 @@ def test_no_patches_at_all_is_no_error_and_time_may_stand_still() -> None:
     tracker = _tracker()
     dots = tracker.step([], 1 / 30)
     assert {dot.state for dot in dots.values()} == {"carried"}
-    assert {dot.state for dot in tracker.step(_patches(REST), 1 / 30).values()} == {"seen"}
+    assert {dot.state for dot in tracker.step(patches_at(REST), 1 / 30).values()} == {"seen"}
     assert DotTracker(NAMES, SIZE, {}).step([], 0.0) == {}
 
 
@@ -120,9 +112,9 @@ def test_no_patches_at_all_is_no_error_and_time_may_stand_still() -> None:
 def test_without_seeds_the_constellation_names_the_dots(landmarks: tuple[str, ...]) -> None:
     """Also where rig.toml leaves open which fingers have dots, and with a speck among them."""
     tracker = DotTracker(landmarks, SIZE)
-    assert tracker.step(_patches(REST[:5]), 0.0) == {}
+    assert tracker.step(patches_at(REST[:5]), 0.0) == {}
     order = np.random.default_rng(2).permutation(8)
-    dots = tracker.step([Patch(620.0, 300.0, 16.0), *_patches(REST[order])], 1 / 30)
+    dots = tracker.step([Patch(620.0, 300.0, 16.0), *patches_at(REST[order])], 1 / 30)
     assert set(dots) == set(NAMES)
     assert _errors(dots, REST).max() == 0.0
     assert not tracker.notes
