@@ -38,5 +38,6 @@ def looked_back(
         for frame in first.frames():
             names = trackers[frame.camera].dot_names
             others = [marker for marker in frame.markers if marker.color not in names]
-            dots = next(again[frame.camera])
+            # None at all of a camera whose shared colour was not asked for.
+            dots = next(again[frame.camera], [])
             yield msgspec.structs.replace(frame, markers=others + dots)

@@ -70,3 +70,11 @@ def test_a_recording_is_told_again_with_hindsight() -> None:
         assert found["blue"] == _by_name(live[number].markers)["blue"]
         for name, (x, y) in zip(NAMES, dot_places(number), strict=True):
             assert found[f"red.{name}"] == pytest.approx((x, y), abs=4.0), (number, name)
+
+
+def test_a_recording_whose_shared_colour_is_not_asked_for_stays_as_it_is() -> None:
+    step = TrackerStep("side", COLORS, Tracker(), SIZE, ["blue"], dots=DOTS, remembers_dots=True)
+    live = [step.step(dot_picture(number, dot_places(number))) for number in range(3)]
+    assert [len(frame.markers) for frame in live] == [1, 1, 1]
+    told = looked_back(live, {"side": step}, 1, Path(tempfile.gettempdir()), False)
+    assert list(told) == live
