@@ -7,7 +7,7 @@ interruption .partial files (results.py).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -104,9 +104,11 @@ def _find_markers(
 def _marker_frames(job: Job, pipeline: Pipeline, progress: bool | None) -> Iterator[MarkerFrame]:
     """The markers of each frame: of pictures, or those that somebody found already."""
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
-    found = _recorded_markers(job)
+    found: Iterable[MarkerFrame]
     if job.markers is None:
         found = map(pipeline.find, merged([one.frames() for one in job.inputs]))
+    else:
+        found = _recorded_markers(job.markers, job.cameras)
     try:
         for markers in found:
             yield markers
@@ -115,15 +117,13 @@ def _marker_frames(job: Job, pipeline: Pipeline, progress: bool | None) -> Itera
         shown.end()
 
 
-def _recorded_markers(job: Job) -> Iterator[MarkerFrame]:
+def _recorded_markers(path: Path, cameras: Sequence[str]) -> Iterator[MarkerFrame]:
     """Those that somebody found already. Raises CaptureError."""
-    if job.markers is None:
-        return
-    for number, frame in enumerate(read_lines(job.markers, MarkerFrame), start=1):
-        if frame.camera not in job.cameras:
+    for number, frame in enumerate(read_lines(path, MarkerFrame), start=1):
+        if frame.camera not in cameras:
             raise CaptureError(
-                f"{job.markers}: line {number}: camera {frame.camera!r} is not in rig.toml; it has"
-                f" {', '.join(job.cameras)}"
+                f"{path}: line {number}: camera {frame.camera!r} is not in rig.toml; it has"
+                f" {', '.join(cameras)}"
             )
         yield frame
 

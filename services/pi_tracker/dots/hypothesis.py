@@ -33,10 +33,10 @@ _STILL_FALSE, _FALSE_STEP_PX = 0.9, 6.0
 # of a dot's diameter (with an earlier search .16: 99.5, 98.5, 98.9 % of `grab` right, seeds 0, 2, 4
 # of benchmarks/dots.py; .12: 96.6, 98.6, 99.5 %). Of the centre of a patch that several dots share,
 # at least.
-_WANDER, _SHARED = 0.16, 0.35
+_WANDER, SHARED = 0.16, 0.35
 # Where half a disc is hidden its centre moves by .24 of the root of its area, as in
 # detect/marker_finder.py; areas vary by less than the second without anything being hidden.
-_HIDDEN, _AREA_NOISE = 0.34, 0.25
+HIDDEN, AREA_NOISE = 0.34, 0.25
 # A dot's area varies by so much (sigma of its logarithm) below and above what it was of late, and
 # no patch is judged by more than so many nats on it.
 _AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (2.0, 4.0)
@@ -110,12 +110,12 @@ class View:
             np.minimum(0.5 * (ratio / _AREA_SIGMA[1]) ** 2, _AREA_NATS[1]),
         )
         hidden = np.clip(1.0 - np.exp(ratio), 0.0, 0.9)
-        hidden[hidden < _AREA_NOISE] = 0.0
-        offset = _HIDDEN * hidden * np.sqrt(parent.areas)[:, None]
+        hidden[hidden < AREA_NOISE] = 0.0
+        offset = HIDDEN * hidden * np.sqrt(parent.areas)[:, None]
         # (n, m): of each patch as a dot's; (n,): what is added where it shares one.
         self.variances = patches.sigmas[None] ** 2 + (_WANDER * diameters[:, None]) ** 2
         self.variances += offset**2
-        self.sharing = (_SHARED * diameters) ** 2
+        self.sharing = (SHARED * diameters) ** 2
 
     def alone(self) -> Array:
         """What each dot gains by each patch over being missing, but for where it is, (n, m)."""

@@ -15,13 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.hypothesis import SHARED
 from services.pi_tracker.dots.search import SEVERAL, Search
-from services.pi_tracker.dots.tracker import DotTracker
+from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, seen_alone
 
-# Of the centre of a patch that several dots share, as a share of a dot's diameter; and where half a
-# dot is hidden: as tracker.py and hypothesis.py have it.
-_SHARED, _HIDDEN, _HIDDEN_LEAST, _MERGED_QUALITY = 0.35, 0.34, 0.25, 0.3
-
+# How often each picture is searched.
 LOOKS = len(SEVERAL)
 
 
@@ -88,12 +86,7 @@ def _dot(told: tuple[int, ...], index: int, patches: list[Patch], area_px: float
     patch = patches[index]
     if told.count(index) > 1:
         diameter = float(np.sqrt(4.0 / np.pi * (area_px or patch.area_px)))
-        sigma = float(np.hypot(patch.sigma_px, _SHARED * diameter))
-        quality = _MERGED_QUALITY * patch.quality
+        sigma = float(np.hypot(patch.sigma_px, SHARED * diameter))
+        quality = MERGED_QUALITY * patch.quality
         return Dot(patch.x_px, patch.y_px, sigma, quality, "merged", patch.area_px, index)
-    parts = {k for k, one in enumerate(patches) if one.whole == patch.whole and patch.whole >= 0}
-    x, y = patch.whole_px if len(parts & set(told)) == 1 else (patch.x_px, patch.y_px)
-    hidden = max(0.0, 1.0 - patch.area_px / max(area_px, 1.0))
-    offset = _HIDDEN * hidden * float(np.sqrt(area_px)) if hidden > _HIDDEN_LEAST else 0.0
-    sigma = float(np.hypot(patch.sigma_px, offset))
-    return Dot(x, y, sigma, patch.quality, "seen", patch.area_px, index)
+    return seen_alone(told, index, patches, area_px, 1.0)

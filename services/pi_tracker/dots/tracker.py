@@ -19,6 +19,8 @@ from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.extend import extend
 from services.pi_tracker.dots.hypothesis import (
+    AREA_NOISE,
+    HIDDEN,
     Hypothesis,
     Patches,
     Surroundings,
@@ -38,6 +40,8 @@ _WORSE_NATS = 14.0
 _FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
 # At the start no dot is known better than to this share of the root of its area.
 _WANDER = 0.15
+# What is left of a patch's quality where several dots share it.
+MERGED_QUALITY = 0.3
 # A gap longer than this tells nothing of where dots have gone meanwhile.
 _LONGEST_GAP_S = 0.5
 
@@ -191,22 +195,29 @@ def _seen(
     patch = patches[index]
     if best.patch.count(index) > 1:
         x, y = expected_px
-        return Dot(x, y, sigma_px, 0.3 * agree * patch.quality, "merged", patch.area_px, index)
+        return Dot(
+            x, y, sigma_px, MERGED_QUALITY * agree * patch.quality, "merged", patch.area_px, index
+        )
+    return seen_alone(best.patch, index, patches, float(best.areas[number]), agree)
+
+
+def seen_alone(
+    told: Sequence[int], index: int, patches: Sequence[Patch], area_px: float, agree: float
+) -> Dot:
+    """The dot of a patch that no other dot shares.
+
+    told are all dots' patches, area_px is how large this dot is as a rule, agree the probability
+    that it is this one.
+    """
+    patch = patches[index]
     parts = {k for k, one in enumerate(patches) if one.whole == patch.whole and patch.whole >= 0}
-    alone = len(parts & set(best.patch)) == 1
-    x, y = patch.whole_px if alone else (patch.x_px, patch.y_px)
+    # A part of which the others are nobody's is no part.
+    x, y = patch.whole_px if len(parts & set(told)) == 1 else (patch.x_px, patch.y_px)
     # Hidden in part, its centre has moved, where to nobody knows.
-    hidden = max(0.0, 1.0 - patch.area_px / max(float(best.areas[number]), 1.0))
-    offset = 0.34 * hidden * float(np.sqrt(best.areas[number])) if hidden > 0.25 else 0.0
-    return Dot(
-        x,
-        y,
-        float(np.hypot(patch.sigma_px, offset)),
-        patch.quality * agree,
-        "seen",
-        patch.area_px,
-        index,
-    )
+    hidden = max(0.0, 1.0 - patch.area_px / max(area_px, 1.0))
+    offset = HIDDEN * hidden * float(np.sqrt(area_px)) if hidden > AREA_NOISE else 0.0
+    sigma = float(np.hypot(patch.sigma_px, offset))
+    return Dot(x, y, sigma, patch.quality * agree, "seen", patch.area_px, index)
 
 
 def _arrays(patches: Sequence[Patch]) -> Patches:
