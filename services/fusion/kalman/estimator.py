@@ -30,6 +30,7 @@ from services.fusion.kalman.frame_update import (
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
 from services.fusion.kalman.one_camera import LastLocated
 from services.fusion.kalman.recent_observations import alone_before
+from services.fusion.kalman.shape.carried_shape import carry_shape, no_shapes, note_shapes
 from services.fusion.kalman.telling import SEEN_FRAMES, empty_telling, tell
 from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
@@ -77,6 +78,8 @@ START_RESIDUAL = 4.0
 # A point this uncertain is of no use to anybody (the width of a hand); a track that young is not
 # shown yet. Of one that a single camera sees, across its ray: bones tell the solver the rest.
 SHOW_SIGMA_M = 0.05
+# A shape is carried where two cameras still see so many of its landmarks.
+ANCHORS = 2
 
 
 class KalmanMethod:
@@ -102,6 +105,7 @@ class KalmanMethod:
         """Forget all observations."""
         self._state = empty_state(self._hands, self._centres_rig, len(MODELS))
         self._located = LastLocated(sum(map(len, self._hands)))
+        self._shapes = no_shapes(sum(map(len, self._hands)))
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
@@ -208,8 +212,10 @@ class KalmanMethod:
         tell(self._state, time_s, self._seen_since_s, MODELS, told)
         means, covs, largest_sigma, seen_by, (found, measured, detected, alone) = told
         self._located.note(found & measured, means, time_s)
+        note_shapes(self._shapes, found & measured, means, covs, time_s)
         if not measured.all():
-            self._tell_alone(time_s, found & alone, seen_by, (means, covs, largest_sigma))
+            are = np.stack([found & alone, found & measured])
+            self._tell_alone(time_s, are, seen_by, (means, covs, largest_sigma))
             for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
                 # The middle one of three: the larger one across the ray.
                 if seen_by[row].any():
@@ -225,17 +231,42 @@ class KalmanMethod:
         )
 
     def _tell_alone(
-        self, time_s: float, alone: Bools, seen_by: Bools, told: tuple[Array, Array, Array]
+        self, time_s: float, are: Bools, seen_by: Bools, told: tuple[Array, Array, Array]
     ) -> None:
-        """What one camera sees alone (L,), by where two saw it last (one_camera.py).
+        """What one camera sees alone, by its ray, its hand's shape and where two saw it last.
 
-        told: means (L, 3), covariances (L, 3, 3) and largest sigmas (L,), changed in place.
+        are (2, L): seen by one alone; known by two. told: means (L, 3), covariances (L, 3, 3) and
+        largest sigmas (L,), changed in place.
         """
-        means, covs, largest_sigma = told
-        for row in np.flatnonzero(alone).tolist():
-            estimate = means[row], covs[row]
-            centre = self._centres_rig[int(seen_by[row].argmax())]
-            by_one = self._located.told(row, time_s, estimate, centre)
+        (alone, known), (means, covs, largest_sigma) = are, told
+        _, rest, _, shape = self._state
+        centres = self._centres_rig[seen_by.argmax(axis=1)]  # (L, 3)
+        filtered, needles = (means.copy(), covs.copy()), (means.copy(), covs.copy())
+        rows = np.flatnonzero(alone).tolist()
+        for row in rows:
+            estimate = filtered[0][row], filtered[1][row]
+            needle = self._located.needle(row, time_s, estimate, centres[row])
+            if needle is not None:
+                needles[0][row], needles[1][row] = needle
+        found = known | alone
+        for row in rows:
+            by_shape = np.empty(3), np.empty((3, 3))
+            estimate = filtered[0][row], filtered[1][row]
+            # Its size alone does not tell how far off a hand is whose fingers move.
+            anchored = np.count_nonzero(known & (rest.hand == rest.hand[row])) >= ANCHORS
+            if anchored and carry_shape(
+                self._shapes,
+                shape,
+                rest.hand,
+                row,
+                float(self._periods_s.min()),
+                found,
+                (time_s, *needles),
+                by_shape,
+            ):
+                by_one = self._located.held(row, time_s, by_shape, centres[row])
+            else:
+                by_one = self._located.told(row, time_s, estimate, centres[row])
             if by_one is not None:
                 means[row], covs[row] = by_one
                 largest_sigma[row] = np.sqrt(covs[row, [0, 1, 2], [0, 1, 2]].max())

@@ -19,8 +19,10 @@ from services.fusion.arrays import Bools
 # Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s, stop and go at 14 m/s^2),
 # one camera gone for 2 s.
 _RATE_M_S, _FARTHEST_M = 0.35, 0.12
-# The filter's own sigma along the ray is worth half in so long.
-_TRUST_S = 0.1
+# The filter's own sigma along the ray is worth half in so long; so it is where a shape is put.
+_TRUST_S, _NEEDLE_TRUST_S = 0.1, 0.05
+# A needle's sigma along its ray is no more than this: a hand stays before its camera.
+_NEEDLE_M = 1.0
 
 
 class LastLocated:
@@ -42,6 +44,49 @@ class LastLocated:
 
         estimate: the filter's. None if two cameras never saw it.
         """
+        worn = self._worn(row, time_s, estimate, centre_rig, _TRUST_S)
+        return self.held(row, time_s, worn, centre_rig)
+
+    def held(
+        self, row: int, time_s: float, estimate: tuple[Array, Array], centre_rig: Array
+    ) -> tuple[Array, Array] | None:
+        """As told, of an estimate that is as good as it says."""
+        return self._between(row, time_s, estimate, centre_rig, _RATE_M_S, _FARTHEST_M)
+
+    def needle(
+        self, row: int, time_s: float, estimate: tuple[Array, Array], centre_rig: Array
+    ) -> tuple[Array, Array] | None:
+        """As told, but with hardly anything said along the ray."""
+        worn = self._worn(row, time_s, estimate, centre_rig, _NEEDLE_TRUST_S)
+        return self._between(row, time_s, worn, centre_rig, np.inf, _NEEDLE_M)
+
+    def _worn(
+        self,
+        row: int,
+        time_s: float,
+        estimate: tuple[Array, Array],
+        centre_rig: Array,
+        trust_s: float,
+    ) -> tuple[Array, Array]:
+        """The filter's estimate, less sure along the ray the longer two cameras did not see it."""
+        position, cov = estimate
+        ray = position - centre_rig
+        along = ray / float(np.linalg.norm(ray))
+        age_s = max(time_s - self._times_s[row], 0.0)
+        if not np.isfinite(age_s):
+            return estimate
+        more = (1.0 + age_s / trust_s) ** 2 - 1.0
+        return position, cov + more * float(along @ cov @ along) * np.outer(along, along)
+
+    def _between(
+        self,
+        row: int,
+        time_s: float,
+        estimate: tuple[Array, Array],
+        centre_rig: Array,
+        rate_m_s: float,
+        farthest_m: float,
+    ) -> tuple[Array, Array] | None:
         age_s = time_s - self._times_s[row]
         distance = float(np.linalg.norm(self._positions[row] - centre_rig))
         if not (age_s >= 0.0 and np.isfinite(distance)):
@@ -50,8 +95,8 @@ class LastLocated:
         ray = position - centre_rig
         own = float(np.linalg.norm(ray))
         along = ray / own
-        own_variance = float(along @ cov @ along) * (1.0 + age_s / _TRUST_S) ** 2
-        held_variance = min(_RATE_M_S * age_s, _FARTHEST_M) ** 2 + 1e-6
+        own_variance = float(along @ cov @ along)
+        held_variance = min(rate_m_s * max(age_s, 1e-9), farthest_m) ** 2 + 1e-6
         variance = own_variance * held_variance / (own_variance + held_variance)
         told = variance * (own / own_variance + distance / held_variance)
         across = np.eye(3) - np.outer(along, along)
