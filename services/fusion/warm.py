@@ -23,6 +23,8 @@ from services.fusion.step import FusionStep
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
 # update of the clock offsets.
 _FRAMES = 8
+# From this one on one camera alone sees one of the markers.
+_ALONE_FROM = 4
 
 
 def warm_up(
@@ -39,7 +41,8 @@ def warm_up(
     for seq in range(_FRAMES):
         for n, camera in enumerate(cameras.values()):
             stamp_ns = 10**18 + round((seq + 0.3 * n) * 1e9 / 30.0)
-            messages += len(step.step(_frame(camera, seq, stamp_ns, point, config.colors)))
+            colors = config.colors[1:] if n and seq >= _ALONE_FROM else config.colors
+            messages += len(step.step(_frame(camera, seq, stamp_ns, point, colors)))
     # What only a pose that comes back, or some seconds of heights, would call.
     turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
     displaced_px(np.zeros(1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from services.fusion.alignment import offset_search
 from services.fusion.intake import ray_interpolation
 from services.fusion.kalman import frame_update, recent_observations, telling, track_history
+from services.fusion.kalman.shape import carried_shape
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
 from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
 from services.fusion.warm import warm_up
@@ -15,6 +16,8 @@ LIVE = (
     frame_update.drop_lost_tracks,
     recent_observations.alone_before,
     telling.tell,
+    carried_shape.carry_shape,
+    carried_shape.note_shapes,
     track_history.start_track,
     paint_to_bone._correct,
     hand_plausibility._coherent,
