@@ -30,7 +30,6 @@ from services.fusion.kalman.frame_update import (
 from services.fusion.kalman.motion_model import ACCELERATION_TIME_S
 from services.fusion.kalman.one_camera import LastLocated
 from services.fusion.kalman.recent_observations import alone_before
-from services.fusion.kalman.shape.carried_shape import carry_shape, no_shapes, note_shapes
 from services.fusion.kalman.telling import SEEN_FRAMES, empty_telling, tell
 from services.fusion.kalman.track_history import start_track
 from services.fusion.kalman.track_insertion import ACCEPTED, GATED, LATE
@@ -78,8 +77,6 @@ START_RESIDUAL = 4.0
 # A point this uncertain is of no use to anybody (the width of a hand); a track that young is not
 # shown yet. Of one that a single camera sees, across its ray: bones tell the solver the rest.
 SHOW_SIGMA_M = 0.05
-# A shape is carried where two cameras still see so many of its landmarks.
-ANCHORS = 2
 
 
 class KalmanMethod:
@@ -104,8 +101,7 @@ class KalmanMethod:
     def reset(self) -> None:
         """Forget all observations."""
         self._state = empty_state(self._hands, self._centres_rig, len(MODELS))
-        self._located = LastLocated(sum(map(len, self._hands)))
-        self._shapes = no_shapes(sum(map(len, self._hands)))
+        self._located = LastLocated(self._state.rest.hand)
 
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
@@ -211,10 +207,10 @@ class KalmanMethod:
         told = empty_telling(len(self._state.history.size), len(self._periods_s))
         tell(self._state, time_s, self._seen_since_s, MODELS, told)
         means, covs, largest_sigma, seen_by, (found, measured, detected, alone) = told
-        self._located.note(found & measured, means, time_s)
-        note_shapes(self._shapes, found & measured, means, covs, time_s)
+        located = found & measured
+        self._located.note(located, means, covs, time_s)
         if not measured.all():
-            are = np.stack([found & alone, found & measured])
+            are = found & alone, located
             self._tell_alone(time_s, are, seen_by, (means, covs, largest_sigma))
             for row in np.flatnonzero(found & ~measured & (largest_sigma > SHOW_SIGMA_M)).tolist():
                 # The middle one of three: the larger one across the ray.
@@ -231,45 +227,19 @@ class KalmanMethod:
         )
 
     def _tell_alone(
-        self, time_s: float, are: Bools, seen_by: Bools, told: tuple[Array, Array, Array]
+        self, time_s: float, are: tuple[Bools, Bools], seen_by: Bools, told: tuple[Array, ...]
     ) -> None:
-        """What one camera sees alone, by its ray, its hand's shape and where two saw it last.
+        """What one camera sees alone (one_camera.py).
 
-        are (2, L): seen by one alone; known by two. told: means (L, 3), covariances (L, 3, 3) and
+        are: seen by one alone, and by two, (L,) each. told: means (L, 3), covariances (L, 3, 3) and
         largest sigmas (L,), changed in place.
         """
-        (alone, known), (means, covs, largest_sigma) = are, told
-        _, rest, _, shape = self._state
+        means, covs, largest_sigma = told
         centres = self._centres_rig[seen_by.argmax(axis=1)]  # (L, 3)
-        filtered, needles = (means.copy(), covs.copy()), (means.copy(), covs.copy())
-        rows = np.flatnonzero(alone).tolist()
-        for row in rows:
-            estimate = filtered[0][row], filtered[1][row]
-            needle = self._located.needle(row, time_s, estimate, centres[row])
-            if needle is not None:
-                needles[0][row], needles[1][row] = needle
-        found = known | alone
-        for row in rows:
-            by_shape = np.empty(3), np.empty((3, 3))
-            estimate = filtered[0][row], filtered[1][row]
-            # Its size alone does not tell how far off a hand is whose fingers move.
-            anchored = np.count_nonzero(known & (rest.hand == rest.hand[row])) >= ANCHORS
-            if anchored and carry_shape(
-                self._shapes,
-                shape,
-                rest.hand,
-                row,
-                float(self._periods_s.min()),
-                found,
-                (time_s, *needles),
-                by_shape,
-            ):
-                by_one = self._located.held(row, time_s, by_shape, centres[row])
-            else:
-                by_one = self._located.told(row, time_s, estimate, centres[row])
-            if by_one is not None:
-                means[row], covs[row] = by_one
-                largest_sigma[row] = np.sqrt(covs[row, [0, 1, 2], [0, 1, 2]].max())
+        memory = self._state.shape, float(self._periods_s.min())
+        self._located.tell(time_s, are, centres, memory, (means, covs))
+        rows = np.flatnonzero(are[0])
+        largest_sigma[rows] = np.sqrt(np.einsum("nii->ni", covs[rows]).max(axis=1))
 
     def rest_probabilities(self) -> Array:
         """How likely each landmark (L,) rests in its hand, 0 to 1; rest/."""

@@ -15,8 +15,8 @@ COV = 1e-6 * np.eye(3) + 0.16 * np.outer(RAY, RAY)
 
 
 def located(time_s=1.0):
-    last = LastLocated(2)
-    last.note(np.array([True, False]), np.stack([PLACE, PLACE]), time_s)
+    last = LastLocated(np.zeros(2, dtype=np.int64))
+    last.note(np.array([True, False]), np.stack([PLACE, PLACE]), np.stack([COV, COV]), time_s)
     return last
 
 
@@ -40,6 +40,10 @@ def test_the_filter_counts_while_it_knows_better():
     assert np.sqrt(np.linalg.eigvalsh(cov)[2]) < 2e-3
 
 
-def test_nothing_is_told_of_what_two_cameras_never_saw():
-    assert located().told(1, 1.1, (PLACE, COV), CENTRE) is None
-    assert located(time_s=2.0).told(0, 1.0, (PLACE, COV), CENTRE) is None
+def test_what_two_cameras_never_saw_is_told_as_the_filter_has_it():
+    for place, cov in (
+        located().told(1, 1.1, (PLACE, COV), CENTRE),
+        located(time_s=2.0).told(0, 1.0, (PLACE, COV), CENTRE),
+    ):
+        assert np.array_equal(place, PLACE)
+        assert np.array_equal(cov, COV)

@@ -14,9 +14,10 @@ SURE = 1e-6 * np.eye(3)
 HIDDEN, SPAN_S = 3, 1.0 / 30.0
 HAND = np.zeros(4, dtype=np.int64)
 ALL = np.ones(4, dtype=np.bool_)
+LOCATED = np.array([True, True, True, False])
 
 
-def carried(age_s, found=ALL):
+def carried(age_s, located=LOCATED):
     """A hand moved and turned, of one landmark only its ray known: truth, place, covariance."""
     memory, shapes = empty_memory(4, np.zeros(3)), no_shapes(4)
     memory.deformed[:] = 0.0005**2
@@ -27,7 +28,8 @@ def carried(age_s, found=ALL):
     now[HIDDEN] += 0.1 * ray
     covs[HIDDEN] += 0.3**2 * np.outer(ray, ray)
     out = np.full(3, np.nan), np.full((3, 3), np.nan)
-    told = carry_shape(shapes, memory, HAND, HIDDEN, SPAN_S, found, (1.0 + age_s, now, covs), out)
+    are, lately = (located, ~LOCATED), (memory, SPAN_S)
+    told = carry_shape(shapes, lately, HAND, HIDDEN, are, (1.0 + age_s, now, covs), out)
     return told, truth[HIDDEN], *out
 
 
@@ -46,5 +48,5 @@ def test_it_is_less_sure_the_older_the_shape_is():
 
 
 def test_without_a_shape_or_with_too_few_landmarks_nothing_is_told():
-    assert not carried(0.1, found=np.array([True, False, False, True]))[0]
+    assert not carried(0.1, located=np.array([True, False, False, False]))[0]
     assert not carried(-0.1)[0]
