@@ -116,7 +116,7 @@ class Disparity(Table, frozen=True, kw_only=True):
 class Fusion(Table, frozen=True, kw_only=True):
     # "kalman": every observation at its own instant; "joint": the same, but all landmarks of a hand
     # in one filter; "triangulate" and "disparity": pair the views first.
-    method: Literal["kalman", "joint", "triangulate", "disparity"] = "kalman"
+    method: Literal["kalman", "joint", "triangulate", "disparity"] = "joint"
     # How paired methods bring views to one instant.
     pairing: Literal["hermite", "linear", "nearest"] = "hermite"
     # Of paired methods: what smooths their points.

@@ -14,6 +14,8 @@ from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.joint.hand_filter import HandFilter
+from services.fusion.kalman.one_camera import LastLocated
+from services.fusion.kalman.shape.kept_shape import empty_memory, learn_deformation
 from services.fusion.method import Counts, Estimates
 
 # A point this uncertain is of no use to anybody (the width of a hand).
@@ -35,6 +37,10 @@ class JointMethod:
         self.counts = Counts()
         self._rows = hands
         self._cameras = extrinsics(cameras)
+        self._centres_rig = np.array([camera.centre_rig for camera in cameras])  # (C, 3)
+        self._hand = np.zeros(sum(map(len, hands)), dtype=np.int64)  # (L,)
+        for number, rows in enumerate(hands):
+            self._hand[rows] = number
         self._periods_s = periods_s
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
@@ -42,6 +48,8 @@ class JointMethod:
 
     def reset(self) -> None:
         """Forget all observations."""
+        self._located = LastLocated(self._hand)
+        self._shape = empty_memory(self._hand.size, self._centres_rig.mean(axis=0))
         self._hands = [
             HandFilter(len(rows), self._cameras, self._hold_s, self._max_distance_m, self.counts)
             for rows in self._rows
@@ -77,18 +85,39 @@ class JointMethod:
             found[rows], places[rows], covs[rows] = hand.estimate(time_s)
             seen_by[rows] = time_s - hand.accepted_s <= since_s
             detected_by[rows] = time_s - hand.observed_s <= since_s
+        measured = seen_by.sum(axis=1) >= 2
+        self._tell_alone(time_s, found, seen_by, (places, covs))
         return Estimates(
-            found=found & _of_use(places, covs),
+            found=found & _of_use(places, covs, measured),
             positions_m=places,
             covariances_m2=covs,
             seen_by=seen_by,
-            measured=seen_by.sum(axis=1) >= 2,
+            measured=measured,
             detected=detected_by.sum(axis=1) >= 2,
         )
 
+    def _tell_alone(
+        self, time_s: float, found: Bools, seen_by: Bools, told: tuple[Array, Array]
+    ) -> None:
+        """What one camera sees alone, by where two saw it last; told (L, 3), (L, 3, 3) in place."""
+        cameras = seen_by.sum(axis=1)
+        located, alone = found & (cameras >= 2), found & (cameras == 1)
+        self._located.note(located, *told, time_s)
+        span_s = float(self._periods_s.min())
+        learn_deformation(self._shape, self._hand, located, told[0], time_s, span_s)
+        if alone.any():
+            centres = self._centres_rig[seen_by.argmax(axis=1)]  # (L, 3)
+            self._located.tell(time_s, (alone, located), centres, (self._shape, span_s), told)
 
-def _of_use(places: Array, covs: Array) -> Bools:
-    """Which points (L, 3), (L, 3, 3) are finite and certain enough to be told (L,)."""
-    largest = np.sqrt(np.maximum(np.einsum("nii->ni", covs).max(axis=1), 0.0))
-    finite = np.isfinite(places).all(axis=1)
-    return np.asarray(finite & (largest > 0.0) & (largest <= SHOW_SIGMA_M))
+
+def _of_use(places: Array, covs: Array, measured: Bools) -> Bools:
+    """Which points (L, 3), (L, 3, 3) are finite and certain enough to be told (L,).
+
+    What one camera sees (not measured, (L,)) may be unsure along its ray: bones tell the solver the
+    rest.
+    """
+    finite = np.isfinite(covs).reshape(len(covs), -1).all(axis=1)  # (L,)
+    finite = np.logical_and(finite, np.isfinite(places).all(axis=1))
+    variances = np.linalg.eigvalsh(np.where(finite.reshape(-1, 1, 1), covs, 0.0))  # (L, 3)
+    largest = np.where(measured, variances[:, 2], variances[:, 1])
+    return np.asarray(finite & (variances[:, 2] > 0.0) & (largest <= SHOW_SIGMA_M**2))

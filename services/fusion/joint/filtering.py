@@ -1,8 +1,9 @@
 """A node filtered from the one before it: all models predicted, gated, updated and weighed.
 
-Multiple-model adaptive estimation as in kalman/multiple_models.py, but a model is one motion of the
-whole hand, and it is weighed by all landmarks of a frame. A model that has been improbable for long
-goes on from the likeliest one's estimate. Compiled; nothing here raises.
+Multiple-model adaptive estimation: a model is one motion of the whole hand, weighed by all
+landmarks of a frame, beside which each landmark may move by itself (own_motion.py). A model that
+has been improbable for long goes on from the likeliest one's estimate. Compiled; nothing here
+raises.
 """
 
 from __future__ import annotations
@@ -14,24 +15,27 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
-from services.fusion.geometry.normal_equations import invert_symmetric
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.joint.history import HandHistory, make_room, nodes_until
-from services.fusion.joint.measurement import (
-    NOT_USED,
-    Innovation,
-    Look,
-    update,
-)
+from services.fusion.joint.measurement import Innovation, Look, apply, innovate, log_likelihood
 from services.fusion.joint.motion_models import (
     MotionModels,
+    SharedNoise,
     add_noise,
-    centred,
     predict_cov,
     predict_state,
-    transition,
     turn_gram,
+    update_way,
 )
+from services.fusion.joint.own_motion import (
+    LOOK_ABOVE,
+    add_own,
+    carried_on,
+    own_motion,
+    own_noise,
+    transitions,
+)
+from services.fusion.joint.rigid_motion import body_transform
 
 # Share of probability that leaks to the other models at each frame.
 LEAK = 0.003
@@ -51,7 +55,7 @@ OUT = 2
 START_SIGMAS = (0.3, 1.0, 10.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def filter_node(
     history: HandHistory, index: int, cameras: Extrinsics, models: MotionModels, gate: float
 ) -> None:
@@ -63,11 +67,17 @@ def filter_node(
     likeliest = int(np.argmax(history.probability[last]))
     gram = np.empty((3 * before.shape[0], 3 * before.shape[0]))
     turn_gram(history.state[last, likeliest], before, gram)
-    for m in range(models.rate.shape[0]):
+    shared = SharedNoise(gram, history.way[last])
+    Q = np.empty((3, 3))
+    for m in range(models.own.shape[0]):
         parent = likeliest if _goes_on_from(history, last, m, likeliest) else m
         history.parent[node, m] = parent
+        own = history.own[node, m]
+        for k in range(own.shape[0]):
+            own[k] = carried_on(history.own[last, parent, k], dt_s)
+            history.carried[node, m, k] = own[k]
         x, P = history.state[node, m], history.cov[node, m]
-        F = transition(models.rate[m], dt_s)
+        F = transitions(models, m, own, dt_s)
         if parent != m and models.walk[m] > 0.0:
             T = body_transform(history.state[last, parent], before)
             predict_state(T @ history.state[last, parent], F, x)
@@ -75,17 +85,25 @@ def filter_node(
         else:
             predict_state(history.state[last, parent], F, x)
             predict_cov(history.cov[last, parent], F, P)
-        add_noise(models, m, dt_s, gram, before, P)
+        add_noise(models, m, dt_s, shared, before, P)
+        own_noise(models, m, dt_s, Q)
+        for k in range(own.shape[0]):
+            if before[k] and own[k] > 0.0:
+                add_own(P, k, own[k], Q)
     _begin(history, node, before)
-    log_likelihoods = np.zeros(models.rate.shape[0])
-    for m in range(models.rate.shape[0]):
+    log_likelihoods = np.zeros(models.own.shape[0])
+    for m in range(models.own.shape[0]):
         history.strikes[node, m] = history.strikes[last, history.parent[node, m]]
-        log_likelihoods[m] = _update(history, node, m, cameras, gate)
+        own_noise(models, m, dt_s, Q)
+        log_likelihoods[m] = _update(history, node, m, cameras, gate, (Q, models.own[m]))
     _weigh(history, last, node, log_likelihoods)
+    likeliest = int(np.argmax(history.probability[node]))
+    alive, after = history.alive[node], history.way[node]
+    update_way(history.way[last], history.state[node, likeliest], alive, dt_s, after)
     _end(history, node)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _goes_on_from(history: HandHistory, last: int, m: int, likeliest: int) -> bool:
     """Whether a model gives its estimate up for the likeliest one's.
 
@@ -100,7 +118,7 @@ def _goes_on_from(history: HandHistory, last: int, m: int, likeliest: int) -> bo
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _begin(history: HandHistory, node: int, before: Bools) -> None:
     """Landmarks that begin at a node: nothing of what they were is left in any model."""
     axes = 3 * before.shape[0]
@@ -119,7 +137,7 @@ def _begin(history: HandHistory, node: int, before: Bools) -> None:
                     x[at] = history.motion[node, k, 3 * r + i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _end(history: HandHistory, node: int) -> None:
     """Landmarks that end with a node: no model holds anything of them."""
     count = history.alive.shape[1]
@@ -134,7 +152,7 @@ def _end(history: HandHistory, node: int) -> None:
                         history.cov[node, m, :, at] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def look_of(history: HandHistory, node: int, k: int, cameras: Extrinsics) -> Look:
     """The observation of landmark k in a node's frame."""
     camera = history.camera[node]
@@ -148,7 +166,7 @@ def look_of(history: HandHistory, node: int, k: int, cameras: Extrinsics) -> Loo
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def innovation_of(history: HandHistory, node: int, m: int, k: int) -> Innovation:
     """Model m's innovation by landmark k at a node; views, to read or to write."""
     return Innovation(
@@ -157,33 +175,57 @@ def innovation_of(history: HandHistory, node: int, m: int, k: int) -> Innovation
         history.nu[node, m, k],
         history.S_inverse[node, m, k],
         history.K[node, m, k],
+        history.distance[node, m, k : k + 1],
     )
 
 
-@njit(cache=True)
-def _update(history: HandHistory, node: int, m: int, cameras: Extrinsics, gate: float) -> float:
-    """Update a model by the looks within its gate; the log-likelihood of all."""
+@njit(cache=True, error_model="numpy")
+def _update(
+    history: HandHistory,
+    node: int,
+    m: int,
+    cameras: Extrinsics,
+    gate: float,
+    noise: tuple[Array, float],
+) -> float:
+    """Update a model by the looks within its gate; the log-likelihood of all.
+
+    Q (3, 3): noise of one axis for own motion of density 1 since the node before.
+    """
+    Q, usual = noise
     x, P = history.state[node, m], history.cov[node, m]
     clock = x.shape[0] - 1
     P[clock, clock] = history.clock_variance[node]
     total = 0.0
     for k in range(history.looked.shape[1]):
         history.used_by[node, m, k] = False
-        if history.looked[node, k] and history.alive[node, k]:
-            look = look_of(history, node, k, cameras)
-            log_likelihood = update(x, P, look, gate, innovation_of(history, node, m, k))
-            used = log_likelihood > NOT_USED
-            history.used_by[node, m, k] = used
-            if history.begins[node, k]:
-                history.strikes[node, m, k] = 0
-            if not used:
-                log_likelihood = STRAY - min(history.strikes[node, m, k], 3) * AGAIN
-            history.strikes[node, m, k] = 0 if used else history.strikes[node, m, k] + 1
-            total += log_likelihood
+        if not (history.looked[node, k] and history.alive[node, k]):
+            continue
+        look, innovation = look_of(history, node, k, cameras), innovation_of(history, node, m, k)
+        begins, strikes = history.begins[node, k], history.strikes[node, m, k]
+        stray = STRAY - (0 if begins else min(strikes, 3)) * AGAIN
+        determinant = innovate(x, P, look, innovation)
+        price = 0.0
+        if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
+            own = own_motion(look, innovation, determinant, Q, usual)
+            if own.log_likelihood > -1e300:
+                add_own(P, k, own.density, Q)
+                history.own[node, m, k] += own.density
+                price = own.price
+                determinant = innovate(x, P, look, innovation)
+        used = determinant > 0.0 and innovation.distance[0] <= gate
+        history.used_by[node, m, k] = used
+        if used:
+            total += log_likelihood(innovation, determinant) - price
+            apply(x, P, innovation)
+            history.strikes[node, m, k] = 0
+        else:
+            total += stray
+            history.strikes[node, m, k] = 1 if begins else strikes + 1
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _weigh(history: HandHistory, last: int, node: int, log_likelihoods: Array) -> None:
     """Bayes' rule over the models, by a frame's log-likelihoods (M,)."""
     prior, posterior = history.probability[last], history.probability[node]
@@ -201,56 +243,7 @@ def _weigh(history: HandHistory, last: int, node: int, log_likelihoods: Array) -
     history.used[node] = history.used_by[node, int(np.argmax(posterior))]
 
 
-@njit(cache=True)
-def body_projection(x: Array, alive: Bools) -> Array:
-    """The projection (3 N, 3 N) of landmarks' velocities onto those of a rigid body."""
-    count = alive.shape[0]
-    number = np.count_nonzero(alive)
-    arms = centred(x, alive)  # (N, 3)
-    inertia = np.zeros((3, 3))
-    for n in range(count):
-        for i in range(3):
-            for j in range(3):
-                inertia[i, j] -= arms[n, i] * arms[n, j]
-            inertia[i, i] += arms[n, 0] ** 2 + arms[n, 1] ** 2 + arms[n, 2] ** 2
-    inverse = np.zeros((3, 3))
-    if number < 3 or not invert_symmetric(inertia, inverse):
-        inverse[:] = 0.0
-    projection = np.zeros((3 * count, 3 * count))
-    left = np.zeros((3, 3))
-    right = np.zeros((3, 3))
-    for n in range(count):
-        _cross_matrix(arms[n], left)
-        for k in range(count):
-            if alive[n] and alive[k]:
-                _cross_matrix(arms[k], right)
-                block = left @ inverse @ right.T
-                for i in range(3):
-                    block[i, i] += 1.0 / number
-                projection[3 * n : 3 * n + 3, 3 * k : 3 * k + 3] = block
-    return projection
-
-
-@njit(cache=True)
-def _cross_matrix(v: Array, out: Array) -> None:
-    """[v]x (3, 3): out @ w = v x w."""
-    out[0, 1], out[0, 2] = -v[2], v[1]
-    out[1, 0], out[1, 2] = v[2], -v[0]
-    out[2, 0], out[2, 1] = -v[1], v[0]
-
-
-@njit(cache=True)
-def body_transform(x: Array, alive: Bools) -> Array:
-    """T (D, D): T x is the state (D,) whose landmarks move as one rigid body."""
-    axes = 3 * alive.shape[0]
-    projection = body_projection(x, alive)
-    T = np.eye(x.shape[0])
-    T[axes : 2 * axes, axes : 2 * axes] = projection
-    T[2 * axes : 3 * axes, 2 * axes : 3 * axes] = projection
-    return T
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def insert_frame(history: HandHistory, time_s: float, camera: int, clock_variance: float) -> int:
     """Room for a frame where it belongs in time; its index, or -1 if it is too late.
 
@@ -267,7 +260,7 @@ def insert_frame(history: HandHistory, time_s: float, camera: int, clock_varianc
     return index
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def filter_from(
     history: HandHistory, index: int, cameras: Extrinsics, models: MotionModels, gate: float
 ) -> None:
@@ -276,7 +269,7 @@ def filter_from(
         filter_node(history, later, cameras, models, gate)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def oldest_with(history: HandHistory, landmark: int, since_s: float) -> Ints:
     """Indices of nodes, none the first, that show a landmark at since_s or later."""
     found = np.zeros(history.size[0], dtype=np.int64)

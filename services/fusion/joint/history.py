@@ -45,12 +45,16 @@ class HandHistory(NamedTuple):
     strikes: Ints  # (NODES, M, N) how many of its latest looks in a row this model did not use
     probability: Array  # (NODES, M) of each model
     behind: Ints  # (NODES, M) how many frames it has been improbable
+    way: Array  # (NODES, 3 N, 3 N) mean of v v^T over recent velocities (motion_models.py)
+    own: Array  # (NODES, M, N) density of each landmark's own jerk in the step here (own_motion.py)
+    carried: Array  # (NODES, M, N) what of it was so before the frame's looks
     parent: Ints  # (NODES, M) the model whose estimate at the node before it was predicted from
     state: Array  # (NODES, M, D) filtered
     cov: Array  # (NODES, M, D, D)
     H: Array  # (NODES, M, N, 2, 3) Jacobian of the ray by the place, where one was used
     drift: Array  # (NODES, M, N, 2) Jacobian of the ray by the clock's error
     nu: Array  # (NODES, M, N, 2) the innovation
+    distance: Array  # (NODES, M, N) the innovation's squared Mahalanobis distance
     S_inverse: Array  # (NODES, M, N, 2, 2) inverse of its covariance
     K: Array  # (NODES, M, N, 2, D) Kalman gain, transposed
 
@@ -79,12 +83,16 @@ def empty_history(landmarks: int, models: int) -> HandHistory:
         strikes=np.zeros((*by_model, landmarks), dtype=np.int64),
         probability=np.full(by_model, 1.0 / models),
         behind=np.zeros(by_model, dtype=np.int64),
+        way=np.zeros((NODES, 3 * landmarks, 3 * landmarks)),
+        own=np.zeros((*by_model, landmarks)),
+        carried=np.zeros((*by_model, landmarks)),
         parent=np.zeros(by_model, dtype=np.int64),
         state=np.zeros((*by_model, size)),
         cov=np.zeros((*by_model, size, size)),
         H=np.zeros((*by_model, landmarks, 2, 3)),
         drift=np.zeros((*by_model, landmarks, 2)),
         nu=np.zeros((*by_model, landmarks, 2)),
+        distance=np.zeros((*by_model, landmarks)),
         S_inverse=np.zeros((*by_model, landmarks, 2, 2)),
         K=np.zeros((*by_model, landmarks, 2, size)),
     )
@@ -108,6 +116,8 @@ def start_history(history: HandHistory, time_s: float) -> None:
     history.behind[node] = 0
     history.strikes[node] = 0
     history.state[node] = 0.0
+    history.way[node] = 0.0
+    history.own[node] = 0.0
     history.cov[node] = 0.0
 
 

@@ -14,12 +14,8 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import project
 
-# Log-likelihood standing for a look that changed nothing: it is beyond the gate, or the camera
-# cannot see that point.
-NOT_USED = -1e300
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
@@ -41,10 +37,11 @@ class Innovation(NamedTuple):
     drift: Array  # (2,) by the clock's error: the ray's own velocity
     nu: Array  # (2,) measured minus predicted ray
     S_inverse: Array  # (2, 2) inverse of the innovation's covariance
-    K: Array  # (2, D) Kalman gain, transposed
+    K: Array  # (2, D) Kalman gain, transposed; before apply(), P H^T
+    distance: Array  # (1,) squared Mahalanobis distance
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def predict_ray(x: Array, look: Look, out: Innovation) -> bool:
     """H, drift and nu of a look, by a state (D,); False if it is not in front of the camera."""
     axes = (x.shape[0] - 1) // 3
@@ -65,40 +62,46 @@ def predict_ray(x: Array, look: Look, out: Innovation) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def update(x: Array, P: Array, look: Look, gate: float, out: Innovation) -> float:
-    """The posterior of a state (D,), (D, D), in place; the log-likelihood of the look.
+def innovate(x: Array, P: Array, look: Look, out: Innovation) -> float:
+    """The innovation of a look by a state (D,), (D, D); returns det(S).
 
-    NOT_USED, and nothing changed, if its squared Mahalanobis distance is beyond the gate or the
-    landmark is not in front of the camera.
+    Not positive, and no innovation of use, if the landmark is not in front of the camera.
     """
-    size = x.shape[0]
     if not predict_ray(x, look, out):
-        return NOT_USED
-    nu, S_inverse, K = out.nu, out.S_inverse, out.K
-    PHt = np.empty((2, size))
-    _cross_cov(P, look, out, PHt)
-    determinant = _invert_innovation_cov(PHt, look, out)
-    if not determinant > 0.0:
-        return NOT_USED
-    distance = (
-        nu[0] * nu[0] * S_inverse[0, 0]
-        + 2.0 * nu[0] * nu[1] * S_inverse[0, 1]
-        + nu[1] * nu[1] * S_inverse[1, 1]
-    )
-    if not distance <= gate:
-        return NOT_USED
+        return 0.0
+    _cross_cov(P, look, out, out.K)
+    determinant = _invert_innovation_cov(out.K, look, out)
+    if determinant > 0.0:
+        nu, S_inverse = out.nu, out.S_inverse
+        out.distance[0] = (
+            nu[0] * nu[0] * S_inverse[0, 0]
+            + 2.0 * nu[0] * nu[1] * S_inverse[0, 1]
+            + nu[1] * nu[1] * S_inverse[1, 1]
+        )
+    return determinant
+
+
+@njit(cache=True, error_model="numpy")
+def apply(x: Array, P: Array, innovation: Innovation) -> None:
+    """The posterior of a state (D,), (D, D) by an innovation, in place; K becomes the gain."""
+    nu, S_inverse, K = innovation.nu, innovation.S_inverse, innovation.K
+    size = x.shape[0]
+    PHt0, PHt1 = K[0].copy(), K[1].copy()
     for i in range(size):
-        K[0, i] = PHt[0, i] * S_inverse[0, 0] + PHt[1, i] * S_inverse[1, 0]
-        K[1, i] = PHt[0, i] * S_inverse[0, 1] + PHt[1, i] * S_inverse[1, 1]
-    for i in range(size):
+        K[0, i] = PHt0[i] * S_inverse[0, 0] + PHt1[i] * S_inverse[1, 0]
+        K[1, i] = PHt0[i] * S_inverse[0, 1] + PHt1[i] * S_inverse[1, 1]
         x[i] += K[0, i] * nu[0] + K[1, i] * nu[1]
-    PHt0, PHt1 = PHt[0], PHt[1]
     for i in range(size):
         row = P[i]
         K0, K1 = K[0, i], K[1, i]
         for j in range(size):
             row[j] -= K0 * PHt0[j] + K1 * PHt1[j]
-    return -0.5 * (distance + math.log(determinant)) - _LOG_2PI
+
+
+@njit(cache=True, error_model="numpy")
+def log_likelihood(innovation: Innovation, determinant: float) -> float:
+    """Of a look, by its innovation."""
+    return -0.5 * (innovation.distance[0] + math.log(determinant)) - _LOG_2PI
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,7 +125,7 @@ def _cross_cov(P: Array, look: Look, innovation: Innovation, PHt: Array) -> None
             PHt[1, j] += H1 * along
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
     """The inverse of S = H P H^T + noise, in place; returns det(S), not positive if singular."""
     axes = (PHt.shape[1] - 1) // 3
@@ -149,65 +152,44 @@ def _invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
 
 @njit(cache=True, error_model="numpy")
 def adjoint_update(
-    adjoint: Array, information: Array, landmark: int, delay_s: float, innovation: Innovation
-) -> None:
+    rows: Array, count: int, landmark: int, delay_s: float, innovation: Innovation
+) -> int:
     """The smoother's step back over one look, in place: from after its update to before it.
 
-    adjoint (D,): (I - K H)^T adjoint - H^T S^-1 nu.
-    information (D, D): (I - K H)^T information (I - K H) + H^T S^-1 H.
+    rows (n, D), of which count are known: the adjoint, and a factor G^T of the information G G^T.
+    Each row g becomes (I - K H)^T g; of the adjoint H^T S^-1 nu is taken off, and the information
+    gains H^T S^-1 H: two rows more. Returns how many are known then.
     """
-    S_inverse, nu, K = innovation.S_inverse, innovation.nu, innovation.K
-    size = adjoint.shape[0]
-    information_K = np.zeros((2, size))
-    w = np.empty(2)  # S^-1 nu + K^T adjoint
-    W = np.empty((2, 2))  # S^-1 + K^T information K
-    for i in range(size):
-        row = information[i]
-        K0, K1 = K[0, i], K[1, i]
-        for j in range(size):
-            information_K[0, j] += K0 * row[j]
-            information_K[1, j] += K1 * row[j]
-    for k in range(2):
-        w[k] = S_inverse[k, 0] * nu[0] + S_inverse[k, 1] * nu[1]
-        for n in range(2):
-            W[k, n] = S_inverse[k, n]
-            for j in range(size):
-                W[k, n] += K[k, j] * information_K[n, j]
-        for j in range(size):
-            w[k] += K[k, j] * adjoint[j]
-    where, rows = _nonzero_rows(landmark, delay_s, size, innovation)  # (10,), (10, 2)
-    for n in range(10):
-        i = where[n]
-        h0, h1 = rows[n, 0], rows[n, 1]
-        adjoint[i] -= h0 * w[0] + h1 * w[1]
-        row = information[i]
-        for j in range(size):
-            row[j] -= h0 * information_K[0, j] + h1 * information_K[1, j]
-    for j in range(size):
-        row = information[j]
-        for n in range(10):
-            row[where[n]] -= information_K[0, j] * rows[n, 0] + information_K[1, j] * rows[n, 1]
-    for n in range(10):
-        W0 = rows[n, 0] * W[0, 0] + rows[n, 1] * W[1, 0]
-        W1 = rows[n, 0] * W[0, 1] + rows[n, 1] * W[1, 1]
-        for k in range(10):
-            information[where[n], where[k]] += W0 * rows[k, 0] + W1 * rows[k, 1]
-
-
-@njit(cache=True)
-def _nonzero_rows(
-    landmark: int, delay_s: float, size: int, innovation: Innovation
-) -> tuple[Ints, Array]:
-    """Where the Jacobian (2, D) of a ray by the state is not zero (10,), and its values (10, 2)."""
+    H, drift, nu = innovation.H, innovation.drift, innovation.nu
+    S_inverse, K = innovation.S_inverse, innovation.K
+    size = rows.shape[1]
     axes = (size - 1) // 3
-    where = np.empty(10, dtype=np.int64)
-    rows = np.empty((10, 2))
-    by_order = (1.0, delay_s, 0.5 * delay_s * delay_s)
+    first = 3 * landmark
+    orders = (1.0, delay_s, 0.5 * delay_s * delay_s)
+    K0, K1 = K[0], K[1]
+    for n in range(count):
+        row = rows[n]
+        w0, w1 = 0.0, 0.0
+        for i in range(size):
+            w0 += K0[i] * row[i]
+            w1 += K1[i] * row[i]
+        if n == 0:
+            w0 += S_inverse[0, 0] * nu[0] + S_inverse[0, 1] * nu[1]
+            w1 += S_inverse[1, 0] * nu[0] + S_inverse[1, 1] * nu[1]
+        for r in range(3):
+            for i in range(3):
+                row[r * axes + first + i] -= orders[r] * (H[0, i] * w0 + H[1, i] * w1)
+        row[3 * axes] -= drift[0] * w0 + drift[1] * w1
+    # The Cholesky factor of S^-1.
+    L00 = math.sqrt(S_inverse[0, 0])
+    L10 = S_inverse[0, 1] / L00
+    L11 = math.sqrt(max(S_inverse[1, 1] - L10 * L10, 0.0))
+    rows[count : count + 2] = 0.0
     for r in range(3):
         for i in range(3):
-            where[3 * r + i] = r * axes + 3 * landmark + i
-            for k in range(2):
-                rows[3 * r + i, k] = by_order[r] * innovation.H[k, i]
-    where[9] = 3 * axes
-    rows[9] = innovation.drift
-    return where, rows
+            at = r * axes + first + i
+            rows[count, at] = orders[r] * (H[0, i] * L00 + H[1, i] * L10)
+            rows[count + 1, at] = orders[r] * H[1, i] * L11
+    rows[count, 3 * axes] = drift[0] * L00 + drift[1] * L10
+    rows[count + 1, 3 * axes] = drift[1] * L11
+    return count + 2

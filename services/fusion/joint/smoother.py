@@ -1,8 +1,9 @@
 """A hand's landmarks at any instant from all frames, before and after it.
 
-Fixed-interval smoothing by the modified Bryson-Frazier recursion, for each model by itself, as in
-kalman/smoother.py: no covariance is inverted, and none of a mixture is matched by a Gaussian on the
-way, which keeps it stable a frame or two back. Compiled; nothing here raises.
+Fixed-interval smoothing by the modified Bryson-Frazier recursion, for each model by itself: no
+covariance is inverted, and none of a mixture is matched by a Gaussian on the way, which keeps it
+stable a frame or two back. The information is kept as a factor, which grows by two rows a look.
+Compiled; nothing here raises.
 """
 
 from __future__ import annotations
@@ -12,24 +13,26 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools
-from services.fusion.joint.filtering import body_transform, innovation_of
+from services.fusion.joint.filtering import innovation_of
 from services.fusion.joint.history import HandHistory, nodes_until
 from services.fusion.joint.measurement import adjoint_update
 from services.fusion.joint.motion_models import (
     MotionModels,
+    SharedNoise,
     add_noise,
     adjoint_predict,
     predict_cov,
     predict_state,
-    transition,
     turn_gram,
 )
+from services.fusion.joint.own_motion import add_own, carried_on, own_noise, transitions
+from services.fusion.joint.rigid_motion import body_transform
 
 # Models less probable than this have no say in what is put out.
 _LEAST = 1e-3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def smooth_hand(
     history: HandHistory, models: MotionModels, time_s: float, places: Array, covs: Array
 ) -> Bools:
@@ -61,7 +64,7 @@ def smooth_hand(
     return history.alive[history.order[index - 1]].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _smooth_model(
     history: HandHistory,
     models: MotionModels,
@@ -72,81 +75,107 @@ def _smooth_model(
     covs: Array,
 ) -> None:
     """One model's places (N, 3) and covs (N, 3, 3) at time_s; nodes from `index` on are later."""
-    size = history.state.shape[2]
-    last = history.order[index - 1]
-    adjoint = np.zeros(size)
-    information = np.zeros((size, size))
-    own = m  # the model by which the state was predicted to time_s
+    size, count = history.state.shape[2], history.alive.shape[1]
+    # The adjoint, and a factor of the information: two rows a look.
+    rows = np.empty((1 + 2 * count * (history.size[0] - index), size))
+    rows[0] = 0.0
+    known = 1
+    ends = m  # the model by which the state was predicted from the last node to time_s
     for k in range(history.size[0] - 1, index - 1, -1):
-        node = history.order[k]
-        before = history.order[k - 1]
+        node, before = history.order[k], history.order[k - 1]
         before_s = time_s if k == index else history.time_s[before]
-        _adjoint_node(history, node, m, adjoint, information)
-        F = transition(models.rate[m], history.time_s[node] - before_s)
-        adjoint_predict(adjoint, information, F)
-        own, m = m, history.parent[node, m]
-        if own != m and k > index and models.walk[own] > 0.0:
+        known = _adjoint_node(history, node, m, rows, known)
+        dt_s = history.time_s[node] - before_s
+        adjoint_predict(rows, known, transitions(models, m, history.carried[node, m], dt_s))
+        ends, m = m, history.parent[node, m]
+        if ends != m and k > index and models.walk[ends] > 0.0:
             T = body_transform(history.state[before, m], history.alive[before])
-            adjoint[:] = T.T @ adjoint
-            information[:] = T.T @ information @ T
-    dt_s = time_s - history.time_s[last]
+            rows[:known] = rows[:known] @ T
     x = np.empty(size)
     P = np.empty((size, size))
-    F = transition(models.rate[own], dt_s)
+    _predict_between(history, models, index, (ends, m), time_s, x, P)
+    _combine(rows[:known], x, P, places, covs)
+
+
+@njit(cache=True, error_model="numpy")
+def _predict_between(
+    history: HandHistory,
+    models: MotionModels,
+    index: int,
+    model: tuple[int, int],
+    time_s: float,
+    x: Array,
+    P: Array,
+) -> None:
+    """The prediction x (D,), P (D, D) at time_s from the node before `index`; in place.
+
+    model: the one that predicts, and the one whose estimate at that node it goes on from.
+    """
+    ends, m = model
+    last = history.order[index - 1]
+    alive = history.alive[last]
+    dt_s = time_s - history.time_s[last]
+    count = alive.shape[0]
+    own, carried = np.empty(count), np.empty(count)
+    if index < history.size[0]:
+        node = history.order[index]
+        own[:] = history.own[node, ends]
+        carried[:] = history.carried[node, ends]
+    else:
+        for k in range(count):
+            own[k] = carried_on(history.own[last, m, k], dt_s)
+        carried[:] = own
+    F = transitions(models, ends, carried, dt_s)
     before_x, before_P = history.state[last, m], history.cov[last, m]
-    if own != m and models.walk[own] > 0.0:
-        T = body_transform(before_x, history.alive[last])
+    if ends != m and models.walk[ends] > 0.0:
+        T = body_transform(before_x, alive)
         before_x, before_P = T @ before_x, T @ before_P @ T.T
     predict_state(before_x, F, x)
     predict_cov(before_P, F, P)
-    gram = np.empty((size // 3, size // 3))
+    gram = np.empty((3 * count, 3 * count))
     likeliest = int(np.argmax(history.probability[last]))
-    turn_gram(history.state[last, likeliest], history.alive[last], gram)
-    add_noise(models, own, dt_s, gram, history.alive[last], P)
-    _apply(adjoint, information, x, P, places, covs)
+    turn_gram(history.state[last, likeliest], alive, gram)
+    add_noise(models, ends, dt_s, SharedNoise(gram, history.way[last]), alive, P)
+    Q = np.empty((3, 3))
+    own_noise(models, ends, dt_s, Q)
+    for k in range(count):
+        if alive[k] and own[k] > 0.0:
+            add_own(P, k, own[k], Q)
 
 
-@njit(cache=True)
-def _adjoint_node(
-    history: HandHistory, node: int, m: int, adjoint: Array, information: Array
-) -> None:
-    """Back over a frame: its looks, and the landmarks that began with it or ended."""
+@njit(cache=True, error_model="numpy")
+def _adjoint_node(history: HandHistory, node: int, m: int, rows: Array, known: int) -> int:
+    """Back over a frame: its looks, and the landmarks that began with it; how many rows known."""
     count = history.alive.shape[1]
     for k in range(count - 1, -1, -1):
         if history.used_by[node, m, k]:
             delay_s = history.delay_s[node, k]
-            adjoint_update(adjoint, information, k, delay_s, innovation_of(history, node, m, k))
+            known = adjoint_update(rows, known, k, delay_s, innovation_of(history, node, m, k))
     for k in range(count):
         if history.begins[node, k]:
             for r in range(3):
                 for i in range(3):
-                    at = 3 * count * r + 3 * k + i
-                    adjoint[at] = 0.0
-                    information[at] = 0.0
-                    information[:, at] = 0.0
+                    rows[:known, 3 * count * r + 3 * k + i] = 0.0
+    return known
 
 
 @njit(cache=True, error_model="numpy")
-def _apply(
-    adjoint: Array, information: Array, x: Array, P: Array, places: Array, covs: Array
-) -> None:
+def _combine(rows: Array, x: Array, P: Array, places: Array, covs: Array) -> None:
     """x - P adjoint and P - P information P of the places: (N, 3), (N, 3, 3)."""
-    size = x.shape[0]
-    product = np.empty((3, size))
+    known, size = rows.shape
+    product = np.empty((3, known))
     for k in range(places.shape[0]):
-        product[:] = 0.0
         for i in range(3):
             row = P[3 * k + i]
-            total = 0.0
-            for j in range(size):
-                total += row[j] * adjoint[j]
-                weight = row[j]
-                for n in range(size):
-                    product[i, n] += weight * information[j, n]
-            places[k, i] = x[3 * k + i] - total
+            for n in range(known):
+                total = 0.0
+                for j in range(size):
+                    total += row[j] * rows[n, j]
+                product[i, n] = total
+            places[k, i] = x[3 * k + i] - product[i, 0]
         for i in range(3):
             for j in range(3):
                 reduction = 0.0
-                for n in range(size):
-                    reduction += product[i, n] * P[3 * k + j, n]
+                for n in range(1, known):
+                    reduction += product[i, n] * product[j, n]
                 covs[k, i, j] = P[3 * k + i, 3 * k + j] - reduction

@@ -80,7 +80,12 @@ def _fit_round(
     x, P = prior.copy(), np.diag(np.append(np.repeat(np.square(START_SIGMAS), 3), 0.0))
     at = np.append(motion, 0.0)
     innovation = Innovation(
-        np.zeros((2, 3)), np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.zeros((2, 10))
+        np.zeros((2, 3)),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros((2, 2)),
+        np.zeros((2, 10)),
+        np.zeros(1),
     )
     chi_squared = 0.0
     for n in range(len(looks.time_s)):

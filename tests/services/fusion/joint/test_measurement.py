@@ -7,12 +7,12 @@ import pytest
 
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.joint.measurement import (
-    NOT_USED,
     Innovation,
     Look,
     adjoint_update,
+    apply,
+    innovate,
     predict_ray,
-    update,
 )
 from testing.synthetic_points import SyntheticRig
 
@@ -39,7 +39,12 @@ def state() -> tuple[np.ndarray, np.ndarray]:
 
 def empty() -> Innovation:
     return Innovation(
-        np.zeros((2, 3)), np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.zeros((2, SIZE))
+        np.zeros((2, 3)),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros((2, 2)),
+        np.zeros((2, SIZE)),
+        np.zeros(1),
     )
 
 
@@ -72,34 +77,49 @@ def test_update_is_the_dense_one(look, state):
     x, P = state
     innovation = empty()
     new_x, new_P = x.copy(), P.copy()
-    assert update(new_x, new_P, look, np.inf, innovation) > NOT_USED
+    determinant = innovate(new_x, new_P, look, innovation)
+    apply(new_x, new_P, innovation)
     H = dense_jacobian(innovation)
     S = H @ P @ H.T + look.ray_variance * np.eye(2)
     K = P @ H.T @ np.linalg.inv(S)
-    np.testing.assert_allclose(new_x, x + K @ innovation.nu, rtol=1e-9)
+    nu = innovation.nu
+    assert determinant == pytest.approx(np.linalg.det(S), rel=1e-6)
+    assert innovation.distance[0] == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-6)
+    np.testing.assert_allclose(new_x, x + K @ nu, rtol=1e-9)
     np.testing.assert_allclose(new_P, P - K @ S @ K.T, atol=1e-12)
 
 
-def test_what_is_beyond_the_gate_changes_nothing(look, state):
+def test_an_innovation_changes_nothing_by_itself(look, state):
     x, P = state
     new_x, new_P = x.copy(), P.copy()
-    assert update(new_x, new_P, look, 1e-6, empty()) == NOT_USED
+    innovate(new_x, new_P, look, empty())
     np.testing.assert_array_equal(new_x, x)
     np.testing.assert_array_equal(new_P, P)
+
+
+def test_what_is_behind_the_camera_gives_no_innovation(look, state):
+    x, P = state
+    x[3 * LANDMARK + 2] = -0.5
+    assert not innovate(x, P, look, empty()) > 0.0
 
 
 def test_adjoint_is_the_dense_one(look, state):
     x, P = state
     innovation = empty()
-    update(x, P.copy(), look, np.inf, innovation)
+    new_x, new_P = x.copy(), P.copy()
+    innovate(new_x, new_P, look, innovation)
+    apply(new_x, new_P, innovation)
     H = dense_jacobian(innovation)
     random = np.random.default_rng(2)
-    root = random.normal(size=(SIZE, SIZE))
-    adjoint, information = random.normal(size=SIZE), root @ root.T
+    factor = random.normal(size=(SIZE, SIZE))
+    adjoint, information = random.normal(size=SIZE), factor @ factor.T
     left = np.eye(SIZE) - innovation.K.T @ H
     expected = left.T @ adjoint - H.T @ innovation.S_inverse @ innovation.nu
     expected_information = left.T @ information @ left + H.T @ innovation.S_inverse @ H
-    adjoint_update(adjoint, information, LANDMARK, DELAY_S, innovation)
+    rows = np.empty((SIZE + 3, SIZE))
+    rows[0], rows[1 : SIZE + 1] = adjoint, factor.T
+    known = adjoint_update(rows, SIZE + 1, LANDMARK, DELAY_S, innovation)
+    assert known == SIZE + 3
     scale = np.abs(expected_information).max()
-    np.testing.assert_allclose(adjoint, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
-    np.testing.assert_allclose(information, expected_information, atol=1e-10 * scale)
+    np.testing.assert_allclose(rows[0], expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+    np.testing.assert_allclose(rows[1:].T @ rows[1:], expected_information, atol=1e-10 * scale)

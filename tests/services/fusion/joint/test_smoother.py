@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.joint.hand_filter import MODELS
-from services.fusion.joint.motion_models import add_noise, transition, turn_gram
+from services.fusion.joint.motion_models import SharedNoise, add_noise, turn_gram
+from services.fusion.joint.own_motion import add_own, own_noise, transitions
 
 
-def dense_transition(rate: float, dt_s: float, axes: int) -> np.ndarray:
-    F = transition(rate, dt_s)
-    one = np.array([[1.0, F.f01, F.f02], [0.0, F.f11, F.f12], [0.0, F.f21, F.f22]])
-    return np.kron(one, np.eye(axes))
+def dense_transition(m: int, carried: np.ndarray, dt_s: float) -> np.ndarray:
+    """F (54, 54) of six landmarks whose own motion is carried on (6,)."""
+    F = np.zeros((54, 54))
+    for k, (f01, f02, f11, f12, f21, f22) in enumerate(transitions(MODELS, m, carried, dt_s)):
+        one = np.array([[1.0, f01, f02], [0.0, f11, f12], [0.0, f21, f22]])
+        for r, c in np.ndindex(3, 3):
+            for i in range(3):
+                F[18 * r + 3 * k + i, 18 * c + 3 * k + i] = one[r, c]
+    return F
 
 
 def test_smoothed_as_rauch_tung_striebel(one_hand):
@@ -29,11 +35,8 @@ def test_smoothed_as_rauch_tung_striebel(one_hand):
     assert (history.parent[nodes[1:], m] == m).all()
     mean, cov = history.state[nodes[-1], m, :54], history.cov[nodes[-1], m, :54, :54]
     for k in range(len(nodes) - 2, len(nodes) - 5, -1):
-        F = dense_transition(
-            float(MODELS.rate[m]),
-            float(history.time_s[nodes[k + 1]] - history.time_s[nodes[k]]),
-            18,
-        )
+        dt_s = float(history.time_s[nodes[k + 1]] - history.time_s[nodes[k]])
+        F = dense_transition(m, history.carried[nodes[k + 1], m], dt_s)
         x, P = history.state[nodes[k], m, :54], history.cov[nodes[k], m, :54, :54]
         Q = _noise(history, nodes[k], nodes[k + 1], m)
         predicted = F @ P @ F.T + Q
@@ -54,5 +57,11 @@ def _noise(history, last, node, m):
     likeliest = int(np.argmax(history.probability[last]))
     turn_gram(history.state[last, likeliest], history.alive[last], gram)
     dt_s = float(history.time_s[node] - history.time_s[last])
-    add_noise(MODELS, m, dt_s, gram, history.alive[last], Q)
+    shared = SharedNoise(gram, history.way[last])
+    add_noise(MODELS, m, dt_s, shared, history.alive[last], Q)
+    one_axis = np.empty((3, 3))
+    own_noise(MODELS, m, dt_s, one_axis)
+    for k, density in enumerate(history.own[node, m].tolist()):
+        if density > 0.0:
+            add_own(Q, k, density, one_axis)
     return Q[:54, :54]

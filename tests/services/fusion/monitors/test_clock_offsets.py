@@ -147,9 +147,9 @@ def test_correction_is_worth_millimetres(run):
     _, tuned = run(setup, path, Fusion(lag_frames=2))
     _, plain = run(setup, path, Fusion(lag_frames=2, tune_clocks=False))
     # Even untuned, a claimed uncertainty of the clocks makes the filter distrust the direction of
-    # motion: 6 ms would be 16 mm otherwise.
-    assert tuned.rms_mm < 1.0
-    assert plain.rms_mm > 2.0
+    # motion, and a hand that keeps its shape tells its depth: 6 ms would be 16 mm otherwise.
+    assert tuned.rms_mm < 0.8
+    assert plain.rms_mm > 1.5 * tuned.rms_mm
 
 
 TRUE = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4)
