@@ -82,14 +82,22 @@ def predict(
 def _relax(posture: PosturePrior, values: Array, keep: float, keep_shared: float) -> Array:
     """K @ values for K = keep * identity + (keep_shared - keep) * synergies @ projection.
 
-    (20, n) -> (20, n).
+    (20, n) -> (20, n). In loops: sums of rows would each make a new one.
     """
-    out = keep * values
+    rows, columns = values.shape
+    out = np.empty((rows, columns))
+    for a in range(rows):
+        for n in range(columns):
+            out[a, n] = keep * values[a, n]
+    share = np.empty(columns)
     for m in range(2):
-        share = np.zeros(values.shape[1])
-        for a in range(20):
-            share += posture.projection[m, a] * values[a]
-        for a in range(20):
+        share[:] = 0.0
+        for a in range(rows):
+            for n in range(columns):
+                share[n] += posture.projection[m, a] * values[a, n]
+        for a in range(rows):
             if posture.synergies[a, m] != 0.0:
-                out[a] += (keep_shared - keep) * posture.synergies[a, m] * share
+                weight = (keep_shared - keep) * posture.synergies[a, m]
+                for n in range(columns):
+                    out[a, n] += weight * share[n]
     return out

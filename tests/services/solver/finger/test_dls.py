@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from rhot.geometry.transforms import rotation_from_quaternion
 from rhot.hand import default_hand
 from services.solver.finger import dls
-from services.solver.finger.dls_equations import COUPLED, POSE, POSITION, tip_goal
+from services.solver.finger.dls_equations import COUPLED, POSE, POSITION, Goal, tip_goal
 from services.solver.finger.outcome import NOT_CONVERGED, SOLVED, UNREACHABLE
 from services.solver.maths.chains import canonical_from_wrist, digit_chain, hand_chains
 from services.solver.maths.kinematics import tip_position
@@ -159,6 +159,23 @@ def test_nothing_leaves_the_limits(
     assert used <= 60
     assert state in (SOLVED, UNREACHABLE, NOT_CONVERGED)
     assert not np.isnan(left)
+
+
+def test_a_start_that_its_prior_holds_is_not_repeated(within: Callable) -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(200):
+        start = within(rng, INDEX.limits, False)
+        point = tip_position(INDEX, start) + rng.normal(0.0, 2e-3, 3)
+        goal = Goal(POSITION, point, np.eye(3), np.vstack([start, np.full(4, 0.5)]))
+        q = start.copy()
+        used, left, state = dls.solve(INDEX, goal, q, 200, 1e-9)
+        assert used <= 20
+        assert left > 1e-9
+        assert state == UNREACHABLE
+        # There was nothing to be found elsewhere.
+        other = within(rng, INDEX.limits, False)
+        dls.solve(INDEX, goal, other, 200, 1e-9)
+        np.testing.assert_allclose(other, q, atol=1e-4)
 
 
 def test_all_digits_at_once_are_each_alone(within: Callable) -> None:
