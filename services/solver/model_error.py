@@ -14,13 +14,12 @@ R is the fit's own, with the misfit that it learned: with a smaller one P H' R^-
 allows, and S grows without end where it should die away. Huber's weights and a rival's share of P
 do the same for some messages, so the gain is held to that bound (`_consistent_share`).
 Two cures go with that: landmarks are told to the fit no more precisely than the model is
-(`widened`), and a hand that was measured has small errors, one that is known exactly none.
+(`landmark_m2`), and a hand that was measured has small errors, one that is known exactly none.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -33,12 +32,7 @@ from services.solver.maths.chains import CHAINS, HandChains
 from services.solver.maths.kinematics import digit_frames
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MAX_GAP_S
-from services.solver.whole_hand.landmarks import (
-    Landmarks,
-    Observation,
-    Observations,
-    Observed,
-)
+from services.solver.whole_hand.landmarks import MAX_LISTS, Landmarks, Observations
 from services.solver.whole_hand.motion_prior import UNKNOWNS
 
 # First columns of b: the hand's size (1), its bones (15), the roots of its chains (15), then the
@@ -83,24 +77,18 @@ class ModelError:
         spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
         paint = [spread.tip_paint_m if name in TIPS else spread.dab_m for name in landmarks]
         self._chains = chains
-        # Added to each landmark's covariance (3, 3).
-        self._landmark_m2 = spread.landmark_m**2 * np.eye(3)
-        self._widens = spread.landmark_m > 0.0
+        # Added to each landmark's variance along each axis: it is known no better than the model
+        # knows where it sits.
+        self.landmark_m2 = spread.landmark_m**2
         self._column = {name: _PAINT + 3 * n for n, name in enumerate(landmarks)}
+        # The first columns of landmarks' paint, by their names.
+        self._columns: dict[tuple[str, ...], Integers] = {}
         self._sigmas = np.concatenate(
             [[spread.size], [spread.bone] * 15, [spread.root_m] * 15, np.ravel(paint)]
         )
         self._known_wrong = bool(self._sigmas.any())
         self._S = np.zeros((UNKNOWNS, len(self._sigmas)))
         self._stamp_ns = 0
-
-    def widened(self, observed: Mapping[str, Observation]) -> Observed:
-        """Landmarks known no better than the model knows where they sit."""
-        seen = Observed.of(observed)
-        if not self._widens:
-            return seen
-        wider_m2 = seen.covariances_m2 + self._landmark_m2
-        return Observed(seen.names, seen.points_m, wider_m2, seen.measured)
 
     def pose_variances(
         self,
@@ -118,7 +106,12 @@ class ModelError:
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
         is_gap = not 0.0 <= seconds <= MAX_GAP_S
-        columns = np.array([self._column[name] for name in names], dtype=np.int64)
+        columns = self._columns.get(names)
+        if columns is None:
+            columns = np.array([self._column[name] for name in names], dtype=np.int64)
+            # Names come from the network, in any order: the memory for them is bounded.
+            if len(self._columns) < MAX_LISTS:
+                self._columns[names] = columns
         return _considered(
             self._chains,
             observations,

@@ -13,23 +13,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import compress
 
-import numpy as np
-
 from rhot.files.config import RigConfig
+from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose, JointSource
-from services.solver.finger.solve_fingers import FingerSolution, solve_fingers, tips_in_wrist
-from services.solver.maths.kinematics import hand_frames
+from services.solver.finger.solve_fingers import DLS, solve_fingers, tips_in_wrist
 from services.solver.model_check import check_model
 from services.solver.model_error import ModelError
-from services.solver.pose_message import (
-    Skeleton,
-    hand_pose,
-    joint_sources,
-    pose_uncertainty,
-    rounded,
-    rounded_within_limits,
-)
+from services.solver.pose_message import hand_pose, joint_sources
+from services.solver.pose_numbers import dls_numbers, pose_numbers, rounded
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandTracker
 from services.solver.whole_hand.landmarks import Observed, hand_landmarks
@@ -77,56 +69,39 @@ class _Hand:
         self._model_error = ModelError(model, self.tracker.chains, self._landmarks)
         # By the landmarks that were measured.
         self._known_sources: dict[frozenset[str], list[JointSource]] = {}
-        self._radii: list[float] = rounded(joint_radii_m(model))
+        self._radii = [rounded(radius_m) for radius_m in joint_radii_m(model)]
 
     def step(self, points: HandPoints) -> HandPose | None:
-        observed = self._model_error.widened(usable_points(points, self._landmarks))
+        observed = usable_points(points, self._landmarks, self._model_error.landmark_m2)
         estimate = self.tracker.track(points.stamp_ns, observed)
         if estimate is None:
             return None
-        fingers = self._solve_fingers(estimate, observed)
-        limits = self.tracker.chains.limits_rad
         variances = self._model_error.pose_variances(
             points.stamp_ns, estimate, observed.names, self.tracker.fitted
         )
-        return hand_pose(
-            points,
-            self._settings.method,
-            self._skeleton(estimate, fingers, observed),
-            fingers,
-            pose_uncertainty(variances, limits),
-        )
+        numbers = self._numbers(estimate, observed, variances)
+        measured = frozenset(compress(observed.names, observed.measured.tolist()))
+        sources = self._sources(measured)
+        return hand_pose(points, self._settings.method, numbers, self._radii, sources)
 
-    def _solve_fingers(self, estimate: HandEstimate, observed: Observed) -> FingerSolution:
-        """The digits by the configured method, angles rounded as they go out."""
-        chains = self.tracker.chains
-        tips = tips_in_wrist(
-            estimate.rotation,
-            estimate.position_m,
+    def _numbers(self, estimate: HandEstimate, observed: Observed, variances: Array) -> Array:
+        """All numbers of the pose (32, 8), its digits by the configured method."""
+        settings, chains = self._settings, self.tracker.chains
+        wrist = estimate.rotation, estimate.position_m
+        tips = (
             self._landmarks.places(observed.names).tip,
             observed.points_m,
             observed.covariances_m2,
             observed.measured,
         )
-        found = solve_fingers(self._settings, chains, estimate.angles_rad, tips)
-        angles = rounded_within_limits(found.angles_rad, chains.limits_rad)
-        return FingerSolution(angles, found.residual_m, found.iterations, found.status)
-
-    def _skeleton(
-        self, estimate: HandEstimate, fingers: FingerSolution, observed: Observed
-    ) -> Skeleton:
-        """All joints at the estimate's wrist and the fingers' angles, and where each comes from."""
-        positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
-        hand_frames(
-            self.tracker.chains,
-            estimate.rotation,
-            estimate.position_m,
-            fingers.angles_rad,
-            positions,
-            rotations,
-        )
-        measured = frozenset(compress(observed.names, observed.measured.tolist()))
-        return Skeleton(positions, rotations, self._radii, self._sources(measured))
+        if settings.method == DLS:
+            options = settings.max_iterations, settings.tolerance_m
+            numbers = dls_numbers(chains, wrist, estimate.angles_rad, tips, options, variances)
+        else:
+            seen = tips_in_wrist(wrist, tips)
+            fingers = solve_fingers(settings, chains, estimate.angles_rad, seen)
+            numbers = pose_numbers(chains, wrist, fingers, variances)
+        return numbers
 
     def _sources(self, measured: frozenset[str]) -> list[JointSource]:
         """Where each joint comes from; the same few sets of landmarks come again and again."""

@@ -18,7 +18,7 @@ from services.solver.step import SolverStep
 
 
 def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
-    """Solve four messages of a made-up hand with the configured method."""
+    """Solve five messages of a made-up hand with the configured method, one with a stray point."""
     for name, model in hands.items():
         step = SolverStep(config, {name: model})
         angles = model.limits_rad.mean(axis=2)
@@ -40,3 +40,6 @@ def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
         )
         for seq in range(4):
             step.step(msgspec.structs.replace(points, seq=seq, stamp_ns=seq * 33_000_000))
+        first, *others = points.points
+        astray = msgspec.structs.replace(first, position_m=(5.0, 5.0, 5.0))
+        step.step(msgspec.structs.replace(points, seq=4, stamp_ns=10**9, points=[astray, *others]))

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +18,7 @@ from numba import njit
 from rhot.files.rig_tables import Solver
 from rhot.geometry.transforms import Array
 from services.solver.finger import analytic, dls, dls_paper, fabrik, fabrik_paper
-from services.solver.finger.outcome import NOT_CONVERGED, SOLVED, UNREACHABLE
+from services.solver.finger.outcome import NOT_SEEN, SOLVED
 from services.solver.finger.swing_limits import BOX
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import Chain, HandChains, canonical_from_wrist, digit_chain
@@ -28,15 +27,11 @@ from services.solver.maths.kinematics import tip_rotation
 
 Bools = npt.NDArray[np.bool_]
 # Of a tip: nobody saw it, fusion predicted it, a camera saw it.
-NOT_SEEN, PREDICTED, MEASURED = 0, 1, 2
+NOBODY, PREDICTED, MEASURED = 0, 1, 2
 # Iterations, distance left (m), outcome.
 Ending = tuple[int, float, int]
-Status = Literal["solved", "unreachable", "not_converged", "predicted"]
-STATUS_OF: dict[int, Status] = {
-    SOLVED: "solved",
-    UNREACHABLE: "unreachable",
-    NOT_CONVERGED: "not_converged",
-}
+# The method that solves all digits at once, compiled.
+DLS = "dls"
 
 # rad; how far dls trusts the whole-hand estimate's angles, against how far it trusts the painted
 # tip. A tip fixes three of four angles, and in a fist, when it lies on the axis of abduction, two:
@@ -54,35 +49,29 @@ class Tips(NamedTuple):
 
     points_m: Array  # (5, 3) wrist frame
     sigma_m: Array  # (5,) one standard deviation
-    seen: Integers  # (5,) NOT_SEEN, or who saw it
+    seen: Integers  # (5,) NOBODY, or who saw it
 
 
-@dataclass(frozen=True)
-class FingerSolution:
+class FingerSolution(NamedTuple):
     """All digits, in the order of DIGITS."""
 
     angles_rad: Array  # (5, 4) within limits
-    residual_m: list[float]  # distance left between painted tip and where it was seen
-    iterations: list[int]
-    status: list[Status]
+    # (5, 3) iterations, distance left between painted tip and where it was seen, and outcome.
+    ends: Array
+    status: Integers  # (5,) codes of outcome.py
 
 
 @njit(cache=True)
 def tips_in_wrist(
-    rotation: Array,
-    position_m: Array,
-    digits: Integers,
-    points_m: Array,
-    covariances_m2: Array,
-    measured: Bools,
+    wrist: tuple[Array, Array], landmarks: tuple[Integers, Array, Array, Bools]
 ) -> Tips:
-    """The tips among m landmarks in the wrist frame of a pose.
+    """The tips among m landmarks in the frame of a wrist (rotation (3, 3), position (3,)).
 
-    rotation (3, 3) and position_m (3,) of the wrist; digits (m,): whose tip a landmark is, -1 of
-    the others; points_m (m, 3), covariances_m2 (m, 3, 3) and measured (m,) in the rig frame, as
-    landmarks.Observed has them.
+    landmarks: digits (m,) whose tip each is, -1 of the others; points (m, 3), covariances (m, 3, 3)
+    and who was measured (m,) in the rig frame, as landmarks.Observed has them.
     """
-    tips = Tips(np.zeros((5, 3)), np.zeros(5), np.full(5, NOT_SEEN))
+    (rotation, position_m), (digits, points_m, covariances_m2, measured) = wrist, landmarks
+    tips = Tips(np.zeros((5, 3)), np.zeros(5), np.full(5, NOBODY))
     for n in range(digits.size):
         row = digits[n]
         if row >= 0:
@@ -101,32 +90,39 @@ def solve_fingers(
     Starts from the whole hand's angles start_rad (5, 4). Tips that no camera saw in this frame are
     solved for too, but called predicted. Points out of any camera's range are not tips.
     """
-    angles = start_rad.copy()
-    clamp_to_limits(angles.reshape(-1), chains.limits_rad.reshape(-1, 2))
-    targets = _targets(chains.lengths_m, *tips)
-    ends = np.zeros((5, 3))  # iterations, metres left, outcome
-    if settings.method == "dls":
-        dls.solve_digits(
-            chains, targets, angles, settings.max_iterations, settings.tolerance_m, ends
+    if settings.method == DLS:
+        found: FingerSolution = solve_dls(
+            chains, start_rad, tips, settings.max_iterations, settings.tolerance_m
         )
-    else:
-        for row in np.flatnonzero(targets.measured).tolist():
-            ends[row] = _solve_digit(settings, chains, row, targets.points_m[row], angles[row])
-    used, left_m, outcomes = ends.T.tolist()
-    seen = (tips.seen * targets.measured).tolist()
-    status = [
-        _status(*tip, settings.tolerance_m)
-        for tip in zip(seen, tips.sigma_m.tolist(), left_m, outcomes, strict=True)
-    ]
-    return FingerSolution(angles, left_m, [int(count) for count in used], status)
+        return found
+    angles, ends = start_rad.copy(), np.zeros((5, 3))
+    clamp_to_limits(angles.reshape(-1), chains.limits_rad.reshape(-1, 2))
+    targets = _targets(chains.lengths_m, tips)
+    for row in np.flatnonzero(targets.measured).tolist():
+        ends[row] = _solve_digit(settings, chains, row, targets.points_m[row], angles[row])
+    return FingerSolution(angles, ends, _statuses(tips, targets, ends, settings.tolerance_m))
 
 
 @njit(cache=True)
-def _targets(lengths_m: Array, points_m: Array, sigma_m: Array, seen: Integers) -> dls.TipTargets:
+def solve_dls(
+    chains: HandChains, start_rad: Array, tips: Tips, max_iterations: int, tolerance_m: float
+) -> FingerSolution:
+    """`solve_fingers` by damped least squares, for kernels."""
+    angles, ends = start_rad.copy(), np.zeros((5, 3))
+    for row in range(5):
+        clamp_to_limits(angles[row], chains.limits_rad[row])
+    targets = _targets(chains.lengths_m, tips)
+    dls.solve_digits(chains, targets, angles, max_iterations, tolerance_m, ends)
+    return FingerSolution(angles, ends, _statuses(tips, targets, ends, tolerance_m))
+
+
+@njit(cache=True)
+def _targets(lengths_m: Array, tips: Tips) -> dls.TipTargets:
     """The tips within range, and how strongly each digit's angles stay near the whole hand's."""
+    points_m, sigma_m, seen = tips
     targets = dls.TipTargets(np.zeros((5, 3)), np.zeros(5, np.int64), np.zeros(5))
     for row in range(5):
-        in_range = seen[row] != NOT_SEEN
+        in_range = seen[row] != NOBODY
         for i in range(3):
             in_range &= abs(points_m[row, i]) < _MAX_RANGE_M
         if in_range:
@@ -137,12 +133,15 @@ def _targets(lengths_m: Array, points_m: Array, sigma_m: Array, seen: Integers) 
     return targets
 
 
-def _status(seen: int, sigma_m: float, left_m: float, outcome: float, tolerance_m: float) -> Status:
-    """What became of a digit."""
-    if seen != MEASURED:
-        return "predicted"
-    reached = left_m <= max(tolerance_m, _REACHED_SIGMAS * sigma_m)
-    return "solved" if reached else STATUS_OF[int(outcome)]
+@njit(cache=True)
+def _statuses(tips: Tips, targets: dls.TipTargets, ends: Array, tolerance_m: float) -> Integers:
+    """What became of the digits; (5,) as in FingerSolution."""
+    status = np.full(5, NOT_SEEN)
+    for row in range(5):
+        if tips.seen[row] == MEASURED and targets.measured[row] != 0:
+            reached = ends[row, 1] <= max(tolerance_m, _REACHED_SIGMAS * tips.sigma_m[row])
+            status[row] = SOLVED if reached else int(ends[row, 2])
+    return status
 
 
 def _solve_digit(settings: Solver, chains: HandChains, row: int, point: Array, q: Array) -> Ending:

@@ -19,7 +19,7 @@ from services.solver.maths.kinematics import hand_frames
 
 Bools = npt.NDArray[np.bool_]
 # Lists of names whose places are remembered: fingers come and go.
-_MAX_LISTS = 256
+MAX_LISTS = 256
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Landmarks(dict[str, Landmark]):
         if known is None:
             known = self._placed(names)
             # Names come from the network, in any order: the memory for them is bounded.
-            if len(self._places) < _MAX_LISTS:
+            if len(self._places) < MAX_LISTS:
                 self._places[names] = known
         return known
 

@@ -10,6 +10,7 @@ equations.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 from numba import njit
@@ -49,8 +50,11 @@ _SIGMAS, _COVARIANCE = 0.0, 1.0
 _MEASURED, _PREDICTED, _ONE_CAMERA = 0.0, 1.0, 2.0
 
 
-def usable_points(points: HandPoints, landmarks: Landmarks) -> Observed:
-    """The points worth solving with, by landmark, in the order of the message."""
+def usable_points(points: HandPoints, landmarks: Landmarks, more_m2: float = 0.0) -> Observed:
+    """The points worth solving with, by landmark, in the order of the message.
+
+    more_m2: a variance along each axis beside that of measuring.
+    """
     seen: dict[str, HandPoint] = {}
     for point in points.points:
         # The first usable one of a name counts; nearly always there is one.
@@ -58,19 +62,17 @@ def usable_points(points: HandPoints, landmarks: Landmarks) -> Observed:
             point.name not in seen or not _usable(_rows([seen[point.name]]))[1][0]
         ):
             seen[point.name] = point
-    rows = _rows(list(seen.values()))
-    covariances, usable = _usable(rows)
-    names, positions = tuple(seen), rows[:, :3].copy()
-    measured = rows[:, 10] == _MEASURED
-    if not usable.all():
-        names = tuple(name for name, good in zip(names, usable.tolist(), strict=True) if good)
-        positions, covariances, measured = positions[usable], covariances[usable], measured[usable]
-    return _without_outliers(Observed(names, positions, covariances, measured), landmarks)
+    names, rows = tuple(seen), _rows(seen.values())
+    places = landmarks.places(names)
+    positions, covariances, measured, sound = _checked(rows, places.reach_m, more_m2)
+    if sound:
+        return Observed(names, positions, covariances, measured)
+    return _without_outliers(names, rows, landmarks, more_m2)
 
 
-def _rows(points: list[HandPoint]) -> Array:
+def _rows(points: Collection[HandPoint]) -> Array:
     """Points as numbers (n, 11): position, six of the covariance or sigmas, and what they are."""
-    rows = []
+    numbers: list[float] = []
     for point in points:
         kind, values = _COVARIANCE, point.covariance_m2
         if values is None:
@@ -79,8 +81,24 @@ def _rows(points: list[HandPoint]) -> Array:
         seen_by = _MEASURED
         if point.source == "predicted":
             seen_by = _ONE_CAMERA if len(point.cameras) == 1 else _PREDICTED
-        rows.append((*point.position_m, *values, kind, seen_by))
-    return np.array(rows, dtype=np.float64).reshape(-1, 11)
+        numbers += point.position_m
+        numbers += values
+        numbers += (kind, seen_by)
+    return np.array(numbers, dtype=np.float64).reshape(-1, 11)
+
+
+@njit(cache=True)
+def _checked(rows: Array, reach_m: Array, more_m2: float) -> tuple[Array, Array, Bools, bool]:
+    """Positions (n, 3), covariances (n, 3, 3), who is measured (n,), and whether all are sound.
+
+    Of points that reach so far (n,) from the wrist; the covariances with more_m2 along each axis.
+    """
+    covariances, usable = _usable(rows)
+    sound = bool(usable.all()) and _worst_outlier(rows[:, :3], covariances, reach_m) < 0
+    for n in range(rows.shape[0]):
+        for i in range(3):
+            covariances[n, i, i] += more_m2
+    return rows[:, :3].copy(), covariances, rows[:, 10] == _MEASURED, sound
 
 
 @njit(cache=True)
@@ -150,23 +168,34 @@ def _above_least(C: Array) -> bool:
     return a > 0.0 and minor > 0.0 and determinant > 0.0
 
 
-def _without_outliers(seen: Observed, landmarks: Landmarks) -> Observed:
-    """Drop, one at a time, the point that is further from most others than a hand is long."""
-    while len(seen) > 1:
-        reach_m = landmarks.places(seen.names).reach_m
-        worst = _worst_outlier(seen.points_m, seen.covariances_m2, reach_m)
+def _without_outliers(
+    names: tuple[str, ...], rows: Array, landmarks: Landmarks, more_m2: float
+) -> Observed:
+    """The usable ones, less, one at a time, the point that is further from most others than a hand
+    is long.
+    """
+    covariances, usable = _usable(rows)
+    kept = np.flatnonzero(usable)
+    while len(kept) > 1:
+        reach_m = landmarks.places(tuple(names[n] for n in kept)).reach_m
+        worst = _worst_outlier(rows[kept, :3], covariances[kept], reach_m)
         if worst < 0:
             break
-        kept = np.arange(len(seen)) != worst
-        names = tuple(name for n, name in enumerate(seen.names) if n != worst)
-        seen = Observed(names, seen.points_m[kept], seen.covariances_m2[kept], seen.measured[kept])
-    return seen
+        kept = np.delete(kept, worst)
+    return Observed(
+        [names[n] for n in kept],
+        rows[kept, :3],
+        covariances[kept] + more_m2 * np.eye(3),
+        rows[kept, 10] == _MEASURED,
+    )
 
 
 @njit(cache=True)
 def _worst_outlier(points: Array, covariances: Array, reach_m: Array) -> int:
     """Which of points (m, 3) is too far from most others, -1 if none is from any."""
     m = points.shape[0]
+    if m < 2:
+        return -1
     reach, conflicts = np.empty(m), np.zeros(m, np.int64)
     for n in range(m):
         trace = covariances[n, 0, 0] + covariances[n, 1, 1] + covariances[n, 2, 2]

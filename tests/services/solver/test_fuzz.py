@@ -64,10 +64,10 @@ def test_all_fingers(points: list, start: list[float], sigma: float, method: str
     tips = Tips(np.array(points), np.full(5, abs(sigma)), np.full(5, MEASURED))
     found = solve_fingers(Solver(method=method), CHAINS, np.array(start).reshape(5, 4), tips)
     assert _inside(found.angles_rad)
-    assert np.all(np.array(found.residual_m) < np.inf)
-    assert max(found.iterations) <= 3 * Solver().max_iterations
+    assert np.all(found.ends[:, 1] < np.inf)
+    assert found.ends[:, 0].max() <= 3 * Solver().max_iterations
     for point, status in zip(tips.points_m, found.status, strict=True):
-        assert status != "solved" or np.all(np.isfinite(point))
+        assert status != SOLVED or np.all(np.isfinite(point))
 
 
 @few

@@ -38,6 +38,17 @@ def test_good_points_pass(message: HandPoints, landmarks: dict[str, Landmark]) -
     np.testing.assert_allclose(observed["wrist"].covariance_m2, 1e-6 * np.eye(3))
 
 
+def test_more_is_added_along_each_axis(message: HandPoints, landmarks: dict[str, Landmark]) -> None:
+    moved = _replaced(message, 2, position_m=(5.0, 5.0, 5.0))
+    for told in (message, moved):  # all sound, and without an outlier
+        plain, wider = (usable_points(told, landmarks, more_m2) for more_m2 in (0.0, 4e-6))
+        assert list(plain) == list(wider)
+        for name, one in plain.items():
+            np.testing.assert_allclose(
+                wider[name].covariance_m2, one.covariance_m2 + 4e-6 * np.eye(3)
+            )
+
+
 @pytest.mark.parametrize("value", [1e300, -1e300, np.nan, np.inf, 11.0])
 def test_absurd_positions_are_dropped(
     message: HandPoints, landmarks: dict[str, Landmark], value: float
