@@ -102,14 +102,14 @@ PARTS: dict[str, Part] = {
     ),
     "systematic error": Part(
         "all of a marker's sigma is white noise",
+        # Of points without extent nothing is systematic.
         _replaced(
-            (SystematicError, "white_sigmas", lambda _self, view: view.sigmas),
-            (SystematicError, "covariances", lambda _self, p, _seen: np.zeros((len(p), 3, 3))),
+            (fusion_step, "SystematicError", lambda e, c: SystematicError(np.zeros_like(e), c))
         ),
     ),
     "plausibility": Part(
         "points need not belong together",
-        _replaced((fusion_step, "coherent", lambda _p, _covs, usable, *_: usable)),
+        _replaced((fusion_step, "hand_reach_m", lambda _model: np.inf)),
     ),
     "background": Part(
         "tracker: static colours are not learned",

@@ -24,7 +24,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.alignment.clock_alignment import ClockAlignment
-from services.fusion.arrays import Bools
+from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
 from services.fusion.joint.estimator import JointMethod
@@ -33,8 +33,8 @@ from services.fusion.method import Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
 from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
-from services.fusion.output.hand_plausibility import coherent, hand_reach_m
-from services.fusion.output.hand_points import PointMessages, usable_points
+from services.fusion.output.hand_plausibility import hand_reach_m
+from services.fusion.output.hand_points import PointMessages
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.paint_to_bone import Directions, PaintToBone
 from services.fusion.output.pose_feedback import PoseFeedback
@@ -71,11 +71,15 @@ class FusionStep:
         self._rows = {
             hand: np.flatnonzero(of_hand == hand) for hand in HANDS if hand in config.hand
         }
-        self._reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._poses: PoseFeedback[Directions] = PoseFeedback()
-        self._messages = PointMessages(self._landmarks, [one.name for one in self._cameras])
+        self._messages = PointMessages(
+            self._landmarks,
+            {hand: hand_reach_m(hands[hand]) for hand in self._rows},
+            [camera.name for camera in self._cameras],
+            extrinsics(self._cameras),
+        )
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         centres = np.array([camera.centre_rig for camera in self._cameras])
         self._hidden = HiddenPaint(centres, self._paint.round)
@@ -210,37 +214,20 @@ class FusionStep:
         positions, covariances = self._paint.correct(
             estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
         )
-        # Rows of landmarks that were not found hold no place.
-        self._hidden.note_places(np.where(estimates.found[:, None], positions, np.nan))
-        covariances += self._systematic.covariances(
-            positions, estimates.seen_by, self._hidden.sigmas
+        points_of, incoherent = self._messages.of(
+            estimates,
+            (positions, covariances),
+            (self._systematic.known, self._hidden.sigmas),
+            self._hidden.places,
         )
-        usable = usable_points(positions, covariances, estimates.found)
-        kept = self._coherent(positions, covariances, usable, estimates.detected)
+        self.method.counts.incoherent += incoherent
         stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
-        messages = []
-        for hand, rows in self._rows.items():
-            told_rows = rows[kept[rows]].tolist()
-            points = self._messages.of(told_rows, positions, covariances, estimates)
-            messages.append(HandPoints(hand=hand, seq=self._seq, stamp_ns=stamp_ns, points=points))
+        messages = [
+            HandPoints(hand=hand, seq=self._seq, stamp_ns=stamp_ns, points=points)
+            for hand, points in points_of.items()
+        ]
         self._seq += 1
         return messages
-
-    def _coherent(
-        self, positions: Array, covariances: Array, usable: Bools, detected: Bools
-    ) -> Bools:
-        """Which of the usable points (L,) can belong to their hand; the others are counted."""
-        kept = np.zeros_like(usable)
-        for hand, rows in self._rows.items():
-            kept[rows] = coherent(
-                positions[rows],
-                covariances[rows],
-                usable[rows],
-                detected[rows],
-                self._reach_m[hand],
-            )
-        self.method.counts.incoherent += int(np.count_nonzero(usable & ~kept))
-        return kept
 
 
 def _check(

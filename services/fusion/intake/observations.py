@@ -16,6 +16,7 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
@@ -23,7 +24,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandName
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.arrays import Ints
-from services.fusion.intake.undistortion import undistort
+from services.fusion.intake.undistortion import undistort_all
 
 # No blob's centre is known better than this (measured: .036 px is the best method's noise in the
 # best picture) nor useful beyond 20 px.
@@ -96,29 +97,27 @@ class ObservationBuilder:
             return FrameRejection.IMPLAUSIBLE_STAMP
         best = self._best_markers(frame, camera)
         landmarks = sorted(best)
-        markers = [best[landmark] for landmark in landmarks]
-        numbers = np.array([(one.x_px, one.y_px, one.sigma_px, one.area_px) for one in markers])
-        numbers = numbers.reshape(-1, 4)
-        pixels, sigmas_px, areas_px = numbers[:, :2], numbers[:, 2], numbers[:, 3]
-        rays, scale, valid = undistort(camera, pixels)
-        columns = (
-            np.array(landmarks, dtype=np.int64),
-            (pixels[:, 1] - middle_row) * frame.row_time_ns * 1e-9,
-            rays,
-            np.minimum(np.maximum(sigmas_px, SIGMA_MIN_PX), SIGMA_MAX_PX) * scale,
-            areas_px * scale**2,
+        numbers: list[float] = []
+        for landmark in landmarks:
+            marker = best[landmark]
+            numbers += (marker.x_px, marker.y_px, marker.sigma_px, marker.area_px)
+        of = np.array(landmarks, dtype=np.int64)
+        delay_s, rays, sigmas, areas, valid = _observed(
+            np.array(numbers), camera.matrix, camera.distortion, middle_row, frame.row_time_ns
         )
-        used = len(landmarks)
-        if not valid.all():
-            columns = tuple(column[valid] for column in columns)  # type: ignore[assignment]
-            used = int(np.count_nonzero(valid))
+        if len(valid) < len(of):
+            of = of[valid]
         return View(
             index,
             instant_ns,
-            *columns,
+            of,
+            delay_s,
+            rays,
+            sigmas,
+            areas,
             clock_offset_ns=frame.clock_offset_ns,
             clock_sigma_s=clock_sigma_s(frame.clock_sigma_ns),
-            ignored=self._count_of_hands(frame) - used,
+            ignored=self._count_of_hands(frame) - len(of),
         )
 
     def _count_of_hands(self, frame: MarkerFrame) -> int:
@@ -148,3 +147,26 @@ def clock_sigma_s(clock_sigma_ns: int) -> float:
     if clock_sigma_ns < 0:
         return CLOCK_SIGMA_MAX_S
     return min(clock_sigma_ns * 1e-9, CLOCK_SIGMA_MAX_S)
+
+
+@njit(cache=True)
+def _observed(
+    numbers: Array, matrix: Array, distortion: Array, middle_row: float, row_time_ns: float
+) -> tuple[Array, Array, Array, Array, Ints]:
+    """Delays, rays, sigmas and areas as in View, of markers that have a ray; and which do.
+
+    numbers (4 n,): x, y, sigma and area (px) of each marker.
+    """
+    markers = numbers.reshape(-1, 4)
+    n = markers.shape[0]
+    rays, scale, valid = np.empty((n, 2)), np.empty(n), np.empty(n, dtype=np.bool_)
+    undistort_all(markers, matrix, distortion, rays, scale, valid)
+    with_ray = np.flatnonzero(valid)
+    delay_s, sigmas, areas = np.empty(n), np.empty(n), np.empty(n)
+    for k in with_ray:
+        delay_s[k] = (markers[k, 1] - middle_row) * row_time_ns * 1e-9
+        sigmas[k] = min(max(markers[k, 2], SIGMA_MIN_PX), SIGMA_MAX_PX) * scale[k]
+        areas[k] = markers[k, 3] * scale[k] ** 2
+    if with_ray.size < n:
+        return delay_s[with_ray], rays[with_ray], sigmas[with_ray], areas[with_ray], with_ray
+    return delay_s, rays, sigmas, areas, with_ray

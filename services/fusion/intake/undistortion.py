@@ -42,14 +42,15 @@ def undistort(camera: Camera, pixels: Array) -> Undistorted:
     rays = np.empty((n, 2))
     scale = np.empty(n)
     valid = np.empty(n, dtype=np.bool_)
-    _undistort_all(pixels, camera.matrix, camera.distortion, rays, scale, valid)
+    undistort_all(pixels, camera.matrix, camera.distortion, rays, scale, valid)
     return Undistorted(rays, scale, valid)
 
 
 @njit(cache=True)
-def _undistort_all(
+def undistort_all(
     pixels: Array, matrix: Array, distortion: Array, rays: Array, scale: Array, valid: Bools
 ) -> None:
+    """`undistort` for kernels, into arrays of the caller."""
     for n in range(pixels.shape[0]):
         yd = (pixels[n, 1] - matrix[1, 2]) / matrix[1, 1]
         xd = (pixels[n, 0] - matrix[0, 2] - matrix[0, 1] * yd) / matrix[0, 0]

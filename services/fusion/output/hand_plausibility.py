@@ -33,22 +33,15 @@ def hand_reach_m(model: HandModel) -> float:
     )
 
 
+@njit(cache=True)
 def coherent(
-    positions_m: Array, covariances_m2: Array, found: Bools, detected: Bools, reach_m: float
+    positions: Array, covariances: Array, found: Bools, detected: Bools, reach_m: float
 ) -> Bools:
     """Which of one hand's points (n, 3), of those found (n,), form a hand of that reach.
 
     detected (n,) are the markers that two cameras detect. One or two points cannot be judged: they
     are kept.
     """
-    kept: Bools = _coherent(positions_m, covariances_m2, found, detected, reach_m)
-    return kept
-
-
-@njit(cache=True)
-def _coherent(
-    positions: Array, covariances: Array, found: Bools, detected: Bools, reach_m: float
-) -> Bools:
     kept = found.copy()
     rows = np.flatnonzero(found)
     if rows.size >= 3:

@@ -1,18 +1,25 @@
 """Located landmarks as the messages that go out: rounded, and without what is of no use.
 
-All numbers of a message are made in one compiled call; Python only puts them into messages.
+All numbers of all messages are made in one compiled call; Python only puts them into messages. What
+a call touches is cold by the next frame: many small ones cost more than what they compute.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.hand import HandName
 from rhot.messages import HandPoint, PointSource
-from services.fusion.arrays import Bools
+from services.fusion.arrays import Bools, Ints
+from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
+from services.fusion.output.hand_plausibility import coherent
+from services.fusion.output.systematic_error import Systematic, add_systematic
 
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
@@ -23,49 +30,108 @@ _PER_M2 = 1e13
 _ROWS, _COLUMNS = np.triu_indices(3)
 
 
-def usable_points(positions_m: Array, covariances_m2: Array, found: Bools) -> Bools:
-    """Which of the found points (L,) are numbers: positions (L, 3), covariances (L, 3, 3)."""
-    usable: Bools = _usable(positions_m, covariances_m2, found)
-    return usable
+class PointMessages:
+    """Makes the messages of L landmarks seen by C cameras."""
+
+    def __init__(
+        self,
+        landmarks: tuple[Landmark, ...],
+        reach_m: Mapping[HandName, float],
+        cameras: Sequence[str],
+        extrinsics: Extrinsics,
+    ) -> None:
+        """reach_m: of every hand, in the order of the messages (hand_plausibility.py)."""
+        self._names = [landmark.name for landmark in landmarks]
+        self._hands = list(reach_m)
+        self._cameras = cameras
+        self._extrinsics = extrinsics
+        hand_of = [self._hands.index(landmark.hand) for landmark in landmarks]
+        self._hand_of = np.array(hand_of, dtype=np.int64), np.array(list(reach_m.values()))
+        # Names of the cameras that see a landmark, by whether each does: few different lists.
+        self._seen_by: dict[tuple[bool, ...], list[str]] = {}
+
+    def of(
+        self,
+        estimates: Estimates,
+        centres: tuple[Array, Array],
+        errors: tuple[Systematic, Array],
+        places: Array,
+    ) -> tuple[dict[HandName, list[HandPoint]], int]:
+        """The points of every hand, and how many were left out as they do not belong to theirs.
+
+        centres: positions (L, 3) and covariances (L, 3, 3), changed in place; errors: what is to be
+        added to these, as in add_systematic; places (L, 3) gets the positions, NaN of what was not
+        found.
+        """
+        seen = estimates.found, estimates.seen_by, estimates.detected
+        numbers, kept, incoherent = _point_numbers(
+            centres, seen, self._hand_of, errors, self._extrinsics, places
+        )
+        points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
+        hands, seen_by = self._hand_of[0].tolist(), estimates.seen_by.tolist()
+        measured, rows = estimates.measured.tolist(), numbers.tolist()
+        for row in np.flatnonzero(kept).tolist():
+            point = self._point(row, rows[row], tuple(seen_by[row]), measured[row])
+            points[self._hands[hands[row]]].append(point)
+        return points, incoherent
+
+    def _point(
+        self, row: int, numbers: list[float], seen_by: tuple[bool, ...], measured: bool
+    ) -> HandPoint:
+        x, y, z, sx, sy, sz, *covariance = numbers
+        source: PointSource = "measured" if measured else "predicted"
+        cameras = self._seen_by.get(seen_by)
+        if cameras is None:
+            cameras = [name for name, sees in zip(self._cameras, seen_by, strict=True) if sees]
+            self._seen_by[seen_by] = cameras
+        return HandPoint(
+            name=self._names[row],
+            position_m=(x, y, z),
+            sigma_m=(sx, sy, sz),
+            cameras=cameras,
+            source=source,
+            covariance_m2=tuple(covariance),  # type: ignore[arg-type]
+        )
+
+
+@njit(cache=True)
+def _point_numbers(
+    centres: tuple[Array, Array],
+    seen: tuple[Bools, Bools, Bools],
+    hands: tuple[Ints, Array],
+    errors: tuple[Systematic, Array],
+    cameras: Extrinsics,
+    places: Array,
+) -> tuple[Array, Bools, int]:
+    """Numbers of points (L, 12), rounded, which of them to tell (L,), and how many are incoherent.
+
+    seen: found (L,), by which cameras (L, C), detected (L,). hands: whose a landmark is (L,), and
+    each one's reach. The others as in PointMessages.of.
+    """
+    (positions, covariances), (found, seen_by, detected) = centres, seen
+    places[:] = np.nan
+    for row in np.flatnonzero(found):
+        places[row] = positions[row]
+    add_systematic(errors[0], errors[1], positions, seen_by, cameras, covariances)
+    usable = _usable(positions, covariances, found)
+    kept = np.zeros_like(usable)
+    for hand in range(hands[1].size):
+        rows = np.flatnonzero(hands[0] == hand)
+        kept[rows] = coherent(
+            positions[rows], covariances[rows], usable[rows], detected[rows], hands[1][hand]
+        )
+    incoherent = int(np.count_nonzero(usable) - np.count_nonzero(kept))
+    return _rounded(positions, covariances), kept, incoherent
 
 
 @njit(cache=True)
 def _usable(positions: Array, covariances: Array, found: Bools) -> Bools:
+    """Which of the found points (L,) are numbers: positions (L, 3), covariances (L, 3, 3)."""
     usable = found.copy()
     for row in range(found.size):
         for i in range(3):
             usable[row] &= np.isfinite(positions[row, i]) and np.isfinite(covariances[row, i, i])
     return usable
-
-
-class PointMessages:
-    """Makes the messages of L landmarks seen by C cameras."""
-
-    def __init__(self, landmarks: tuple[Landmark, ...], cameras: list[str]) -> None:
-        self._names = [landmark.name for landmark in landmarks]
-        self._cameras = cameras
-
-    def of(
-        self, rows: list[int], positions_m: Array, covariances_m2: Array, estimates: Estimates
-    ) -> list[HandPoint]:
-        """Some landmarks' messages; positions (L, 3), covariances (L, 3, 3) as they go out."""
-        numbers = _rounded(positions_m, covariances_m2).tolist()
-        seen_by, measured = estimates.seen_by.tolist(), estimates.measured.tolist()
-        return [self._point(row, numbers[row], seen_by[row], measured[row]) for row in rows]
-
-    def _point(
-        self, row: int, numbers: list[float], seen_by: list[bool], measured: bool
-    ) -> HandPoint:
-        x, y, z, sx, sy, sz, *covariance = numbers
-        source: PointSource = "measured" if measured else "predicted"
-        return HandPoint(
-            name=self._names[row],
-            position_m=(x, y, z),
-            sigma_m=(sx, sy, sz),
-            cameras=[name for name, sees in zip(self._cameras, seen_by, strict=True) if sees],
-            source=source,
-            covariance_m2=tuple(covariance),  # type: ignore[arg-type]
-        )
 
 
 @njit(cache=True)

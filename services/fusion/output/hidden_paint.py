@@ -48,19 +48,16 @@ class HiddenPaint:
         """Time starts anew."""
         shape = (len(self._per_rad), len(self._centres))
         self._areas, self._seen_s = np.zeros(shape), np.full(shape, -np.inf)
-        # One standard deviation of each ray (L, C), and where each landmark was put last.
+        # One standard deviation of each ray (L, C); where each landmark is (L, 3), which whoever
+        # puts it there writes, NaN where that is unknown.
         self.sigmas = np.zeros(shape)
-        self._places = np.full((shape[0], 3), np.nan)
-
-    def note_places(self, positions_m: Array) -> None:
-        """Where the landmarks are (L, 3), NaN where that is unknown."""
-        self._places[:] = positions_m
+        self.places = np.full((shape[0], 3), np.nan)
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
         return _compare(
             (self._areas, self._seen_s, self.sigmas),
-            self._places,
+            self.places,
             self._centres,
             self._per_rad,
             (view.camera, time_s),

@@ -33,7 +33,7 @@ from numba import njit
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
-from rhot.hand import HandModel, HandName
+from rhot.hand import JOINT_INDEX, HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics, extrinsics
@@ -108,10 +108,10 @@ class PaintToBone:
         )
         offsets = np.array([paint.offset_m for paint in paints]).reshape(-1, 3)
         limbs_m = np.linalg.norm(offsets, axis=1)
-        # Which rows and names of each hand are extended.
-        self._extended_of: dict[HandName, list[tuple[int, str]]] = {
+        # Which rows of each hand are extended, with their names and the places of those in a pose.
+        self._extended_of: dict[HandName, list[tuple[int, str, int]]] = {
             hand: [
-                (row, landmark.name)
+                (row, landmark.name, JOINT_INDEX[landmark.name])
                 for row, landmark in enumerate(landmarks)
                 if landmark.hand == hand and self.extended[row]
             ]
@@ -146,21 +146,22 @@ class PaintToBone:
 
     def directions(self, pose: HandPose) -> Directions:
         """A solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
-        joints = {joint.name: joint for joint in pose.joints if joint.source != "predicted"}
         sigmas = {
             f"{finger.name}_tip": _direction_sigma(pose.wrist_sigma_rad, finger.sigma_rad)
             for finger in pose.fingers
         }
         rows, quaternions, sigmas_rad = [], [], []
-        for row, name in self._extended_of.get(pose.hand, []):
-            joint = joints.get(name)
-            if joint is not None and 0.4 < max(map(abs, joint.orientation_wxyz)) < 1.1:
+        for row, name, place in self._extended_of.get(pose.hand, []):
+            joint = pose.joints[place]
+            # A pose of another order of joints than OpenXR's tells nothing.
+            told = joint.name == name and joint.source != "predicted"
+            if told and 0.4 < max(map(abs, joint.orientation_wxyz)) < 1.1:
                 rows.append(row)
                 quaternions.append(joint.orientation_wxyz)
                 sigmas_rad.append(sigmas.get(name, 0.0))
-        told = np.array(rows, dtype=np.int64)
-        directions = turned_vectors(self._outwards[told], np.array(quaternions).reshape(-1, 4))
-        return Directions(pose.hand, pose.stamp_ns, told, directions, np.array(sigmas_rad))
+        of = np.array(rows, dtype=np.int64)
+        directions = turned_vectors(self._outwards[of], np.array(quaternions).reshape(-1, 4))
+        return Directions(pose.hand, pose.stamp_ns, of, directions, np.array(sigmas_rad))
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
@@ -263,7 +264,8 @@ def _correct(
 @njit(cache=True)
 def _locating(cameras: Extrinsics, seen_by: Bools) -> Extrinsics:
     """The cameras that locate a landmark: those that see it (C,), all where less than two do."""
-    if np.count_nonzero(seen_by) < 2:
+    count = np.count_nonzero(seen_by)
+    if count < 2 or count == seen_by.size:
         return cameras
     chosen = np.flatnonzero(seen_by)
     return Extrinsics(cameras.R[chosen], cameras.t[chosen])

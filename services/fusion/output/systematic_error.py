@@ -24,7 +24,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.normal_equations import invert_symmetric
-from services.fusion.geometry.projection import Extrinsics, extrinsics, project
+from services.fusion.geometry.projection import Extrinsics, project
 from services.fusion.intake.observations import View
 
 # What changes from frame to frame: this much of every marker, and this share of a large sigma
@@ -43,11 +43,12 @@ SHARED_SHARE = 0.14
 _NEW = 0.1
 
 
-class _Sigmas(NamedTuple):
-    """Systematic errors of a ray's coordinates."""
+class Systematic(NamedTuple):
+    """What is known of the systematic errors of L landmarks' rays in C cameras."""
 
-    shared: Array  # (L,) by all cameras
-    own: Array  # (L, C) each camera's
+    running: Array  # (L,) sigma of a marker, over its last views
+    own: Array  # (C,) each camera's error, where no paint is hidden
+    extended: Bools  # (L,) the landmark is paint of some size, not a point
 
 
 class SystematicError:
@@ -55,33 +56,18 @@ class SystematicError:
 
     def __init__(self, extended: Bools, cameras: tuple[Camera, ...]) -> None:
         """extended (L,): the landmark is paint of some size, not a point."""
-        self._extended = extended
-        self._extrinsics = extrinsics(cameras)
         # Normalised units per px in the middle of each camera's image.
         self._unit = np.array([1.0 / float(np.mean(camera.focal_px)) for camera in cameras])
-        self._own_sigmas = OWN_PX * self._unit  # (C,)
-        self._running_sigmas = np.zeros(len(extended))  # (L,)
+        self.known = Systematic(np.zeros(len(extended)), OWN_PX * self._unit, extended)
 
     def white_sigmas(self, view: View) -> Array:
         """The part of a view's sigmas (n,) that changes from frame to frame; and remember them."""
         white = np.empty(len(view.landmarks))
         white_floor = WHITE_PX * float(self._unit[view.camera])
         _split_sigmas(
-            self._running_sigmas, self._extended, view.landmarks, view.sigmas, white_floor, white
+            self.known.running, self.known.extended, view.landmarks, view.sigmas, white_floor, white
         )
         return white
-
-    def covariances(self, positions_m: Array, seen_by: Bools, hidden: Array) -> Array:
-        """What to add to the covariances of points (L, 3); (L, 3, 3) m^2.
-
-        seen_by (L, C) tells which cameras located them, hidden (L, C) how far each one's ray may be
-        off since paint is hidden from it (hidden_paint.py).
-        """
-        covs = np.zeros((len(positions_m), 3, 3))
-        own = np.hypot(self._own_sigmas, hidden)
-        sigmas = _Sigmas(SHARED_SHARE * self._running_sigmas, own)
-        _add_covariances(positions_m, seen_by, self._extended, sigmas, self._extrinsics, covs)
-        return covs
 
 
 @njit(cache=True)
@@ -102,19 +88,20 @@ def _split_sigmas(
 
 
 @njit(cache=True)
-def _add_covariances(
+def add_systematic(
+    known: Systematic,
+    hidden: Array,
     positions: Array,
     seen_by: Bools,
-    extended: Bools,
-    sigmas: _Sigmas,
     cameras: Extrinsics,
     covs: Array,
 ) -> None:
     """Add the covariances of points (L, 3) by their systematic errors to covs (L, 3, 3).
 
     Own errors: the covariance of the least-squares point of the cameras' rays. Shared ones: across
-    the first camera's optical axis. A point seen by fewer than two cameras counts as seen by all;
-    one without extent has none.
+    the first camera's optical axis. seen_by (L, C) tells which cameras located a point; one that
+    fewer than two did counts as seen by all; one without extent has none. hidden (L, C): how far
+    each ray may be off since paint is hidden from it (hidden_paint.py).
     """
     R, t = cameras
     A = np.empty((3, 3))  # H^T H / own^2, summed
@@ -122,7 +109,7 @@ def _add_covariances(
     ray = np.empty(2)
     H = np.empty((2, 3))
     for row in range(positions.shape[0]):
-        if not extended[row]:
+        if not known.extended[row]:
             continue
         p_rig = positions[row]
         by_all = np.count_nonzero(seen_by[row]) < 2
@@ -131,11 +118,13 @@ def _add_covariances(
         for c in range(R.shape[0]):
             if not (seen_by[row, c] or by_all) or not project(p_rig, R[c], t[c], ray, H):
                 continue
+            own = math.hypot(known.own[c], hidden[row, c])
             for i in range(3):
                 for j in range(3):
-                    A[i, j] += (H[0, i] * H[0, j] + H[1, i] * H[1, j]) / sigmas.own[row, c] ** 2
+                    A[i, j] += (H[0, i] * H[0, j] + H[1, i] * H[1, j]) / own**2
             if is_first:
-                _add_shared_error(p_rig, sigmas.shared[row], R[c], t[c], covs[row])
+                shared = SHARED_SHARE * known.running[row]
+                _add_shared_error(p_rig, shared, R[c], t[c], covs[row])
                 is_first = False
         if invert_symmetric(A, A_inverse):
             covs[row] += A_inverse

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from services.fusion.alignment import offset_search
-from services.fusion.intake import ray_interpolation
+from services.fusion.intake import observations, ray_interpolation
 from services.fusion.kalman import frame_update, recent_observations, telling, track_history
 from services.fusion.kalman.shape import carried_shape
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
-from services.fusion.output import hand_plausibility, hand_points, paint_to_bone
+from services.fusion.output import hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
@@ -20,10 +20,9 @@ LIVE = (
     carried_shape.note_shapes,
     track_history.start_track,
     paint_to_bone._correct,
-    hand_plausibility._coherent,
-    hand_points._usable,
-    hand_points._rounded,
+    hand_points._point_numbers,
     paint_to_bone.turned_vectors,
+    observations._observed,
     ray_interpolation._insert,
     epipolar_error._newest_error,
     moved_camera.displaced_px,

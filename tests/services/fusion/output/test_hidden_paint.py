@@ -27,7 +27,7 @@ AREA = (13.0 / 527.0) ** 2
 @pytest.fixture
 def paint() -> HiddenPaint:
     paint = HiddenPaint(CENTRES, np.array([True, False]))
-    paint.note_places(PLACES)
+    paint.places[:] = PLACES
     return paint
 
 
@@ -75,7 +75,7 @@ def test_a_nearer_camera_sees_more():
     """Twice as near is four times the area, and nothing is hidden of either."""
     centres = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.25]])
     paint = HiddenPaint(centres, np.array([True, False]))
-    paint.note_places(np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]]))
+    paint.places[:] = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
     paint.observe(look(1, 4.0, 4.0), 0.0)
     assert not paint.observe(look(0, 1.0, 1.0), 0.01).any()
     assert paint.observe(look(0, 0.5, 1.0), 0.02)[0] > 0.0
@@ -84,10 +84,10 @@ def test_a_nearer_camera_sees_more():
 def test_nothing_is_known_without_a_place():
     paint = HiddenPaint(CENTRES, np.array([True, False]))
     for places in (np.full((2, 3), np.nan), np.zeros((2, 3)), np.tile(CENTRES[1], (2, 1))):
-        paint.note_places(places)
+        paint.places[:] = places
         paint.observe(look(0, 1.0, 1.0), 0.0)
         assert not paint.observe(look(1, 0.2, 0.2), 0.01).any()
-    paint.note_places(PLACES)
+    paint.places[:] = PLACES
     assert not paint.observe(look(1, 0.0, 0.0), 0.02).any()
     paint.reset()
     assert not paint.sigmas.any()

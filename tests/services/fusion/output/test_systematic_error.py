@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools
+from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.output.systematic_error import (
     OWN_PX,
@@ -12,6 +15,7 @@ from services.fusion.output.systematic_error import (
     WHITE_PX,
     WHITE_SHARE,
     SystematicError,
+    add_systematic,
 )
 from testing.synthetic_points import SyntheticRig
 
@@ -44,6 +48,13 @@ def view(sigma_px: float, camera: int = 0) -> View:
     )
 
 
+def covariances(errors: SystematicError, points: Array, seen_by: Bools, hidden: Array) -> Array:
+    """What is added to the covariances of points; (2, 3, 3)."""
+    added = np.zeros((2, 3, 3))
+    add_systematic(errors.known, hidden, points, seen_by, extrinsics(CAMERAS), added)
+    return added
+
+
 def test_only_a_part_of_a_large_sigma_is_noise(errors):
     paint_px, point_px = errors.white_sigmas(view(0.3)) * FOCAL_PX
     assert paint_px == pytest.approx(np.hypot(WHITE_PX, 0.3 * WHITE_SHARE), rel=0.01)
@@ -55,33 +66,31 @@ def test_only_a_part_of_a_large_sigma_is_noise(errors):
 def test_own_errors_are_disparity_and_shared_ones_are_not(errors):
     for _ in range(100):
         errors.white_sigmas(view(0.2))
-    covariances = errors.covariances(POINTS, BOTH, WHOLE)
+    found = covariances(errors, POINTS, BOTH, WHOLE)
     depth_per_px = DISTANCE_M**2 / (FOCAL_PX * 0.075)
-    assert np.sqrt(covariances[0, 2, 2]) == pytest.approx(
-        np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02
-    )
+    assert np.sqrt(found[0, 2, 2]) == pytest.approx(np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02)
     across = np.hypot(SHARED_SHARE * 0.2, OWN_PX / np.sqrt(2.0)) * DISTANCE_M / FOCAL_PX
-    assert np.sqrt(covariances[0, 1, 1]) == pytest.approx(across, rel=0.03)
-    assert not covariances[1].any()
+    assert np.sqrt(found[0, 1, 1]) == pytest.approx(across, rel=0.03)
+    assert not found[1].any()
 
 
 def test_a_point_seen_by_one_camera_counts_as_seen_by_all(errors):
     one = np.array([[True, False], [True, False]])
     np.testing.assert_array_equal(
-        errors.covariances(POINTS, one, WHOLE), errors.covariances(POINTS, BOTH, WHOLE)
+        covariances(errors, POINTS, one, WHOLE), covariances(errors, POINTS, BOTH, WHOLE)
     )
 
 
 def test_points_behind_the_cameras_add_nothing_and_nan_nowhere(errors):
     errors.white_sigmas(view(0.2))
-    assert not errors.covariances(-POINTS, BOTH, WHOLE).any()
-    assert np.isfinite(errors.covariances(POINTS * 1e6, BOTH, WHOLE)).all()
+    assert not covariances(errors, -POINTS, BOTH, WHOLE).any()
+    assert np.isfinite(covariances(errors, POINTS * 1e6, BOTH, WHOLE)).all()
 
 
 def test_a_ray_that_paint_is_hidden_from_is_off_by_so_much(errors):
     hidden = WHOLE.copy()
     hidden[0, 1] = 2.0 / FOCAL_PX
-    more = errors.covariances(POINTS, BOTH, hidden) - errors.covariances(POINTS, BOTH, WHOLE)
+    more = covariances(errors, POINTS, BOTH, hidden) - covariances(errors, POINTS, BOTH, WHOLE)
     assert np.sqrt(more[0, 2, 2]) == pytest.approx(
         2.0 * DISTANCE_M**2 / (FOCAL_PX * 0.075), rel=0.02
     )
