@@ -47,6 +47,7 @@ class PointMessages:
         self._extrinsics = extrinsics
         hand_of = [self._hands.index(landmark.hand) for landmark in landmarks]
         self._hand_of = np.array(hand_of, dtype=np.int64), np.array(list(reach_m.values()))
+        self._hand_names = [landmark.hand for landmark in landmarks]
         # Names of the cameras that see a landmark, by whether each does: few different lists.
         self._seen_by: dict[tuple[bool, ...], list[str]] = {}
 
@@ -68,11 +69,11 @@ class PointMessages:
             centres, seen, self._hand_of, errors, self._extrinsics, places
         )
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
-        hands, seen_by = self._hand_of[0].tolist(), estimates.seen_by.tolist()
-        measured, rows = estimates.measured.tolist(), numbers.tolist()
+        seen_by, measured = estimates.seen_by.tolist(), estimates.measured.tolist()
+        rows = numbers.tolist()
         for row in np.flatnonzero(kept).tolist():
             point = self._point(row, rows[row], tuple(seen_by[row]), measured[row])
-            points[self._hands[hands[row]]].append(point)
+            points[self._hand_names[row]].append(point)
         return points, incoherent
 
     def _point(

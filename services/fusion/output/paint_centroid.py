@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.normal_equations import add_equation, solve_symmetric
+from services.fusion.geometry.normal_equations import invert_symmetric, multiply
 from services.fusion.geometry.projection import Extrinsics, project
 
 # Angles of the table, 0 to 180 deg: 3 deg apart, linear between them is right to 20 um for a 7 mm
@@ -112,20 +112,53 @@ def located_shift(
     direction (3,) is the finger's, towards its end, of unit length. Least squares over the cameras'
     rays. False if they cannot locate it.
     """
-    R, t = cameras
-    A = np.zeros((3, 3))  # H^T H, summed
-    b = np.zeros(3)  # H^T (shift of the ray), summed
-    ray = np.empty(2)
-    H = np.empty((2, 3))
-    seen_shift = np.empty(3)
-    for c in range(R.shape[0]):
-        if not project(p_rig, R[c], t[c], ray, H):
+    H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
+    if not _sights(p_rig, cameras, H, A_inverse):
+        return False
+    _least_squares(table, p_rig, direction, cameras, (H, A_inverse), work, shift)
+    return True
+
+
+@njit(cache=True)
+def _sights(p_rig: Array, cameras: Extrinsics, H: Array, A_inverse: Array) -> bool:
+    """What does not depend on a finger's direction: H (C, 2, 3) of the rays by a point p_rig (3,).
+
+    And the inverse of H^T H (3, 3), summed over the cameras. False if they cannot locate it.
+    """
+    A, ray = np.zeros((3, 3)), np.empty(2)
+    for c in range(H.shape[0]):
+        if not project(p_rig, cameras.R[c], cameras.t[c], ray, H[c]):
             return False
-        _seen_shift(table, p_rig, direction, R[c], t[c], seen_shift)
         for k in range(2):
-            ray_shift = H[k, 0] * seen_shift[0] + H[k, 1] * seen_shift[1] + H[k, 2] * seen_shift[2]
-            add_equation(H[k], ray_shift, A, b)
-    return solve_symmetric(A, b, shift)
+            for i in range(3):
+                for j in range(3):
+                    A[i, j] += H[c, k, i] * H[c, k, j]
+    return invert_symmetric(A, A_inverse)
+
+
+@njit(cache=True)
+def _least_squares(
+    table: Array,
+    p_rig: Array,
+    direction: Array,
+    cameras: Extrinsics,
+    sights: tuple[Array, Array],
+    work: Array,
+    shift: Array,
+) -> None:
+    """located_shift from what _sights found; work (2, 3) is written over."""
+    H, A_inverse = sights
+    b, seen_shift = work[0], work[1]
+    b[:] = 0.0  # H^T (shift of the ray), summed
+    for c in range(H.shape[0]):
+        _seen_shift(table, p_rig, direction, cameras.R[c], cameras.t[c], seen_shift)
+        for k in range(2):
+            ray_shift = (
+                H[c, k, 0] * seen_shift[0] + H[c, k, 1] * seen_shift[1] + H[c, k, 2] * seen_shift[2]
+            )
+            for i in range(3):
+                b[i] += H[c, k, i] * ray_shift
+    multiply(A_inverse, b, shift)
 
 
 @njit(cache=True)
@@ -145,22 +178,25 @@ def expected_shift(
     it.
     """
     direction, sigma_rad, radius_sd = finger
-    if not located_shift(table, p_rig, direction, cameras, shift):
+    H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
+    if not _sights(p_rig, cameras, H, A_inverse):
         return False
+    sights = H, A_inverse
+    _least_squares(table, p_rig, direction, cameras, sights, work, shift)
     covariance[:] = 0.0
     # The shift of a longer or shorter stretch of paint is the same to .1 mm, that of a thicker
     # finger larger in proportion.
     _add_square(shift, radius_sd**2, covariance)
     cosine, sine = math.cos(min(sigma_rad, 1.0)), math.sin(min(sigma_rad, 1.0))
-    across = np.empty((2, 3))
+    across, turned, tried = np.empty((2, 3)), np.empty(3), np.empty(3)
     _across(direction, across)
-    tried = np.empty(3)
     for n in range(4):
         sign = 1.0 if n < 2 else -1.0
-        turned = cosine * direction + sign * sine * across[n % 2]
-        if not located_shift(table, p_rig, turned, cameras, tried):
-            return False
-        _add_square(tried - shift, 0.5, covariance)
+        for i in range(3):
+            turned[i] = cosine * direction[i] + sign * sine * across[n % 2, i]
+        _least_squares(table, p_rig, turned, cameras, sights, work, tried)
+        tried -= shift
+        _add_square(tried, 0.5, covariance)
     return True
 
 
