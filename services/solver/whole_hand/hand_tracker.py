@@ -9,6 +9,7 @@
   explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
   won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
 - What fits cost says how far the hand model is to be believed (model_misfit.py).
+- What is told follows what is believed no faster than a hand moves (glide.py).
 - The hand is forgotten after a gap in the stamps of more than a second, when stamps run backwards,
   and after a second with fewer than three landmarks.
 """
@@ -24,6 +25,7 @@ from rhot.hand import TIPS, HandModel
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
+from services.solver.whole_hand.glide import Told
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.initialise import Hypothesis, initialise
 from services.solver.whole_hand.landmarks import (
@@ -68,6 +70,8 @@ class HandTracker:
         self._landmarks = landmarks
         self._uninformed = uninformed_prior(self._posture)
         self._estimate: HandEstimate | None = None
+        # What was told last.
+        self._told: Told | None = None
         self._stamp_ns = 0
         # When there last were enough landmarks.
         self._located_ns = 0
@@ -100,14 +104,23 @@ class HandTracker:
         observations = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
         self.fitted = observations
         if self._estimate is None:
-            own = self._initialise(observations)
+            own, self._told = self._initialise(observations), None
         else:
             own = self._follow(self._estimate, seconds, observations)
             if self._restart_due(own, frozenset(observed.names)):
                 self._to_challenge = own, observations
         self._misfit_m2 = learned_misfit(self._misfit_m2, observations.whitening, own.cost, seconds)
         self._estimate, self._stamp_ns = own, stamp_ns
-        return own if self._rival is None else self._rival.told(own)
+        return self._tell(own if self._rival is None else self._rival.told(own), observed, seconds)
+
+    def _tell(self, believed: HandEstimate, observed: Observed, seconds: float) -> HandEstimate:
+        """What is told of what is believed: the same, unless it jumped."""
+        if self._told is None:
+            self._told = Told(believed, observed.names, observed.points_m)
+        else:
+            limits_rad = self.chains.limits_rad
+            self._told = self._told.then(believed, observed.names, self.fitted, limits_rad, seconds)
+        return self._told.estimate
 
     @property
     def challenge_due(self) -> bool:

@@ -1,4 +1,5 @@
-"""No jump without motion: recorded hands with all their points, right and wrong bones, thinned out.
+"""No jump without motion: recorded hands with all their points, right and wrong bones, thinned out,
+exact and with a millimetre of noise. `benchmarks/solver_jumps.py` has more of it, and gaps.
 
 A jump is a change of more than 20 deg between two messages, of the wrist's orientation or of any
 joint, beyond what the recording itself does.
@@ -52,12 +53,18 @@ def _turns(rotations: Array) -> Array:
     return np.array([angle_between(a, b) for a, b in itertools.pairwise(rotations)])
 
 
-@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize(("every", "noise_m"), [(1, 0.0), (4, 0.0), (2, 1e-3)])
 @pytest.mark.parametrize("bones", ["own", "tables"])
 @pytest.mark.parametrize("marker", list(BEHIND_M))
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_no_jump_without_motion(
-    rhot_data: Path, angles_of: Callable, name: str, marker: str, bones: str, every: int
+    rhot_data: Path,
+    angles_of: Callable,
+    name: str,
+    marker: str,
+    bones: str,
+    every: int,
+    noise_m: float,
 ) -> None:
     recorded = load_recording(rhot_data / f"hand_motion/leap/{name}.csv")
     assert isinstance(recorded, RecordedJoints)
@@ -67,18 +74,21 @@ def test_no_jump_without_motion(
     palm_m = hand.rotations[0].T @ (recorded.origin_m[0] - hand.wrist_m[0])
     step = SolverStep(RigConfig(), {hand.hand: _models(hand, palm_m, marker)[bones]})
     markers_m = recorded.origin_m + BEHIND_M[marker] * recorded.axes[:, :, 2]
+    noise = np.random.default_rng([1, 5]).normal(0.0, noise_m, (len(markers_m), 6, 3))
     poses = []
     for frame, time_s in enumerate(hand.times_s):
         tips = zip((f"{d}_tip" for d in DIGITS), recorded.joints_m[frame, :, 3], strict=True)
         points = [
             HandPoint(
                 name=landmark,
-                position_m=tuple(place.tolist()),
+                position_m=tuple((place + off).tolist()),
                 sigma_m=(1e-3,) * 3,
                 cameras=[],
                 source="measured",
             )
-            for landmark, place in (("wrist", markers_m[frame]), *tips)
+            for (landmark, place), off in zip(
+                (("wrist", markers_m[frame]), *tips), noise[frame], strict=True
+            )
         ]
         stamp_ns = 10**18 + round(1e9 * time_s)
         poses.append(step.step(HandPoints(hand=hand.hand, seq=0, stamp_ns=stamp_ns, points=points)))
