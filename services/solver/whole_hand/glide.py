@@ -25,9 +25,10 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS
 from services.solver.whole_hand.residuals import Pose
 
 # How fast the wrist turns and a joint bends at most where no landmark moves. Tuning half of
-# benchmarks/solver_jumps.py with eight seeds of noise, jumps: none held back 57, 400 deg/s of turn
-# 2, 300 1, 200 0; bends at 150 deg/s as at 200. Errors on simulated gestures, played once to four
-# times as fast: 4.80 deg of flexion and 3.12 of orientation without, 4.80 and 3.11 with this.
+# benchmarks/solver_jumps.py, recordings with their own bones, eight seeds of noise, jumps: 3 with
+# nothing held back, 2 at 400 deg/s of turn, 1 at 300, 0 at 200; bends at 150 deg/s as at 200.
+# Errors on simulated gestures, played once to four times as fast: 4.80 deg of flexion and 3.12 of
+# orientation without, 4.80 and 3.11 with this.
 _TURN_RAD_S, _BEND_RAD_S = np.deg2rad([200.0, 200.0])
 # A joint that bends by 1 rad moves its tip by about so much, from the last bone's 20 mm to a whole
 # finger's 80. At 20 mm a millimetre of noise at 30 Hz allows for 15 deg.

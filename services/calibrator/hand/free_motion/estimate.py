@@ -18,6 +18,7 @@ from rhot.hand import HandModel
 from services.calibrator.hand.free_motion.frames import Seen
 from services.calibrator.hand.free_motion.marginal import (
     ALIKE,
+    ALIKE_TOLD,
     HandEquations,
     Plausibility,
     hand_equations,
@@ -104,7 +105,9 @@ def estimate_hand(
             hand = _hand(parameters, now, found.x)
             at = plausibility(hand, found.x, frames, at.poses, _SPREAD_ROUNDS)
         found = _climb(parameters, now, frames, found.x, at.poses)
-    covariance = ALIKE * np.asarray(np.linalg.inv(found.equations.A), dtype=np.float64)[:p, :p]
+    # The information, with the tables' part of it as for frames that count for less.
+    told = found.equations.A + (ALIKE_TOLD - ALIKE) * np.eye(len(found.x))
+    covariance = ALIKE_TOLD * np.asarray(np.linalg.inv(told), dtype=np.float64)[:p, :p]
     seen_coordinates = 3 * int((frames.weights[:, :, 0, 0] > 0.0).sum())
     missing = frames.weights[:, :, :1, 0] == 0.0
     error = np.where(missing, 0.0, found.at.linear.error)
