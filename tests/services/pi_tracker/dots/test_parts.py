@@ -36,6 +36,12 @@ def test_two_dots_that_touch_or_overlap_are_two_parts_in_their_places(apart: int
         assert area == pytest.approx(AREA, rel=0.3)
 
 
+def test_two_dots_nearer_to_the_camera_than_the_others_are_two() -> None:
+    for apart in (9, 10):
+        parts = parts_of(_blob((30, 30), (30 + apart, 30)), 0.7 * AREA)
+        assert len(parts) == 2
+
+
 def test_three_in_a_row_are_three() -> None:
     parts = sorted(parts_of(_blob((20, 20), (29, 24), (38, 28)), AREA))
     assert [round(x / 2) for x, _, _ in parts] == pytest.approx([20, 29, 38], abs=2)
