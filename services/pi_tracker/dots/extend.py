@@ -81,8 +81,8 @@ def extend(
     after = motion.updated(skeleton, before, seen, places, variances)
     nats = after.nats + np.array([prior for _, prior in around.levels])[beam.level]
     return [
-        view.become(beam.patch[k], after.state.take([k]), float(nats[k]))
-        for k, view in enumerate(own)
+        own[k].become(parents[row], beam.patch[k], after.state.take([k]), float(nats[k]))
+        for k, row in enumerate(beam.view.tolist())
     ]
 
 
@@ -139,9 +139,9 @@ def _searched(beam: _Beam, tables: _Tables, search: Search) -> _Beam:
         beam = _given(beam.take(which), tables, dot, patch - 1, own[which, patch])
     order = np.argsort(-beam.score, kind="stable")
     beam = beam.take(order[beam.score[order] > beam.score[order[0]] - _WORSE_NATS])
-    _, first = np.unique(
-        np.concatenate([beam.view[:, None], beam.patch], axis=1), axis=0, return_index=True
-    )
+    level = beam.level * search.each_acceleration
+    which = np.concatenate([beam.view[:, None], level[:, None], beam.patch], axis=1)
+    _, first = np.unique(which, axis=0, return_index=True)
     return beam.take(np.sort(first)[: search.updated])
 
 

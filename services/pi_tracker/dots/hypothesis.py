@@ -24,6 +24,8 @@ Mask = npt.NDArray[np.bool_]
 
 # Probability that a dot is found in a picture: where it was in the last one, and where it was not.
 _FOUND, _FOUND_AGAIN = 0.97, 0.6
+# Of each picture so many patches that are no dots, at least.
+FEWEST_FALSE = 0.1
 # Where a dot lies behind or beside another's it shares that one's patch, with this probability.
 _MERGED = float(np.log(0.8))
 # A patch that was no dot is still there in the next picture with this probability, and within so
@@ -64,12 +66,20 @@ class Surroundings:
     false_density: float  # patches that are no dots, per px^2
 
 
+class Known(NamedTuple):
+    """What a view needs to know of an account; a Hypothesis is one, too."""
+
+    score: float
+    areas: Array  # (n,) px^2
+    unseen: Indices  # (n,) pictures in a row in which each was not seen
+    false: Array  # (k, 2) patches of the last picture that are no dots
+
+
 class Way(NamedTuple):
     """What an account said of a picture, and of those before."""
 
     before: Way | None
     patch: tuple[int, ...]  # of each dot, -1 for none
-    nats: float  # how likely the picture was by it, given those before
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +101,7 @@ class Hypothesis:
 class View:
     """A hypothesis looking at the next picture: assignments, and how likely each is."""
 
-    def __init__(self, parent: Hypothesis, patches: Patches, false_density: float) -> None:
+    def __init__(self, parent: Hypothesis | Known, patches: Patches, false_density: float) -> None:
         self.parent, self.patches = parent, patches
         found = np.where(parent.unseen == 0, _FOUND, _FOUND_AGAIN)
         self._found, self._missed = np.log(found), np.log1p(-found)
@@ -161,22 +171,24 @@ class View:
                 variances[dot] += (0.25 * self._diameters[dot]) ** 2
         return seen, places, variances
 
-    def become(self, patch: Indices, state: motion.State, nats: float) -> Hypothesis:
-        """The hypothesis that an assignment leads to, with its state and likelihood of places."""
+    def become(
+        self, parent: Hypothesis, patch: Indices, state: motion.State, nats: float
+    ) -> Hypothesis:
+        """What a hypothesis becomes by an assignment, with its state and likelihood of places."""
         missed = patch < 0
-        areas, alone = self.parent.areas.copy(), ~missed & ~self._shared(patch)
+        areas, alone = parent.areas.copy(), ~missed & ~self._shared(patch)
         areas[alone] += _AREA_WEIGHT * (self.patches.areas[patch[alone]] - areas[alone])
-        score, told, way = self.claims(patch) + nats, tuple(patch.tolist()), self.parent.way
+        score, told, way = self.claims(patch) + nats, tuple(patch.tolist()), parent.way
         return Hypothesis(
             score=score,
             state=state,
-            branch=self.parent.branch,
+            branch=parent.branch,
             areas=areas,
-            unseen=np.where(missed, self.parent.unseen + 1, 0),
+            unseen=np.where(missed, parent.unseen + 1, 0),
             patch=told,
-            before=self.parent.patch,
+            before=parent.patch,
             false=np.delete(self.patches.places, patch[~missed], axis=0),
-            way=None if way is None else Way(way, told, score - self.parent.score),
+            way=None if way is None else Way(way, told),
         )
 
     def _shared(self, patch: Indices) -> Mask:

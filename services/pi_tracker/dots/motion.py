@@ -33,6 +33,8 @@ _OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
 # of `splay`, seeds 2 and 4, with an earlier search: 44 and 77 % right without, 90 and 99 % so;
 # .4 s: 93 % of seed 2, but of `grab` with seed 4 42 instead of 46 %.)
 _PERSON_TIME_S = 1.0
+# A gap longer than this tells nothing of where dots have gone meanwhile.
+_LONGEST_GAP_S = 0.5
 # Speeds at the start: m/s, rad/s.
 _START_M_S, _START_RAD_S = 0.5, 2.0
 # What is usual counts in each picture by a share, as pictures that follow each other say the same.
@@ -65,6 +67,11 @@ class Update(NamedTuple):
     state: State
     squared: Array
     nats: Array
+
+
+def between(before_s: float, time_s: float) -> float:
+    """The time from a picture to the next, s, as motion counts it."""
+    return min(max(time_s - before_s, 1e-3), _LONGEST_GAP_S)
 
 
 def together(states: list[State]) -> State:

@@ -17,9 +17,11 @@ import numpy.typing as npt
 from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.evidence import Begun
 from services.pi_tracker.dots.extend import extend
 from services.pi_tracker.dots.hypothesis import (
     AREA_NOISE,
+    FEWEST_FALSE,
     HIDDEN,
     Hypothesis,
     Patches,
@@ -36,14 +38,12 @@ Array = npt.NDArray[np.float64]
 
 # No account is kept that is so much (nats) less likely than the best.
 _WORSE_NATS = 14.0
-# Of the number of false patches: weight of a new picture, and what it never falls below.
-_FALSE_WEIGHT, _FEWEST_FALSE = 0.05, 0.1
+# Of the number of false patches: weight of a new picture.
+_FALSE_WEIGHT = 0.05
 # At the start no dot is known better than to this share of the root of its area.
 _WANDER = 0.15
 # What is left of a patch's quality where several dots share it.
 MERGED_QUALITY = 0.3
-# A gap longer than this tells nothing of where dots have gone meanwhile.
-_LONGEST_GAP_S = 0.5
 
 
 class DotTracker:
@@ -82,6 +82,8 @@ class DotTracker:
         self._hypotheses: list[Hypothesis] = []
         self._false_patches = 0.0
         self._time_s = 0.0
+        # The hand in the picture with which tracking started, None before.
+        self.begun: Begun | None = None
         # What a person should know of the start; empty if all is well.
         self.notes: list[str] = []
 
@@ -90,9 +92,9 @@ class DotTracker:
         if not self._hypotheses:
             self._start(patches, time_s)
             return self._dots(patches) if self._hypotheses else {}
-        elapsed_s = min(max(time_s - self._time_s, 1e-3), _LONGEST_GAP_S)
+        elapsed_s = motion.between(self._time_s, time_s)
         self._time_s = time_s
-        arrays = _arrays(patches)
+        arrays = arrays_of(patches)
         around = self._around(elapsed_s)
         found = extend(self._hypotheses, arrays, around, elapsed_s, self._search)
         self._hypotheses = _pruned(found, self._search)
@@ -137,20 +139,24 @@ class DotTracker:
         typical = float(np.median(areas))
         own = [typical if p < 0 else patches[p].area_px for p in found.patch]
         missing = np.array([p < 0 for p in found.patch], np.int64)
-        places = _arrays(patches).places
+        places = arrays_of(patches).places
         false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
-        way = Way(None, found.patch, 0.0) if self._remembers else None
+        way = Way(None, found.patch) if self._remembers else None
         sigmas = np.maximum(found.sigmas, _WANDER * np.sqrt(typical))
+        scores, states = zip(*postures(self._skeleton, found.places, sigmas), strict=True)
+        self.begun = Begun(
+            self._skeleton, motion.together(list(states)), np.array(scores), self._size_px
+        )
         self._hypotheses = [
             Hypothesis(
                 score, state, branch, np.array(own), missing, found.patch, found.patch, false, way
             )
-            for branch, (score, state) in enumerate(postures(self._skeleton, found.places, sigmas))
+            for branch, (score, state) in enumerate(zip(scores, states, strict=True))
         ]
 
     def _around(self, elapsed_s: float) -> Surroundings:
         width, height = self._size_px
-        density = (self._false_patches + _FEWEST_FALSE) / (width * height)
+        density = (self._false_patches + FEWEST_FALSE) / (width * height)
         return Surroundings(self._skeleton, motion.levels(self._skeleton, elapsed_s), density)
 
     def _dots(self, patches: Sequence[Patch]) -> dict[str, Dot]:
@@ -220,7 +226,8 @@ def seen_alone(
     return Dot(x, y, sigma, patch.quality * agree, "seen", patch.area_px, index)
 
 
-def _arrays(patches: Sequence[Patch]) -> Patches:
+def arrays_of(patches: Sequence[Patch]) -> Patches:
+    """The same patches as arrays."""
     count = len(patches)
     return Patches(
         np.array([(p.x_px, p.y_px) for p in patches]).reshape(count, 2),

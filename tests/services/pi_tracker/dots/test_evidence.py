@@ -1,0 +1,53 @@
+"""Right names make pictures likelier than wrong ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from services.pi_tracker.dots.evidence import evidence
+from services.pi_tracker.dots.hypothesis import Patches
+from services.pi_tracker.dots.tracker import DotTracker, arrays_of
+from testing.dot_patches import NAMES, REST, SIZE, patches_at
+
+RIGHT = tuple(range(8))
+TIMES = [k / 30 for k in range(12)]
+
+
+def _pictures() -> list[Patches]:
+    return [arrays_of(patches_at(REST + np.array([4.0, -2.0]) * k)) for k in range(12)]
+
+
+def _evidence(told: list[tuple[int, ...]], pictures: list[Patches]) -> float:
+    tracker = DotTracker(NAMES, SIZE)
+    tracker.step(patches_at(REST), 0.0)
+    assert tracker.begun is not None
+    return evidence(tracker.begun, pictures, TIMES, told)
+
+
+def test_exchanged_and_missing_names_are_less_likely() -> None:
+    pictures = _pictures()
+    right = _evidence([RIGHT] * 12, pictures)
+    tips = (0, 1, 2, 7, 4, 5, 6, 3)
+    assert _evidence([RIGHT] * 6 + [tips] * 6, pictures) < right - 10.0
+    joints = (0, 2, 1, 3, 4, 5, 6, 7)
+    assert _evidence([RIGHT] * 4 + [joints] * 4 + [RIGHT] * 4, pictures) < right - 10.0
+    lost = (0, 1, 2, -1, 4, 5, 6, 7)
+    assert _evidence([RIGHT] * 6 + [lost] * 6, pictures) < right - 10.0
+
+
+def test_a_dot_that_is_hidden_is_told_so() -> None:
+    pictures = _pictures()
+    for k in (5, 6, 7):
+        own = REST + np.array([4.0, -2.0]) * k
+        pictures[k] = arrays_of(patches_at(np.delete(own, 3, axis=0)))
+    hidden, shared = (0, 1, 2, -1, 3, 4, 5, 6), (0, 1, 2, 3, 3, 4, 5, 6)
+    told = [RIGHT] * 5 + [hidden] * 3 + [RIGHT] * 4
+    assert _evidence(told, pictures) > _evidence([RIGHT] * 5 + [shared] * 3 + [RIGHT] * 4, pictures)
+
+
+def test_no_dot_needs_to_be_seen_and_one_picture_is_none_after_the_first() -> None:
+    pictures, nothing = _pictures(), (-1,) * 8
+    assert np.isfinite(_evidence([RIGHT] + [nothing] * 11, pictures))
+    empty = [pictures[0], *[arrays_of([])] * 11]
+    assert np.isfinite(_evidence([RIGHT] + [nothing] * 11, empty))
+    assert np.isfinite(_evidence([RIGHT], pictures[:1]))
