@@ -29,7 +29,8 @@ from held_out_score import Figures, make_fusion, misses, scores
 
 from rhot.files.rig_tables import Fusion
 from services.fusion import step as fusion_step
-from services.fusion.kalman import estimator
+from services.fusion.kalman import hand_filter
+from services.fusion.kalman.motion_models import MotionModels
 from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import SystematicError
 from services.pi_tracker.identify import group_consistency
@@ -44,10 +45,21 @@ from testing.families.pictures import Without, detected
 LAGS = (0, 2)
 # Points have none of these.
 _OF_PAINT = ("finger direction", "paint to bone", "systematic error")
-# One model that is neither calm nor lively: the geometric middle of the ladder's upper half.
-_ONE_MODEL = np.array([[300.0, 0.0, estimator.SLOWING, 0.0]])
-# None whose noise is larger along the way that a landmark came.
-_NO_WAY = estimator.MODELS[estimator.MODELS[:, 3] == 0.0]
+_MODELS = hand_filter.MODELS
+
+
+def _only(*rows: int) -> MotionModels:
+    """Fusion's ladder of these rows."""
+    return MotionModels(*(column[list(rows)] for column in _MODELS))
+
+
+# Landmarks that have nothing in common but how lively they are.
+_EACH_BY_ITSELF = _MODELS._replace(
+    shift=np.zeros_like(_MODELS.shift),
+    turn=np.zeros_like(_MODELS.turn),
+    along=np.zeros_like(_MODELS.along),
+    own=_MODELS.shift + _MODELS.own,
+)
 
 
 class Part(NamedTuple):
@@ -78,22 +90,27 @@ def _replaced(*places: tuple[object, str, object]) -> Without:
 
 
 PARTS: dict[str, Part] = {
-    "rest and body": Part(
-        "landmarks of a hand at rest share its motion",
-        _replaced((estimator, "mix_rest", lambda *_: None)),
+    "rest": Part(
+        "no model of a hand at rest",
+        _replaced((hand_filter, "MODELS", _only(*range(1, len(_MODELS.own))))),
     ),
     "mixture of models": Part(
-        "one model of motion instead of several",
-        _replaced((estimator, "MODELS", _ONE_MODEL)),
+        "one model of motion instead of several, neither calm nor lively",
+        _replaced((hand_filter, "MODELS", _only(3))),
     ),
     "liveliest model": Part(
         "the ladder ends before the model of sharp turns",
-        _replaced((estimator, "MODELS", estimator.MODELS[:-1])),
+        _replaced((hand_filter, "MODELS", _only(*range(len(_MODELS.own) - 1)))),
     ),
     "way": Part(
-        "no model knows which way a landmark came", _replaced((estimator, "MODELS", _NO_WAY))
+        "no model knows which way the hand came",
+        _replaced((hand_filter, "MODELS", _MODELS._replace(along=np.zeros_like(_MODELS.along)))),
     ),
-    "gate": Part("innovations are never refused", _replaced((estimator, "GATE", np.inf))),
+    "shared motion": Part(
+        "landmarks of a hand do not move together",
+        _replaced((hand_filter, "MODELS", _EACH_BY_ITSELF)),
+    ),
+    "gate": Part("innovations are never refused", _replaced((hand_filter, "GATE", np.inf))),
     "clock tuning": Part("offsets stay as announced", settings={"tune_clocks": False}),
     "finger direction": Part("no poses come back from the solver", feedback=False),
     "paint to bone": Part(

@@ -29,11 +29,13 @@ from typing import Any
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.kalman.motion_model import ACCELERATION_TIME_S, discretize, empty_step
+from services.fusion.kalman.motion_models import transition, unit_process_noise
 from services.fusion.paired.one_euro import OneEuroFilter
 from testing.synthetic_points import MovingHand
 
 NOISE_M = 1e-3
+# Correlation time of a hand's acceleration, as fusion's calm models have it.
+ACCELERATION_TIME_S = 0.3
 # Jitter at rest that each filter must reach, as a share of the noise.
 TARGETS = (0.7, 0.5, 0.35)
 # Covariance of one axis when a Kalman filter starts: position as measured, m/s, m/s^2.
@@ -80,7 +82,7 @@ def double_exponential(
 def kalman(path: Array, rate_hz: float, density: float) -> Array:
     """Fusion's motion model with one jerk density; positions are measured.
 
-    services/fusion/kalman/motion_model.py. The gain is the same for all axes.
+    services/fusion/kalman/motion_models.py. The gain is the same for all axes.
     """
     F, unit_Q = motion_model(rate_hz)
     state = np.zeros((3, 3))  # position, velocity, acceleration; each of the three axes
@@ -100,15 +102,17 @@ def kalman(path: Array, rate_hz: float, density: float) -> Array:
 
 def motion_model(rate_hz: float) -> tuple[Array, Array]:
     """F (3, 3) and the process noise (3, 3) of one axis for a jerk density of 1."""
-    step = empty_step()
-    discretize(1.0 / rate_hz, np.array([1.0, 0.0, 1.0 / ACCELERATION_TIME_S]), step)
-    return step.F, step.Q
+    rates, dt_s = (0.0, 1.0 / ACCELERATION_TIME_S), 1.0 / rate_hz
+    f01, f02, f11, f12, f21, f22 = transition(*rates, dt_s)
+    Q = np.empty((3, 3))
+    unit_process_noise(rates, dt_s, Q)
+    return np.array([[1.0, f01, f02], [0.0, f11, f12], [0.0, f21, f22]]), Q
 
 
 def adaptive_kalman(path: Array, rate_hz: float, calmest: float) -> Array:
     """Four of these side by side, weighted by their likelihoods; densities from `calmest` to 5000.
 
-    As in services/fusion/kalman/multiple_models.py.
+    As in services/fusion/kalman/filtering.py.
     """
     densities = np.geomspace(calmest, 5000.0, 4)
     F, unit_Q = motion_model(rate_hz)

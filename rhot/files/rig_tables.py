@@ -114,9 +114,9 @@ class Disparity(Table, frozen=True, kw_only=True):
 
 
 class Fusion(Table, frozen=True, kw_only=True):
-    # "kalman": every observation at its own instant; "joint": the same, but all landmarks of a hand
-    # in one filter; "triangulate" and "disparity": pair the views first.
-    method: Literal["kalman", "joint", "triangulate", "disparity"] = "joint"
+    # "kalman": every observation at its own instant, all landmarks of a hand in one filter;
+    # "triangulate" and "disparity": pair the views first.
+    method: Literal["kalman", "triangulate", "disparity"] = "kalman"
     # How paired methods bring views to one instant.
     pairing: Literal["hermite", "linear", "nearest"] = "hermite"
     # Of paired methods: what smooths their points.

@@ -1,6 +1,6 @@
 """What every method of fusion offers: observations of one camera in, landmarks at an instant out.
 
-FusionStep owns one of the four (kalman, joint, triangulate, disparity) and knows no more of it than
+FusionStep owns one of the three (kalman, triangulate, disparity) and knows no more of it than
 this.
 """
 

@@ -27,7 +27,6 @@ from services.fusion.alignment.clock_alignment import ClockAlignment
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
-from services.fusion.joint.estimator import JointMethod
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
@@ -104,8 +103,6 @@ class FusionStep:
         hands = list(self._rows.values())
         if settings.method == "kalman":
             return KalmanMethod(hands, self._cameras, periods_s, settings)
-        if settings.method == "joint":
-            return JointMethod(hands, self._cameras, periods_s, settings)
         return PairedMethod(len(self._landmarks), self._cameras, periods_s, settings)
 
     @property

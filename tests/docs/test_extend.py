@@ -150,6 +150,7 @@ async def test_a_topic_and_a_service(module, running):
 
 def test_a_solver_method(module, monkeypatch):
     from services.solver.finger import solve_fingers as fingers
+    from services.solver.finger.outcome import SOLVED
     from services.solver.maths.chains import digit_chain, hand_chains
 
     monkeypatch.setattr(fingers, "METHODS", dict(fingers.METHODS))
@@ -166,5 +167,5 @@ def test_a_solver_method(module, monkeypatch):
     start = np.tile([0.0, 0.3, 0.3, 0.2], (5, 1))
     settings = Solver(method="trust-region", tolerance_m=1e-5)
     found = fingers.solve_fingers(settings, chains, start, tips)
-    assert found.status[1] == "solved"
+    assert found.status[1] == SOLVED
     assert found.residual_m[1] < 1e-5

@@ -60,7 +60,7 @@ def test_a_missing_file_names_the_examples(tmp_path):
 
 def test_an_empty_file_is_all_defaults(rig):
     config = load_rig(rig(""))
-    assert config.fusion.method == "joint"
+    assert config.fusion.method == "kalman"
     assert config.calibration_dir.name == "calibration"
 
 

@@ -101,7 +101,7 @@ def test_one_message_per_reference_frame_with_rising_stamps(fuse):
     assert step.flush() == []
 
 
-@pytest.mark.parametrize("method", ["joint", "kalman", "triangulate", "disparity"])
+@pytest.mark.parametrize("method", ["kalman", "triangulate", "disparity"])
 def test_the_frame_of_the_rig_does_not_matter(method):
     """Test: the same frames with [rig.world] turning the rig frame z up.
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from services.fusion.alignment import offset_search
 from services.fusion.intake import observations, ray_interpolation
-from services.fusion.kalman import frame_update, recent_observations, telling, track_history
-from services.fusion.kalman.shape import carried_shape
+from services.fusion.kalman import filtering, smoother
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
+from services.fusion.one_camera import carried_shape
 from services.fusion.output import hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
-    frame_update.update_frame,
-    frame_update.drop_lost_tracks,
-    recent_observations.alone_before,
-    telling.tell,
+    filtering.filter_from,
+    filtering.insert_frame,
+    filtering.oldest_with,
+    smoother.smooth_hand,
     carried_shape.carry_shape,
     carried_shape.note_shapes,
-    track_history.start_track,
     paint_to_bone._correct,
     hand_points._point_numbers,
     paint_to_bone.turned_vectors,

@@ -1,4 +1,4 @@
-"""The measurement update, against the textbook."""
+"""The update by one ray, and its adjoint, against dense algebra."""
 
 from __future__ import annotations
 
@@ -7,52 +7,119 @@ import pytest
 
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.kalman.measurement import (
-    NOT_VISIBLE,
     Innovation,
-    Measurement,
+    Look,
+    adjoint_update,
+    apply,
     innovate,
-    mahalanobis_squared,
-    update,
+    predict_ray,
 )
-from services.fusion.kalman.motion_model import Gaussian
+from testing.synthetic_points import SyntheticRig
 
-RAY_VARIANCE, CLOCK_VARIANCE = 1e-6, 4e-6
+LANDMARK, SIZE, DELAY_S = 1, 28, 0.004
 
 
-def innovation_of(state: Gaussian, cameras, camera: int, ray) -> tuple[float, Innovation]:
-    found = Innovation(np.zeros((2, 3)), np.zeros(2), np.zeros((2, 2)), np.zeros((9, 2)))
-    measured = Measurement(
-        cameras.R[camera], cameras.t[camera], np.asarray(ray), RAY_VARIANCE, CLOCK_VARIANCE
+@pytest.fixture
+def look() -> Look:
+    """Of the second of three landmarks."""
+    cameras = extrinsics(tuple(SyntheticRig(toe_in_rad=0.05).rig().values()))
+    return Look(LANDMARK, DELAY_S, np.array([0.11, 0.02]), 1e-8, cameras.R[1], cameras.t[1])
+
+
+@pytest.fixture
+def state() -> tuple[np.ndarray, np.ndarray]:
+    """Mean (28,) and covariance (28, 28) of three landmarks and the clock."""
+    random = np.random.default_rng(1)
+    x = random.normal(0.0, 0.1, SIZE)
+    x[[2, 5, 8]] += 0.7
+    x[27] = 1e-4
+    root = random.normal(0.0, 1e-3, (SIZE, SIZE))
+    return x, root @ root.T
+
+
+def empty() -> Innovation:
+    return Innovation(
+        np.zeros((2, 3)),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros((2, 2)),
+        np.zeros((2, SIZE)),
+        np.zeros(1),
     )
-    return innovate(state, measured, found), found
 
 
-def test_update_is_the_textbook_formula(pair):
-    random = np.random.default_rng(6)
-    root = 0.05 * random.normal(size=(9, 9))
-    x, P = np.array([0.05, -0.02, 0.6, 0.4, -0.3, 0.2, 1.0, 2.0, -1.0]), root @ root.T
-    likelihood, found = innovation_of(Gaussian(x, P), extrinsics(pair), 1, [0.02, 0.01])
-    H = np.hstack([found.H, np.zeros((2, 6))])
-    nu, ray_velocity = found.nu, found.H @ x[3:6]
-    S = (
-        H @ P @ H.T
-        + RAY_VARIANCE * np.eye(2)
-        + CLOCK_VARIANCE * np.outer(ray_velocity, ray_velocity)
-    )
-    np.testing.assert_allclose(found.S_inverse, np.linalg.inv(S), rtol=1e-9)
-    np.testing.assert_allclose(found.K, P @ H.T @ np.linalg.inv(S), rtol=1e-9)
-    assert mahalanobis_squared(nu, found.S_inverse) == pytest.approx(nu @ np.linalg.inv(S) @ nu)
-    assert likelihood == pytest.approx(
-        -0.5 * (nu @ np.linalg.inv(S) @ nu + np.log(np.linalg.det(2.0 * np.pi * S)))
-    )
-    posterior = Gaussian(x.copy(), P.copy())
-    update(posterior, found)
-    np.testing.assert_allclose(posterior.mean, x + found.K @ nu, atol=1e-12)
-    np.testing.assert_allclose(posterior.cov, P - found.K @ H @ P, atol=1e-12)
-    np.testing.assert_array_equal(posterior.cov, posterior.cov.T)
+def dense_jacobian(innovation: Innovation) -> np.ndarray:
+    """H (2, 28) of the ray by the whole state."""
+    H = np.zeros((2, SIZE))
+    for order, weight in enumerate((1.0, DELAY_S, 0.5 * DELAY_S**2)):
+        at = 9 * order + 3 * LANDMARK
+        H[:, at : at + 3] = weight * innovation.H
+    H[:, 27] = innovation.drift
+    return H
 
 
-@pytest.mark.parametrize("depth_m", [-0.5, 0.0, 0.01, np.nan])
-def test_what_is_not_in_front_of_the_camera_is_not_visible(pair, depth_m):
-    state = Gaussian(np.array([0.0, 0.0, depth_m, *[0.0] * 6]), np.eye(9))
-    assert innovation_of(state, extrinsics(pair), 0, [0.0, 0.0])[0] == NOT_VISIBLE
+def test_jacobian_by_finite_differences(look, state):
+    x, _ = state
+    innovation = empty()
+    assert predict_ray(x, look, innovation)
+    H = dense_jacobian(innovation)
+    x[27] = 0.0  # the drift itself depends on the velocity, by clock errors of .1 ms
+    for i in range(27):
+        step = np.zeros(SIZE)
+        step[i] = 1e-6
+        ahead, back = empty(), empty()
+        predict_ray(x + step, look, ahead)
+        predict_ray(x - step, look, back)
+        np.testing.assert_allclose((back.nu - ahead.nu) / 2e-6, H[:, i], atol=1e-6)
+
+
+def test_update_is_the_dense_one(look, state):
+    x, P = state
+    innovation = empty()
+    new_x, new_P = x.copy(), P.copy()
+    determinant = innovate(new_x, new_P, look, innovation)
+    apply(new_x, new_P, innovation)
+    H = dense_jacobian(innovation)
+    S = H @ P @ H.T + look.ray_variance * np.eye(2)
+    K = P @ H.T @ np.linalg.inv(S)
+    nu = innovation.nu
+    assert determinant == pytest.approx(np.linalg.det(S), rel=1e-6)
+    assert innovation.distance[0] == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-6)
+    np.testing.assert_allclose(new_x, x + K @ nu, rtol=1e-9)
+    np.testing.assert_allclose(new_P, P - K @ S @ K.T, atol=1e-12)
+
+
+def test_an_innovation_changes_nothing_by_itself(look, state):
+    x, P = state
+    new_x, new_P = x.copy(), P.copy()
+    innovate(new_x, new_P, look, empty())
+    np.testing.assert_array_equal(new_x, x)
+    np.testing.assert_array_equal(new_P, P)
+
+
+def test_what_is_behind_the_camera_gives_no_innovation(look, state):
+    x, P = state
+    x[3 * LANDMARK + 2] = -0.5
+    assert not innovate(x, P, look, empty()) > 0.0
+
+
+def test_adjoint_is_the_dense_one(look, state):
+    x, P = state
+    innovation = empty()
+    new_x, new_P = x.copy(), P.copy()
+    innovate(new_x, new_P, look, innovation)
+    apply(new_x, new_P, innovation)
+    H = dense_jacobian(innovation)
+    random = np.random.default_rng(2)
+    factor = random.normal(size=(SIZE, SIZE))
+    adjoint, information = random.normal(size=SIZE), factor @ factor.T
+    left = np.eye(SIZE) - innovation.K.T @ H
+    expected = left.T @ adjoint - H.T @ innovation.S_inverse @ innovation.nu
+    expected_information = left.T @ information @ left + H.T @ innovation.S_inverse @ H
+    rows = np.empty((SIZE + 3, SIZE))
+    rows[0], rows[1 : SIZE + 1] = adjoint, factor.T
+    known = adjoint_update(rows, SIZE + 1, LANDMARK, DELAY_S, innovation)
+    assert known == SIZE + 3
+    scale = np.abs(expected_information).max()
+    np.testing.assert_allclose(rows[0], expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+    np.testing.assert_allclose(rows[1:].T @ rows[1:], expected_information, atol=1e-10 * scale)

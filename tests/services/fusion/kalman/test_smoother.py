@@ -1,56 +1,67 @@
-"""The smoother: equal to Rauch, Tung and Striebel's, in whatever order observations come."""
+"""Smoothing: the same as Rauch-Tung-Striebel by dense matrices, for one model."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from services.fusion.kalman.motion_model import discretize, empty_step
-
-
-def rts(track):
-    """Smoothed states of all nodes from the filtered ones, by Rauch, Tung and Striebel."""
-    history = track.history
-    nodes = history.order[0, : history.size[0]]
-    x, P, times = history.state[0, nodes, 0], history.cov[0, nodes, 0], history.time_s[0, nodes]
-    xs, Ps = x.copy(), P.copy()
-    for k in range(len(nodes) - 2, -1, -1):
-        step = empty_step()
-        discretize(times[k + 1] - times[k], track.models[0], step)
-        F = np.kron(step.F, np.eye(3))
-        density, _, _, along = track.models[0]
-        way = history.way[0, nodes[k]]
-        noise = np.eye(3) + along / density * way / np.trace(way)
-        prior = F @ P[k] @ F.T + np.kron(step.Q, noise)
-        C = P[k] @ F.T @ np.linalg.inv(prior)
-        xs[k] = x[k] + C @ (xs[k + 1] - F @ x[k])
-        Ps[k] = P[k] + C @ (Ps[k + 1] - prior) @ C.T
-    return times, xs, Ps
+from services.fusion.kalman.hand_filter import MODELS
+from services.fusion.kalman.motion_models import SharedNoise, add_noise, turn_gram
+from services.fusion.kalman.own_motion import add_own, own_noise, transitions
 
 
-@pytest.mark.parametrize("along", [0.0, 4000.0])
-def test_smoothing_equals_rauch_tung_striebel(curved_track, along):
-    track = curved_track(along=along)
-    times, xs, Ps = rts(track)
-    for k in range(1, len(times)):
-        mean, cov = track.at(times[k])
-        np.testing.assert_allclose(mean, xs[k, :3], rtol=0, atol=1e-8)
-        scale = np.sqrt(np.diag(Ps[k])[:3])
+def dense_transition(m: int, carried: np.ndarray, dt_s: float) -> np.ndarray:
+    """F (54, 54) of six landmarks whose own motion is carried on (6,)."""
+    F = np.zeros((54, 54))
+    for k, (f01, f02, f11, f12, f21, f22) in enumerate(transitions(MODELS, m, carried, dt_s)):
+        one = np.array([[1.0, f01, f02], [0.0, f11, f12], [0.0, f21, f22]])
+        for r, c in np.ndindex(3, 3):
+            for i in range(3):
+                F[18 * r + 3 * k + i, 18 * c + 3 * k + i] = one[r, c]
+    return F
+
+
+def test_smoothed_as_rauch_tung_striebel(one_hand):
+    """Test: an instant three frames back, of a hand that one model alone describes.
+
+    Expected: the smoother's mean and covariance are those of RTS over the filtered estimates.
+    """
+    hand = one_hand()
+    hand.run(range(20))
+    history = hand.filter._history
+    nodes = history.order[: history.size[0]]
+    m = int(np.argmax(history.probability[nodes[-1]]))
+    history.probability[nodes[-1]] = 0.0
+    history.probability[nodes[-1], m] = 1.0
+    assert (history.parent[nodes[1:], m] == m).all()
+    mean, cov = history.state[nodes[-1], m, :54], history.cov[nodes[-1], m, :54, :54]
+    for k in range(len(nodes) - 2, len(nodes) - 5, -1):
+        dt_s = float(history.time_s[nodes[k + 1]] - history.time_s[nodes[k]])
+        F = dense_transition(m, history.carried[nodes[k + 1], m], dt_s)
+        x, P = history.state[nodes[k], m, :54], history.cov[nodes[k], m, :54, :54]
+        Q = _noise(history, nodes[k], nodes[k + 1], m)
+        predicted = F @ P @ F.T + Q
+        G = np.linalg.solve(predicted, F @ P).T
+        mean, cov = x + G @ (mean - F @ x), P + G @ (cov - predicted) @ G.T
+    found, places, covs = hand.filter.estimate(float(history.time_s[nodes[-4]]))
+    assert found.all()
+    np.testing.assert_allclose(places.ravel(), mean[:18], atol=1e-6)
+    for n in range(6):
         np.testing.assert_allclose(
-            cov / np.outer(scale, scale), Ps[k, :3, :3] / np.outer(scale, scale), rtol=0, atol=1e-3
+            covs[n], cov[3 * n : 3 * n + 3, 3 * n : 3 * n + 3], atol=1e-2 * covs[n].max()
         )
 
 
-def test_between_observations_the_estimate_runs_smoothly(curved_track):
-    track = curved_track()
-    node_s = track.history.time_s[0, track.history.order[0, 6]]
-    before, at, after = (track.at(node_s + step_s)[0] for step_s in (-1e-7, 0.0, 1e-7))
-    np.testing.assert_allclose(before, at, atol=1e-6)
-    np.testing.assert_allclose(after, at, atol=1e-6)
-
-
-def test_smoothing_reduces_and_prediction_grows_the_variance(curved_track):
-    track = curved_track()
-    newest_s = track.history.time_s[0, track.newest()]
-    depth = [np.sqrt(track.at(newest_s + step_s)[1][2, 2]) for step_s in (-0.05, 0.0, 0.02, 0.1)]
-    assert depth == sorted(depth)
+def _noise(history, last, node, m):
+    """Q (54, 54) between two nodes."""
+    gram, Q = np.empty((18, 18)), np.zeros((55, 55))
+    likeliest = int(np.argmax(history.probability[last]))
+    turn_gram(history.state[last, likeliest], history.alive[last], gram)
+    dt_s = float(history.time_s[node] - history.time_s[last])
+    shared = SharedNoise(gram, history.way[last])
+    add_noise(MODELS, m, dt_s, shared, history.alive[last], Q)
+    one_axis = np.empty((3, 3))
+    own_noise(MODELS, m, dt_s, one_axis)
+    for k, density in enumerate(history.own[node, m].tolist()):
+        if density > 0.0:
+            add_own(Q, k, density, one_axis)
+    return Q[:54, :54]

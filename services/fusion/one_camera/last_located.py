@@ -1,0 +1,125 @@
+"""A landmark that one camera sees alone: known across its ray, and along it by its hand.
+
+The filter goes on with the velocity it had. Within some tenths of a second that velocity's error
+takes the landmark decimetres along the ray, metres within seconds, far outside what its covariance
+says, as all of it rests on one straight line through a turn. So the distance from the camera is
+told as that of the last sight by two cameras, as unsure as hands move, weighed against what else
+tells it: the shape of its hand, where two cameras see others of the hand (carried_shape.py),
+or else the filter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools, Ints
+from services.fusion.one_camera.carried_shape import carry_shape, no_shapes, note_shapes
+from services.fusion.one_camera.kept_shape import ShapeMemory
+
+Estimate = tuple[Array, Array]  # position (3,) and covariance (3, 3), rig frame
+
+# How far a hand's distance changes, 1 sigma: as fast as this at first, never more than so far.
+# Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s, stop and go at 14 m/s^2),
+# one camera gone for 2 s.
+_RATE_M_S, _FARTHEST_M = 0.35, 0.12
+# The filter's own sigma along the ray is worth half in so long: alone, and where a shape tells the
+# distance. Tuning motions of benchmarks/one_camera.py, three tips, .5 s, geometric mean of RMS:
+# with .1 for .05 there 12.0 for 10.6 mm, .03 no better.
+_TRUST_S, _BESIDE_SHAPE_S = 0.1, 0.05
+# How far along the ray a shape is looked for from the last distance, 1 sigma.
+_REACH_M = 1.0
+
+
+class LastLocated:
+    """Where L landmarks were when two cameras saw each last, and what that tells of them now."""
+
+    def __init__(self, hand: Ints) -> None:
+        """hand (L,): whose each landmark is."""
+        self._hand = hand
+        self._shapes = no_shapes(hand.size)
+
+    def note(self, located: Bools, positions_m: Array, covs: Array, time_s: float) -> None:
+        """Positions (L, 3), covariances (L, 3, 3) of landmarks that two cameras see (L,)."""
+        note_shapes(self._shapes, located, positions_m, covs, time_s)
+
+    def tell(
+        self,
+        time_s: float,
+        are: tuple[Bools, Bools],
+        centres_rig: Array,
+        memory: tuple[ShapeMemory, float],
+        told: Estimate,
+    ) -> None:
+        """Estimates of all landmarks that one camera sees alone; told (L, 3), (L, 3, 3) in place.
+
+        are: who one camera sees alone (L,), and who two see; centres_rig (L, 3): of a camera that
+        sees each; memory: how the hands deformed lately, in spans of so many seconds.
+        """
+        (alone, located), (means, covs) = are, told
+        places = means.copy(), covs.copy()
+        rows = np.flatnonzero(alone).tolist()
+        for row in rows:
+            places[0][row], places[1][row] = self._ray(
+                row, time_s, (means[row], covs[row]), centres_rig[row]
+            )
+        for row in rows:
+            shape = np.empty(3), np.empty((3, 3))
+            now = (time_s, *places)
+            if carry_shape(self._shapes, memory, self._hand, row, (located, alone), now, shape):
+                means[row], covs[row] = self._held(row, time_s, shape, centres_rig[row])
+            else:
+                estimate = means[row], covs[row]
+                means[row], covs[row] = self.told(row, time_s, estimate, centres_rig[row])
+
+    def told(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
+        """The filter's estimate of a landmark by one camera at centre_rig (3,), its distance held.
+
+        As it is if two cameras never saw the landmark.
+        """
+        worn = self._worn(row, time_s, estimate, centre_rig, _TRUST_S)
+        return self._held(row, time_s, worn, centre_rig)
+
+    def _held(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
+        """An estimate weighed against the last distance, as unsure as hands move."""
+        sigma_m = min(_RATE_M_S * (time_s - self._shapes.time_s[row]), _FARTHEST_M)
+        return self._weighed(row, time_s, estimate, centre_rig, sigma_m)
+
+    def _ray(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
+        """The filter's estimate with hardly anything said of the distance."""
+        worn = self._worn(row, time_s, estimate, centre_rig, _BESIDE_SHAPE_S)
+        return self._weighed(row, time_s, worn, centre_rig, _REACH_M)
+
+    def _worn(
+        self, row: int, time_s: float, estimate: Estimate, centre_rig: Array, trust_s: float
+    ) -> Estimate:
+        """The filter's estimate, less sure along the ray the longer two cameras did not see it."""
+        age_s = time_s - self._shapes.time_s[row]
+        if not 0.0 <= age_s < np.inf:
+            return estimate
+        position, cov = estimate
+        along = (position - centre_rig) / float(np.linalg.norm(position - centre_rig))
+        more = (1.0 + age_s / trust_s) ** 2 - 1.0
+        return position, cov + more * float(along @ cov @ along) * np.outer(along, along)
+
+    def _weighed(
+        self, row: int, time_s: float, estimate: Estimate, centre_rig: Array, sigma_m: float
+    ) -> Estimate:
+        """An estimate weighed along the ray against the last distance, that unsure; else as it is.
+
+        It is scaled to the told distance, so an angle stays an angle.
+        """
+        distance = float(np.linalg.norm(self._shapes.places[row, row] - centre_rig))
+        if not (time_s >= self._shapes.time_s[row] and np.isfinite(distance)):
+            return estimate
+        position, cov = estimate
+        ray = position - centre_rig
+        own = float(np.linalg.norm(ray))
+        along = ray / own
+        own_variance = float(along @ cov @ along)
+        held_variance = sigma_m**2 + 1e-6
+        variance = own_variance * held_variance / (own_variance + held_variance)
+        told = variance * (own / own_variance + distance / held_variance)
+        across = np.eye(3) - np.outer(along, along)
+        told_cov = (told / own) ** 2 * (across @ cov @ across) + variance * np.outer(along, along)
+        return centre_rig + told * along, told_cov
