@@ -168,4 +168,4 @@ def test_a_solver_method(module, monkeypatch):
     settings = Solver(method="trust-region", tolerance_m=1e-5)
     found = fingers.solve_fingers(settings, chains, start, tips)
     assert found.status[1] == SOLVED
-    assert found.residual_m[1] < 1e-5
+    assert found.ends[1, 1] < 1e-5
