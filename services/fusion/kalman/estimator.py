@@ -8,6 +8,7 @@ that landmarks share, own_motion.py for what each does by itself.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
@@ -15,6 +16,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
+from services.fusion.kalman.frame_update import Looks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts, Estimates
 from services.fusion.one_camera.kept_shape import empty_memory, learn_deformation
@@ -65,12 +67,14 @@ class KalmanMethod:
             of_hand = rows[at] == view.landmarks
             if of_hand.any():
                 hand.observe(
-                    view.camera,
-                    at[of_hand],
-                    times_s[of_hand],
-                    view.rays[of_hand],
-                    view.sigmas[of_hand] ** 2,
-                    clock_sigma_s**2,
+                    Looks(
+                        view.camera,
+                        at[of_hand],
+                        times_s[of_hand],
+                        view.rays[of_hand],
+                        view.sigmas[of_hand] ** 2,
+                        clock_sigma_s**2,
+                    )
                 )
 
     def estimate(self, time_s: float) -> Estimates:
@@ -85,8 +89,8 @@ class KalmanMethod:
         for rows, hand in zip(self._rows, self._hands, strict=True):
             hand.drop_lost(time_s)
             found[rows], places[rows], covs[rows] = hand.estimate(time_s)
-            seen_by[rows] = time_s - hand.accepted_s <= since_s
-            detected_by[rows] = time_s - hand.observed_s <= since_s
+            seen_by[rows] = time_s - hand.sights.accepted_s <= since_s
+            detected_by[rows] = time_s - hand.sights.observed_s <= since_s
         measured = seen_by.sum(axis=1) >= 2
         self._tell_alone(time_s, found, seen_by, (places, covs))
         return Estimates(
@@ -112,14 +116,18 @@ class KalmanMethod:
             self._located.tell(time_s, (alone, located), centres, (self._shape, span_s), told)
 
 
+@njit(cache=True, error_model="numpy")
 def _of_use(places: Array, covs: Array, measured: Bools) -> Bools:
     """Which points (L, 3), (L, 3, 3) are finite and certain enough to be told (L,).
 
     What one camera sees (not measured, (L,)) may be unsure along its ray: bones tell the solver the
     rest.
     """
-    finite = np.isfinite(covs).reshape(len(covs), -1).all(axis=1)  # (L,)
-    finite = np.logical_and(finite, np.isfinite(places).all(axis=1))
-    variances = np.linalg.eigvalsh(np.where(finite.reshape(-1, 1, 1), covs, 0.0))  # (L, 3)
-    largest = np.where(measured, variances[:, 2], variances[:, 1])
-    return np.asarray(finite & (variances[:, 2] > 0.0) & (largest <= SHOW_SIGMA_M**2))
+    of_use = np.zeros(measured.shape[0], dtype=np.bool_)
+    for row in range(measured.shape[0]):
+        if not (np.isfinite(places[row]).all() and np.isfinite(covs[row]).all()):
+            continue
+        variances = np.linalg.eigvalsh(covs[row])  # (3,) ascending
+        largest = variances[2] if measured[row] else variances[1]
+        of_use[row] = variances[2] > 0.0 and largest <= SHOW_SIGMA_M**2
+    return of_use

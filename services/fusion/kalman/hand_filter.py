@@ -7,8 +7,16 @@ import numpy as np
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.filtering import filter_from, insert_frame, oldest_with
-from services.fusion.kalman.history import empty_history, start_history
+from services.fusion.kalman.filtering import filter_from, oldest_with
+from services.fusion.kalman.frame_update import (
+    RESTART_WINDOW_S,
+    Sights,
+    drop_lost,
+    no_fates,
+    take_in,
+)
+from services.fusion.kalman.frame_update import Looks as FrameLooks
+from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion_models import MotionModels
 from services.fusion.kalman.smoother import smooth_hand
 from services.fusion.kalman.starting import Looks, fit_start
@@ -31,19 +39,12 @@ MODELS = MotionModels(
 # Innovations beyond this squared Mahalanobis distance (2 degrees of freedom) are taken for another
 # marker: chance exceeds 30 once in three million.
 GATE = 30.0
-# Looks of this long begin a landmark, or begin it again.
+# Looks of this long begin a landmark; of RESTART_WINDOW_S, begin it again.
 START_WINDOW_S = 0.05
-RESTART_WINDOW_S = 0.1
 # Looks that miss a motion by more sigmas than this are of two things.
 START_RESIDUAL = 4.0
 # Looks that contradict a landmark within RESTART_WINDOW_S, after which it may begin again.
 CONTRADICTIONS = 2
-# A landmark that two cameras see and whose sigma is above both, absolutely and against the median
-# of its hand, begins again with no fewer looks: from any number, with a fifth of the markers
-# missing, it began up to 437 mm off.
-ASTRAY_SIGMA_M, ASTRAY_RATIO, ASTRAY_LOOKS = 0.01, 3.0, 6
-# What one camera alone has seen for longer is forgotten: by then its distance says nothing.
-ONE_CAMERA_S = 2.0
 
 
 class HandFilter:
@@ -58,93 +59,41 @@ class HandFilter:
         counts: Counts,
     ) -> None:
         self._cameras = cameras
-        self._hold_s = hold_s
         self._max_distance_m = max_distance_m
         self._counts = counts
         self._history = empty_history(landmarks, len(MODELS.own))
         shape = (landmarks, len(cameras.t))
-        self.accepted_s = np.full(shape, -np.inf)  # (N, C) last observation that was used
-        self.observed_s = np.full(shape, -np.inf)  # (N, C) last observation
-        self._begun_s = np.full(landmarks, -np.inf)
+        self._sights = Sights(
+            np.full(shape, -np.inf), np.full(shape, -np.inf), np.full(landmarks, -np.inf), hold_s
+        )
 
-    def observe(
-        self,
-        camera: int,
-        landmarks: Ints,
-        times_s: Array,
-        rays: Array,
-        variances: Array,
-        clock_variance: float,
-    ) -> None:
-        """Take in a frame's n looks: landmarks (n,), times (n,), rays (n, 2), variances (n,)."""
-        time_s = float(times_s.mean())
-        self.drop_lost(time_s)
-        history = self._history
-        if history.size[0] == 0:
-            start_history(history, time_s - 1e-6)
-        index = insert_frame(history, time_s, camera, clock_variance)
-        if index < 0:
-            self._counts.late += len(landmarks)
+    @property
+    def sights(self) -> Sights:
+        """When each landmark was seen last, by each camera."""
+        return self._sights
+
+    def observe(self, looks: FrameLooks) -> None:
+        """Take in a frame's looks."""
+        fates = no_fates(len(looks.landmarks))
+        filters = MODELS, GATE
+        if not take_in(self._history, self._sights, self._cameras, filters, looks, fates):
+            self._counts.late += len(looks.landmarks)
+            self._counts.dropped += int(fates.lost[0])
             return
-        node = history.order[index]
-        history.looked[node] = False
-        history.looked[node, landmarks] = True
-        history.delay_s[node, landmarks] = times_s - time_s
-        history.ray[node, landmarks] = rays
-        history.ray_variance[node, landmarks] = variances
-        back = self._is_back(landmarks, camera, time_s)
-        self._filter_from(index)
-        alive, used = history.alive[node, landmarks], history.used[node, landmarks]
-        self.observed_s[landmarks, camera] = np.maximum(self.observed_s[landmarks, camera], times_s)
-        self._counts.accepted += int(np.count_nonzero(used))
-        self._counts.gated += int(np.count_nonzero(alive & ~used))
-        self._note_used(landmarks[used], camera, times_s[used])
-        for landmark in landmarks[self._astray(landmarks)].tolist():
-            if len(oldest_with(history, landmark, time_s - RESTART_WINDOW_S)) >= ASTRAY_LOOKS:
-                self._begin(landmark, time_s, RESTART_WINDOW_S)
-        for landmark in landmarks[back].tolist():
+        used = int(np.count_nonzero(fates.used))
+        self._counts.dropped += int(fates.lost[0])
+        self._counts.accepted += used
+        self._counts.gated += int(np.count_nonzero(fates.alive)) - used
+        # Nothing but what fits is the usual case.
+        if used == len(looks.landmarks) and not (fates.back.any() or fates.astray.any()):
+            return
+        time_s = float(looks.times_s.mean())
+        for landmark in looks.landmarks[fates.astray].tolist():
+            self._begin(landmark, time_s, RESTART_WINDOW_S)
+        for landmark in looks.landmarks[fates.back | ~fates.alive].tolist():
             self._begin(landmark, time_s, START_WINDOW_S)
-        if not used.all():
-            for landmark in landmarks[~alive].tolist():
-                self._begin(landmark, time_s, START_WINDOW_S)
-            for landmark in landmarks[alive & ~used].tolist():
-                self._begin_again(landmark, time_s)
-
-    def _alone_since(self, time_s: float) -> Array:
-        """How long all but one camera have not seen each landmark (N,), s; 0 if none ever did."""
-        second_s = np.partition(self.accepted_s, -2, axis=1)[:, -2]
-        return np.asarray(np.where(np.isfinite(second_s), time_s - second_s, 0.0))
-
-    def _is_back(self, landmarks: Ints, camera: int, time_s: float) -> Bools:
-        """Which landmarks (n,) another camera saw alone for longer than hold_s.
-
-        They begin anew where rays meet: along that camera's ray only old motion was known.
-        """
-        last_s = self.accepted_s[landmarks, camera]
-        alone = self._alone_since(time_s)[landmarks] > self._hold_s
-        return np.asarray(alone & (time_s - last_s > self._hold_s))
-
-    def _astray(self, landmarks: Ints) -> Bools:
-        """Which of a newest frame's landmarks (n,) are known much worse than their hand is.
-
-        Two cameras see them, and yet they are adrift along a ray: as each look fits by itself, no
-        gate tells.
-        """
-        history = self._history
-        newest = history.order[history.size[0] - 1]
-        likeliest = int(np.argmax(history.probability[newest]))
-        alive = history.alive[newest]
-        variances = history.cov[newest, likeliest].diagonal()[: 3 * len(alive)]
-        largest = variances.reshape(-1, 3).max(axis=1)  # (N,)
-        usual = float(np.median(largest[alive])) if alive.any() else 0.0
-        now_s = float(history.time_s[newest])
-        seen_by = np.count_nonzero(self.accepted_s >= now_s - RESTART_WINDOW_S, axis=1)
-        wide = largest > max(ASTRAY_SIGMA_M**2, ASTRAY_RATIO**2 * usual)
-        settled = now_s - self._begun_s > RESTART_WINDOW_S
-        return np.asarray((alive & wide & settled & (seen_by >= 2))[landmarks])
-
-    def _note_used(self, landmarks: Ints, camera: int, times_s: Array) -> None:
-        self.accepted_s[landmarks, camera] = np.maximum(self.accepted_s[landmarks, camera], times_s)
+        for landmark in looks.landmarks[fates.alive & ~fates.used].tolist():
+            self._begin_again(landmark, time_s)
 
     def _filter_from(self, index: int) -> None:
         filter_from(self._history, index, self._cameras, MODELS, GATE)
@@ -187,13 +136,12 @@ class HandFilter:
         for k in indices.tolist():
             at = history.order[k]
             if history.used[at, landmark]:
-                self._note_used(
-                    np.array([landmark]),
-                    int(history.camera[at]),
-                    history.time_s[at : at + 1] + history.delay_s[at, landmark],
-                )
+                camera = int(history.camera[at])
+                accepted_s = self._sights.accepted_s
+                seen_s = float(history.time_s[at] + history.delay_s[at, landmark])
+                accepted_s[landmark, camera] = max(float(accepted_s[landmark, camera]), seen_s)
         self._counts.started += 1
-        self._begun_s[landmark] = now_s
+        self._sights.begun_s[landmark] = now_s
         return True
 
     def _begin_again(self, landmark: int, now_s: float) -> None:
@@ -205,30 +153,14 @@ class HandFilter:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
     def drop_lost(self, now_s: float) -> None:
-        """End landmarks that no camera has seen for hold_s, or one alone for ONE_CAMERA_S.
-
-        One that a second camera has seen since, but nothing that fits, is lost after hold_s.
-        """
-        history = self._history
-        if history.size[0] == 0:
-            return
-        newest = history.order[history.size[0] - 1]
-        seen = now_s - self.accepted_s.max(axis=1) <= self._hold_s  # (N,)
-        shown = np.count_nonzero(self.observed_s >= now_s - self._hold_s, axis=1)
-        alone_s = self._alone_since(now_s)
-        kept = seen & (alone_s <= np.where(shown >= 2, self._hold_s, ONE_CAMERA_S))
-        lost = history.alive[newest] & ~kept
-        if lost.any():
-            history.ends[newest] |= lost
-            self._counts.dropped += int(np.count_nonzero(lost))
-            if history.size[0] > 1:
-                self._filter_from(int(history.size[0]) - 1)
-            else:
-                history.alive[newest] &= ~lost
+        """End landmarks that nobody has seen for too long (frame_update.drop_lost)."""
+        filters = MODELS, GATE
+        lost = drop_lost(self._history, self._sights, self._cameras, filters, now_s)
+        self._counts.dropped += int(lost)
 
     def estimate(self, time_s: float) -> tuple[Bools, Array, Array]:
         """Which landmarks (N,) there are at an instant, places (N, 3), covs (N, 3, 3)."""
-        count = len(self._begun_s)
+        count = len(self._sights.begun_s)
         places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
         if self._history.size[0] == 0:
             return np.zeros(count, dtype=np.bool_), places, covs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from services.fusion.alignment import offset_search
 from services.fusion.intake import observations, ray_interpolation
-from services.fusion.kalman import filtering, smoother
+from services.fusion.kalman import filtering, frame_update, smoother
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
 from services.fusion.one_camera import carried_shape
 from services.fusion.output import hand_points, paint_to_bone
@@ -12,8 +12,9 @@ from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
+    frame_update.take_in,
+    frame_update.drop_lost,
     filtering.filter_from,
-    filtering.insert_frame,
     filtering.oldest_with,
     smoother.smooth_hand,
     carried_shape.carry_shape,

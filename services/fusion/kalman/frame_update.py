@@ -1,0 +1,183 @@
+"""A frame taken into a hand's history, and landmarks that are lost: all of it in one compiled call.
+
+Numpy's small calls from Python would cost as much as the filter: two thirds of a frame's time.
+Compiled; nothing here raises.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from rhot.geometry.transforms import Array
+from services.fusion.arrays import Bools, Ints
+from services.fusion.geometry.projection import Extrinsics
+from services.fusion.kalman.filtering import filter_from, insert_frame, oldest_with
+from services.fusion.kalman.history import HandHistory, start_history
+from services.fusion.kalman.motion_models import MotionModels
+
+# What one camera alone has seen for longer is forgotten: by then its distance says nothing.
+ONE_CAMERA_S = 2.0
+# A landmark that two cameras have seen lately and whose sigma is above both, absolutely and against
+# the median of its hand, begins again with no fewer looks: from any number, with a fifth of the
+# markers missing, it began up to 437 mm off.
+RESTART_WINDOW_S = 0.1
+ASTRAY_SIGMA_M, ASTRAY_RATIO, ASTRAY_LOOKS = 0.01, 3.0, 6
+
+
+class Sights(NamedTuple):
+    """When each landmark was seen last by each camera; -inf: never."""
+
+    accepted_s: Array  # (N, C) an observation that was used
+    observed_s: Array  # (N, C) any observation
+    begun_s: Array  # (N,) when it began last
+    hold_s: float  # so long a landmark stays that nobody sees
+
+
+class Looks(NamedTuple):
+    """A frame's n looks."""
+
+    camera: int
+    landmarks: Ints  # (n,)
+    times_s: Array  # (n,)
+    rays: Array  # (n, 2)
+    variances: Array  # (n,) of each ray coordinate
+    clock_variance: float  # s^2
+
+
+class Fates(NamedTuple):
+    """What became of a frame's n looks; arrays that take_in fills."""
+
+    alive: Bools  # (n,) their landmark has an estimate
+    used: Bools  # (n,) they updated it
+    back: Bools  # (n,) another camera saw it alone for longer than hold_s
+    astray: Bools  # (n,) it is known much worse than its hand
+    lost: Ints  # (1,) how many landmarks ended before
+
+
+def no_fates(looks: int) -> Fates:
+    """To be filled by take_in."""
+    flags = np.zeros((4, looks), dtype=np.bool_)
+    return Fates(flags[0], flags[1], flags[2], flags[3], np.zeros(1, dtype=np.int64))
+
+
+@njit(cache=True, error_model="numpy")
+def take_in(
+    history: HandHistory,
+    sights: Sights,
+    cameras: Extrinsics,
+    filters: tuple[MotionModels, float],
+    looks: Looks,
+    fates: Fates,
+) -> bool:
+    """Filter a frame, and later ones anew; filters: the models, and the gate.
+
+    False if it is older than all that is remembered, and counts for nothing.
+    """
+    models, gate = filters
+    time_s = looks.times_s.mean()
+    fates.lost[0] = drop_lost(history, sights, cameras, filters, time_s)
+    if history.size[0] == 0:
+        start_history(history, time_s - 1e-6)
+    index = insert_frame(history, time_s, looks.camera, looks.clock_variance)
+    if index < 0:
+        return False
+    node = history.order[index]
+    history.looked[node] = False
+    for n in range(looks.landmarks.size):
+        k = looks.landmarks[n]
+        history.looked[node, k] = True
+        history.delay_s[node, k] = looks.times_s[n] - time_s
+        history.ray[node, k] = looks.rays[n]
+        history.ray_variance[node, k] = looks.variances[n]
+        away_s = time_s - sights.accepted_s[k, looks.camera]
+        fates.back[n] = min(alone_since(sights, k, time_s), away_s) > sights.hold_s
+    filter_from(history, index, cameras, models, gate)
+    for n in range(looks.landmarks.size):
+        k, at_s = looks.landmarks[n], looks.times_s[n]
+        fates.alive[n], fates.used[n] = history.alive[node, k], history.used[node, k]
+        sights.observed_s[k, looks.camera] = max(sights.observed_s[k, looks.camera], at_s)
+        if fates.used[n]:
+            sights.accepted_s[k, looks.camera] = max(sights.accepted_s[k, looks.camera], at_s)
+    _find_astray(history, sights, looks, fates.astray)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def alone_since(sights: Sights, k: int, time_s: float) -> float:
+    """How long all but one camera have not seen landmark k, s; 0 if no two ever did."""
+    first_s, second_s = -np.inf, -np.inf
+    for seen_s in sights.accepted_s[k]:
+        if seen_s > first_s:
+            first_s, second_s = seen_s, first_s
+        elif seen_s > second_s:
+            second_s = seen_s
+    return time_s - second_s if second_s > -np.inf else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def drop_lost(
+    history: HandHistory,
+    sights: Sights,
+    cameras: Extrinsics,
+    filters: tuple[MotionModels, float],
+    now_s: float,
+) -> int:
+    """End landmarks that no camera has seen for hold_s, or one alone for ONE_CAMERA_S; how many.
+
+    One that a second camera has seen since, but nothing that fits, is lost after hold_s.
+    """
+    if history.size[0] == 0:
+        return 0
+    newest = history.order[history.size[0] - 1]
+    lost = 0
+    for k in range(history.alive.shape[1]):
+        shown = 0
+        for seen_s in sights.observed_s[k]:
+            shown += seen_s >= now_s - sights.hold_s
+        longest_s = sights.hold_s if shown >= 2 else ONE_CAMERA_S
+        kept = now_s - sights.accepted_s[k].max() <= sights.hold_s
+        kept &= alone_since(sights, k, now_s) <= longest_s
+        if history.alive[newest, k] and not kept:
+            history.ends[newest, k] = True
+            lost += 1
+    if lost and history.size[0] > 1:
+        filter_from(history, history.size[0] - 1, cameras, filters[0], filters[1])
+    elif lost:
+        for k in range(history.alive.shape[1]):
+            history.alive[newest, k] &= not history.ends[newest, k]
+    return lost
+
+
+@njit(cache=True, error_model="numpy")
+def _find_astray(history: HandHistory, sights: Sights, looks: Looks, astray: Bools) -> None:
+    """Which looks' landmarks (n,) are known much worse than their hand is; in place.
+
+    Two cameras see them, and yet they are adrift along a ray: as each look fits by itself, no gate
+    tells.
+    """
+    newest = history.order[history.size[0] - 1]
+    likeliest = int(np.argmax(history.probability[newest]))
+    count = history.alive.shape[1]
+    now_s = history.time_s[newest]
+    variances = np.full(count, np.inf)  # of those alive, the largest of each
+    for k in range(count):
+        if history.alive[newest, k]:
+            variances[k] = 0.0
+            for i in range(3 * k, 3 * k + 3):
+                variances[k] = max(variances[k], history.cov[newest, likeliest, i, i])
+    known = np.sort(variances[np.isfinite(variances)])
+    usual = 0.5 * (known[known.size // 2] + known[(known.size - 1) // 2]) if known.size else 0.0
+    wide = max(ASTRAY_SIGMA_M**2, ASTRAY_RATIO**2 * usual)
+    for n in range(looks.landmarks.size):
+        k = looks.landmarks[n]
+        seen_by = 0
+        for seen_s in sights.accepted_s[k]:
+            seen_by += seen_s >= now_s - RESTART_WINDOW_S
+        settled = now_s - sights.begun_s[k] > RESTART_WINDOW_S
+        astray[n] = history.alive[newest, k] and variances[k] > wide and settled and seen_by >= 2
+        if astray[n]:
+            found = oldest_with(history, k, looks.times_s.mean() - RESTART_WINDOW_S)
+            astray[n] = found.size >= ASTRAY_LOOKS
