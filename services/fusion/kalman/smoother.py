@@ -17,6 +17,7 @@ from services.fusion.kalman.filtering import innovation_of
 from services.fusion.kalman.history import HandHistory, nodes_until
 from services.fusion.kalman.measurement import adjoint_update
 from services.fusion.kalman.motion_models import (
+    FAST_SUMS,
     MotionModels,
     SharedNoise,
     add_noise,
@@ -159,7 +160,7 @@ def _adjoint_node(history: HandHistory, node: int, m: int, rows: Array, known: i
     return known
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
 def _combine(rows: Array, x: Array, P: Array, places: Array, covs: Array) -> None:
     """x - P adjoint and P - P information P of the places: (N, 3), (N, 3, 3)."""
     known, size = rows.shape
