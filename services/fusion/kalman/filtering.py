@@ -40,6 +40,8 @@ from services.fusion.kalman.rigid_motion import body_transform
 # Share of probability that leaks to the other models at each frame.
 LEAK = 0.003
 # A model less probable than this for so many frames goes on from the likeliest model's estimate.
+# With 8, errors on the tuning half of points are 2 to 9 % smaller, but a hand that is suddenly a
+# decimetre away has a finger begun 285 mm off.
 BEHIND_BELOW, BEHIND_FRAMES = 0.02, 15
 # Log-likelihood of a look that a model does not use: one look in 300 is of something else, anywhere
 # in an image (rays x/z, y/z of about 1 by 1). So a model that explains five looks of a frame well
@@ -208,7 +210,7 @@ def _update(
         price = 0.0
         if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
             own = own_motion(look, innovation, determinant, Q, usual)
-            if own.log_likelihood > -1e300:
+            if own.density > 0.0:
                 add_own(P, k, own.density, Q)
                 history.own[node, m, k] += own.density
                 price = own.price

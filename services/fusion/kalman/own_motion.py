@@ -37,9 +37,8 @@ LIVELY = (15.0, 40.0)
 class OwnMotion(NamedTuple):
     """A landmark's own jerk that its look asked for."""
 
-    density: float  # m^2/s^5
+    density: float  # m^2/s^5; 0: it explains nothing better
     price: float  # nats
-    log_likelihood: float  # of the look with it, less its price; -inf if it explains nothing better
 
 
 @njit(cache=True, error_model="numpy")
@@ -121,6 +120,4 @@ def own_motion(
         if value < best:
             best, density, price = value, q, cost
         q *= 4.0
-    if density == 0.0:
-        return OwnMotion(0.0, 0.0, -np.inf)
-    return OwnMotion(density, price, -0.5 * best - math.log(2.0 * math.pi))
+    return OwnMotion(density, price)

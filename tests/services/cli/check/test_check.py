@@ -90,7 +90,7 @@ x = 1
         "`hand.right.markers.thumb_tip`",
         "colour 'red' is used twice, once for wrist",
         "'left' is used 2 times",
-        "'kalmann'; valid: disparity, joint, kalman, triangulate",
+        "'kalmann'; valid: disparity, kalman, triangulate",
         "`fusion.one_euro.beta`",
         "unknown key `bogus`",
     ):
