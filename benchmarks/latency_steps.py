@@ -11,7 +11,7 @@ import numpy as np
 from latency_rig import Recording
 
 from rhot.hand import HandModel, HandName, default_hand
-from rhot.messages import HandPoints, HandPose, MarkerFrame
+from rhot.messages import HandPoints, MarkerFrame
 from services.fusion.step import FusionStep
 from services.solver.maths.chains import hand_chains
 from services.solver.step import SolverStep
@@ -53,11 +53,11 @@ def alone_us(recording: Recording) -> dict[str, float]:
         timed("fusion_settle", fusion.settle)
         for points in told:
             heard = timed("decode_points", decode_points, timed("encode_points", encode, points))
-            text = timed("solver", solver.text, heard)
+            pose = timed("solver", solver.step, heard)
             solver.challenge("right")
-            if text is not None:
-                pose = timed("encode_pose", _ended, text)
-                fusion.note_pose(msgspec.json.decode(pose, type=HandPose))
+            if pose is not None:
+                timed("encode_pose", encode, pose)
+                fusion.note_pose(pose)
     _time_kernel(recording, timed)
     found = {name: float(np.median(values[_WARM:])) for name, values in times.items()}
     # Rare and long: searches and regressions of clocks, which a median does not show.
@@ -65,11 +65,6 @@ def alone_us(recording: Recording) -> dict[str, float]:
     kernel_us = found["hand_fit"]
     ratios = {f"{name}_over_fit": found[name] / kernel_us for name in ("fusion_telling", "solver")}
     return {**found, **ratios}
-
-
-def _ended(text: bytes) -> bytes:
-    """The JSON of a pose, as Publisher.put_text ends it."""
-    return b'%s,"sent_ns":%d}' % (text, time.time_ns())
 
 
 def _time_kernel(recording: Recording, timed: Callable[..., Any]) -> None:

@@ -56,18 +56,12 @@ class Publisher(Generic[T]):
         now_ns = clock.now_ns()
         if self._says_when:
             message = msgspec.structs.replace(message, sent_ns=now_ns)  # type: ignore[type-var]
-        self._put(self._encoder.encode(message), now_ns, getattr(message, "stamp_ns", 0))
-
-    def put_text(self, text: bytes, stamp_ns: int) -> None:
-        """Send a message that is JSON already, but for its end: sent_ns, its last field."""
-        now_ns = clock.now_ns()
-        self._put(b'%s,"sent_ns":%d}' % (text, now_ns), now_ns, stamp_ns)
-
-    def _put(self, payload: bytes, now_ns: int, stamp_ns: int) -> None:
+        payload = self._encoder.encode(message)
         if b"null" in payload and not self._decodes(payload):
             self.stats.rejected += 1
             return
         self._publisher.put(payload)
+        stamp_ns = getattr(message, "stamp_ns", 0)
         self._count(now_ns - stamp_ns if stamp_ns else None)
 
     def _decodes(self, payload: bytes) -> bool:

@@ -24,14 +24,12 @@ from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
-DECIMALS = 6
-_UNITS = 10.0**DECIMALS
+_DECIMALS = 6
+_UNITS = 10.0**_DECIMALS
 # Where the numbers of a pose are: joints (x, y, z, w, x, y, z), digits (four angles, distance left,
 # iterations, outcome, sigma), the wrist (sigmas of position and rotation).
 JOINT_ROWS, DIGIT_ROWS, WRIST_ROW = slice(0, 26), slice(26, 31), 31
 _ROWS, _COLUMNS = 32, 8
-# The column of a digit's outcome.
-OUTCOME = 6
 _DIGIT_0 = DIGIT_ROWS.start
 # Half a turn and a metre say: unknown.
 _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
@@ -79,7 +77,7 @@ def pose_numbers(
         digit[:4] = angles[row]
         digit[4] = rounded(fingers.ends[row, 1])
         digit[5] = fingers.ends[row, 0]
-        digit[OUTCOME] = fingers.status[row]
+        digit[6] = fingers.status[row]
         digit[7] = rounded(min(sigmas[2 + row], _UNKNOWN_RAD))
     numbers[WRIST_ROW, 0] = rounded(min(sigmas[0], _UNKNOWN_M))
     numbers[WRIST_ROW, 1] = rounded(min(sigmas[1], _UNKNOWN_RAD))
@@ -96,19 +94,13 @@ def rounded(value: float) -> float:
 def rounded_within_limits(angles: Array, limits: Array) -> Array:
     """Angles (5, 4) as they go out: rounded, and still within limits (5, 4, 2).
 
-    Rounding alone would cross a limit here and there: there it is towards the other one. Limits
-    that have no round number between them are told as they are.
+    Rounding alone would cross a limit here and there.
     """
     inside = np.empty((5, 4))
     for row in range(5):
         for k in range(4):
-            low, high = limits[row, k]
-            near = rounded(angles[row, k])
-            if near > high:
-                near = np.floor(high * _UNITS) / _UNITS + 0.0
-            elif near < low:
-                near = np.ceil(low * _UNITS) / _UNITS + 0.0
-            inside[row, k] = min(max(near, low), high) + 0.0
+            near = max(rounded(angles[row, k]), limits[row, k, 0])
+            inside[row, k] = min(near, limits[row, k, 1]) + 0.0
     return inside
 
 

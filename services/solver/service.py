@@ -77,10 +77,10 @@ async def _solve_hand(
     def take(message: HandPoints) -> None:
         nonlocal mean_ms
         start_s = time.perf_counter()
-        pose = step.text(message)
+        pose = step.step(message)
         took_ms = (time.perf_counter() - start_s) * 1e3
         if pose is not None:
-            poses.put_text(pose, message.stamp_ns)
+            poses.put(pose)
         mean_ms += _MEAN_WEIGHT * (took_ms - mean_ms)
         service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
         if step.challenge_due(hand):

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import compress
-from typing import NamedTuple
 
 from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
@@ -23,7 +22,6 @@ from services.solver.model_check import check_model
 from services.solver.model_error import ModelError
 from services.solver.pose_message import hand_pose, joint_sources
 from services.solver.pose_numbers import dls_numbers, pose_numbers, rounded
-from services.solver.pose_text import PoseTexts
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandTracker
 from services.solver.whole_hand.landmarks import Observed, hand_landmarks
@@ -31,14 +29,6 @@ from services.solver.whole_hand.point_check import usable_points
 
 # Sets of measured landmarks whose joints' sources are remembered: fingers come and go.
 _MAX_SETS = 256
-
-
-class Solved(NamedTuple):
-    """What there is to tell of a hand."""
-
-    points: HandPoints
-    numbers: Array  # (32, 8) as in pose_numbers.py
-    measured: frozenset[str]  # landmarks
 
 
 class SolverStep:
@@ -54,14 +44,7 @@ class SolverStep:
         None too for a hand that is not configured.
         """
         hand = self._hands.get(points.hand)
-        solved = hand.solve(points) if hand is not None else None
-        return hand.message(*solved) if hand is not None and solved is not None else None
-
-    def text(self, points: HandPoints) -> bytes | None:
-        """The same as JSON, but for its end: for Publisher.put_text, in a third of the time."""
-        hand = self._hands.get(points.hand)
-        solved = hand.solve(points) if hand is not None else None
-        return hand.text(*solved) if hand is not None and solved is not None else None
+        return hand.step(points) if hand is not None else None
 
     def challenge_due(self, hand: HandName) -> bool:
         """Whether challenge() of that hand has something to do."""
@@ -86,11 +69,9 @@ class _Hand:
         self._model_error = ModelError(model, self.tracker.chains, self._landmarks)
         # By the landmarks that were measured.
         self._known_sources: dict[frozenset[str], list[JointSource]] = {}
-        self._texts = PoseTexts()
         self._radii = [rounded(radius_m) for radius_m in joint_radii_m(model)]
 
-    def solve(self, points: HandPoints) -> Solved | None:
-        """All numbers of the pose, and which landmarks were measured."""
+    def step(self, points: HandPoints) -> HandPose | None:
         observed = usable_points(points, self._landmarks, self._model_error.landmark_m2)
         estimate = self.tracker.track(points.stamp_ns, observed)
         if estimate is None:
@@ -100,18 +81,8 @@ class _Hand:
         )
         numbers = self._numbers(estimate, observed, variances)
         measured = frozenset(compress(observed.names, observed.measured.tolist()))
-        return Solved(points, numbers, measured)
-
-    def message(self, points: HandPoints, numbers: Array, measured: frozenset[str]) -> HandPose:
-        """What was solved, as a message."""
         sources = self._sources(measured)
         return hand_pose(points, self._settings.method, numbers, self._radii, sources)
-
-    def text(self, points: HandPoints, numbers: Array, measured: frozenset[str]) -> bytes:
-        """What was solved, as JSON without its end."""
-        return self._texts.of(
-            points, numbers, measured, lambda like: self.message(points, like, measured)
-        )
 
     def _numbers(self, estimate: HandEstimate, observed: Observed, variances: Array) -> Array:
         """All numbers of the pose (32, 8), its digits by the configured method."""

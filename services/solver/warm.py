@@ -39,7 +39,7 @@ def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
             ],
         )
         for seq in range(4):
-            step.text(msgspec.structs.replace(points, seq=seq, stamp_ns=seq * 33_000_000))
+            step.step(msgspec.structs.replace(points, seq=seq, stamp_ns=seq * 33_000_000))
         first, *others = points.points
         astray = msgspec.structs.replace(first, position_m=(5.0, 5.0, 5.0))
         step.step(msgspec.structs.replace(points, seq=4, stamp_ns=10**9, points=[astray, *others]))

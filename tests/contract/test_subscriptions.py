@@ -148,22 +148,6 @@ async def test_of_names_that_are_not_expected_some_a_second_are_taken(pair):
     assert taken.count("right") > taken.count("left") > 0
 
 
-async def test_a_text_without_its_end_arrives_as_its_message(pair):
-    sender, receiver = pair
-    subscription = receiver.every(topics.POINTS, 8)
-    publisher = await publisher_of(sender, topics.POINTS, hand="right")
-    told = points(7)
-    text = msgspec.json.encode(told).removesuffix(b',"sent_ns":0}')
-    publisher.put_text(text, told.stamp_ns)
-    async with asyncio.timeout(DEADLINE_S):
-        (message,) = await next_of(subscription, 1)
-    assert message.sent_ns > 0
-    assert msgspec.structs.replace(message, sent_ns=0) == told
-    assert publisher.stats.count == len(publisher.stats.latencies_ns) == 1
-    publisher.put_text(text.replace(b'"seq":7', b'"seq":null'), 1)
-    assert (publisher.stats.count, publisher.stats.rejected) == (1, 1)
-
-
 async def test_what_is_not_finite_is_not_sent(pair):
     sender, receiver = pair
     subscription = receiver.every(topics.POINTS, 64)

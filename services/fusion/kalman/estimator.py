@@ -16,7 +16,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
-from services.fusion.kalman.frame_update import Looks
+from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts, Estimates
 from services.fusion.one_camera.kept_shape import empty_memory, learn_deformation
@@ -67,7 +67,7 @@ class KalmanMethod:
             of_hand = rows[at] == view.landmarks
             if of_hand.any():
                 hand.observe(
-                    Looks(
+                    FrameLooks(
                         view.camera,
                         at[of_hand],
                         times_s[of_hand],

@@ -36,7 +36,7 @@ class Sights(NamedTuple):
     hold_s: float  # so long a landmark stays that nobody sees
 
 
-class Looks(NamedTuple):
+class FrameLooks(NamedTuple):
     """A frame's n looks."""
 
     camera: int
@@ -69,7 +69,7 @@ def take_in(
     sights: Sights,
     cameras: Extrinsics,
     filters: tuple[MotionModels, float],
-    looks: Looks,
+    looks: FrameLooks,
     fates: Fates,
 ) -> bool:
     """Filter a frame, and later ones anew; filters: the models, and the gate.
@@ -152,7 +152,7 @@ def drop_lost(
 
 
 @njit(cache=True, error_model="numpy")
-def _find_astray(history: HandHistory, sights: Sights, looks: Looks, astray: Bools) -> None:
+def _find_astray(history: HandHistory, sights: Sights, looks: FrameLooks, astray: Bools) -> None:
     """Which looks' landmarks (n,) are known much worse than their hand is; in place.
 
     Two cameras see them, and yet they are adrift along a ray: as each look fits by itself, no gate

@@ -10,22 +10,22 @@ from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import filter_from, oldest_with
 from services.fusion.kalman.frame_update import (
     RESTART_WINDOW_S,
+    FrameLooks,
     Sights,
     drop_lost,
     no_fates,
     take_in,
 )
-from services.fusion.kalman.frame_update import Looks as FrameLooks
 from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion_models import MotionModels
 from services.fusion.kalman.smoother import smooth_hand
 from services.fusion.kalman.starting import Looks, fit_start
 from services.fusion.method import Counts
 
-# From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets: with jerk
-# along the hand's way in all models but the last one, geometric mean of RMS, 95 % and maximum at
-# lag 0 .74 of those of a filter of each landmark with eight models, without it .87; two models
-# more, between the fourth and the last, change nothing (.74), and fewer lose 3 % at lag 2.
+# From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
+# motion was bounded (own_motion.MOST). Geometric mean of RMS, 95 % and maximum at lag 0, over those
+# of a filter of each landmark with eight models: .74; with jerk along the way in the last model
+# alone .86; with two models more beside the fourth .74; without the fifth .75.
 _SLOWING = 1.0 / 0.3
 MODELS = MotionModels(
     velocity_rate=np.array([0.5, 0.0, 0.0, 2.9, 12.0, 15.0]),

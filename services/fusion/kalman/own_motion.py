@@ -21,15 +21,16 @@ from services.fusion.kalman.motion_models import MotionModels, transition, unit_
 # Squared Mahalanobis distance (2 degrees of freedom) of a look beyond which own motion is looked
 # for: 5 % of all by chance.
 LOOK_ABOVE = 6.0
-# Nats that own motion costs, and how many more for each e-fold of its density above LEAST. On the
-# tuning half of points any of 1.5 to 4.5 and .15 to .6 is within 3 % (geometric mean of RMS, 95 %
-# and maximum at lags 0 and 2); without own motion, taps are 15.5 mm off instead of 2.4.
+# Nats that own motion costs, and how many more for each e-fold of its density above a model's own.
+# On the tuning half of points, with an earlier set of models: 2 to 4.5 and .15 to .6 are within 3 %
+# of each other (geometric mean of RMS at lags 0 and 2); without own motion taps are 15 mm RMS off
+# at lag 0 instead of 2.5.
 RARE, DEARER = 3.0, 0.5
 # From so small a density (m^2/s^5) by powers of 4 up to MOST: in 16 ms a landmark is then somewhere
 # within 7 mm, as far as a tap of 45 m/s^2 takes it. What is farther off is another thing.
 LEAST, MOST = 0.1, 3e4
 # Own motion fades in so long, s: .03 to .1 are within 3 %. Meanwhile velocity and acceleration fade
-# at these rates, 1/s; (8, 25) is 2 % worse.
+# at these rates, 1/s; with (8, 25) errors are 2 % larger. Both with an earlier set of models.
 CALM_S = 0.045
 LIVELY = (15.0, 40.0)
 

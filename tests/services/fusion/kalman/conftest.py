@@ -9,7 +9,7 @@ import pytest
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import extrinsics
-from services.fusion.kalman.frame_update import Looks
+from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts
 from testing.synthetic_points import Motion, MovingHand, SyntheticRig
@@ -40,7 +40,9 @@ class OneHand:
         camera, times_s, rays = frame
         which = np.array(list(seen), dtype=np.int64)
         variances = np.full(len(which), self.SIGMA**2)
-        self.filter.observe(Looks(camera, which, times_s[which], rays[which], variances, 1e-10))
+        self.filter.observe(
+            FrameLooks(camera, which, times_s[which], rays[which], variances, 1e-10)
+        )
 
     def errors_m(self, time_s: float) -> tuple[Array, Array]:
         """Which landmarks (6,) have an estimate, and how far it is off (6, 3)."""
