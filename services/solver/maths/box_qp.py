@@ -44,8 +44,8 @@ def workspace(n: int) -> Workspace:
 def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, work: Workspace) -> bool:
     """Solve into x (n,); H (n, n) symmetric positive definite, bounds may be infinite.
 
-    False if H is not definite. x is feasible in any case, and never worse than the feasible point
-    nearest to zero.
+    Of H only the lower triangle is read. False if H is not definite. x is feasible in any case, and
+    never worse than the feasible point nearest to zero.
     """
     n = g.size
     step, state, free = work.step, work.state, work.free
@@ -64,7 +64,7 @@ def box_qp(H: Array, g: Array, low: Array, high: Array, x: Array, work: Workspac
         total = 0.0
         for a in range(count):
             total += abs(step[a])
-        # Not a number (from H's upper triangle or g): nothing moves.
+        # Not a number (from g): nothing moves.
         if not math.isfinite(total):
             return False
         for a in range(count):
@@ -115,20 +115,30 @@ def _newton_step(H: Array, g: Array, x: Array, count: int, work: Workspace) -> b
             else:
                 L[a, b] = total * L[b, b]
     # Right-hand side: -(g + H x) is the descent at x, so the solution is a step from x.
+    # Nearly always it starts at zero, where the gradient is g.
+    at_zero = not x.any()
     for a in range(count):
-        i = free[a]
-        total = -g[i]
-        for j in range(x.size):
-            total -= H[i, j] * x[j]
+        total = -g[free[a]] if at_zero else -_slope(H, g, x, free[a])
         for k in range(a):
             total -= L[a, k] * step[k]
         step[a] = total * L[a, a]
+    # By rows of L, of which processors do several numbers at once.
     for a in range(count - 1, -1, -1):
-        total = step[a]
-        for k in range(a + 1, count):
-            total -= L[k, a] * step[k]
-        step[a] = total * L[a, a]
+        step[a] *= L[a, a]
+        for k in range(a):
+            step[k] -= L[a, k] * step[a]
     return True
+
+
+@njit(cache=True)
+def _slope(H: Array, g: Array, x: Array, i: int) -> float:
+    """The gradient g + H x along unknown i, from H's lower triangle."""
+    slope = g[i]
+    for j in range(i):
+        slope += H[i, j] * x[j]
+    for j in range(i, x.size):
+        slope += H[j, i] * x[j]
+    return slope
 
 
 @njit(cache=True)
@@ -152,9 +162,7 @@ def _wrong_multiplier(H: Array, g: Array, x: Array, state: Integers) -> int:
     worst, which = 1e-14, -1
     for i in range(g.size):
         if abs(state[i]) == 1:
-            slope = g[i]
-            for j in range(g.size):
-                slope += H[i, j] * x[j]
+            slope = _slope(H, g, x, i)
             if slope * state[i] > worst:
                 worst, which = slope * state[i], i
     return which

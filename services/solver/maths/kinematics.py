@@ -19,6 +19,10 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.solver.maths.chains import CHAINS, Chain, HandChains, norm
 
+# For the kernels of many short sums: products may be fused with sums, and these added up in any
+# order. Not a number and infinite stay what they are.
+FUSED = {"contract", "reassoc"}
+
 
 @njit(cache=True)
 def tip_position(chain: Chain, q: Array) -> Array:
@@ -97,7 +101,7 @@ class DigitFrames(NamedTuple):
     rotations: Array  # (5, 4, 3, 3) of the joints; that of the tip is its last bone's
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FUSED)
 def digit_frames(chains: HandChains, angles: Array) -> DigitFrames:
     """Forward kinematics of all digits in the wrist frame; angles (5, 4) rad."""
     frames = DigitFrames(np.empty((5, 4, 3)), np.empty((5, 4, 3)), np.empty((5, 4, 3, 3)))
@@ -108,27 +112,32 @@ def digit_frames(chains: HandChains, angles: Array) -> DigitFrames:
     return frames
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FUSED)
 def _fill_digit(
     chains: HandChains, row: int, q: Array, roots: Array, axes: Array, rotations: Array
 ) -> None:
-    """One digit of DigitFrames; q (4,)."""
-    s, c = math.sin(chains.side * q[0]), math.cos(chains.side * q[0])
-    B = chains.base_rotation[row]
-    F = np.empty((3, 3))  # axes of the bone that is being turned
+    """One digit of DigitFrames; q (4,).
+
+    The three flexions turn about the same axis, so that each bone's turn is that of their sum.
+    """
+    B, side = chains.base_rotation[row], chains.side
+    s0, c0 = math.sin(side * q[0]), math.cos(side * q[0])
+    s1, c1 = math.sin(q[1]), math.cos(q[1])
+    s2, c2 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
+    s3, c3 = math.sin(q[1] + q[2] + q[3]), math.cos(q[1] + q[2] + q[3])
     for i in range(3):
-        axes[0, i] = chains.side * B[i, 1]
-        F[i, 0], F[i, 1], F[i, 2] = c * B[i, 0] - s * B[i, 2], B[i, 1], s * B[i, 0] + c * B[i, 2]
+        # Axes of the first bone at zero flexion.
+        x, y, z = c0 * B[i, 0] - s0 * B[i, 2], B[i, 1], s0 * B[i, 0] + c0 * B[i, 2]
+        axes[0, i], axes[1, i], axes[2, i], axes[3, i] = side * y, -x, -x, -x
+        for k in range(4):
+            rotations[k, i, 0] = x
+        rotations[0, i, 1], rotations[0, i, 2] = c1 * y - s1 * z, s1 * y + c1 * z
+        rotations[1, i, 1], rotations[1, i, 2] = c2 * y - s2 * z, s2 * y + c2 * z
+        for k in range(2, 4):
+            rotations[k, i, 1], rotations[k, i, 2] = c3 * y - s3 * z, s3 * y + c3 * z
         roots[0, i] = chains.base_m[row, i]
-    for k in range(3):
-        s, c = math.sin(q[k + 1]), math.cos(q[k + 1])
-        for i in range(3):
-            axes[k + 1, i] = -F[i, 0]
-            y, z = F[i, 1], F[i, 2]
-            F[i, 1], F[i, 2] = c * y - s * z, s * y + c * z
-            roots[k + 1, i] = roots[k, i] - chains.lengths_m[row, k] * F[i, 2]
-        rotations[k] = F
-    rotations[3] = F
+        for k in range(3):
+            roots[k + 1, i] = roots[k, i] - chains.lengths_m[row, k] * rotations[k, i, 2]
 
 
 @njit(cache=True)

@@ -87,7 +87,9 @@ def fit(
             damping *= _DAMPING_UP
             if damping > _DAMPING_MAX:
                 break
-    information[:] = normal.H
+    for a in range(UNKNOWNS):
+        for b in range(a + 1):
+            information[a, b] = information[b, a] = normal.H[a, b]
     return cost, used
 
 

@@ -20,6 +20,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.solver.maths.cholesky import spd_inverse
+from services.solver.maths.kinematics import FUSED
 from services.solver.whole_hand.posture_prior import PosturePrior
 
 # Unknowns of a hand's pose: rotation (0..2), position (3..5) and 20 angles.
@@ -54,50 +55,51 @@ def uninformed_prior(posture: PosturePrior) -> PosePrior:
     return PosePrior(np.eye(3), np.zeros(3), posture.mean.reshape(5, 4).copy(), information)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FUSED)
 def predict(
     posture: PosturePrior, angles: Array, covariance: Array, seconds: float
 ) -> tuple[Array, Array]:
     """Time update: angles (5, 4) and the information (26, 26) some seconds later.
 
     From angles and *covariance* (26, 26). The covariance becomes K P K' + H - K H K' with the
-    habit's H; the projection that K is made of commutes with H.
+    habit's H; the projection that K is made of commutes with H. K of the angles is keep * identity
+    + synergies @ D, with a D of two rows: all of K C K', C = P - H, is in W = keep D C + 1/2 D C D'
+    synergies'.
     """
     keep = math.exp(-seconds / _RELAXATION_S)
-    keep_shared = math.exp(-seconds / _SYNERGY_RELAXATION_S)
-    off = (angles.ravel() - posture.mean).reshape(20, 1)
-    expected = (posture.mean + _relax(posture, off, keep, keep_shared)[:, 0]).reshape(5, 4)
-    P = covariance.copy()
-    P[6:, :6] = _relax(posture, covariance[6:, :6], keep, keep_shared)
-    P[:6, 6:] = P[6:, :6].T
-    relaxed = _relax(posture, covariance[6:, 6:] - posture.covariance, keep, keep_shared)
-    P[6:, 6:] = posture.covariance + _relax(posture, relaxed.T.copy(), keep, keep_shared)
+    D = (math.exp(-seconds / _SYNERGY_RELAXATION_S) - keep) * posture.projection
+    S = posture.synergies
+    # Of P, its lower triangle; C in the place of the angles.
+    P, moved = covariance.copy(), np.zeros((2, UNKNOWNS))
+    for a in range(20):
+        for b in range(20):
+            P[6 + a, 6 + b] -= posture.covariance[a, b]
+    for m in range(2):
+        for a in range(20):
+            for n in range(UNKNOWNS):
+                moved[m, n] += D[m, a] * P[6 + a, n]
+    W, off = keep * moved, np.zeros(2)
+    for m in range(2):
+        for n in range(2):
+            both = 0.0
+            for a in range(20):
+                both += moved[m, 6 + a] * D[n, a]
+            for a in range(20):
+                W[m, 6 + a] += 0.5 * both * S[a, n]
+        for a in range(20):
+            off[m] += D[m, a] * (angles[a // 4, a % 4] - posture.mean[a])
+    expected = np.empty((5, 4))
+    for a in range(20):
+        away = angles[a // 4, a % 4] - posture.mean[a]
+        away = keep * away + S[a, 0] * off[0] + S[a, 1] * off[1]
+        expected[a // 4, a % 4] = posture.mean[a] + away
+        for n in range(6):
+            P[6 + a, n] = keep * P[6 + a, n] + S[a, 0] * moved[0, n] + S[a, 1] * moved[1, n]
+        for b in range(a + 1):
+            shared = S[a, 0] * W[0, 6 + b] + S[a, 1] * W[1, 6 + b]
+            shared += W[0, 6 + a] * S[b, 0] + W[1, 6 + a] * S[b, 1]
+            P[6 + a, 6 + b] = posture.covariance[a, b] + keep**2 * P[6 + a, 6 + b] + shared
     for a in range(3):
         P[a, a] += _ROTATION_NOISE_RAD_SQRT_S**2 * seconds
         P[3 + a, 3 + a] += _POSITION_NOISE_M_SQRT_S**2 * seconds
     return expected, spd_inverse(P)
-
-
-@njit(cache=True)
-def _relax(posture: PosturePrior, values: Array, keep: float, keep_shared: float) -> Array:
-    """K @ values for K = keep * identity + (keep_shared - keep) * synergies @ projection.
-
-    (20, n) -> (20, n). In loops: sums of rows would each make a new one.
-    """
-    rows, columns = values.shape
-    out = np.empty((rows, columns))
-    for a in range(rows):
-        for n in range(columns):
-            out[a, n] = keep * values[a, n]
-    share = np.empty(columns)
-    for m in range(2):
-        share[:] = 0.0
-        for a in range(rows):
-            for n in range(columns):
-                share[n] += posture.projection[m, a] * values[a, n]
-        for a in range(rows):
-            if posture.synergies[a, m] != 0.0:
-                weight = (keep_shared - keep) * posture.synergies[a, m]
-                for n in range(columns):
-                    out[a, n] += weight * share[n]
-    return out

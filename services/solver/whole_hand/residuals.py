@@ -5,7 +5,9 @@ the angles of the five digits. A landmark's residual is its distance whitened by
 standard deviations, and the same however the rig's axes lie.
 
 Functions that take a tuple of arrays are inlined by force, as in finger/dls_step.py: calls that
-count references cost a tenth of the fit's time.
+count references cost a tenth of the fit's time. Vectors of three are written out: a slice or a
+product with `@` costs more than its nine products. Sums may be fused and added up in another order
+(`FUSED`): what that rounds is a ten-millionth of what a pose is rounded by.
 """
 
 from __future__ import annotations
@@ -17,10 +19,9 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains
-from services.solver.maths.kinematics import DigitFrames, digit_frames
-from services.solver.maths.rotation_vectors import rotation_vector
+from services.solver.maths.kinematics import FUSED, DigitFrames, digit_frames
+from services.solver.maths.rotation_vectors import turn_between, turned
 from services.solver.whole_hand.landmarks import Observations
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior
 
@@ -40,11 +41,11 @@ class Pose(NamedTuple):
 class NormalEquations(NamedTuple):
     """Gauss-Newton's matrix and gradient (half the cost's), of the residuals weighed."""
 
-    H: Array  # (26, 26)
+    H: Array  # (26, 26) its lower triangle; what is above is not kept up
     g: Array  # (26,)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FUSED)
 def normal_equations(
     chains: HandChains,
     observations: Observations,
@@ -56,124 +57,109 @@ def normal_equations(
 
     The cost is the sum of squares in standard deviations, with Huber's.
     """
-    H, g = normal.H, normal.g
-    H[:] = 0.0
-    g[:] = 0.0
-    cost = 0.0
+    cost = _begin_with_prior(prior, pose, normal)
     frames = digit_frames(chains, pose.angles)
-    columns = np.arange(10, dtype=np.int64)
-    p, J = np.empty(3), np.empty((3, 4))
-    point, jacobian = np.empty(3), np.empty((3, 10))
-    for index in range(observations.joint.size):
-        depth = _wrist_point(frames, observations, index, p, J, columns)
-        arm = pose.rotation @ p
-        _rig_jacobian(pose.rotation, arm, J, depth, jacobian)
-        for i in range(3):
-            point[i] = arm[i] + pose.position_m[i]
-        cost += _add_observation(observations, index, point, jacobian, columns[: 6 + depth], normal)
-    for a in range(UNKNOWNS):
-        for b in range(a):
-            H[b, a] = H[a, b]
-    return cost + _add_prior(prior, pose, normal)
+    jacobian = np.empty((3, 10))
+    for n in range(observations.joint.size):
+        error = _whitened(frames, observations, n, pose, jacobian)
+        cost += _add_observation(observations, n, jacobian, error, normal)
+    return cost
 
 
 @njit(cache=True, inline="always")
-def _wrist_point(
-    frames: DigitFrames,
-    observations: Observations,
-    index: int,
-    p: Array,
-    J: Array,
-    columns: Integers,
-) -> int:
-    """One landmark in the wrist frame, p (3,), and its Jacobian J (3, 4) by its digit's angles.
+def _whitened(
+    frames: DigitFrames, observations: Observations, n: int, pose: Pose, J: Array
+) -> tuple[float, float, float]:
+    """The error of one landmark, and its Jacobian into J (3, 10), both in standard deviations.
 
-    Returns how many of the angles move it; columns[6:] gets their places among the unknowns.
+    J is by rotation, position and the angles of its digit that move it, as many as its depth.
     """
-    row, depth = observations.digit[index], observations.depth[index]
-    if row < 0:
-        p[:] = observations.offset_m[index]
-        return depth
-    k = 0
-    while CHAINS[row, k] != observations.joint[index]:
-        k += 1
-    offset, F, root = observations.offset_m[index], frames.rotations[row, k], frames.roots_m[row, k]
-    for i in range(3):
-        p[i] = root[i] + F[i, 0] * offset[0] + F[i, 1] * offset[1] + F[i, 2] * offset[2]
-    for a in range(depth):
-        columns[6 + a] = 6 + 4 * row + a
+    R, W, row = pose.rotation, observations.whitening, observations.digit[n]
+    offset = observations.offset_m
+    px, py, pz = offset[n, 0], offset[n, 1], offset[n, 2]
+    if row >= 0:
+        k = 0
+        while CHAINS[row, k] != observations.joint[n]:
+            k += 1
+        F = frames.rotations
+        u = F[row, k, 0, 0] * px + F[row, k, 0, 1] * py + F[row, k, 0, 2] * pz
+        v = F[row, k, 1, 0] * px + F[row, k, 1, 1] * py + F[row, k, 1, 2] * pz
+        w = F[row, k, 2, 0] * px + F[row, k, 2, 1] * py + F[row, k, 2, 2] * pz
+        # Not by other names: those of the frames' arrays would be counted as references.
+        px, py = u + frames.roots_m[row, k, 0], v + frames.roots_m[row, k, 1]
+        pz = w + frames.roots_m[row, k, 2]
+    w00, w11, w22 = W[n, 0, 0], W[n, 1, 1], W[n, 2, 2]
+    w10, w20, w21 = W[n, 1, 0], W[n, 2, 0], W[n, 2, 1]
+    # From the wrist to the landmark, rig axes; turning moves it by e x arm.
+    x, y, z = turned(R, px, py, pz)
+    J[0, 0], J[1, 0], J[2, 0] = 0.0, -w11 * z, w22 * y - w21 * z
+    J[0, 1], J[1, 1], J[2, 1] = w00 * z, w10 * z, w20 * z - w22 * x
+    J[0, 2], J[1, 2], J[2, 2] = -w00 * y, w11 * x - w10 * y, w21 * x - w20 * y
+    J[0, 3], J[1, 3], J[2, 3] = w00, w10, w20
+    J[0, 4], J[1, 4], J[2, 4] = 0.0, w11, w21
+    J[0, 5], J[1, 5], J[2, 5] = 0.0, 0.0, w22
+    x += pose.position_m[0] - observations.point_m[n, 0]
+    y += pose.position_m[1] - observations.point_m[n, 1]
+    z += pose.position_m[2] - observations.point_m[n, 2]
+    e0, e1, e2 = w00 * x, w10 * x + w11 * y, w20 * x + w21 * y + w22 * z
+    for a in range(observations.depth[n]):
         # Axis x lever arm. Abduction and the first flexion turn about the same root.
-        x, y, z = frames.axes[row, a]
-        origin = frames.roots_m[row, max(a - 1, 0)]
-        u, v, w = p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]
-        J[0, a], J[1, a], J[2, a] = y * w - z * v, z * u - x * w, x * v - y * u
-    return depth
-
-
-@njit(cache=True)
-def _rig_jacobian(R: Array, arm: Array, J: Array, depth: int, out: Array) -> None:
-    """Fill out (3, 10) with the derivative of a landmark in the rig frame.
-
-    By rotation, position and the first `depth` angles of its digit. arm (3,): from the wrist to the
-    landmark, rig axes; J (3, 4): by the angles, wrist frame.
-    """
-    # Rotation: e x arm.
-    out[:, :6] = 0.0
-    out[0, 1], out[0, 2] = arm[2], -arm[1]
-    out[1, 0], out[1, 2] = -arm[2], arm[0]
-    out[2, 0], out[2, 1] = arm[1], -arm[0]
-    for i in range(3):
-        out[i, 3 + i] = 1.0
-        for a in range(depth):
-            out[i, 6 + a] = R[i, 0] * J[0, a] + R[i, 1] * J[1, a] + R[i, 2] * J[2, a]
+        o = max(a - 1, 0)
+        u, v = px - frames.roots_m[row, o, 0], py - frames.roots_m[row, o, 1]
+        w = pz - frames.roots_m[row, o, 2]
+        x, y, z = frames.axes[row, a, 0], frames.axes[row, a, 1], frames.axes[row, a, 2]
+        x, y, z = turned(R, y * w - z * v, z * u - x * w, x * v - y * u)
+        J[0, 6 + a], J[1, 6 + a] = w00 * x, w10 * x + w11 * y
+        J[2, 6 + a] = w20 * x + w21 * y + w22 * z
+    return e0, e1, e2
 
 
 @njit(cache=True, inline="always")
 def _add_observation(
     observations: Observations,
-    index: int,
-    point: Array,
-    jacobian: Array,
-    columns: Integers,
+    n: int,
+    J: Array,
+    error: tuple[float, float, float],
     normal: NormalEquations,
 ) -> float:
-    """Add one landmark's normal equations, lower triangle of H; returns its Huber cost.
-
-    point (3,): where the pose puts it, rig frame; jacobian (3, 10) of it by the unknowns `columns`,
-    whitened here in place.
-    """
-    W = observations.whitening[index]
-    e = np.empty(3)
-    square = 0.0
-    for i in range(2, -1, -1):
-        e[i] = 0.0
-        for k in range(i + 1):
-            e[i] += W[i, k] * (point[k] - observations.point_m[index, k])
-        square += e[i] * e[i]
-        # From the last row up: those above are still as they came.
-        for a in range(columns.size):
-            jacobian[i, a] *= W[i, i]
-            for k in range(i):
-                jacobian[i, a] += W[i, k] * jacobian[k, a]
+    """Add a landmark's normal equations, from its whitened Jacobian and error; returns its cost."""
+    H, g = normal.H, normal.g
+    e0, e1, e2 = error
+    square = e0 * e0 + e1 * e1 + e2 * e2
     distance = math.sqrt(square)
     weight = 1.0 if distance <= _HUBER_SIGMAS else _HUBER_SIGMAS / distance
-    for i in range(3):
-        for a in range(columns.size):
-            ga = weight * jacobian[i, a]
-            normal.g[columns[a]] += ga * e[i]
-            for b in range(a + 1):
-                normal.H[columns[a], columns[b]] += ga * jacobian[i, b]
+    for a in range(6):
+        x, y, z = weight * J[0, a], weight * J[1, a], weight * J[2, a]
+        g[a] += x * e0 + y * e1 + z * e2
+        for b in range(a + 1):
+            H[a, b] += x * J[0, b] + y * J[1, b] + z * J[2, b]
+    # Where its digit's angles are among the unknowns.
+    first = 6 + 4 * observations.digit[n]
+    for a in range(observations.depth[n]):
+        x, y, z = weight * J[0, 6 + a], weight * J[1, 6 + a], weight * J[2, 6 + a]
+        g[first + a] += x * e0 + y * e1 + z * e2
+        for b in range(6):
+            H[first + a, b] += x * J[0, b] + y * J[1, b] + z * J[2, b]
+        for b in range(a + 1):
+            H[first + a, first + b] += x * J[0, 6 + b] + y * J[1, 6 + b] + z * J[2, 6 + b]
     return square if distance <= _HUBER_SIGMAS else _HUBER_SIGMAS * (2.0 * distance - _HUBER_SIGMAS)
 
 
-@njit(cache=True, inline="always")
-def _add_prior(prior: PosePrior, pose: Pose, normal: NormalEquations) -> float:
-    """Add the prior's information and gradient; returns its cost."""
-    off = np.empty(UNKNOWNS)
-    off[:3] = rotation_vector(pose.rotation @ prior.rotation.T)
-    off[3:6] = pose.position_m - prior.position_m
-    off[6:] = (pose.angles - prior.angles).ravel()
-    gradient = prior.information @ off
-    normal.H[:] += prior.information
-    normal.g[:] += gradient
-    return float(off @ gradient)
+@njit(cache=True, fastmath=FUSED)
+def _begin_with_prior(prior: PosePrior, pose: Pose, normal: NormalEquations) -> float:
+    """Fill H and g with the prior's information and gradient; returns its cost."""
+    H, g, off = normal.H, normal.g, np.empty(UNKNOWNS)
+    off[0], off[1], off[2] = turn_between(prior.rotation, pose.rotation)
+    for i in range(3):
+        off[3 + i] = pose.position_m[i] - prior.position_m[i]
+    for a in range(20):
+        off[6 + a] = pose.angles[a // 4, a % 4] - prior.angles[a // 4, a % 4]
+    cost = 0.0
+    for a in range(UNKNOWNS):
+        slope = 0.0
+        for b in range(UNKNOWNS):
+            H[a, b] = prior.information[a, b]
+            slope += H[a, b] * off[b]
+        g[a] = slope
+        cost += slope * off[a]
+    return cost
