@@ -23,29 +23,19 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import TIPS, HandModel
+from services.solver.error_effect import PAINT, Errors, variances
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.chains import CHAINS, HandChains
-from services.solver.maths.kinematics import digit_frames
+from services.solver.maths.chains import HandChains
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MAX_GAP_S
-from services.solver.whole_hand.landmarks import MAX_LISTS, Landmarks, Observations
+from services.solver.whole_hand.landmarks import MAX_LISTS, Observations
 from services.solver.whole_hand.motion_prior import UNKNOWNS
 
-# First columns of b: the hand's size (1), its bones (15), the roots of its chains (15), then the
-# paint of every landmark (3 each).
-_SIZE, _BONES, _ROOTS, _PAINT = 0, 1, 16, 31
 # Time in which what an old error did to the angles is forgotten, between the motion prior's two.
 _FORGET_S = 0.4
-# Eigenvalues this much above 1 are rounding: covariances of 26 unknowns are inverted to about 1e-9.
-_ROUNDING = 1e-6
-# Share of the fit's own covariance that is published: its prior allows for more postures than a
-# hand takes. On fourteen rendered captures of hands that were known exactly, squared errors over
-# variances were .47 (wrist), .28 (orientation), .33 (fingers) with all of it.
-_FIT_SHARE = 0.5
 
 
 class Spread(NamedTuple):
@@ -72,22 +62,20 @@ _EXACT = Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 class ModelError:
     """The errors of one hand's model, and what they have done to its pose."""
 
-    def __init__(self, model: HandModel, chains: HandChains, landmarks: Landmarks) -> None:
-        """landmarks: all of the model (landmarks.hand_landmarks)."""
+    def __init__(self, model: HandModel, chains: HandChains) -> None:
         spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
-        paint = [spread.tip_paint_m if name in TIPS else spread.dab_m for name in landmarks]
-        self._chains = chains
+        self._chains, self._spread = chains, spread
         # Added to each landmark's variance along each axis: it is known no better than the model
         # knows where it sits.
         self.landmark_m2 = spread.landmark_m**2
-        self._column = {name: _PAINT + 3 * n for n, name in enumerate(landmarks)}
+        # The first column of each landmark's paint, in the order in which they were first seen:
+        # most hands have paint for many more than are painted.
+        self._column: dict[str, int] = {}
         # The first columns of landmarks' paint, by their names.
         self._columns: dict[tuple[str, ...], Integers] = {}
-        self._sigmas = np.concatenate(
-            [[spread.size], [spread.bone] * 15, [spread.root_m] * 15, np.ravel(paint)]
-        )
-        self._known_wrong = bool(self._sigmas.any())
-        self._S = np.zeros((UNKNOWNS, len(self._sigmas)))
+        self._sigmas = np.array([spread.size, *[spread.bone] * 15, *[spread.root_m] * 15])
+        self._S = np.zeros((UNKNOWNS, PAINT))
+        self._known_wrong = spread != _EXACT
         self._stamp_ns = 0
 
     def pose_variances(
@@ -101,151 +89,30 @@ class ModelError:
 
         names and observations: the landmarks that it was fitted to, as the fit was told.
         """
-        if not self._known_wrong:
-            return _FIT_SHARE * estimate.covariance.diagonal()
+        errors = self.errors(stamp_ns, names)
+        found: Array = variances(self._chains, observations, estimate, errors)
+        return found
+
+    def errors(self, stamp_ns: int, names: tuple[str, ...]) -> Errors:
+        """What `variances` is to take on to a message of landmarks of these names."""
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
         is_gap = not 0.0 <= seconds <= MAX_GAP_S
         columns = self._columns.get(names)
         if columns is None:
-            columns = np.array([self._column[name] for name in names], dtype=np.int64)
+            columns = np.array([self._column_of(name) for name in names], dtype=np.int64)
             # Names come from the network, in any order: the memory for them is bounded.
             if len(self._columns) < MAX_LISTS:
                 self._columns[names] = columns
-        return _considered(
-            self._chains,
-            observations,
-            columns,
-            (estimate.rotation, estimate.angles_rad, estimate.covariance),
-            (self._S, self._sigmas),
-            0.0 if is_gap else math.exp(-seconds / _FORGET_S),
-        )
+        keep = 0.0 if is_gap else math.exp(-seconds / _FORGET_S)
+        return Errors(self._S, self._sigmas, columns, keep, self._known_wrong)
 
-
-@njit(cache=True)
-def _considered(
-    chains: HandChains,
-    observations: Observations,
-    paint_columns: Integers,
-    estimate: tuple[Array, Array, Array],
-    errors: tuple[Array, Array],
-    keep: float,
-) -> Array:
-    """The variances (26,) of a pose with what the model's errors add to them.
-
-    estimate: rotation (3, 3), angles (5, 4) and covariance (26, 26) of the fit. errors: S (26, b),
-    taken on to this message, and their standard deviations (b,). keep: how much of an old error's
-    effect on the angles is left, 0: of its effect on anything.
-    """
-    rotation, angles, covariance = estimate
-    S, sigmas = errors
-    if keep == 0.0:
-        S[:] = 0.0
-    S[6:] *= keep
-    H = np.zeros((3 * observations.joint.size, UNKNOWNS))
-    J = np.zeros((3 * observations.joint.size, sigmas.size))
-    _fill_derivatives(chains, observations, paint_columns, rotation, angles, (H, J))
-    for n in range(observations.joint.size):
-        _whiten(observations.whitening[n], H[3 * n : 3 * n + 3])
-        _whiten(observations.whitening[n], J[3 * n : 3 * n + 3])
-    gain = covariance @ H.T
-    gain *= _consistent_share(H @ gain)
-    S -= gain @ (H @ S + J)
-    variances = np.empty(UNKNOWNS)
-    for i in range(UNKNOWNS):
-        variances[i] = _FIT_SHARE * covariance[i, i]
-        for k in range(sigmas.size):
-            variances[i] += (S[i, k] * sigmas[k]) ** 2
-    return variances
-
-
-@njit(cache=True)
-def _turn(R: Array, v: Array, out: Array) -> None:
-    """Fill out (3,) with R v: for three numbers a call of `@` costs more than the product."""
-    for i in range(3):
-        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
-
-
-@njit(cache=True)
-def _whiten(W: Array, rows: Array) -> None:
-    """Multiply rows (3, n) by a lower triangle W (3, 3), in place."""
-    for k in range(rows.shape[1]):
-        rows[2, k] = W[2, 0] * rows[0, k] + W[2, 1] * rows[1, k] + W[2, 2] * rows[2, k]
-        rows[1, k] = W[1, 0] * rows[0, k] + W[1, 1] * rows[1, k]
-        rows[0, k] = W[0, 0] * rows[0, k]
-
-
-@njit(cache=True)
-def _consistent_share(B: Array) -> float:
-    """How much of a gain is left where B = H P H' (n, n), whitened, is to be at most 1.
-
-    P is what is left of a prior after the landmarks: no more than they alone would leave. 1 where
-    that holds, which a Cholesky factorisation tells; else 1 / the largest eigenvalue.
-    """
-    n = B.shape[0]
-    L = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            value = (1.0 + _ROUNDING if i == j else 0.0) - B[i, j]
-            for k in range(j):
-                value -= L[i, k] * L[j, k]
-            if i > j:
-                L[i, j] = value / L[j, j]
-            elif value > 0.0:
-                L[i, i] = math.sqrt(value)
-            else:
-                return 1.0 / max(np.linalg.eigvalsh(0.5 * (B + B.T))[-1], 1.0)
-    return 1.0
-
-
-@njit(cache=True)
-def _fill_derivatives(
-    chains: HandChains,
-    observations: Observations,
-    paint_columns: Integers,
-    R: Array,
-    angles: Array,
-    out: tuple[Array, Array],
-) -> None:
-    """Fill out = (H (3 m, 26), J (3 m, b)) with derivatives of m landmarks, which are 0.
-
-    H by rotation, position and angles, J by the model's errors; R (3, 3) and angles (5, 4): the
-    pose.
-    """
-    H, J = out
-    frames = digit_frames(chains, angles)
-    p, arm, moved = np.empty(3), np.empty(3), np.empty(3)
-    for n in range(observations.joint.size):
-        row = observations.digit[n]
-        h, j = H[3 * n : 3 * n + 3], J[3 * n : 3 * n + 3]
-        paint = j[:, paint_columns[n] : paint_columns[n] + 3]
-        if row < 0:
-            p[:] = observations.offset_m[n]
-            paint[:] = R
-        else:
-            k = 0
-            while CHAINS[row, k] != observations.joint[n]:
-                k += 1
-            _turn(frames.rotations[row, k], observations.offset_m[n], p)
-            p += frames.roots_m[row, k]
-            for i in range(3):
-                _turn(R, frames.rotations[row, k, :, i], paint[:, i])
-            j[:, _ROOTS + 3 * row : _ROOTS + 3 * row + 3] = R
-            for bone in range(k):
-                along = frames.roots_m[row, bone + 1] - frames.roots_m[row, bone]
-                _turn(R, along, j[:, _BONES + 3 * row + bone])
-            for a in range(observations.depth[n]):
-                # Axis x lever arm. Abduction and the first flexion turn about the same root.
-                lever = p - frames.roots_m[row, max(a - 1, 0)]
-                x, y, z = frames.axes[row, a]
-                moved[0] = y * lever[2] - z * lever[1]
-                moved[1] = z * lever[0] - x * lever[2]
-                moved[2] = x * lever[1] - y * lever[0]
-                _turn(R, moved, h[:, 6 + 4 * row + a])
-        _turn(R, p, arm)
-        j[:, _SIZE] = arm
-        h[0, 1], h[0, 2] = arm[2], -arm[1]
-        h[1, 0], h[1, 2] = -arm[2], arm[0]
-        h[2, 0], h[2, 1] = arm[1], -arm[0]
-        for i in range(3):
-            h[i, 3 + i] = 1.0
+    def _column_of(self, name: str) -> int:
+        """The first column of a landmark's paint, which is new where it was never seen."""
+        known = self._column.get(name)
+        if known is None:
+            known = self._column[name] = len(self._sigmas)
+            paint_m = self._spread.tip_paint_m if name in TIPS else self._spread.dab_m
+            self._sigmas = np.append(self._sigmas, paint_m)
+            self._S = np.hstack([self._S, np.zeros((UNKNOWNS, 3))])
+        return known

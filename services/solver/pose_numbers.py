@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.solver.error_effect import Errors, variances
 from services.solver.finger.solve_fingers import (
     Bools,
     FingerSolution,
@@ -22,6 +23,8 @@ from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
+from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.landmarks import Observations
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
 _DECIMALS = 6
@@ -38,19 +41,22 @@ _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 @njit(cache=True)
 def dls_numbers(
     chains: HandChains,
-    wrist: tuple[Array, Array],
-    angles: Array,
+    estimate: HandEstimate,
     tips: tuple[Integers, Array, Array, Bools],
     options: tuple[int, float],
-    variances: Array,
+    observations: Observations,
+    errors: Errors,
 ) -> Array:
-    """`pose_numbers` with the digits solved by dls, from the whole hand's angles (5, 4).
+    """`pose_numbers` of an estimate whose digits are solved by dls.
 
     tips: the last four arguments of tips_in_wrist. options: iterations and tolerance (m).
+    observations and errors: as `variances` takes them.
     """
+    wrist = estimate.rotation, estimate.position_m
     seen = tips_in_wrist(wrist, tips)
-    fingers = solve_dls(chains, angles, seen, options[0], options[1])
-    return pose_numbers(chains, wrist, fingers, variances)
+    fingers = solve_dls(chains, estimate.angles_rad, seen, options[0], options[1])
+    spread = variances(chains, observations, estimate, errors)
+    return pose_numbers(chains, wrist, fingers, spread)
 
 
 @njit(cache=True)

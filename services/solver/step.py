@@ -17,6 +17,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose, JointSource
+from services.solver.error_effect import Errors, variances
 from services.solver.finger.solve_fingers import DLS, solve_fingers, tips_in_wrist
 from services.solver.model_check import check_model
 from services.solver.model_error import ModelError
@@ -66,7 +67,7 @@ class _Hand:
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
         self.tracker = HandTracker(model, self._landmarks)
-        self._model_error = ModelError(model, self.tracker.chains, self._landmarks)
+        self._model_error = ModelError(model, self.tracker.chains)
         # By the landmarks that were measured.
         self._known_sources: dict[frozenset[str], list[JointSource]] = {}
         self._radii = [rounded(radius_m) for radius_m in joint_radii_m(model)]
@@ -76,18 +77,16 @@ class _Hand:
         estimate = self.tracker.track(points.stamp_ns, observed)
         if estimate is None:
             return None
-        variances = self._model_error.pose_variances(
-            points.stamp_ns, estimate, observed.names, self.tracker.fitted
-        )
-        numbers = self._numbers(estimate, observed, variances)
+        errors = self._model_error.errors(points.stamp_ns, observed.names)
+        numbers = self._numbers(estimate, observed, errors)
         measured = frozenset(compress(observed.names, observed.measured.tolist()))
         sources = self._sources(measured)
         return hand_pose(points, self._settings.method, numbers, self._radii, sources)
 
-    def _numbers(self, estimate: HandEstimate, observed: Observed, variances: Array) -> Array:
+    def _numbers(self, estimate: HandEstimate, observed: Observed, errors: Errors) -> Array:
         """All numbers of the pose (32, 8), its digits by the configured method."""
         settings, chains = self._settings, self.tracker.chains
-        wrist = estimate.rotation, estimate.position_m
+        fitted = self.tracker.fitted
         tips = (
             self._landmarks.places(observed.names).tip,
             observed.points_m,
@@ -96,11 +95,13 @@ class _Hand:
         )
         if settings.method == DLS:
             options = settings.max_iterations, settings.tolerance_m
-            numbers = dls_numbers(chains, wrist, estimate.angles_rad, tips, options, variances)
+            numbers = dls_numbers(chains, estimate, tips, options, fitted, errors)
         else:
+            wrist = estimate.rotation, estimate.position_m
             seen = tips_in_wrist(wrist, tips)
             fingers = solve_fingers(settings, chains, estimate.angles_rad, seen)
-            numbers = pose_numbers(chains, wrist, fingers, variances)
+            spread = variances(chains, fitted, estimate, errors)
+            numbers = pose_numbers(chains, wrist, fingers, spread)
         return numbers
 
     def _sources(self, measured: frozenset[str]) -> list[JointSource]:

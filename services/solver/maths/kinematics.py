@@ -18,6 +18,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.solver.maths.chains import CHAINS, Chain, HandChains, norm
+from services.solver.maths.rotation_vectors import turned
 
 # For the kernels of many short sums: products may be fused with sums, and these added up in any
 # order. Not a number and infinite stay what they are.
@@ -140,7 +141,7 @@ def _fill_digit(
             roots[k + 1, i] = roots[k, i] - chains.lengths_m[row, k] * rotations[k, i, 2]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=FUSED)
 def hand_frames(
     chains: HandChains,
     wrist_rotation: Array,
@@ -153,28 +154,33 @@ def hand_frames(
 
     Angles (5, 4) rad.
     """
-    for j in range(26):
-        positions[j] = wrist_m
-        rotations[j] = wrist_rotation
-    bone = np.empty((3, 3))
-    turn = np.zeros((3, 3))
+    R, frames = wrist_rotation, digit_frames(chains, angles)
+    for joint in range(26):
+        for i in range(3):
+            positions[joint, i] = wrist_m[i]
+            for k in range(3):
+                rotations[joint, i, k] = R[i, k]
     for row in range(5):
         root = CHAINS[row, 0]
         if row > 0:
-            positions[root - 1] = wrist_m + wrist_rotation @ chains.metacarpal_m[row]
-        s, c = math.sin(chains.side * angles[row, 0]), math.cos(chains.side * angles[row, 0])
-        turn[:] = 0.0
-        turn[0, 0], turn[0, 2], turn[1, 1], turn[2, 0], turn[2, 2] = c, s, 1.0, -s, c
-        bone[:] = wrist_rotation @ chains.base_rotation[row] @ turn
-        positions[root] = wrist_m + wrist_rotation @ chains.base_m[row]
-        for k in range(3):
-            s, c = math.sin(angles[row, k + 1]), math.cos(angles[row, k + 1])
+            m = chains.metacarpal_m
+            x, y, z = turned(R, m[row, 0], m[row, 1], m[row, 2])
+            _shift(positions[root - 1], x, y, z)
+        for k in range(4):
+            joint, r, F = CHAINS[row, k], frames.roots_m[row, k], frames.rotations[row, k]
+            x, y, z = turned(R, r[0], r[1], r[2])
+            _shift(positions[joint], x, y, z)
             for i in range(3):
-                y, z = bone[i, 1], bone[i, 2]
-                bone[i, 1], bone[i, 2] = c * y - s * z, s * y + c * z
-            joint = CHAINS[row, k]
-            rotations[joint] = bone
-            positions[CHAINS[row, k + 1]] = positions[joint] - chains.lengths_m[row, k] * bone[:, 2]
-        rotations[CHAINS[row, 3]] = bone
+                x, y, z = turned(R, F[0, i], F[1, i], F[2, i])
+                rotations[joint, 0, i], rotations[joint, 1, i], rotations[joint, 2, i] = x, y, z
     middle = CHAINS[2, 0]
-    positions[0] = 0.5 * (positions[middle - 1] + positions[middle])
+    for i in range(3):
+        positions[0, i] = 0.5 * (positions[middle - 1, i] + positions[middle, i])
+
+
+@njit(cache=True, inline="always")
+def _shift(place: Array, x: float, y: float, z: float) -> None:
+    """Move a place (3,) by a vector."""
+    place[0] += x
+    place[1] += y
+    place[2] += z

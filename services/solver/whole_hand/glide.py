@@ -18,11 +18,14 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.rotation_vectors import apply_rotation_vector, rotation_vector
+from services.solver.maths.rotation_vectors import (
+    apply_rotation_vector,
+    rotation_vector,
+    turn_between,
+)
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations
 from services.solver.whole_hand.motion_prior import UNKNOWNS
-from services.solver.whole_hand.residuals import Pose
 
 # How fast the wrist turns and a joint bends at most where no landmark moves. Tuning half of
 # benchmarks/solver_jumps.py, recordings with their own bones, eight seeds of noise, jumps: 3 with
@@ -53,43 +56,45 @@ class Told:
     ) -> Told:
         """What is told some seconds later, where own is believed; limits_rad (5, 4, 2)."""
         after_m = observations.point_m
+        if is_quiet(self.estimate, own, seconds):
+            return Told(own, names, after_m)
         if names == self.names:
             before_m, now_m, digits = self.points_m, after_m, observations.digit
         else:
             now = [n for n, name in enumerate(names) if name in self.names]
             before_m = self.points_m[[self.names.index(names[n]) for n in now]]
             now_m, digits = after_m[now], observations.digit[now]
-        pose, covariance, held_back = _glided(
-            Pose(self.estimate.rotation, self.estimate.position_m, self.estimate.angles_rad),
-            Pose(own.rotation, own.position_m, own.angles_rad),
-            own.covariance,
-            (before_m, now_m, digits),
-            limits_rad,
-            seconds,
-        )
-        if held_back:
-            own = HandEstimate(*pose, covariance, own.cost, own.iterations)
-        return Told(own, names, after_m)
+        seen = before_m, now_m, digits
+        return Told(_glided(self.estimate, own, seen, limits_rad, seconds), names, after_m)
+
+
+@njit(cache=True)
+def is_quiet(last: HandEstimate, own: HandEstimate, seconds: float) -> bool:
+    """Whether what is believed (own) is so near to what was told last that nothing is held back."""
+    x, y, z = turn_between(last.rotation, own.rotation)
+    most = 0.0
+    for row in range(5):
+        for k in range(4):
+            most = max(most, abs(own.angles_rad[row, k] - last.angles_rad[row, k]))
+    turn = math.sqrt(x * x + y * y + z * z)
+    return turn <= _TURN_RAD_S * seconds and most <= _BEND_RAD_S * seconds
 
 
 @njit(cache=True)
 def _glided(
-    last: Pose,
-    own: Pose,
-    covariance: Array,
+    last: HandEstimate,
+    own: HandEstimate,
     seen: tuple[Array, Array, Integers],
     limits: Array,
     seconds: float,
-) -> tuple[Pose, Array, bool]:
-    """The pose that is told, its covariance, and whether it differs from what is believed (own).
+) -> HandEstimate:
+    """What is told where own is believed and last was told.
 
     seen: landmarks (m, 3) of both messages, then and now, and the digit of each, -1 of others.
     """
-    move = rotation_vector(own.rotation @ last.rotation.T)
+    move = np.array(turn_between(last.rotation, own.rotation))
     size = math.sqrt(move @ move)
     bend = _BEND_RAD_S * seconds
-    if size <= _TURN_RAD_S * seconds and np.abs(own.angles - last.angles).max() <= bend:
-        return own, covariance, False
     turned, left_m = _motion(seen[0], seen[1])
     bends = np.full(5, bend)
     for n in range(left_m.size):
@@ -103,24 +108,28 @@ def _glided(
     off = np.empty(UNKNOWNS)
     off[:3] = (1.0 - share) * move
     if share < 1.0:
-        by_turn = np.linalg.solve(covariance[:3, :3], off[:3])
+        by_turn = np.linalg.solve(own.covariance[:3, :3], off[:3])
         for i in range(UNKNOWNS - 3):
             for k in range(3):
-                rest[i] -= covariance[3 + i, k] * by_turn[k]
+                rest[i] -= own.covariance[3 + i, k] * by_turn[k]
     off[3:6] = -rest[:3]
-    told = Pose(
-        apply_rotation_vector(last.rotation, share * move),
-        own.position_m + rest[:3],
-        np.empty((5, 4)),
-    )
+    rotation = apply_rotation_vector(last.rotation, share * move)
+    told = np.empty((5, 4))
     for row in range(5):
         for k in range(4):
-            before, low, high = last.angles[row, k], limits[row, k, 0], limits[row, k, 1]
-            angle = own.angles[row, k] + rest[3 + 4 * row + k]
+            before, low, high = last.angles_rad[row, k], limits[row, k, 0], limits[row, k, 1]
+            angle = own.angles_rad[row, k] + rest[3 + 4 * row + k]
             angle = before + min(max(angle - before, -bends[row]), bends[row])
-            told.angles[row, k] = min(max(angle, low), high)
-            off[6 + 4 * row + k] = own.angles[row, k] - told.angles[row, k]
-    return told, covariance + np.outer(off, off), True
+            told[row, k] = min(max(angle, low), high)
+            off[6 + 4 * row + k] = own.angles_rad[row, k] - told[row, k]
+    return HandEstimate(
+        rotation,
+        own.position_m + rest[:3],
+        told,
+        own.covariance + np.outer(off, off),
+        own.cost,
+        own.iterations,
+    )
 
 
 @njit(cache=True)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.solver.maths.rotation_vectors import rotation_vector
+from services.solver.maths.rotation_vectors import turn_between
 
 
-@dataclass(frozen=True)
-class HandEstimate:
-    """The hand after one message."""
+class HandEstimate(NamedTuple):
+    """The hand after one message, in the form in which kernels take it."""
 
     rotation: Array  # (3, 3) wrist in the rig frame
     position_m: Array  # (3,)
@@ -24,7 +23,7 @@ class HandEstimate:
 
 def offset(a: HandEstimate, b: HandEstimate) -> Array:
     """b - a in the order of the unknowns: rotation vector, position, angles; (26,)."""
-    turn = rotation_vector(b.rotation @ a.rotation.T)
+    turn = turn_between(a.rotation, b.rotation)
     return np.concatenate(
         [turn, b.position_m - a.position_m, (b.angles_rad - a.angles_rad).ravel()]
     )

@@ -40,7 +40,7 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
-from services.solver.whole_hand.update import update
+from services.solver.whole_hand.update import follow, update
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -101,26 +101,39 @@ class HandTracker:
             if "wrist" not in placed or len(placed.intersection(TIPS)) < MIN_LANDMARKS:
                 return None
             self._misfit_m2, seconds = 0.0, MAX_GAP_S
-        observations = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
-        self.fitted = observations
-        if self._estimate is None:
-            own, self._told = self._initialise(observations), None
-        else:
-            own = self._follow(self._estimate, seconds, observations)
-            if self._restart_due(own, frozenset(observed.names)):
-                self._to_challenge = own, observations
-        self._misfit_m2 = learned_misfit(self._misfit_m2, observations.whitening, own.cost, seconds)
-        self._estimate, self._stamp_ns = own, stamp_ns
-        return self._tell(own if self._rival is None else self._rival.told(own), observed, seconds)
+        own, told = self._taken_in(observed, seconds)
+        self._estimate, self._stamp_ns, self._told = own, stamp_ns, told
+        return told.estimate
 
-    def _tell(self, believed: HandEstimate, observed: Observed, seconds: float) -> HandEstimate:
-        """What is told of what is believed: the same, unless it jumped."""
-        if self._told is None:
-            self._told = Told(believed, observed.names, observed.points_m)
+    def _taken_in(self, observed: Observed, seconds: float) -> tuple[HandEstimate, Told]:
+        """What is believed with a message, and what is told: the same, unless it jumped."""
+        last, told, names = self._estimate, self._told, observed.names
+        if last is not None and told is not None and self._rival is None:
+            own, self.fitted, self._misfit_m2, quiet = follow(
+                self.chains,
+                self._posture,
+                self._landmarks.places(names),
+                (observed.points_m, observed.covariances_m2),
+                self._misfit_m2,
+                (last, told.estimate),
+                seconds,
+            )
+            self._challenge_if_due(own, observed)
+            if quiet:
+                return own, Told(own, names, observed.points_m)
+            return own, told.then(own, names, self.fitted, self.chains.limits_rad, seconds)
+        seen = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
+        self.fitted = seen
+        if last is None:
+            own, told = self._initialise(seen), None
         else:
-            limits_rad = self.chains.limits_rad
-            self._told = self._told.then(believed, observed.names, self.fitted, limits_rad, seconds)
-        return self._told.estimate
+            own = self._follow_both(last, seconds, seen)
+            self._challenge_if_due(own, observed)
+        self._misfit_m2 = learned_misfit(self._misfit_m2, seen.whitening, own.cost, seconds)
+        believed = own if self._rival is None else self._rival.told(own)
+        if told is None:
+            return own, Told(believed, names, observed.points_m)
+        return own, told.then(believed, names, seen, self.chains.limits_rad, seconds)
 
     @property
     def challenge_due(self) -> bool:
@@ -140,13 +153,14 @@ class HandTracker:
             found = initialise(self.chains, self._uninformed, observations)
             self._follow_rival(own, own_cost, found)
 
-    def _follow(
+    def _follow_both(
         self, last: HandEstimate, seconds: float, observations: Observations
     ) -> HandEstimate:
         """Take in a message: the pose and its rival, of which one may have won."""
-        own = self._update(last, seconds, observations)
+        own = update(self.chains, self._posture, observations, last, seconds)
         if self._rival is not None:
-            other = self._update(self._rival.estimate, seconds, observations)
+            rival = self._rival.estimate
+            other = update(self.chains, self._posture, observations, rival, seconds)
             self._rival = self._rival.after(own, other, seconds)
             if self._rival.has_won():
                 own, self._rival = other, None
@@ -180,30 +194,16 @@ class HandTracker:
                     self._rival = Rival(other, min(odds, -START_ODDS), 0.0)
                 return
 
-    def _update(
-        self, last: HandEstimate, seconds: float, observations: Observations
-    ) -> HandEstimate:
-        """Predict from the last estimate and fit the observations."""
-        pose, covariance, cost, used = update(
-            self.chains,
-            self._posture,
-            observations,
-            Pose(last.rotation, last.position_m, last.angles_rad),
-            last.covariance,
-            seconds,
-        )
-        return HandEstimate(*pose, covariance, cost, used)
-
-    def _restart_due(self, estimate: HandEstimate, names: frozenset[str]) -> bool:
-        """Whether this estimate is to be compared with a restart."""
+    def _challenge_if_due(self, estimate: HandEstimate, observed: Observed) -> None:
+        """Have an estimate compared with a restart, where that is due."""
         self._updates_to_restart -= 1
+        names = frozenset(observed.names)
         bad = estimate.cost > BAD_COST_PER_COORDINATE * 3 * max(len(names), 1)
         if bad or not names <= self._restart_landmarks:
             self._updates_to_restart = min(self._updates_to_restart, RESTART_INTERVAL_BAD)
-        if self._updates_to_restart > 0 or len(names) <= MIN_LANDMARKS:
-            return False
-        self._updates_to_restart, self._restart_landmarks = RESTART_INTERVAL, names
-        return True
+        if self._updates_to_restart <= 0 and len(names) > MIN_LANDMARKS:
+            self._updates_to_restart, self._restart_landmarks = RESTART_INTERVAL, names
+            self._to_challenge = estimate, self.fitted
 
     def _cost_without_history(self, estimate: HandEstimate, observations: Observations) -> float:
         """The least cost near the estimate where the prior says nothing of the wrist."""

@@ -174,7 +174,7 @@ def observation_arrays(
         places.depth,
         places.offset_m,
         seen.points_m,
-        _whitening(seen.covariances_m2, misfit_m**2),
+        whitening(seen.covariances_m2, misfit_m**2),
     )
 
 
@@ -196,7 +196,7 @@ def _landmark(model: HandModel, name: str, open_hand_m: Array) -> Landmark:
 
 
 @njit(cache=True)
-def _whitening(covariances: Array, more_m2: float) -> Array:
+def whitening(covariances: Array, more_m2: float) -> Array:
     """Inverse Cholesky factors of covariances (m, 3, 3) + more_m2 times the identity; (m, 3, 3)."""
     out = np.zeros_like(covariances)
     for m in range(covariances.shape[0]):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 
@@ -29,16 +29,17 @@ _GROWTH_S, _FORGETTING_S = 0.2, 10.0
 _MAX_MISFIT_M2 = 0.02**2
 
 
+@njit(cache=True)
 def learned_misfit(misfit_m2: float, whitening: Array, cost: float, seconds: float) -> float:
     """The misfit (a variance, m^2) after a fit some seconds after the last one.
 
     whitening (m, 3, 3) of the landmarks fitted, with misfit_m2 in their variances; cost of the fit.
     """
-    coordinates = 3 * len(whitening)
+    coordinates = 3 * whitening.shape[0]
     if coordinates == 0:
         return misfit_m2
     # The harmonic mean: what is known badly (along one camera's ray) says nothing of the model.
-    variance_m2 = coordinates / float(np.vdot(whitening, whitening))
+    variance_m2 = coordinates / (whitening * whitening).sum()
     ratio = min(cost / (_EXPECTED_COST * coordinates), _MAX_RATIO)
     target_m2 = misfit_m2 + (ratio - 1.0) * variance_m2
     time_s = _GROWTH_S if target_m2 > misfit_m2 else _FORGETTING_S

@@ -184,7 +184,7 @@ def _without_outliers(
         kept = np.delete(kept, worst)
     return Observed(
         [names[n] for n in kept],
-        rows[kept, :3],
+        rows[kept, :3].copy(),
         covariances[kept] + more_m2 * np.eye(3),
         rows[kept, 10] == _MEASURED,
     )

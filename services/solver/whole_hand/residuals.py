@@ -61,13 +61,13 @@ def normal_equations(
     frames = digit_frames(chains, pose.angles)
     jacobian = np.empty((3, 10))
     for n in range(observations.joint.size):
-        error = _whitened(frames, observations, n, pose, jacobian)
+        error = whitened(frames, observations, n, pose, jacobian)
         cost += _add_observation(observations, n, jacobian, error, normal)
     return cost
 
 
 @njit(cache=True, inline="always")
-def _whitened(
+def whitened(
     frames: DigitFrames, observations: Observations, n: int, pose: Pose, J: Array
 ) -> tuple[float, float, float]:
     """The error of one landmark, and its Jacobian into J (3, 10), both in standard deviations.

@@ -10,7 +10,7 @@ its share of the belief is in the covariance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Rival:
         share = 1.0 / (1.0 + math.exp(-self.odds))
         off = offset(own, self.estimate)
         spread = self.estimate.covariance + np.outer(off, off)
-        return replace(own, covariance=(1.0 - share) * own.covariance + share * spread)
+        return own._replace(covariance=(1.0 - share) * own.covariance + share * spread)
 
 
 def same_pose(a: HandEstimate, b: HandEstimate) -> bool:

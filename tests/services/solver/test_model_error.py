@@ -139,7 +139,7 @@ def test_what_a_pose_forgets_and_what_it_starts_with(world: Callable) -> None:
         np.eye(3), np.array([0.0, 0.0, 0.5]), np.full((5, 4), 0.2), 1e-4 * np.eye(26), 1.0, 3
     )
     told = tuple(observed), observation_arrays(landmarks, observed)
-    errors = ModelError(model, chains, landmarks)
+    errors = ModelError(model, chains)
     first = errors.pose_variances(10**18, estimate, *told)
     assert np.all(first > 0.0)
     later = errors.pose_variances(10**18 + 33_000_000, estimate, *told)
@@ -147,7 +147,7 @@ def test_what_a_pose_forgets_and_what_it_starts_with(world: Callable) -> None:
     for stamp_ns in (10**18 + 5 * 10**9, 10**18 + 2 * 10**9):
         np.testing.assert_allclose(errors.pose_variances(stamp_ns, estimate, *told), first)
     # Without a landmark nothing is added to what is known, and nothing breaks.
-    errors = ModelError(model, chains, landmarks)
+    errors = ModelError(model, chains)
     nothing = errors.pose_variances(10**18, estimate, (), observation_arrays(landmarks, {}))
     np.testing.assert_allclose(nothing, 0.5 * estimate.covariance.diagonal())
 
@@ -164,7 +164,7 @@ def test_a_covariance_wider_than_its_landmarks_leave_makes_no_error_grow() -> No
     told = tuple(observed), observation_arrays(landmarks, observed)
     place = np.array([0.0, 0.0, 0.5])
     estimate = HandEstimate(np.eye(3), place, np.full((5, 4), 0.2), 1e-2 * np.eye(26), 1.0, 3)
-    errors = ModelError(model, chains, landmarks)
+    errors = ModelError(model, chains)
     variances = [
         errors.pose_variances(10**18 + 16_000_000 * frame, estimate, *told) for frame in range(5000)
     ]
@@ -177,6 +177,6 @@ def test_a_covariance_wider_than_its_landmarks_leave_makes_no_error_grow() -> No
 def test_landmarks_are_known_no_better_than_where_they_sit() -> None:
     for origin, at_least_m in (("tables", 4e-3), ("measured", 1.2e-3), ("simulated", 1e-3)):
         model = msgspec.structs.replace(default_hand(), origin=origin)
-        errors = ModelError(model, hand_chains(model), hand_landmarks(model))
+        errors = ModelError(model, hand_chains(model))
         sigma_m = math.sqrt(1e-6 + errors.landmark_m2)
         assert 0.999 * at_least_m <= sigma_m < 1.5 * at_least_m

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,8 +38,7 @@ def test_small_changes_are_told_as_they_are(
 ) -> None:
     places, limits = hand()
     seen = observe(world("right").model, places)
-    own = replace(
-        LAST,
+    own = LAST._replace(
         angles_rad=LAST.angles_rad + 0.1,
         rotation=rotation_from_vector(np.array([0.1, 0.0, 0.0])),
     )
@@ -53,7 +51,7 @@ def test_a_jump_without_motion_glides_and_arrives(
 ) -> None:
     places, limits = hand()
     seen = observe(world("right").model, places)
-    own = replace(LAST, angles_rad=BENT, rotation=rotation_from_vector(np.array([0.5, 0.0, 0.0])))
+    own = LAST._replace(angles_rad=BENT, rotation=rotation_from_vector(np.array([0.5, 0.0, 0.0])))
     told = Told(LAST, tuple(places), seen.point_m)
     first = _then(told, own, seen, limits)
     assert 0.05 < first.angles_rad[1, 2] - 0.1 < 0.2
@@ -74,11 +72,11 @@ def test_what_landmarks_do_is_not_held_back(
     told = Told(LAST, tuple(places), observe(world("right").model, places).point_m)
     turn = rotation_from_vector(np.array([0.5, 0.0, 0.0]))
     turned = observe(world("right").model, {name: turn @ place for name, place in places.items()})
-    found = _then(told, replace(LAST, rotation=turn), turned, limits)
+    found = _then(told, LAST._replace(rotation=turn), turned, limits)
     np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
     places["index_tip"] = places["index_tip"] + [0.0, 0.0, 0.05]
     moved = observe(world("right").model, places)
-    found = _then(told, replace(LAST, angles_rad=BENT), moved, limits)
+    found = _then(told, LAST._replace(angles_rad=BENT), moved, limits)
     np.testing.assert_allclose(found.angles_rad, BENT, atol=1e-9)
 
 
@@ -90,8 +88,7 @@ def test_the_rest_follows_a_turn_that_is_held_back(
     seen = observe(world("right").model, places)
     covariance = 1e-4 * np.eye(26)
     covariance[0, 6 + 5] = covariance[6 + 5, 0] = 0.9e-4
-    own = replace(
-        LAST,
+    own = LAST._replace(
         angles_rad=LAST.angles_rad.copy(),
         rotation=rotation_from_vector(np.array([0.5, 0.0, 0.0])),
         covariance=covariance,

@@ -138,7 +138,7 @@ def test_a_mirrored_orientation_does_not_last(
     wrong = estimate.rotation @ rotation_from_vector(flip)
     # As if the first estimate had gone wrong, and the tracker were sure of it.
     sure = 1e-4 * np.eye(UNKNOWNS)
-    tracker._estimate = replace(estimate, rotation=wrong, covariance=sure)
+    tracker._estimate = estimate._replace(rotation=wrong, covariance=sure)
     for frame, instant in enumerate(motion[1:], 1):
         estimate = tracker.track(frame * FRAME_NS, _observed(ours.points(instant), rng))
     assert angle_between(estimate.rotation, motion[-1].rotation) < np.deg2rad(30.0)

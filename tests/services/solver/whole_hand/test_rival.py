@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,13 +12,13 @@ from services.solver.whole_hand.rival import Rival, same_pose
 FRAME_S = 1.0 / 30.0
 OWN = HandEstimate(np.eye(3), np.zeros(3), np.full((5, 4), 0.3), 1e-4 * np.eye(26), 10.0, 4)
 TURN = np.array([0.0, 0.0, 1.0])
-OTHER = replace(OWN, rotation=rotation_from_vector(TURN))
+OTHER = OWN._replace(rotation=rotation_from_vector(TURN))
 
 
 def _followed(messages: int, own_cost: float, other_cost: float) -> Rival:
     rival = Rival(OTHER, 0.0, 0.0)
     for _ in range(messages):
-        rival = rival.after(replace(OWN, cost=own_cost), replace(OTHER, cost=other_cost), FRAME_S)
+        rival = rival.after(OWN._replace(cost=own_cost), OTHER._replace(cost=other_cost), FRAME_S)
     return rival
 
 
@@ -36,12 +34,12 @@ def test_a_worse_rival_is_given_up() -> None:
 
 
 def test_a_rival_that_became_the_pose_is_over() -> None:
-    near = replace(OWN, rotation=rotation_from_vector(0.1 * TURN))
+    near = OWN._replace(rotation=rotation_from_vector(0.1 * TURN))
     assert same_pose(OWN, near)
     assert Rival(near, 0.0, 0.0).is_over(OWN)
     bent = OWN.angles_rad.copy()
     bent[4, 1] += 0.5
-    assert not same_pose(OWN, replace(OWN, angles_rad=bent))
+    assert not same_pose(OWN, OWN._replace(angles_rad=bent))
 
 
 @pytest.mark.parametrize(("odds", "share"), [(0.0, 0.5), (-np.log(3.0), 0.25)])
