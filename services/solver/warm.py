@@ -18,7 +18,9 @@ from services.solver.step import SolverStep
 
 
 def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
-    """Solve five messages of a made-up hand with the configured method, one with a stray point."""
+    """Solve five messages of a made-up hand with the configured method: of one it is elsewhere, of
+    one a point is.
+    """
     for name, model in hands.items():
         step = SolverStep(config, {name: model})
         angles = model.limits_rad.mean(axis=2)
@@ -38,8 +40,15 @@ def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
                 for landmark in BASIC_LANDMARKS
             ],
         )
-        for seq in range(4):
-            step.step(msgspec.structs.replace(points, seq=seq, stamp_ns=seq * 33_000_000))
+        # Landmarks that change places: what is told glides there.
+        places = [point.position_m for point in points.points]
+        turned = [
+            msgspec.structs.replace(point, position_m=place)
+            for point, place in zip(points.points, places[1:] + places[:1], strict=True)
+        ]
+        for seq, shown in enumerate((points.points, points.points, turned, points.points)):
+            message = msgspec.structs.replace(points, seq=seq, points=shown)
+            step.step(msgspec.structs.replace(message, stamp_ns=seq * 33_000_000))
         first, *others = points.points
         astray = msgspec.structs.replace(first, position_m=(5.0, 5.0, 5.0))
         step.step(msgspec.structs.replace(points, seq=4, stamp_ns=10**9, points=[astray, *others]))

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -40,7 +39,7 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
-from services.solver.whole_hand.update import follow, update
+from services.solver.whole_hand.update import Followed, follow
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -96,44 +95,17 @@ class HandTracker:
             self._estimate = None
         if len(observed) >= MIN_LANDMARKS:
             self._located_ns = stamp_ns
-        if self._estimate is None:
+        if self._estimate is None or self._told is None:
             placed = {name for name, seen in observed.items() if _is_placed(seen)}
             if "wrist" not in placed or len(placed.intersection(TIPS)) < MIN_LANDMARKS:
                 return None
-            self._misfit_m2, seconds = 0.0, MAX_GAP_S
-        own, told = self._taken_in(observed, seconds)
-        self._estimate, self._stamp_ns, self._told = own, stamp_ns, told
-        return told.estimate
-
-    def _taken_in(self, observed: Observed, seconds: float) -> tuple[HandEstimate, Told]:
-        """What is believed with a message, and what is told: the same, unless it jumped."""
-        last, told, names = self._estimate, self._told, observed.names
-        if last is not None and told is not None and self._rival is None:
-            own, self.fitted, self._misfit_m2, quiet = follow(
-                self.chains,
-                self._posture,
-                self._landmarks.places(names),
-                (observed.points_m, observed.covariances_m2),
-                self._misfit_m2,
-                (last, told.estimate),
-                seconds,
-            )
-            self._challenge_if_due(own, observed)
-            if quiet:
-                return own, Told(own, names, observed.points_m)
-            return own, told.then(own, names, self.fitted, self.chains.limits_rad, seconds)
-        seen = observation_arrays(self._landmarks, observed, math.sqrt(self._misfit_m2))
-        self.fitted = seen
-        if last is None:
-            own, told = self._initialise(seen), None
+            self._estimate, self._told = self._begun(observed)
         else:
-            own = self._follow_both(last, seconds, seen)
-            self._challenge_if_due(own, observed)
-        self._misfit_m2 = learned_misfit(self._misfit_m2, seen.whitening, own.cost, seconds)
-        believed = own if self._rival is None else self._rival.told(own)
-        if told is None:
-            return own, Told(believed, names, observed.points_m)
-        return own, told.then(believed, names, seen, self.chains.limits_rad, seconds)
+            self._estimate, self._told = self._continued(
+                self._estimate, self._told, observed, seconds
+            )
+        self._stamp_ns = stamp_ns
+        return self._told.estimate
 
     @property
     def challenge_due(self) -> bool:
@@ -153,35 +125,61 @@ class HandTracker:
             found = initialise(self.chains, self._uninformed, observations)
             self._follow_rival(own, own_cost, found)
 
-    def _follow_both(
-        self, last: HandEstimate, seconds: float, observations: Observations
-    ) -> HandEstimate:
-        """Take in a message: the pose and its rival, of which one may have won."""
-        own = update(self.chains, self._posture, observations, last, seconds)
+    def _continued(
+        self, last: HandEstimate, told: Told, observed: Observed, seconds: float
+    ) -> tuple[HandEstimate, Told]:
+        """What is believed with a message, and what is told: the same, unless it jumped.
+
+        The pose is followed, and its rival, of which one may have won.
+        """
+        taken = self._follow(last, told, observed, seconds)
         if self._rival is not None:
-            rival = self._rival.estimate
-            other = update(self.chains, self._posture, observations, rival, seconds)
-            self._rival = self._rival.after(own, other, seconds)
+            other = self._follow(self._rival.estimate, told, observed, seconds)
+            self._rival = self._rival.after(taken.estimate, other.estimate, seconds)
             if self._rival.has_won():
-                own, self._rival = other, None
-            elif self._rival.is_over(own):
+                taken, self._rival = other, None
+            elif self._rival.is_over(taken.estimate):
                 self._rival = None
-        return own
+        own, self.fitted, self._misfit_m2, quiet = taken
+        self._challenge_if_due(own, observed)
+        if quiet and self._rival is None:
+            return own, Told(own, observed.names, observed.points_m)
+        believed = own if self._rival is None else self._rival.told(own)
+        limits_rad = self.chains.limits_rad
+        return own, told.then(believed, observed.names, self.fitted, limits_rad, seconds)
+
+    def _follow(
+        self, last: HandEstimate, told: Told, observed: Observed, seconds: float
+    ) -> Followed:
+        """Predict from one of the estimates, and fit the landmarks."""
+        found: Followed = follow(
+            self.chains,
+            self._posture,
+            self._landmarks.places(observed.names),
+            (observed.points_m, observed.covariances_m2),
+            self._misfit_m2,
+            (last, told.estimate),
+            seconds,
+        )
+        return found
 
     def _is_lost(self, stamp_ns: int, seconds: float) -> bool:
         """Whether stamps ran backwards, or nothing was known of the hand for too long."""
         unseen_s = (stamp_ns - self._located_ns) * 1e-9
         return not (0.0 <= seconds <= MAX_GAP_S and unseen_s <= MAX_GAP_S)
 
-    def _initialise(self, observations: Observations) -> HandEstimate:
+    def _begun(self, observed: Observed) -> tuple[HandEstimate, Told]:
         """The likeliest pose; the next that differs from it is followed as its rival."""
+        self.fitted = observation_arrays(self._landmarks, observed)
         self._updates_to_restart = RESTART_INTERVAL_BAD
         self._restart_landmarks = frozenset()
-        best, *others = initialise(self.chains, self._uninformed, observations)
+        best, *others = initialise(self.chains, self._uninformed, self.fitted)
         self._rival = None
         own = _estimate_of(best)
         self._follow_rival(own, best.cost, others)
-        return own
+        self._misfit_m2 = learned_misfit(0.0, self.fitted.whitening, own.cost, MAX_GAP_S)
+        believed = own if self._rival is None else self._rival.told(own)
+        return own, Told(believed, observed.names, observed.points_m)
 
     def _follow_rival(
         self, own: HandEstimate, own_cost: float, found: Sequence[Hypothesis]
