@@ -19,12 +19,12 @@ from services.solver.finger.solve_fingers import (
     solve_dls,
     tips_in_wrist,
 )
-from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
+from services.solver.whole_hand.fixed_numbers import chains_of
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.landmarks import Observations
+from services.solver.whole_hand.landmarks import Observations, Places
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
 _DECIMALS = 6
@@ -40,21 +40,26 @@ _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 
 @njit(cache=True)
 def dls_numbers(
-    chains: HandChains,
+    fixed: Array,
+    places: Places,
+    seen: tuple[Array, Array, Bools, Array],
     estimate: HandEstimate,
-    tips: tuple[Integers, Array, Array, Bools],
     options: tuple[int, float],
-    observations: Observations,
     errors: Errors,
 ) -> Array:
     """`pose_numbers` of an estimate whose digits are solved by dls.
 
-    tips: the last four arguments of tips_in_wrist. options: iterations and tolerance (m).
-    observations and errors: as `variances` takes them.
+    fixed: as fixed_numbers.py has them. seen: points (m, 3), covariances (m, 3, 3), who was
+    measured (m,) and whitening (m, 3, 3), as in Observed and Observations, of landmarks at places.
+    options: iterations and tolerance (m). errors: as `variances` takes them.
     """
+    chains, (points_m, covariances_m2, measured, whitening) = chains_of(fixed), seen
     wrist = estimate.rotation, estimate.position_m
-    seen = tips_in_wrist(wrist, tips)
-    fingers = solve_dls(chains, estimate.angles_rad, seen, options[0], options[1])
+    tips = tips_in_wrist(wrist, (places.tip, points_m, covariances_m2, measured))
+    fingers = solve_dls(chains, estimate.angles_rad, tips, options[0], options[1])
+    observations = Observations(
+        places.joint, places.digit, places.depth, places.offset_m, points_m, whitening
+    )
     spread = variances(chains, observations, estimate, errors)
     return pose_numbers(chains, wrist, fingers, spread)
 

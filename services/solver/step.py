@@ -85,24 +85,18 @@ class _Hand:
 
     def _numbers(self, estimate: HandEstimate, observed: Observed, errors: Errors) -> Array:
         """All numbers of the pose (32, 8), its digits by the configured method."""
-        settings, chains = self._settings, self.tracker.chains
-        fitted = self.tracker.fitted
-        tips = (
-            self._landmarks.places(observed.names).tip,
-            observed.points_m,
-            observed.covariances_m2,
-            observed.measured,
-        )
+        settings, tracker = self._settings, self.tracker
+        places, fitted = self._landmarks.places(observed.names), tracker.fitted
+        seen = observed.points_m, observed.covariances_m2, observed.measured
         if settings.method == DLS:
             options = settings.max_iterations, settings.tolerance_m
-            numbers = dls_numbers(chains, estimate, tips, options, fitted, errors)
-        else:
-            wrist = estimate.rotation, estimate.position_m
-            seen = tips_in_wrist(wrist, tips)
-            fingers = solve_fingers(settings, chains, estimate.angles_rad, seen)
-            spread = variances(chains, fitted, estimate, errors)
-            numbers = pose_numbers(chains, wrist, fingers, spread)
-        return numbers
+            whitened = *seen, fitted.whitening
+            return dls_numbers(tracker.fixed, places, whitened, estimate, options, errors)
+        wrist = estimate.rotation, estimate.position_m
+        tips = tips_in_wrist(wrist, (places.tip, *seen))
+        fingers = solve_fingers(settings, tracker.chains, estimate.angles_rad, tips)
+        spread = variances(tracker.chains, fitted, estimate, errors)
+        return pose_numbers(tracker.chains, wrist, fingers, spread)
 
     def _sources(self, measured: frozenset[str]) -> list[JointSource]:
         """Where each joint comes from; the same few sets of landmarks come again and again."""

@@ -75,9 +75,14 @@ def tips_in_wrist(
     for n in range(digits.size):
         row = digits[n]
         if row >= 0:
-            tips.points_m[row] = rotation.T @ (points_m[n] - position_m)
-            variance = np.trace(covariances_m2[n]) / 3.0
-            tips.sigma_m[row] = math.sqrt(variance)
+            trace = 0.0
+            for i in range(3):
+                trace += covariances_m2[n, i, i]
+                # Row i of the rotation turned over.
+                for k in range(3):
+                    way_m = points_m[n, k] - position_m[k]
+                    tips.points_m[row, i] += rotation[k, i] * way_m
+            tips.sigma_m[row] = math.sqrt(trace / 3.0)
             tips.seen[row] = MEASURED if measured[n] else PREDICTED
     return tips
 

@@ -24,6 +24,7 @@ from rhot.hand import TIPS, HandModel
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
+from services.solver.whole_hand.fixed_numbers import fixed_numbers
 from services.solver.whole_hand.glide import Told
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.initialise import Hypothesis, initialise
@@ -65,9 +66,11 @@ class HandTracker:
     def __init__(self, model: HandModel, landmarks: Landmarks) -> None:
         """landmarks: those of the model (landmarks.hand_landmarks)."""
         self.chains = hand_chains(model)
-        self._posture = posture_prior(model)
+        posture = posture_prior(model)
+        # The same for kernels: fixed_numbers.py.
+        self.fixed = fixed_numbers(self.chains, posture)
         self._landmarks = landmarks
-        self._uninformed = uninformed_prior(self._posture)
+        self._uninformed = uninformed_prior(posture)
         self._estimate: HandEstimate | None = None
         # What was told last.
         self._told: Told | None = None
@@ -140,7 +143,9 @@ class HandTracker:
                 taken, self._rival = other, None
             elif self._rival.is_over(taken.estimate):
                 self._rival = None
-        own, self.fitted, self._misfit_m2, quiet = taken
+        own, whitening, self._misfit_m2, quiet = taken
+        places = self._landmarks.places(observed.names)
+        self.fitted = Observations(*places[:4], observed.points_m, whitening)
         self._challenge_if_due(own, observed)
         if quiet and self._rival is None:
             return own, Told(own, observed.names, observed.points_m)
@@ -153,8 +158,7 @@ class HandTracker:
     ) -> Followed:
         """Predict from one of the estimates, and fit the landmarks."""
         found: Followed = follow(
-            self.chains,
-            self._posture,
+            self.fixed,
             self._landmarks.places(observed.names),
             (observed.points_m, observed.covariances_m2),
             self._misfit_m2,

@@ -14,6 +14,7 @@ from rhot.geometry.transforms import Array
 from services.solver.maths.chains import HandChains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
+from services.solver.whole_hand.fixed_numbers import chains_of, posture_of
 from services.solver.whole_hand.glide import is_quiet
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations, Places, whitening
@@ -27,15 +28,14 @@ class Followed(NamedTuple):
     """What a message made of a hand that nothing rivals."""
 
     estimate: HandEstimate
-    observations: Observations  # what it was fitted to
+    whitening: Array  # (m, 3, 3) of the landmarks, as in Observations
     misfit_m2: float  # as learned from it
     quiet: bool  # whether it may be told as it is (glide.py)
 
 
 @njit(cache=True)
 def follow(
-    chains: HandChains,
-    posture: PosturePrior,
+    fixed: Array,
     places: Places,
     seen: tuple[Array, Array],
     misfit_m2: float,
@@ -44,8 +44,8 @@ def follow(
 ) -> Followed:
     """A message of landmarks that sit at places, some seconds after the last estimate.
 
-    seen: their points (m, 3) and covariances (m, 3, 3) in the rig frame. last: what was believed
-    and what was told.
+    fixed: as fixed_numbers.py has them. seen: points (m, 3) and covariances (m, 3, 3) in the rig
+    frame. last: what was believed and what was told.
     """
     observations = Observations(
         places.joint,
@@ -55,9 +55,9 @@ def follow(
         seen[0],
         whitening(seen[1], misfit_m2),
     )
-    own = update(chains, posture, observations, last[0], seconds)
+    own = update(chains_of(fixed), posture_of(fixed), observations, last[0], seconds)
     learned_m2 = learned_misfit(misfit_m2, observations.whitening, own.cost, seconds)
-    return Followed(own, observations, learned_m2, is_quiet(last[1], own, seconds))
+    return Followed(own, observations.whitening, learned_m2, is_quiet(last[1], own, seconds))
 
 
 @njit(cache=True)
