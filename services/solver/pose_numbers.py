@@ -19,12 +19,13 @@ from services.solver.finger.solve_fingers import (
     solve_dls,
     tips_in_wrist,
 )
+from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
 from services.solver.whole_hand.fixed_numbers import chains_of
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.landmarks import Observations, Places
+from services.solver.whole_hand.landmarks import Observations, Observed, Places
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
 _DECIMALS = 6
@@ -38,28 +39,69 @@ _DIGIT_0 = DIGIT_ROWS.start
 _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 
 
-@njit(cache=True)
 def dls_numbers(
     fixed: Array,
     places: Places,
-    seen: tuple[Array, Array, Bools, Array],
+    observed: Observed,
+    whitening: Array,
     estimate: HandEstimate,
-    options: tuple[int, float],
     errors: Errors,
+    options: tuple[int, float],
 ) -> Array:
     """`pose_numbers` of an estimate whose digits are solved by dls.
 
-    fixed: as fixed_numbers.py has them. seen: points (m, 3), covariances (m, 3, 3), who was
-    measured (m,) and whitening (m, 3, 3), as in Observed and Observations, of landmarks at places.
-    options: iterations and tolerance (m). errors: as `variances` takes them.
+    fixed: as fixed_numbers.py has them. whitening (m, 3, 3), as in Observations, of the landmarks
+    observed, which sit at places. errors: as `variances` takes them. options: iterations and
+    tolerance (m).
     """
-    chains, (points_m, covariances_m2, measured, whitening) = chains_of(fixed), seen
-    wrist = estimate.rotation, estimate.position_m
-    tips = tips_in_wrist(wrist, (places.tip, points_m, covariances_m2, measured))
-    fingers = solve_dls(chains, estimate.angles_rad, tips, options[0], options[1])
-    observations = Observations(
-        places.joint, places.digit, places.depth, places.offset_m, points_m, whitening
+    numbers: Array = _dls_numbers_unpacked(
+        fixed,
+        *places,
+        observed.points_m,
+        observed.covariances_m2,
+        observed.measured,
+        whitening,
+        *estimate,
+        *errors,
+        *options,
     )
+    return numbers
+
+
+@njit(cache=True)
+def _dls_numbers_unpacked(
+    fixed: Array,
+    joint: Integers,
+    digit: Integers,
+    depth: Integers,
+    offset_m: Array,
+    _reach_m: Array,
+    tip: Integers,
+    points_m: Array,
+    covariances_m2: Array,
+    measured: Bools,
+    whitening: Array,
+    rotation: Array,
+    position_m: Array,
+    angles: Array,
+    covariance: Array,
+    cost: float,
+    used: int,
+    effect: Array,
+    sigmas: Array,
+    paint_columns: Integers,
+    keep: float,
+    any_errors: bool,
+    max_iterations: int,
+    tolerance_m: float,
+) -> Array:
+    """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long."""
+    chains, wrist = chains_of(fixed), (rotation, position_m)
+    tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
+    fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
+    estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)
+    observations = Observations(joint, digit, depth, offset_m, points_m, whitening)
+    errors = Errors(effect, sigmas, paint_columns, keep, any_errors)
     spread = variances(chains, observations, estimate, errors)
     return pose_numbers(chains, wrist, fingers, spread)
 

@@ -87,13 +87,13 @@ class _Hand:
         """All numbers of the pose (32, 8), its digits by the configured method."""
         settings, tracker = self._settings, self.tracker
         places, fitted = self._landmarks.places(observed.names), tracker.fitted
-        seen = observed.points_m, observed.covariances_m2, observed.measured
         if settings.method == DLS:
             options = settings.max_iterations, settings.tolerance_m
-            whitened = *seen, fitted.whitening
-            return dls_numbers(tracker.fixed, places, whitened, estimate, options, errors)
+            seen = places, observed, fitted.whitening
+            return dls_numbers(tracker.fixed, *seen, estimate, errors, options)
         wrist = estimate.rotation, estimate.position_m
-        tips = tips_in_wrist(wrist, (places.tip, *seen))
+        points = places.tip, observed.points_m, observed.covariances_m2, observed.measured
+        tips = tips_in_wrist(wrist, points)
         fingers = solve_fingers(settings, tracker.chains, estimate.angles_rad, tips)
         spread = variances(tracker.chains, fitted, estimate, errors)
         return pose_numbers(tracker.chains, wrist, fingers, spread)

@@ -11,7 +11,7 @@ belief is left alone; how far it is away goes into the told covariance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -38,8 +38,7 @@ _TURN_RAD_S, _BEND_RAD_S = np.deg2rad([200.0, 200.0])
 _LEVER_M = 0.05
 
 
-@dataclass(frozen=True)
-class Told:
+class Told(NamedTuple):
     """What was told with a message, and the landmarks that it was told of."""
 
     estimate: HandEstimate
@@ -56,7 +55,7 @@ class Told:
     ) -> Told:
         """What is told some seconds later, where own is believed; limits_rad (5, 4, 2)."""
         after_m = observations.point_m
-        if is_quiet(self.estimate, own, seconds):
+        if is_quiet(self.estimate.rotation, self.estimate.angles_rad, own, seconds):
             return Told(own, names, after_m)
         if names == self.names:
             before_m, now_m, digits = self.points_m, after_m, observations.digit
@@ -69,13 +68,16 @@ class Told:
 
 
 @njit(cache=True)
-def is_quiet(last: HandEstimate, own: HandEstimate, seconds: float) -> bool:
-    """Whether what is believed (own) is so near to what was told last that nothing is held back."""
-    x, y, z = turn_between(last.rotation, own.rotation)
+def is_quiet(rotation: Array, angles: Array, own: HandEstimate, seconds: float) -> bool:
+    """Whether what is believed (own) is so near to what was told last that nothing is held back.
+
+    rotation (3, 3) and angles (5, 4): of what was told.
+    """
+    x, y, z = turn_between(rotation, own.rotation)
     most = 0.0
     for row in range(5):
         for k in range(4):
-            most = max(most, abs(own.angles_rad[row, k] - last.angles_rad[row, k]))
+            most = max(most, abs(own.angles_rad[row, k] - angles[row, k]))
     turn = math.sqrt(x * x + y * y + z * z)
     return turn <= _TURN_RAD_S * seconds and most <= _BEND_RAD_S * seconds
 

@@ -40,7 +40,7 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
-from services.solver.whole_hand.update import Followed, follow
+from services.solver.whole_hand.update import follow
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -135,16 +135,17 @@ class HandTracker:
 
         The pose is followed, and its rival, of which one may have won.
         """
-        taken = self._follow(last, told, observed, seconds)
+        places = self._landmarks.places(observed.names)
+        given = self.fixed, places, observed, self._misfit_m2
+        taken = follow(*given, last, told.estimate, seconds)
         if self._rival is not None:
-            other = self._follow(self._rival.estimate, told, observed, seconds)
+            other = follow(*given, self._rival.estimate, told.estimate, seconds)
             self._rival = self._rival.after(taken.estimate, other.estimate, seconds)
             if self._rival.has_won():
                 taken, self._rival = other, None
             elif self._rival.is_over(taken.estimate):
                 self._rival = None
         own, whitening, self._misfit_m2, quiet = taken
-        places = self._landmarks.places(observed.names)
         self.fitted = Observations(*places[:4], observed.points_m, whitening)
         self._challenge_if_due(own, observed)
         if quiet and self._rival is None:
@@ -152,20 +153,6 @@ class HandTracker:
         believed = own if self._rival is None else self._rival.told(own)
         limits_rad = self.chains.limits_rad
         return own, told.then(believed, observed.names, self.fitted, limits_rad, seconds)
-
-    def _follow(
-        self, last: HandEstimate, told: Told, observed: Observed, seconds: float
-    ) -> Followed:
-        """Predict from one of the estimates, and fit the landmarks."""
-        found: Followed = follow(
-            self.fixed,
-            self._landmarks.places(observed.names),
-            (observed.points_m, observed.covariances_m2),
-            self._misfit_m2,
-            (last, told.estimate),
-            seconds,
-        )
-        return found
 
     def _is_lost(self, stamp_ns: int, seconds: float) -> bool:
         """Whether stamps ran backwards, or nothing was known of the hand for too long."""

@@ -11,13 +11,14 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.fixed_numbers import chains_of, posture_of
 from services.solver.whole_hand.glide import is_quiet
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.landmarks import Observations, Places, whitening
+from services.solver.whole_hand.landmarks import Observations, Observed, Places, whitening
 from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior, predict
 from services.solver.whole_hand.posture_prior import PosturePrior
@@ -33,31 +34,74 @@ class Followed(NamedTuple):
     quiet: bool  # whether it may be told as it is (glide.py)
 
 
-@njit(cache=True)
 def follow(
     fixed: Array,
     places: Places,
-    seen: tuple[Array, Array],
+    observed: Observed,
     misfit_m2: float,
-    last: tuple[HandEstimate, HandEstimate],
+    last: HandEstimate,
+    told: HandEstimate,
     seconds: float,
 ) -> Followed:
     """A message of landmarks that sit at places, some seconds after the last estimate.
 
-    fixed: as fixed_numbers.py has them. seen: points (m, 3) and covariances (m, 3, 3) in the rig
-    frame. last: what was believed and what was told.
+    fixed: as fixed_numbers.py has them. last, told: what was believed and what was told.
     """
-    observations = Observations(
+    # Tuples unpacked: numba takes four times as long over an array in a tuple.
+    found = _follow_unpacked(
+        fixed,
         places.joint,
         places.digit,
         places.depth,
         places.offset_m,
-        seen[0],
-        whitening(seen[1], misfit_m2),
+        observed.points_m,
+        observed.covariances_m2,
+        misfit_m2,
+        last.rotation,
+        last.position_m,
+        last.angles_rad,
+        last.covariance,
+        told.rotation,
+        told.angles_rad,
+        seconds,
     )
-    own = update(chains_of(fixed), posture_of(fixed), observations, last[0], seconds)
-    learned_m2 = learned_misfit(misfit_m2, observations.whitening, own.cost, seconds)
-    return Followed(own, observations.whitening, learned_m2, is_quiet(last[1], own, seconds))
+    return Followed(HandEstimate(*found[:6]), *found[6:])
+
+
+@njit(cache=True)
+def _follow_unpacked(
+    fixed: Array,
+    joint: Integers,
+    digit: Integers,
+    depth: Integers,
+    offset_m: Array,
+    points_m: Array,
+    covariances_m2: Array,
+    misfit_m2: float,
+    rotation: Array,
+    position_m: Array,
+    angles: Array,
+    covariance: Array,
+    told_rotation: Array,
+    told_angles: Array,
+    seconds: float,
+) -> tuple[Array, Array, Array, Array, float, int, Array, float, bool]:
+    """`follow` with plain arrays for its tuples, and for what it returns."""
+    whitened = whitening(covariances_m2, misfit_m2)
+    observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
+    last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)
+    own = update(chains_of(fixed), posture_of(fixed), observations, last, seconds)
+    return (
+        own.rotation,
+        own.position_m,
+        own.angles_rad,
+        own.covariance,
+        own.cost,
+        own.iterations,
+        whitened,
+        learned_misfit(misfit_m2, whitened, own.cost, seconds),
+        is_quiet(told_rotation, told_angles, own, seconds),
+    )
 
 
 @njit(cache=True)
