@@ -68,8 +68,8 @@ class _Hand:
         self._landmarks = hand_landmarks(model)
         self.tracker = HandTracker(model, self._landmarks)
         self._model_error = ModelError(model, self.tracker.chains)
-        # By the landmarks that were measured.
-        self._known_sources: dict[frozenset[str], list[JointSource]] = {}
+        # By the landmarks of a message, and which of them were measured.
+        self._known_sources: dict[tuple[tuple[str, ...], bytes], list[JointSource]] = {}
         self._radii = [rounded(radius_m) for radius_m in joint_radii_m(model)]
 
     def step(self, points: HandPoints) -> HandPose | None:
@@ -79,8 +79,7 @@ class _Hand:
             return None
         errors = self._model_error.errors(points.stamp_ns, observed.names)
         numbers = self._numbers(estimate, observed, errors)
-        measured = frozenset(compress(observed.names, observed.measured.tolist()))
-        sources = self._sources(measured)
+        sources = self._sources(observed)
         return hand_pose(points, self._settings.method, numbers, self._radii, sources)
 
     def _numbers(self, estimate: HandEstimate, observed: Observed, errors: Errors) -> Array:
@@ -98,13 +97,15 @@ class _Hand:
         spread = variances(tracker.chains, fitted, estimate, errors)
         return pose_numbers(tracker.chains, wrist, fingers, spread)
 
-    def _sources(self, measured: frozenset[str]) -> list[JointSource]:
+    def _sources(self, observed: Observed) -> list[JointSource]:
         """Where each joint comes from; the same few sets of landmarks come again and again."""
-        known = self._known_sources.get(measured)
+        key = observed.names, observed.measured.tobytes()
+        known = self._known_sources.get(key)
         if known is None:
+            measured = set(compress(observed.names, observed.measured.tolist()))
             located = len(measured) >= MIN_LANDMARKS
             digits = {self._landmarks[name].digit for name in measured}
             known = joint_sources(measured, located, [row in digits for row in range(5)])
             if len(self._known_sources) < _MAX_SETS:
-                self._known_sources[measured] = known
+                self._known_sources[key] = known
         return known

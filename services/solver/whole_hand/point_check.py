@@ -81,9 +81,7 @@ def _rows(points: Collection[HandPoint]) -> Array:
         seen_by = _MEASURED
         if point.source == "predicted":
             seen_by = _ONE_CAMERA if len(point.cameras) == 1 else _PREDICTED
-        numbers += point.position_m
-        numbers += values
-        numbers += (kind, seen_by)
+        numbers += (*point.position_m, *values, kind, seen_by)
     return np.array(numbers, dtype=np.float64).reshape(-1, 11)
 
 
@@ -201,8 +199,10 @@ def _worst_outlier(points: Array, covariances: Array, reach_m: Array) -> int:
         trace = covariances[n, 0, 0] + covariances[n, 1, 1] + covariances[n, 2, 2]
         reach[n] = reach_m[n] + _VAGUE_SIGMAS * math.sqrt(trace)
         for k in range(n):
-            apart = points[n] - points[k]
-            if math.sqrt(apart @ apart) > _REACH_MARGIN * (reach[n] + reach[k]):
+            square = 0.0
+            for i in range(3):
+                square += (points[n, i] - points[k, i]) ** 2
+            if math.sqrt(square) > _REACH_MARGIN * (reach[n] + reach[k]):
                 conflicts[n] += 1
                 conflicts[k] += 1
     worst = int(conflicts.argmax())
