@@ -20,10 +20,9 @@ from services.solver.finger.solve_fingers import (
     tips_in_wrist,
 )
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.chains import HandChains
+from services.solver.maths.chains import HandChains, chains_of
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
-from services.solver.whole_hand.fixed_numbers import chains_of
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations, Observed, Places
 
@@ -40,7 +39,7 @@ _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 
 
 def dls_numbers(
-    fixed: Array,
+    chains_row: Array,
     places: Places,
     observed: Observed,
     whitening: Array,
@@ -50,12 +49,12 @@ def dls_numbers(
 ) -> Array:
     """`pose_numbers` of an estimate whose digits are solved by dls.
 
-    fixed: as fixed_numbers.py has them. whitening (m, 3, 3), as in Observations, of the landmarks
+    chains_row: of in_a_row. whitening (m, 3, 3), as in Observations, of the landmarks
     observed, which sit at places. errors: as `variances` takes them. options: iterations and
     tolerance (m).
     """
     numbers: Array = _dls_numbers_unpacked(
-        fixed,
+        chains_row,
         *places,
         observed.points_m,
         observed.covariances_m2,
@@ -70,7 +69,7 @@ def dls_numbers(
 
 @njit(cache=True)
 def _dls_numbers_unpacked(
-    fixed: Array,
+    chains_row: Array,
     joint: Integers,
     digit: Integers,
     depth: Integers,
@@ -96,7 +95,7 @@ def _dls_numbers_unpacked(
     tolerance_m: float,
 ) -> Array:
     """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long."""
-    chains, wrist = chains_of(fixed), (rotation, position_m)
+    chains, wrist = chains_of(chains_row), (rotation, position_m)
     tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
     estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)

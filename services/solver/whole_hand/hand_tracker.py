@@ -21,10 +21,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rhot.hand import TIPS, HandModel
-from services.solver.maths.chains import hand_chains
+from services.solver.maths.chains import hand_chains, in_a_row
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
-from services.solver.whole_hand.fixed_numbers import fixed_numbers
 from services.solver.whole_hand.glide import Told
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.initialise import Hypothesis, initialise
@@ -67,8 +66,8 @@ class HandTracker:
         """landmarks: those of the model (landmarks.hand_landmarks)."""
         self.chains = hand_chains(model)
         posture = posture_prior(model)
-        # The same for kernels: fixed_numbers.py.
-        self.fixed = fixed_numbers(self.chains, posture)
+        # As kernels are given them.
+        self.chains_row, self._posture_row = in_a_row(self.chains), in_a_row(posture)
         self._landmarks = landmarks
         self._uninformed = uninformed_prior(posture)
         self._estimate: HandEstimate | None = None
@@ -136,7 +135,7 @@ class HandTracker:
         The pose is followed, and its rival, of which one may have won.
         """
         places = self._landmarks.places(observed.names)
-        given = self.fixed, places, observed, self._misfit_m2
+        given = self.chains_row, self._posture_row, places, observed, self._misfit_m2
         taken = follow(*given, last, told.estimate, seconds)
         if self._rival is not None:
             other = follow(*given, self._rival.estimate, told.estimate, seconds)

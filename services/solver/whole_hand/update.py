@@ -12,16 +12,15 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.chains import HandChains
+from services.solver.maths.chains import HandChains, chains_of
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
-from services.solver.whole_hand.fixed_numbers import chains_of, posture_of
 from services.solver.whole_hand.glide import is_quiet
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations, Observed, Places, whitening
 from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior, predict
-from services.solver.whole_hand.posture_prior import PosturePrior
+from services.solver.whole_hand.posture_prior import PosturePrior, posture_of
 from services.solver.whole_hand.residuals import Pose
 
 
@@ -35,7 +34,8 @@ class Followed(NamedTuple):
 
 
 def follow(
-    fixed: Array,
+    chains_row: Array,
+    posture_row: Array,
     places: Places,
     observed: Observed,
     misfit_m2: float,
@@ -45,11 +45,12 @@ def follow(
 ) -> Followed:
     """A message of landmarks that sit at places, some seconds after the last estimate.
 
-    fixed: as fixed_numbers.py has them. last, told: what was believed and what was told.
+    The rows: of in_a_row. last, told: what was believed and what was told.
     """
     # Tuples unpacked: numba takes four times as long over an array in a tuple.
     found = _follow_unpacked(
-        fixed,
+        chains_row,
+        posture_row,
         places.joint,
         places.digit,
         places.depth,
@@ -70,7 +71,8 @@ def follow(
 
 @njit(cache=True)
 def _follow_unpacked(
-    fixed: Array,
+    chains_row: Array,
+    posture_row: Array,
     joint: Integers,
     digit: Integers,
     depth: Integers,
@@ -90,7 +92,7 @@ def _follow_unpacked(
     whitened = whitening(covariances_m2, misfit_m2)
     observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
     last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)
-    own = update(chains_of(fixed), posture_of(fixed), observations, last, seconds)
+    own = update(chains_of(chains_row), posture_of(posture_row), observations, last, seconds)
     return (
         own.rotation,
         own.position_m,
