@@ -80,7 +80,7 @@ def _carry_along(
             for r in range(3):
                 H[3 * n + r, i] = of_one[r, a]
         for i in range(3):
-            # All of the hand's lengths: the landmark's own distance from the wrist.
+            # The hand's size moves a landmark along its own way from the wrist.
             J[3 * n + i, _SIZE] = error[i]
             for k in range(i + 1):
                 way = observations.point_m[n, k] - pose.position_m[k]
