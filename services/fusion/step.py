@@ -208,12 +208,10 @@ class FusionStep:
         for told in self._poses.take(instant_ns):
             self._paint.note(told)
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
-        positions, covariances = self._paint.correct(
-            estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
-        )
         points_of, incoherent = self._messages.of(
             estimates,
-            (positions, covariances),
+            instant_ns,
+            self._paint.known,
             (self._systematic.known, self._hidden.sigmas),
             self._hidden.places,
         )

@@ -28,10 +28,12 @@ from services.fusion.kalman.measurement import (
 from services.fusion.kalman.motion_models import (
     MotionModels,
     SharedNoise,
-    add_noise,
+    add_walk,
+    jerk_cov,
     predict_cov,
     predict_state,
     turn_gram,
+    unit_process_noise,
     update_way,
 )
 from services.fusion.kalman.own_motion import (
@@ -87,14 +89,16 @@ def filter_node(
             history.carried[node, m, k] = own[k]
         x, P = history.state[node, m], history.cov[node, m]
         F = transitions(models, m, own, dt_s)
+        jerk = jerk_cov(models, m, shared, before)
+        unit_process_noise((models.velocity_rate[m], models.acceleration_rate[m]), dt_s, Q)
         if parent != m and models.walk[m] > 0.0:
             T = body_transform(history.state[last, parent], before)
             predict_state(T @ history.state[last, parent], F, x)
-            predict_cov(T @ history.cov[last, parent] @ T.T, F, P)
+            predict_cov(T @ history.cov[last, parent] @ T.T, F, jerk, Q, P)
         else:
             predict_state(history.state[last, parent], F, x)
-            predict_cov(history.cov[last, parent], F, P)
-        add_noise(models, m, dt_s, shared, before, P)
+            predict_cov(history.cov[last, parent], F, jerk, Q, P)
+        add_walk(models, m, dt_s, before, P)
         own_noise(models, m, dt_s, Q)
         for k in range(own.shape[0]):
             if before[k] and own[k] > 0.0:

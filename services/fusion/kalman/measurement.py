@@ -61,9 +61,7 @@ def predict_ray(x: Array, look: Look, out: Innovation) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def innovate(
-    x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation
-) -> float:
+def innovate(x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation) -> float:
     """The innovation of a look by a state (D,), (D, D); returns det(S).
 
     Of the frame's looks that take() took, P knows nothing yet: what they say of it are the first

@@ -11,11 +11,17 @@ or else the filter.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
-from services.fusion.one_camera.carried_shape import carry_shape, no_shapes, note_shapes
-from services.fusion.one_camera.kept_shape import ShapeMemory
+from services.fusion.one_camera.carried_shape import (
+    LocatedShapes,
+    carry_shape,
+    no_shapes,
+    note_shapes,
+)
+from services.fusion.one_camera.kept_shape import ShapeMemory, empty_memory, learn_deformation
 
 Estimate = tuple[Array, Array]  # position (3,) and covariance (3, 3), rig frame
 
@@ -34,29 +40,44 @@ _REACH_M = 1.0
 class LastLocated:
     """Where L landmarks were when two cameras saw each last, and what that tells of them now."""
 
-    def __init__(self, hand: Ints) -> None:
-        """hand (L,): whose each landmark is."""
-        self._hand = hand
-        self._shapes = no_shapes(hand.size)
+    def __init__(self, hand: Ints, eye_rig: Array, span_s: float) -> None:
+        """hand (L,): whose each landmark is; eye_rig (3,): the middle of the cameras.
 
-    def note(self, located: Bools, positions_m: Array, covs: Array, time_s: float) -> None:
-        """Positions (L, 3), covariances (L, 3, 3) of landmarks that two cameras see (L,)."""
-        note_shapes(self._shapes, located, positions_m, covs, time_s)
+        span_s: from one instant to the next, usually.
+        """
+        self._hand, self._span_s = hand, span_s
+        self._shapes = no_shapes(hand.size)
+        # How the hands deformed lately.
+        self._memory = empty_memory(hand.size, eye_rig)
 
     def tell(
         self,
         time_s: float,
-        are: tuple[Bools, Bools],
+        sights: tuple[Bools, Bools, Bools],
         centres_rig: Array,
-        memory: tuple[ShapeMemory, float],
         told: Estimate,
     ) -> None:
         """Estimates of all landmarks that one camera sees alone; told (L, 3), (L, 3, 3) in place.
 
-        are: who one camera sees alone (L,), and who two see; centres_rig (L, 3): of a camera that
-        sees each; memory: how the hands deformed lately, in spans of so many seconds.
+        sights: what is known at all (L,), by which cameras (L, C), by two or more (L,); centres_rig
+        (C, 3) of the cameras. What two see is remembered.
+        """
+        found, seen_by, measured = sights
+        spans = time_s, self._span_s
+        if _note(self._shapes, self._memory, self._hand, (found, seen_by, measured), told, spans):
+            alone = found & ~measured & seen_by.any(axis=1)
+            centres = centres_rig[seen_by.argmax(axis=1)]  # (L, 3)
+            self._tell_alone(time_s, (alone, found & measured), centres, told)
+
+    def _tell_alone(
+        self, time_s: float, are: tuple[Bools, Bools], centres_rig: Array, told: Estimate
+    ) -> None:
+        """The same of those that one camera sees alone (L,), by those that two see (L,).
+
+        centres_rig (L, 3): of a camera that sees each.
         """
         (alone, located), (means, covs) = are, told
+        memory = self._memory, self._span_s
         places = means.copy(), covs.copy()
         rows = np.flatnonzero(alone).tolist()
         for row in rows:
@@ -123,3 +144,26 @@ class LastLocated:
         across = np.eye(3) - np.outer(along, along)
         told_cov = (told / own) ** 2 * (across @ cov @ across) + variance * np.outer(along, along)
         return centre_rig + told * along, told_cov
+
+
+@njit(cache=True, error_model="numpy")
+def _note(
+    shapes: LocatedShapes,
+    memory: ShapeMemory,
+    hand: Ints,
+    sights: tuple[Bools, Bools, Bools],
+    told: Estimate,
+    times_s: tuple[float, float],
+) -> bool:
+    """Remember what two cameras see, as LastLocated.tell; whether one sees any landmark alone.
+
+    times_s: the instant, and from one to the next.
+    """
+    (found, seen_by, measured), (time_s, span_s) = sights, times_s
+    located = found & measured
+    note_shapes(shapes, located, told[0], told[1], time_s)
+    learn_deformation(memory, hand, located, told[0], time_s, span_s)
+    alone = 0
+    for row in range(found.size):
+        alone += found[row] and not measured[row] and seen_by[row].any()
+    return alone > 0

@@ -15,8 +15,11 @@ COV = 1e-6 * np.eye(3) + 0.16 * np.outer(RAY, RAY)
 
 
 def located(time_s=1.0):
-    last = LastLocated(np.zeros(2, dtype=np.int64))
-    last.note(np.array([True, False]), np.stack([PLACE, PLACE]), np.stack([COV, COV]), time_s)
+    last = LastLocated(np.zeros(2, dtype=np.int64), CENTRE, 1.0 / 60.0)
+    measured = np.array([True, False])
+    sights = measured, np.stack([measured, measured], axis=1), measured
+    told = np.stack([PLACE, PLACE]), np.stack([COV, COV])
+    last.tell(time_s, sights, np.stack([CENTRE, CENTRE]), told)
     return last
 
 
