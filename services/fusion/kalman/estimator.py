@@ -18,8 +18,7 @@ from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
-from services.fusion.kalman.telling import Told, nothing_told
-from services.fusion.method import Counts, Estimates
+from services.fusion.method import Counts, Estimates, no_estimates
 from services.fusion.one_camera.last_located import LastLocated
 
 # A point this uncertain is of no use to anybody (the width of a hand).
@@ -50,6 +49,7 @@ class KalmanMethod:
         self._span_s = float(periods_s.min())
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
+        self._told = no_estimates(len(self._hand), len(cameras))
         self.reset()
 
     def reset(self) -> None:
@@ -84,22 +84,20 @@ class KalmanMethod:
 
     def estimate(self, time_s: float) -> Estimates:
         """All landmarks at an instant."""
-        told = nothing_told(len(self._hand), len(self._recent_s))
+        told, alone = self._told, False
         since_s = time_s - self._recent_s
         for rows, hand in zip(self._rows, self._hands, strict=True):
-            mine = told if len(self._hands) == 1 else Told(*(array[rows] for array in told))
-            hand.tell(time_s, since_s, mine)
-        sights = told.found, told.seen_by, told.measured
-        self._located.tell(time_s, sights, self._centres_rig, (told.places, told.covs))
-        _keep_useful(told.found, told.places, told.covs, told.measured)
-        return Estimates(
-            found=told.found,
-            positions_m=told.places,
-            covariances_m2=told.covs,
-            seen_by=told.seen_by,
-            measured=told.measured,
-            detected=told.detected,
-        )
+            mine = told if len(self._hands) == 1 else Estimates(*(array[rows] for array in told))
+            alone |= hand.tell(time_s, since_s, mine)
+        self._located.take(time_s, told)
+        if alone:
+            self._located.tell_alone(time_s, self._centres_rig, told)
+        _keep_useful(told.found, told.positions_m, told.covariances_m2, told.measured)
+        return told
+
+    def settle(self) -> None:
+        """Learn from the last estimates."""
+        self._located.settle()
 
 
 def _looks_at(looks: FrameLooks, rows: slice) -> FrameLooks:

@@ -20,8 +20,8 @@ from services.fusion.kalman.frame_update import (
 from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
-from services.fusion.kalman.telling import Told, tell
-from services.fusion.method import Counts
+from services.fusion.kalman.telling import tell
+from services.fusion.method import Counts, Estimates
 
 # From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
 # motion was bounded (own_motion.MOST). Geometric mean of RMS, 95 % and maximum at lag 0, over those
@@ -151,11 +151,15 @@ class HandFilter:
         if np.count_nonzero(~history.used[nodes, landmark]) >= CONTRADICTIONS:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
-    def tell(self, time_s: float, since_s: Array, told: Told) -> None:
-        """What is known at an instant, to told; lost landmarks end (frame_update.drop_lost).
+    def tell(self, time_s: float, since_s: Array, told: Estimates) -> bool:
+        """Fill told with what is known at an instant; lost landmarks end (frame_update.drop_lost).
 
-        since_s (C,): from when on a camera's look counts as of that instant.
+        since_s (C,): from when on a camera's look counts as of that instant. Returns whether one
+        camera sees any landmark alone.
         """
         filters = MODELS, GATE
-        lost = tell(self._history, self._sights, self._cameras, filters, time_s, since_s, told)
+        lost, alone = tell(
+            self._history, self._sights, self._cameras, filters, time_s, since_s, told
+        )
         self._counts.dropped += lost
+        return alone > 0

@@ -15,6 +15,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
+from services.fusion.method import Estimates
 from services.fusion.one_camera.carried_shape import (
     LocatedShapes,
     carry_shape,
@@ -49,49 +50,52 @@ class LastLocated:
         self._shapes = no_shapes(hand.size)
         # How the hands deformed lately.
         self._memory = empty_memory(hand.size, eye_rig)
+        # An instant that is not learnt from yet: who was located, and all places.
+        self._taken: tuple[float, Bools, Estimate] | None = None
 
-    def tell(
-        self,
-        time_s: float,
-        sights: tuple[Bools, Bools, Bools],
-        centres_rig: Array,
-        told: Estimate,
-    ) -> None:
-        """Estimates of all landmarks that one camera sees alone; told (L, 3), (L, 3, 3) in place.
+    def take(self, time_s: float, estimates: Estimates) -> None:
+        """Remember what two cameras see at an instant.
 
-        sights: what is known at all (L,), by which cameras (L, C), by two or more (L,); centres_rig
-        (C, 3) of the cameras. What two see is remembered.
+        That takes a while, which nobody waits for: settle() does it, or who asks next.
         """
-        found, seen_by, measured = sights
-        spans = time_s, self._span_s
-        if _note(self._shapes, self._memory, self._hand, (found, seen_by, measured), told, spans):
-            alone = found & ~measured & seen_by.any(axis=1)
-            centres = centres_rig[seen_by.argmax(axis=1)]  # (L, 3)
-            self._tell_alone(time_s, (alone, found & measured), centres, told)
+        self.settle()
+        located = estimates.found & estimates.measured
+        places = estimates.positions_m.copy(), estimates.covariances_m2.copy()
+        self._taken = time_s, located, places
 
-    def _tell_alone(
-        self, time_s: float, are: tuple[Bools, Bools], centres_rig: Array, told: Estimate
-    ) -> None:
-        """The same of those that one camera sees alone (L,), by those that two see (L,).
+    def settle(self) -> None:
+        """Learn from what was taken last."""
+        if self._taken is not None:
+            time_s, located, places = self._taken
+            self._taken = None
+            spans = time_s, self._span_s
+            _note(self._shapes, self._memory, self._hand, located, places, spans)
 
-        centres_rig (L, 3): of a camera that sees each.
+    def tell_alone(self, time_s: float, centres_rig: Array, estimates: Estimates) -> None:
+        """Estimates of all landmarks that one camera sees alone, in place.
+
+        centres_rig (C, 3): of the cameras.
         """
-        (alone, located), (means, covs) = are, told
+        self.settle()
+        alone = estimates.found & ~estimates.measured & estimates.seen_by.any(axis=1)
+        located = estimates.found & estimates.measured
+        centres = centres_rig[estimates.seen_by.argmax(axis=1)]  # (L, 3) of one that sees each
+        means, covs = estimates.positions_m, estimates.covariances_m2
         memory = self._memory, self._span_s
         places = means.copy(), covs.copy()
         rows = np.flatnonzero(alone).tolist()
         for row in rows:
             places[0][row], places[1][row] = self._ray(
-                row, time_s, (means[row], covs[row]), centres_rig[row]
+                row, time_s, (means[row], covs[row]), centres[row]
             )
         for row in rows:
             shape = np.empty(3), np.empty((3, 3))
             now = (time_s, *places)
             if carry_shape(self._shapes, memory, self._hand, row, (located, alone), now, shape):
-                means[row], covs[row] = self._held(row, time_s, shape, centres_rig[row])
+                means[row], covs[row] = self._held(row, time_s, shape, centres[row])
             else:
                 estimate = means[row], covs[row]
-                means[row], covs[row] = self.told(row, time_s, estimate, centres_rig[row])
+                means[row], covs[row] = self.told(row, time_s, estimate, centres[row])
 
     def told(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
         """The filter's estimate of a landmark by one camera at centre_rig (3,), its distance held.
@@ -151,19 +155,14 @@ def _note(
     shapes: LocatedShapes,
     memory: ShapeMemory,
     hand: Ints,
-    sights: tuple[Bools, Bools, Bools],
-    told: Estimate,
+    located: Bools,
+    places: Estimate,
     times_s: tuple[float, float],
-) -> bool:
-    """Remember what two cameras see, as LastLocated.tell; whether one sees any landmark alone.
+) -> None:
+    """Remember the places (L, 3), (L, 3, 3) of those that two cameras see (L,).
 
     times_s: the instant, and from one to the next.
     """
-    (found, seen_by, measured), (time_s, span_s) = sights, times_s
-    located = found & measured
-    note_shapes(shapes, located, told[0], told[1], time_s)
-    learn_deformation(memory, hand, located, told[0], time_s, span_s)
-    alone = 0
-    for row in range(found.size):
-        alone += found[row] and not measured[row] and seen_by[row].any()
-    return alone > 0
+    time_s, span_s = times_s
+    note_shapes(shapes, located, places[0], places[1], time_s)
+    learn_deformation(memory, hand, located, places[0], time_s, span_s)

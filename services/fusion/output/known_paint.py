@@ -47,6 +47,17 @@ class KnownPaint(NamedTuple):
 
 
 @njit(cache=True)
+def note_directions(
+    paint: KnownPaint, rows: Ints, directions: Array, sigmas_rad: Array, stamp_ns: int
+) -> None:
+    """Remember which way the fingers of landmarks (n,) point: (n, 3), as sure as (n,)."""
+    for n in range(rows.size):
+        paint.directions[rows[n]] = directions[n]
+        paint.direction_sigmas[rows[n]] = sigmas_rad[n]
+        paint.stamps_ns[rows[n]] = stamp_ns
+
+
+@njit(cache=True)
 def correct_paint(
     paint: KnownPaint,
     instant_ns: int,

@@ -37,7 +37,7 @@ from rhot.hand import JOINT_INDEX, HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint
+from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
 from services.fusion.output.paint_centroid import shift_table
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
@@ -150,9 +150,7 @@ class PaintToBone:
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
-        self.known.directions[told.rows] = told.directions
-        self.known.direction_sigmas[told.rows] = told.sigmas_rad
-        self.known.stamps_ns[told.rows] = told.stamp_ns
+        note_directions(self.known, told.rows, told.directions, told.sigmas_rad, told.stamp_ns)
 
 
 @njit(cache=True)

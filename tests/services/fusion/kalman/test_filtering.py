@@ -21,7 +21,7 @@ def test_late_frames_give_the_same_estimate(one_hand):
         mixed.see(given[k])
     time_s = 23 / 60.0
     expected, found = in_order.told(time_s), mixed.told(time_s)
-    np.testing.assert_allclose(found.places, expected.places, atol=2e-5)
+    np.testing.assert_allclose(found.positions_m, expected.positions_m, atol=2e-5)
     assert mixed.counts.late == 0
 
 

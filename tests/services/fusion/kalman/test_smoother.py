@@ -49,9 +49,9 @@ def test_smoothed_as_rauch_tung_striebel(one_hand):
         G = np.linalg.solve(predicted, F @ P).T
         mean, cov = x + G @ (mean - F @ x), P + G @ (cov - predicted) @ G.T
     told = hand.told(float(history.time_s[nodes[-4]]))
-    covs = told.covs
+    covs = told.covariances_m2
     assert told.found.all()
-    np.testing.assert_allclose(told.places.ravel(), mean[:18], atol=1e-6)
+    np.testing.assert_allclose(told.positions_m.ravel(), mean[:18], atol=1e-6)
     for n in range(6):
         np.testing.assert_allclose(
             covs[n], cov[3 * n : 3 * n + 3, 3 * n : 3 * n + 3], atol=1e-2 * covs[n].max()
