@@ -29,6 +29,17 @@ class Estimates(NamedTuple):
     measured: Bools  # (L,) two or more did; else it is predicted
     detected: Bools  # (L,) two or more detected something of its colour then, gated or not
 
+    def of(self, rows: slice) -> Estimates:
+        """Those of some landmarks; views."""
+        return Estimates(
+            found=self.found[rows],
+            positions_m=self.positions_m[rows],
+            covariances_m2=self.covariances_m2[rows],
+            seen_by=self.seen_by[rows],
+            measured=self.measured[rows],
+            detected=self.detected[rows],
+        )
+
 
 def no_estimates(landmarks: int, cameras: int) -> Estimates:
     """To be filled in place."""

@@ -50,6 +50,7 @@ class KalmanMethod:
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
         self._told = no_estimates(len(self._hand), len(cameras))
+        self._told_of = [self._told.of(rows) for rows in self._rows]
         self.reset()
 
     def reset(self) -> None:
@@ -86,8 +87,7 @@ class KalmanMethod:
         """All landmarks at an instant."""
         told, alone = self._told, False
         since_s = time_s - self._recent_s
-        for rows, hand in zip(self._rows, self._hands, strict=True):
-            mine = told if len(self._hands) == 1 else Estimates(*(array[rows] for array in told))
+        for hand, mine in zip(self._hands, self._told_of, strict=True):
             alone |= hand.tell(time_s, since_s, mine)
         self._located.take(time_s, told)
         if alone:
