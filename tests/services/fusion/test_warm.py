@@ -27,7 +27,7 @@ LIVE = (
     moved_camera.displaced_px,
     shift_regression._fit,
     mirrored_view._order,
-    offset_search._through,
+    offset_search._interpolate,
 )
 
 
