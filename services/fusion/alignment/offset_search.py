@@ -284,19 +284,18 @@ def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
 
 def _rows(samples: _Samples, others: Sequence[HeightTrack], offset_s: float) -> Heights:
     """Differences between samples and the second camera's heights at an offset, where known."""
-    there, inside = np.empty(len(samples.times_s)), np.zeros(len(samples.times_s), dtype=bool)
+    there, inside = np.zeros(len(samples.times_s)), np.zeros(len(samples.times_s), dtype=bool)
     for row, other in enumerate(others):
         own = samples.landmarks == row
         there[own], inside[own] = interpolated(other, samples.times_s[own] + offset_s)
-    kept = _Samples(*(column[inside] for column in samples))
-    n = len(kept.times_s)
+    n = np.count_nonzero(inside)
     return Heights(
-        kept.instants,
-        kept.landmarks,
-        kept.heights - there[inside],
+        samples.instants[inside],
+        samples.landmarks[inside],
+        (samples.heights - there)[inside],
         np.full(n, offset_s),
-        kept.speeds,
-        kept.spans,
+        samples.speeds[inside],
+        samples.spans[inside],
         np.full(n, _NOISE**2),
         np.ones(n),
     )
