@@ -115,7 +115,8 @@ class HandFilter:
         looks = self._looks(landmark, indices)
         if len(np.unique(looks.camera)) < 2:
             return False
-        start = fit_start(looks, self._cameras, self._max_distance_m, np.zeros(3))
+        velocity = self._velocity(landmark)
+        start = fit_start(looks, self._cameras, self._max_distance_m, velocity)
         if start is None or start.residual > START_RESIDUAL:
             self._counts.refused += 1
             return False
@@ -142,6 +143,20 @@ class HandFilter:
         self._counts.started += 1
         self._sights.begun_s[landmark] = now_s
         return True
+
+    def _velocity(self, landmark: int) -> Array:
+        """What the others of the hand move by on average (3,); 0 without two of them."""
+        history = self._history
+        newest = history.order[history.size[0] - 1]
+        others = history.alive[newest].copy()
+        others[landmark] = False
+        if np.count_nonzero(others) < 2:
+            return np.zeros(3)
+        likeliest = int(np.argmax(history.probability[newest]))
+        axes = 3 * len(others)
+        velocities = history.state[newest, likeliest, axes : 2 * axes].reshape(-1, 3)
+        mean: Array = velocities[others].mean(axis=0)
+        return mean
 
     def _begin_again(self, landmark: int, now_s: float) -> None:
         """Begin a landmark again that its latest looks contradict, if those agree."""
