@@ -7,16 +7,20 @@ this.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools
 from services.fusion.intake.observations import View
 
 
-@dataclass(frozen=True, eq=False)
-class Estimates:
-    """All L landmarks at one instant, rig frame; rows whose `found` is false hold nothing."""
+class Estimates(NamedTuple):
+    """All L landmarks at one instant, rig frame; rows whose `found` is false hold nothing.
+
+    Arrays are the receiver's to change, until the method is asked again.
+    """
 
     found: Bools  # (L,)
     positions_m: Array  # (L, 3)
@@ -24,6 +28,30 @@ class Estimates:
     seen_by: Bools  # (L, C) which cameras saw it about then
     measured: Bools  # (L,) two or more did; else it is predicted
     detected: Bools  # (L,) two or more detected something of its colour then, gated or not
+
+    def of(self, rows: slice) -> Estimates:
+        """Those of some landmarks; views."""
+        return Estimates(
+            found=self.found[rows],
+            positions_m=self.positions_m[rows],
+            covariances_m2=self.covariances_m2[rows],
+            seen_by=self.seen_by[rows],
+            measured=self.measured[rows],
+            detected=self.detected[rows],
+        )
+
+
+def no_estimates(landmarks: int, cameras: int) -> Estimates:
+    """To be filled in place."""
+    flags = np.zeros((3, landmarks), dtype=np.bool_)
+    return Estimates(
+        found=flags[0],
+        positions_m=np.zeros((landmarks, 3)),
+        covariances_m2=np.zeros((landmarks, 3, 3)),
+        seen_by=np.zeros((landmarks, cameras), dtype=np.bool_),
+        measured=flags[1],
+        detected=flags[2],
+    )
 
 
 @dataclass
@@ -62,6 +90,10 @@ class Method(Protocol):
 
         May be asked once for each, ascending.
         """
+        ...
+
+    def settle(self) -> None:
+        """Do what the last estimates do not wait for; estimate() does it where nobody has."""
         ...
 
     def reset(self) -> None:

@@ -139,8 +139,7 @@ class FusionStep:
         late_s, clock_sigma_s = self.clocks.note_announced(view)
         self._unsettled.insert(0, partial(self._watch, view, times_s))
         hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
-        white = np.hypot(self._systematic.white_sigmas(view), hidden)
-        view = view._replace(sigmas=white)
+        view = view._replace(sigmas=self._systematic.white_sigmas(view, hidden))
         self.method.observe(view, times_s - late_s, clock_sigma_s)
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._points_at(due_ns)
@@ -154,6 +153,7 @@ class FusionStep:
         unsettled, self._unsettled = self._unsettled, []
         for work in unsettled:
             work()
+        self.method.settle()
 
     def _watch(self, view: View, times_s: Array) -> None:
         """Learn from an admitted frame, whose observations have times_s (n,)."""
@@ -208,12 +208,10 @@ class FusionStep:
         for told in self._poses.take(instant_ns):
             self._paint.note(told)
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
-        positions, covariances = self._paint.correct(
-            estimates.positions_m, estimates.covariances_m2, estimates.seen_by, instant_ns
-        )
         points_of, incoherent = self._messages.of(
             estimates,
-            (positions, covariances),
+            instant_ns,
+            self._paint.known,
             (self._systematic.known, self._hidden.sigmas),
             self._hidden.places,
         )

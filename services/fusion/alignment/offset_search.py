@@ -204,33 +204,33 @@ def interpolated(track: HeightTrack, at_s: Array, samples: int = 4) -> tuple[Arr
 
     By cubics through four samples, or by polynomials through another even number.
     """
-    times, heights, half = track.times_s, track.heights, samples // 2
-    if len(times) < samples:
-        return np.zeros(len(at_s)), np.zeros(len(at_s), dtype=bool)
-    gap_s = _GAP_FRAMES * float(np.median(np.diff(times)))
-    after = np.clip(np.searchsorted(times, at_s, side="right"), half, len(times) - half)
-    inside = (at_s >= times[half - 1]) & (at_s <= times[-half])
-    widest_s = gap_s + (samples - 2) * gap_s / _GAP_FRAMES
-    inside &= times[after + half - 1] - times[after - half] <= widest_s
-    found = np.empty(len(at_s))
-    _through(times, heights, at_s, after - half, samples, found)
+    found, inside = np.zeros(len(at_s)), np.zeros(len(at_s), dtype=np.bool_)
+    if len(track.times_s) >= samples:
+        _interpolate(track.times_s, track.heights, at_s, samples, found, inside)
     return found, inside
 
 
 # Samples of one instant give NaN, as in numpy, and no ZeroDivisionError.
 @njit(cache=True, error_model="numpy")
-def _through(
-    times: Array, heights: Array, at_s: Array, begin: Ints, samples: int, found: Array
+def _interpolate(
+    times: Array, heights: Array, at_s: Array, samples: int, found: Array, inside: Bools
 ) -> None:
-    """At each of at_s (m,) the polynomial through so many samples from begin (m,) on, into found.
+    """interpolated(), in place: at each instant the polynomial through the samples about it.
 
     Lagrange's, as ray_interpolation.polynomial_weights has it, for all instants at once.
     """
+    half, count = samples // 2, len(times)
+    frame_s = np.median(np.diff(times))
+    widest_s = (_GAP_FRAMES + samples - 2) * frame_s
     for n in range(len(at_s)):
-        found[n] = 0.0
-        for i in range(begin[n], begin[n] + samples):
+        after = int(np.searchsorted(times, at_s[n], side="right"))
+        after = min(max(after, half), count - half)
+        begin, end = after - half, after + half
+        within = times[half - 1] <= at_s[n] <= times[count - half]
+        inside[n] = within and times[end - 1] - times[begin] <= widest_s
+        for i in range(begin, end):
             weight = 1.0
-            for j in range(begin[n], begin[n] + samples):
+            for j in range(begin, end):
                 if i != j:
                     weight *= (at_s[n] - times[j]) / (times[i] - times[j])
             found[n] += weight * heights[i]
@@ -240,9 +240,11 @@ def _refined(
     pairs: list[tuple[HeightTrack, HeightTrack]], coarse_s: float, better: float
 ) -> Offset:
     """The offset by regression about that of the grid."""
+    samples = _samples([one for one, _ in pairs])
+    others = [other for _, other in pairs]
     offset_s, variance = coarse_s, math.inf
     for _ in range(_ROUNDS):
-        found = fit_shift(_rows(pairs, offset_s), offset_s, _CONSTANT)
+        found = fit_shift(_rows(samples, others, offset_s), offset_s, _CONSTANT)
         variance = found.variance
         if not math.isfinite(variance) or abs(found.shift_s - coarse_s) > 2.0 * STEP_S:
             return Offset(coarse_s, math.inf, "the motion is too little to be timed", better)
@@ -250,32 +252,50 @@ def _refined(
     return Offset(offset_s, math.sqrt(variance), "", better)
 
 
-def _rows(pairs: list[tuple[HeightTrack, HeightTrack]], offset_s: float) -> Heights:
-    """Height differences at some of the first camera's samples, with speeds of its neighbours."""
+class _Samples(NamedTuple):
+    """Some of the first camera's samples (n,), in order of their instants."""
+
+    instants: Ints  # by number
+    landmarks: Ints
+    times_s: Array
+    heights: Array
+    speeds: Array  # by their neighbours
+    spans: Array
+
+
+def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
+    """Of each landmark's track, those whose neighbours are as far before as after."""
     columns = []
-    begin_s = min(float(one.times_s[0]) for one, _ in pairs)
-    for row, (one, other) in enumerate(pairs):
-        every = max(1, round(1.0 / (_ROWS_HZ * float(np.median(np.diff(one.times_s))))))
-        k = np.arange(1, len(one.times_s) - 1, every)
-        times = one.times_s[k]
-        span = one.times_s[k + 1] - one.times_s[k - 1]
-        even = np.abs(one.times_s[k + 1] + one.times_s[k - 1] - 2.0 * times) <= 0.1 * span
-        there, inside = interpolated(other, times + offset_s)
-        kept = even & inside
-        speed = (one.heights[k + 1] - one.heights[k - 1]) / span
+    begin_s = min(float(track.times_s[0]) for track in tracks)
+    for row, (times_s, heights) in enumerate(tracks):
+        every = max(1, round(1.0 / (_ROWS_HZ * float(np.median(np.diff(times_s))))))
+        k = np.arange(1, len(times_s) - 1, every)
+        times = times_s[k]
+        span = times_s[k + 1] - times_s[k - 1]
+        even = np.abs(times_s[k + 1] + times_s[k - 1] - 2.0 * times) <= 0.1 * span
+        speed = (heights[k + 1] - heights[k - 1]) / span
         numbers = np.round((times - begin_s) * _ROWS_HZ)
-        table = [numbers, np.full(len(k), row), one.heights[k] - there, speed, span]
-        columns.append(np.stack(table)[:, kept])
-    instants, landmarks, heights, speeds, spans = np.concatenate(columns, axis=1)
-    order = np.argsort(instants, kind="stable")
-    n = len(order)
+        table = [numbers, np.full(len(k), row), times, heights[k], speed, span]
+        columns.append(np.stack(table)[:, even])
+    joined = np.concatenate(columns, axis=1)
+    instants, landmarks, *others = joined[:, np.argsort(joined[0], kind="stable")]
+    return _Samples(instants.astype(np.int64), landmarks.astype(np.int64), *others)
+
+
+def _rows(samples: _Samples, others: Sequence[HeightTrack], offset_s: float) -> Heights:
+    """Differences between samples and the second camera's heights at an offset, where known."""
+    there, inside = np.zeros(len(samples.times_s)), np.zeros(len(samples.times_s), dtype=bool)
+    for row, other in enumerate(others):
+        own = samples.landmarks == row
+        there[own], inside[own] = interpolated(other, samples.times_s[own] + offset_s)
+    n = np.count_nonzero(inside)
     return Heights(
-        instants[order].astype(np.int64),
-        landmarks[order].astype(np.int64),
-        heights[order],
+        samples.instants[inside],
+        samples.landmarks[inside],
+        (samples.heights - there)[inside],
         np.full(n, offset_s),
-        speeds[order],
-        spans[order],
+        samples.speeds[inside],
+        samples.spans[inside],
         np.full(n, _NOISE**2),
         np.ones(n),
     )

@@ -47,9 +47,17 @@ def project(p_rig: Array, R: Array, t: Array, ray: Array, H: Array) -> bool:
     R (3, 3) and t (3,) are T_camera_from_rig of one camera. Both results are written in place.
     False, and nothing written, if the point is not in front of the camera.
     """
-    x = R[0, 0] * p_rig[0] + R[0, 1] * p_rig[1] + R[0, 2] * p_rig[2] + t[0]
-    y = R[1, 0] * p_rig[0] + R[1, 1] * p_rig[1] + R[1, 2] * p_rig[2] + t[1]
-    z = R[2, 0] * p_rig[0] + R[2, 1] * p_rig[1] + R[2, 2] * p_rig[2] + t[2]
+    return project_at(p_rig[0], p_rig[1], p_rig[2], R, t, ray, H)
+
+
+@njit(cache=True, error_model="numpy")
+def project_at(
+    x_rig: float, y_rig: float, z_rig: float, R: Array, t: Array, ray: Array, H: Array
+) -> bool:
+    """The same of a point by its coordinates."""
+    x = R[0, 0] * x_rig + R[0, 1] * y_rig + R[0, 2] * z_rig + t[0]
+    y = R[1, 0] * x_rig + R[1, 1] * y_rig + R[1, 2] * z_rig + t[1]
+    z = R[2, 0] * x_rig + R[2, 1] * y_rig + R[2, 2] * z_rig + t[2]
     if not z > NEAR_M:
         return False
     ray[0] = x / z

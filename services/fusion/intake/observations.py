@@ -22,7 +22,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandName
-from rhot.messages import Marker, MarkerFrame
+from rhot.messages import MarkerFrame
 from services.fusion.arrays import Ints
 from services.fusion.intake.undistortion import undistort_all
 
@@ -66,11 +66,23 @@ class View(NamedTuple):
     ignored: int  # markers left out
 
 
+class Lens(NamedTuple):
+    """What of a camera makes rays of its pixels."""
+
+    size_px: tuple[int, int]
+    matrix: Array  # (3, 3)
+    distortion: Array  # (n,) as Camera.distortion
+
+
 class ObservationBuilder:
     """Turns the frames of a rig's cameras into Views; holds which colour is which landmark."""
 
     def __init__(self, config: RigConfig, cameras: Mapping[str, Camera]) -> None:
         self.cameras = tuple(cameras.values())
+        self._lenses = [
+            Lens((int(camera.size_px[0]), int(camera.size_px[1])), camera.matrix, camera.distortion)
+            for camera in self.cameras
+        ]
         self._camera_index = {camera.name: index for index, camera in enumerate(self.cameras)}
         landmarks: list[Landmark] = []
         self._landmark_of: dict[str, int] = {}  # colour -> index
@@ -95,18 +107,26 @@ class ObservationBuilder:
         instant_ns = frame.stamp_ns + round(middle_row * frame.row_time_ns) - frame.clock_offset_ns
         if not 0 <= instant_ns <= _STAMP_MAX:
             return FrameRejection.IMPLAUSIBLE_STAMP
-        best = self._best_markers(frame, camera)
-        landmarks = sorted(best)
+        claimed: list[int] = []
         numbers: list[float] = []
-        for landmark in landmarks:
-            marker = best[landmark]
-            numbers += (marker.x_px, marker.y_px, marker.sigma_px, marker.area_px)
-        of = np.array(landmarks, dtype=np.int64)
-        delay_s, rays, sigmas, areas, valid = _observed(
-            np.array(numbers), camera.matrix, camera.distortion, middle_row, frame.row_time_ns
+        for marker in frame.markers:
+            landmark = self._landmark_of.get(marker.color)
+            if landmark is not None:
+                claimed.append(landmark)
+                numbers += (
+                    marker.x_px,
+                    marker.y_px,
+                    marker.sigma_px,
+                    marker.area_px,
+                    marker.quality,
+                )
+        of, delay_s, rays, sigmas, areas = _observed(
+            np.array(claimed, dtype=np.int64),
+            np.array(numbers),
+            len(self.landmarks),
+            self._lenses[index],
+            (middle_row, frame.row_time_ns),
         )
-        if len(valid) < len(of):
-            of = of[valid]
         return View(
             index,
             instant_ns,
@@ -125,19 +145,6 @@ class ObservationBuilder:
             return len(frame.markers)
         return sum(marker.color not in self._of_objects for marker in frame.markers)
 
-    def _best_markers(self, frame: MarkerFrame, camera: Camera) -> dict[int, Marker]:
-        """The best usable marker of each landmark (by index) that is in the frame."""
-        width, height = camera.size_px
-        best: dict[int, Marker] = {}
-        for marker in frame.markers:
-            landmark = self._landmark_of.get(marker.color)
-            inside = -0.5 <= marker.x_px <= width - 0.5 and -0.5 <= marker.y_px <= height - 0.5
-            if landmark is None or not inside or not math.isfinite(marker.sigma_px):
-                continue
-            if landmark not in best or marker.quality > best[landmark].quality:
-                best[landmark] = marker
-        return best
-
 
 def clock_sigma_s(clock_sigma_ns: int) -> float:
     """How far a camera's clock may be off, in s.
@@ -151,22 +158,46 @@ def clock_sigma_s(clock_sigma_ns: int) -> float:
 
 @njit(cache=True)
 def _observed(
-    numbers: Array, matrix: Array, distortion: Array, middle_row: float, row_time_ns: float
-) -> tuple[Array, Array, Array, Array, Ints]:
-    """Delays, rays, sigmas and areas as in View, of markers that have a ray; and which do.
+    claimed: Ints,
+    numbers: Array,
+    landmarks: int,
+    lens: Lens,
+    rows: tuple[float, float],
+) -> tuple[Ints, Array, Array, Array, Array]:
+    """Landmarks, delays, rays, sigmas and areas as in View, of the best usable marker of each.
 
-    numbers (4 n,): x, y, sigma and area (px) of each marker.
+    claimed (m,): the landmark that each marker is of; numbers (5 m,): x, y, sigma, area (px) and
+    quality of each. rows: the middle one, and the time from row to row, ns.
     """
-    markers = numbers.reshape(-1, 4)
-    n = markers.shape[0]
+    of = _best_markers(claimed, numbers.reshape(-1, 5), landmarks, lens.size_px)
+    n = of.size
+    markers = np.empty((n, 5))
+    for k in range(n):
+        markers[k] = numbers[5 * of[k] : 5 * of[k] + 5]
     rays, scale, valid = np.empty((n, 2)), np.empty(n), np.empty(n, dtype=np.bool_)
-    undistort_all(markers, matrix, distortion, rays, scale, valid)
-    with_ray = np.flatnonzero(valid)
+    undistort_all(markers, lens.matrix, lens.distortion, rays, scale, valid)
     delay_s, sigmas, areas = np.empty(n), np.empty(n), np.empty(n)
-    for k in with_ray:
-        delay_s[k] = (markers[k, 1] - middle_row) * row_time_ns * 1e-9
-        sigmas[k] = min(max(markers[k, 2], SIGMA_MIN_PX), SIGMA_MAX_PX) * scale[k]
-        areas[k] = markers[k, 3] * scale[k] ** 2
-    if with_ray.size < n:
-        return delay_s[with_ray], rays[with_ray], sigmas[with_ray], areas[with_ray], with_ray
-    return delay_s, rays, sigmas, areas, with_ray
+    kept = 0
+    for k in range(n):
+        if valid[k]:
+            of[kept] = claimed[of[k]]
+            rays[kept] = rays[k]
+            delay_s[kept] = (markers[k, 1] - rows[0]) * rows[1] * 1e-9
+            sigmas[kept] = min(max(markers[k, 2], SIGMA_MIN_PX), SIGMA_MAX_PX) * scale[k]
+            areas[kept] = markers[k, 3] * scale[k] ** 2
+            kept += 1
+    return of[:kept], delay_s[:kept], rays[:kept], sigmas[:kept], areas[:kept]
+
+
+@njit(cache=True)
+def _best_markers(claimed: Ints, markers: Array, landmarks: int, size_px: tuple[int, int]) -> Ints:
+    """Which marker (m, 5) is the best usable one of each landmark, ascending; as in _observed."""
+    best = np.full(landmarks, -1)
+    for n in range(claimed.size):
+        x, y = markers[n, 0], markers[n, 1]
+        inside = -0.5 <= x <= size_px[0] - 0.5 and -0.5 <= y <= size_px[1] - 0.5
+        if inside and math.isfinite(markers[n, 2]):
+            k = claimed[n]
+            if best[k] < 0 or markers[n, 4] > markers[best[k], 4]:
+                best[k] = n
+    return best[best >= 0]

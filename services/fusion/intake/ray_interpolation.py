@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.fusion.arrays import Ints
 
 Pairing = Literal["hermite", "linear", "nearest"]
 
@@ -109,6 +110,45 @@ def _insert(
             times_s[k], rays[k], sigmas[k] = times_s[k + 1], rays[k + 1], sigmas[k + 1]
     times_s[index], rays[index, 0], rays[index, 1], sigmas[index] = time_s, ray[0], ray[1], sigma
     return count
+
+
+class RayTracks(NamedTuple):
+    """The samples of L landmarks in C cameras, as RaySamples has each one's; and how many."""
+
+    times_s: Array  # (L, C, SAMPLES)
+    rays: Array  # (L, C, SAMPLES, 2)
+    sigmas: Array  # (L, C, SAMPLES)
+    counts: Ints  # (L, C)
+
+
+def no_tracks(landmarks: int, cameras: int) -> RayTracks:
+    """Nothing seen yet."""
+    each = (landmarks, cameras, SAMPLES)
+    return RayTracks(
+        np.empty(each), np.empty((*each, 2)), np.empty(each), np.zeros(each[:2], dtype=np.int64)
+    )
+
+
+@njit(cache=True)
+def samples_of(tracks: RayTracks, landmark: int, camera: int) -> RaySamples:
+    """One track's; views."""
+    return RaySamples(
+        tracks.times_s[landmark, camera],
+        tracks.rays[landmark, camera],
+        tracks.sigmas[landmark, camera],
+    )
+
+
+@njit(cache=True)
+def add_frame(
+    tracks: RayTracks, camera: int, landmarks: Ints, times_s: Array, rays: Array, sigmas: Array
+) -> None:
+    """RayTrack.add for all landmarks (n,) of a frame."""
+    for n in range(landmarks.size):
+        k = landmarks[n]
+        ray = rays[n, 0], rays[n, 1]
+        samples, count = samples_of(tracks, k, camera), tracks.counts[k, camera]
+        tracks.counts[k, camera] = _insert(samples, count, times_s[n], ray, sigmas[n])
 
 
 @njit(cache=True)

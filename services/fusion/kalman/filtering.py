@@ -17,14 +17,23 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.history import HandHistory, make_room, nodes_until
-from services.fusion.kalman.measurement import Innovation, Look, apply, innovate, log_likelihood
+from services.fusion.kalman.measurement import (
+    Innovation,
+    Look,
+    innovate,
+    log_likelihood,
+    shrink,
+    take,
+)
 from services.fusion.kalman.motion_models import (
     MotionModels,
     SharedNoise,
-    add_noise,
+    add_walk,
+    jerk_cov,
     predict_cov,
     predict_state,
     turn_gram,
+    unit_process_noise,
     update_way,
 )
 from services.fusion.kalman.own_motion import (
@@ -80,14 +89,16 @@ def filter_node(
             history.carried[node, m, k] = own[k]
         x, P = history.state[node, m], history.cov[node, m]
         F = transitions(models, m, own, dt_s)
+        jerk = jerk_cov(models, m, shared, before)
+        unit_process_noise((models.velocity_rate[m], models.acceleration_rate[m]), dt_s, Q)
         if parent != m and models.walk[m] > 0.0:
             T = body_transform(history.state[last, parent], before)
             predict_state(T @ history.state[last, parent], F, x)
-            predict_cov(T @ history.cov[last, parent] @ T.T, F, P)
+            predict_cov(T @ history.cov[last, parent] @ T.T, F, jerk, Q, P)
         else:
             predict_state(history.state[last, parent], F, x)
-            predict_cov(history.cov[last, parent], F, P)
-        add_noise(models, m, dt_s, shared, before, P)
+            predict_cov(history.cov[last, parent], F, jerk, Q, P)
+        add_walk(models, m, dt_s, before, P)
         own_noise(models, m, dt_s, Q)
         for k in range(own.shape[0]):
             if before[k] and own[k] > 0.0:
@@ -199,6 +210,7 @@ def _update(
     clock = x.shape[0] - 1
     P[clock, clock] = history.clock_variance[node]
     total = 0.0
+    taken, known = np.empty((2 * history.looked.shape[1], x.shape[0])), 0
     for k in range(history.looked.shape[1]):
         history.used_by[node, m, k] = False
         if not (history.looked[node, k] and history.alive[node, k]):
@@ -206,7 +218,7 @@ def _update(
         look, innovation = look_of(history, node, k, cameras), innovation_of(history, node, m, k)
         begins, strikes = history.begins[node, k], history.strikes[node, m, k]
         stray = STRAY - (0 if begins else min(strikes, 3)) * AGAIN
-        determinant = innovate(x, P, look, innovation)
+        determinant = innovate(x, P, taken, known, look, innovation)
         price = 0.0
         if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
             own = own_motion(look, innovation, determinant, Q, usual)
@@ -214,16 +226,17 @@ def _update(
                 add_own(P, k, own.density, Q)
                 history.own[node, m, k] += own.density
                 price = own.price
-                determinant = innovate(x, P, look, innovation)
+                determinant = innovate(x, P, taken, known, look, innovation)
         used = determinant > 0.0 and innovation.distance[0] <= gate
         history.used_by[node, m, k] = used
         if used:
             total += log_likelihood(innovation, determinant) - price
-            apply(x, P, innovation)
+            known = take(x, taken, known, innovation)
             history.strikes[node, m, k] = 0
         else:
             total += stray
             history.strikes[node, m, k] = 1 if begins else strikes + 1
+    shrink(P, taken, known)
     return total
 
 

@@ -48,19 +48,24 @@ class FrameLooks(NamedTuple):
 
 
 class Fates(NamedTuple):
-    """What became of a frame's n looks; arrays that take_in fills."""
+    """What became of the looks at N landmarks in a frame; take_in fills it, each time anew."""
 
-    alive: Bools  # (n,) their landmark has an estimate
-    used: Bools  # (n,) they updated it
-    back: Bools  # (n,) another camera saw it alone for longer than hold_s
-    astray: Bools  # (n,) it is known much worse than its hand
-    lost: Ints  # (1,) how many landmarks ended before
+    alive: Bools  # (N,) the landmark has an estimate
+    used: Bools  # (N,) the look updated it
+    back: Bools  # (N,) another camera saw it alone for longer than hold_s
+    astray: Bools  # (N,) it is known much worse than its hand
+    counts: Ints  # (3,) of landmarks that ended before, of looks used, of looks at those alive
 
 
-def no_fates(looks: int) -> Fates:
+def no_fates(landmarks: int) -> Fates:
     """To be filled by take_in."""
-    flags = np.zeros((4, looks), dtype=np.bool_)
-    return Fates(flags[0], flags[1], flags[2], flags[3], np.zeros(1, dtype=np.int64))
+    flags = np.zeros((4, landmarks), dtype=np.bool_)
+    return Fates(flags[0], flags[1], flags[2], flags[3], np.zeros(3, dtype=np.int64))
+
+
+# What take_in says of a frame: it is older than all that is remembered, and counts for nothing; all
+# of it fits; or landmarks may have to begin, as the fates say.
+LATE, FITS, UNUSUAL = 0, 1, 2
 
 
 @njit(cache=True, error_model="numpy")
@@ -71,19 +76,17 @@ def take_in(
     filters: tuple[MotionModels, float],
     looks: FrameLooks,
     fates: Fates,
-) -> bool:
-    """Filter a frame, and later ones anew; filters: the models, and the gate.
-
-    False if it is older than all that is remembered, and counts for nothing.
-    """
+) -> int:
+    """Filter a frame, and later ones anew; filters: the models, and the gate."""
     models, gate = filters
     time_s = looks.times_s.mean()
-    fates.lost[0] = drop_lost(history, sights, cameras, filters, time_s)
+    _no_fate(fates)
+    fates.counts[0] = drop_lost(history, sights, cameras, filters, time_s)
     if history.size[0] == 0:
         start_history(history, time_s - 1e-6)
     index = insert_frame(history, time_s, looks.camera, looks.clock_variance)
     if index < 0:
-        return False
+        return LATE
     node = history.order[index]
     history.looked[node] = False
     for n in range(looks.landmarks.size):
@@ -93,16 +96,32 @@ def take_in(
         history.ray[node, k] = looks.rays[n]
         history.ray_variance[node, k] = looks.variances[n]
         away_s = time_s - sights.accepted_s[k, looks.camera]
-        fates.back[n] = min(alone_since(sights, k, time_s), away_s) > sights.hold_s
+        fates.back[k] = min(alone_since(sights, k, time_s), away_s) > sights.hold_s
     filter_from(history, index, cameras, models, gate)
     for n in range(looks.landmarks.size):
         k, at_s = looks.landmarks[n], looks.times_s[n]
-        fates.alive[n], fates.used[n] = history.alive[node, k], history.used[node, k]
+        fates.alive[k], fates.used[k] = history.alive[node, k], history.used[node, k]
         sights.observed_s[k, looks.camera] = max(sights.observed_s[k, looks.camera], at_s)
-        if fates.used[n]:
+        if fates.used[k]:
             sights.accepted_s[k, looks.camera] = max(sights.accepted_s[k, looks.camera], at_s)
+        fates.counts[1] += fates.used[k]
+        fates.counts[2] += fates.alive[k]
     _find_astray(history, sights, looks, fates.astray)
-    return True
+    for n in range(looks.landmarks.size):
+        k = looks.landmarks[n]
+        if not fates.used[k] or fates.back[k] or fates.astray[k]:
+            return UNUSUAL
+    return FITS
+
+
+@njit(cache=True, error_model="numpy")
+def _no_fate(fates: Fates) -> None:
+    """As no_fates makes them, in place."""
+    fates.alive[:] = False
+    fates.used[:] = False
+    fates.back[:] = False
+    fates.astray[:] = False
+    fates.counts[:] = 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -153,7 +172,7 @@ def drop_lost(
 
 @njit(cache=True, error_model="numpy")
 def _find_astray(history: HandHistory, sights: Sights, looks: FrameLooks, astray: Bools) -> None:
-    """Which looks' landmarks (n,) are known much worse than their hand is; in place.
+    """Which looks' landmarks are known much worse than their hand is; astray (N,) in place.
 
     Two cameras see them, and yet they are adrift along a ray: as each look fits by itself, no gate
     tells.
@@ -177,7 +196,7 @@ def _find_astray(history: HandHistory, sights: Sights, looks: FrameLooks, astray
         for seen_s in sights.accepted_s[k]:
             seen_by += seen_s >= now_s - RESTART_WINDOW_S
         settled = now_s - sights.begun_s[k] > RESTART_WINDOW_S
-        astray[n] = history.alive[newest, k] and variances[k] > wide and settled and seen_by >= 2
-        if astray[n]:
+        astray[k] = history.alive[newest, k] and variances[k] > wide and settled and seen_by >= 2
+        if astray[k]:
             found = oldest_with(history, k, looks.times_s.mean() - RESTART_WINDOW_S)
-            astray[n] = found.size >= ASTRAY_LOOKS
+            astray[k] = found.size >= ASTRAY_LOOKS

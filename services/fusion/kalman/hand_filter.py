@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.arrays import Bools, Ints
+from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import filter_from, oldest_with
 from services.fusion.kalman.frame_update import (
+    LATE,
     RESTART_WINDOW_S,
+    UNUSUAL,
     FrameLooks,
     Sights,
-    drop_lost,
     no_fates,
     take_in,
 )
 from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion_models import MotionModels
-from services.fusion.kalman.smoother import smooth_hand
 from services.fusion.kalman.starting import Looks, fit_start
-from services.fusion.method import Counts
+from services.fusion.kalman.telling import tell
+from services.fusion.method import Counts, Estimates
 
 # From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
 # motion was bounded (own_motion.MOST). Geometric mean of RMS, 95 % and maximum at lag 0, over those
@@ -66,33 +67,31 @@ class HandFilter:
         self._sights = Sights(
             np.full(shape, -np.inf), np.full(shape, -np.inf), np.full(landmarks, -np.inf), hold_s
         )
-
-    @property
-    def sights(self) -> Sights:
-        """When each landmark was seen last, by each camera."""
-        return self._sights
+        self._fates = no_fates(landmarks)
 
     def observe(self, looks: FrameLooks) -> None:
         """Take in a frame's looks."""
-        fates = no_fates(len(looks.landmarks))
-        filters = MODELS, GATE
-        if not take_in(self._history, self._sights, self._cameras, filters, looks, fates):
+        fates, filters = self._fates, (MODELS, GATE)
+        outcome = take_in(self._history, self._sights, self._cameras, filters, looks, fates)
+        lost, used, alive = fates.counts.tolist()
+        self._counts.dropped += lost
+        if outcome == LATE:
             self._counts.late += len(looks.landmarks)
-            self._counts.dropped += int(fates.lost[0])
             return
-        used = int(np.count_nonzero(fates.used))
-        self._counts.dropped += int(fates.lost[0])
         self._counts.accepted += used
-        self._counts.gated += int(np.count_nonzero(fates.alive)) - used
-        # Nothing but what fits is the usual case.
-        if used == len(looks.landmarks) and not (fates.back.any() or fates.astray.any()):
-            return
-        time_s = float(looks.times_s.mean())
-        for landmark in looks.landmarks[fates.astray].tolist():
+        self._counts.gated += alive - used
+        if outcome == UNUSUAL:
+            self._begin_where_due(looks)
+
+    def _begin_where_due(self, looks: FrameLooks) -> None:
+        """Landmarks of a frame that begin, or begin again, as their fates say."""
+        fates, time_s = self._fates, float(looks.times_s.mean())
+        back, alive, used = fates.back.copy(), fates.alive.copy(), fates.used.copy()
+        for landmark in looks.landmarks[fates.astray[looks.landmarks]].tolist():
             self._begin(landmark, time_s, RESTART_WINDOW_S)
-        for landmark in looks.landmarks[fates.back | ~fates.alive].tolist():
+        for landmark in looks.landmarks[(back | ~alive)[looks.landmarks]].tolist():
             self._begin(landmark, time_s, START_WINDOW_S)
-        for landmark in looks.landmarks[fates.alive & ~fates.used].tolist():
+        for landmark in looks.landmarks[(alive & ~used)[looks.landmarks]].tolist():
             self._begin_again(landmark, time_s)
 
     def _filter_from(self, index: int) -> None:
@@ -116,7 +115,8 @@ class HandFilter:
         looks = self._looks(landmark, indices)
         if len(np.unique(looks.camera)) < 2:
             return False
-        start = fit_start(looks, self._cameras, self._max_distance_m, np.zeros(3))
+        velocity = self._velocity(landmark)
+        start = fit_start(looks, self._cameras, self._max_distance_m, velocity)
         if start is None or start.residual > START_RESIDUAL:
             self._counts.refused += 1
             return False
@@ -144,6 +144,20 @@ class HandFilter:
         self._sights.begun_s[landmark] = now_s
         return True
 
+    def _velocity(self, landmark: int) -> Array:
+        """What the others of the hand move by on average (3,); 0 without two of them."""
+        history = self._history
+        newest = history.order[history.size[0] - 1]
+        others = history.alive[newest].copy()
+        others[landmark] = False
+        if np.count_nonzero(others) < 2:
+            return np.zeros(3)
+        likeliest = int(np.argmax(history.probability[newest]))
+        axes = 3 * len(others)
+        velocities = history.state[newest, likeliest, axes : 2 * axes].reshape(-1, 3)
+        mean: Array = velocities[others].mean(axis=0)
+        return mean
+
     def _begin_again(self, landmark: int, now_s: float) -> None:
         """Begin a landmark again that its latest looks contradict, if those agree."""
         history = self._history
@@ -152,16 +166,15 @@ class HandFilter:
         if np.count_nonzero(~history.used[nodes, landmark]) >= CONTRADICTIONS:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
-    def drop_lost(self, now_s: float) -> None:
-        """End landmarks that nobody has seen for too long (frame_update.drop_lost)."""
-        filters = MODELS, GATE
-        lost = drop_lost(self._history, self._sights, self._cameras, filters, now_s)
-        self._counts.dropped += int(lost)
+    def tell(self, time_s: float, since_s: Array, told: Estimates) -> bool:
+        """Fill told with what is known at an instant; lost landmarks end (frame_update.drop_lost).
 
-    def estimate(self, time_s: float) -> tuple[Bools, Array, Array]:
-        """Which landmarks (N,) there are at an instant, places (N, 3), covs (N, 3, 3)."""
-        count = len(self._sights.begun_s)
-        places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
-        if self._history.size[0] == 0:
-            return np.zeros(count, dtype=np.bool_), places, covs
-        return smooth_hand(self._history, MODELS, time_s, places, covs), places, covs
+        since_s (C,): from when on a camera's look counts as of that instant. Returns whether one
+        camera sees any landmark alone.
+        """
+        filters = MODELS, GATE
+        lost, alone = tell(
+            self._history, self._sights, self._cameras, filters, time_s, since_s, told
+        )
+        self._counts.dropped += lost
+        return alone > 0

@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.geometry.projection import project
+from services.fusion.geometry.projection import project_at
 from services.fusion.kalman.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -38,7 +37,7 @@ class Innovation(NamedTuple):
     drift: Array  # (2,) by the clock's error: the ray's own velocity
     nu: Array  # (2,) measured minus predicted ray
     S_inverse: Array  # (2, 2) inverse of the innovation's covariance
-    K: Array  # (2, D) Kalman gain, transposed; before apply(), P H^T
+    K: Array  # (2, D) Kalman gain, transposed; before take(), P H^T
     distance: Array  # (1,) squared Mahalanobis distance
 
 
@@ -47,30 +46,32 @@ def predict_ray(x: Array, look: Look, out: Innovation) -> bool:
     """H, drift and nu of a look, by a state (D,); False if it is not in front of the camera."""
     axes = (x.shape[0] - 1) // 3
     first = 3 * look.landmark
-    place = np.empty(3)
-    for i in range(3):
-        p, v, a = x[first + i], x[axes + first + i], x[2 * axes + first + i]
-        place[i] = p + look.delay_s * (v + 0.5 * look.delay_s * a)
-    ray = np.empty(2)
-    if not project(place, look.R, look.t, ray, out.H):
+    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
+    place_x = x[first] + delay_s * x[axes + first] + half * x[2 * axes + first]
+    place_y = x[first + 1] + delay_s * x[axes + first + 1] + half * x[2 * axes + first + 1]
+    place_z = x[first + 2] + delay_s * x[axes + first + 2] + half * x[2 * axes + first + 2]
+    if not project_at(place_x, place_y, place_z, look.R, look.t, out.nu, out.H):
         return False
     for k in range(2):
         out.drift[k] = 0.0
         for i in range(3):
             out.drift[k] += out.H[k, i] * x[axes + first + i]
-        out.nu[k] = look.ray[k] - ray[k] - out.drift[k] * x[3 * axes]
+        out.nu[k] = look.ray[k] - out.nu[k] - out.drift[k] * x[3 * axes]
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def innovate(x: Array, P: Array, look: Look, out: Innovation) -> float:
+def innovate(x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation) -> float:
     """The innovation of a look by a state (D,), (D, D); returns det(S).
 
-    Not positive, and no innovation of use, if the landmark is not in front of the camera.
+    Of the frame's looks that take() took, P knows nothing yet: what they say of it are the first
+    `known` rows of taken (n, D). Of the clock's error P knows its own variance only. The
+    determinant is not positive, and the innovation of no use, if the landmark is not in front of
+    the camera.
     """
     if not predict_ray(x, look, out):
         return 0.0
-    _cross_cov(P, look, out, out.K)
+    _cross_cov(P, taken, known, look, out)
     determinant = _invert_innovation_cov(out.K, look, out)
     if determinant > 0.0:
         nu, S_inverse = out.nu, out.S_inverse
@@ -83,20 +84,32 @@ def innovate(x: Array, P: Array, look: Look, out: Innovation) -> float:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
-def apply(x: Array, P: Array, innovation: Innovation) -> None:
-    """The posterior of a state (D,), (D, D) by an innovation, in place; K becomes the gain."""
-    nu, S_inverse, K = innovation.nu, innovation.S_inverse, innovation.K
-    size = x.shape[0]
-    PHt0, PHt1 = K[0].copy(), K[1].copy()
-    for i in range(size):
-        K[0, i] = PHt0[i] * S_inverse[0, 0] + PHt1[i] * S_inverse[1, 0]
-        K[1, i] = PHt0[i] * S_inverse[0, 1] + PHt1[i] * S_inverse[1, 1]
-        x[i] += K[0, i] * nu[0] + K[1, i] * nu[1]
-    for i in range(size):
-        row = P[i]
-        K0, K1 = K[0, i], K[1, i]
-        for j in range(size):
-            row[j] -= K0 * PHt0[j] + K1 * PHt1[j]
+def take(x: Array, taken: Array, known: int, innovation: Innovation) -> int:
+    """The posterior mean (D,) by an innovation, in place; K becomes the gain.
+
+    The covariance loses w w^T of two rows w that are added to taken (n, D): once for all looks of a
+    frame, by shrink(). Returns how many rows are known now.
+    """
+    nu, S_inverse = innovation.nu, innovation.S_inverse
+    L00, L10, L11 = _factor(S_inverse)
+    K0, K1, W0, W1 = innovation.K[0], innovation.K[1], taken[known], taken[known + 1]
+    S00, S01, S11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 1]
+    nu0, nu1 = nu[0], nu[1]
+    for i in range(x.shape[0]):
+        PHt0, PHt1 = K0[i], K1[i]
+        W0[i] = PHt0 * L00 + PHt1 * L10
+        W1[i] = PHt1 * L11
+        K0[i] = PHt0 * S00 + PHt1 * S01
+        K1[i] = PHt0 * S01 + PHt1 * S11
+        x[i] += K0[i] * nu0 + K1[i] * nu1
+    return known + 2
+
+
+@njit(cache=True, error_model="numpy")
+def shrink(P: Array, taken: Array, known: int) -> None:
+    """What all looks of a frame (take) take off a covariance (D, D), in place."""
+    rows = taken[:known]
+    P -= rows.T @ rows
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,49 +119,72 @@ def log_likelihood(innovation: Innovation, determinant: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
-def _cross_cov(P: Array, look: Look, innovation: Innovation, PHt: Array) -> None:
-    """P H^T of the whole state, transposed (2, D), in place."""
+def _cross_cov(P: Array, taken: Array, known: int, look: Look, innovation: Innovation) -> None:
+    """P H^T of the whole state, transposed (2, D), to K; taken rows count, as in innovate()."""
     H, drift = innovation.H, innovation.drift
-    size = P.shape[0]
-    axes = (size - 1) // 3
-    clock = P[3 * axes]
-    for j in range(size):
-        PHt[0, j] = drift[0] * clock[j]
-        PHt[1, j] = drift[1] * clock[j]
+    axes = (P.shape[0] - 1) // 3
+    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
+    p, v = 3 * look.landmark, 3 * look.landmark + axes
+    a = v + axes
+    p0, p1, p2 = P[p], P[p + 1], P[p + 2]
+    v0, v1, v2 = P[v], P[v + 1], P[v + 2]
+    a0, a1, a2 = P[a], P[a + 1], P[a + 2]
+    to0, to1 = innovation.K[0], innovation.K[1]
+    H00, H01, H02 = H[0, 0], H[0, 1], H[0, 2]
+    H10, H11, H12 = H[1, 0], H[1, 1], H[1, 2]
+    for j in range(3 * axes):
+        s0 = p0[j] + delay_s * v0[j] + half * a0[j]
+        s1 = p1[j] + delay_s * v1[j] + half * a1[j]
+        s2 = p2[j] + delay_s * v2[j] + half * a2[j]
+        to0[j] = H00 * s0 + H01 * s1 + H02 * s2
+        to1[j] = H10 * s0 + H11 * s1 + H12 * s2
+    to0[3 * axes] = drift[0] * P[3 * axes, 3 * axes]
+    to1[3 * axes] = drift[1] * P[3 * axes, 3 * axes]
+    for n in range(0, known, 2):
+        row, next_row = taken[n], taken[n + 1]
+        w00, w01 = _along(row, look, H, drift)
+        w10, w11 = _along(next_row, look, H, drift)
+        for j in range(3 * axes + 1):
+            to0[j] -= w00 * row[j] + w10 * next_row[j]
+            to1[j] -= w01 * row[j] + w11 * next_row[j]
+
+
+@njit(cache=True, error_model="numpy")
+def _along(row: Array, look: Look, H: Array, drift: Array) -> tuple[float, float]:
+    """H of the whole state times a row (D,)."""
+    axes = (row.shape[0] - 1) // 3
     half = 0.5 * look.delay_s * look.delay_s
+    first, second = drift[0] * row[3 * axes], drift[1] * row[3 * axes]
     for i in range(3):
-        row = 3 * look.landmark + i
-        p, v, a = P[row], P[axes + row], P[2 * axes + row]
-        H0, H1 = H[0, i], H[1, i]
-        for j in range(size):
-            along = p[j] + look.delay_s * v[j] + half * a[j]
-            PHt[0, j] += H0 * along
-            PHt[1, j] += H1 * along
+        at = 3 * look.landmark + i
+        moved = row[at] + look.delay_s * row[axes + at] + half * row[2 * axes + at]
+        first += H[0, i] * moved
+        second += H[1, i] * moved
+    return first, second
 
 
 @njit(cache=True, error_model="numpy")
 def _invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
     """The inverse of S = H P H^T + noise, in place; returns det(S), not positive if singular."""
-    axes = (PHt.shape[1] - 1) // 3
-    half = 0.5 * look.delay_s * look.delay_s
-    S = np.zeros((2, 2))
-    for k in range(2):
-        for n in range(2):
-            S[k, n] = out.drift[k] * PHt[n, 3 * axes]
-            for i in range(3):
-                at = 3 * look.landmark + i
-                S[k, n] += out.H[k, i] * (
-                    PHt[n, at] + look.delay_s * PHt[n, axes + at] + half * PHt[n, 2 * axes + at]
-                )
-        S[k, k] += look.ray_variance
-    across = 0.5 * (S[0, 1] + S[1, 0])
-    determinant = S[0, 0] * S[1, 1] - across * across
+    S00, across = _along(PHt[0], look, out.H, out.drift)
+    _, S11 = _along(PHt[1], look, out.H, out.drift)
+    S00 += look.ray_variance
+    S11 += look.ray_variance
+    determinant = S00 * S11 - across * across
     if determinant > 0.0:
-        out.S_inverse[0, 0] = S[1, 1] / determinant
-        out.S_inverse[1, 1] = S[0, 0] / determinant
+        out.S_inverse[0, 0] = S11 / determinant
+        out.S_inverse[1, 1] = S00 / determinant
         out.S_inverse[0, 1] = -across / determinant
         out.S_inverse[1, 0] = -across / determinant
     return float(determinant)
+
+
+@njit(cache=True, error_model="numpy")
+def _factor(S_inverse: Array) -> tuple[float, float, float]:
+    """The Cholesky factor of (2, 2): its elements 00, 10, 11."""
+    L00 = math.sqrt(S_inverse[0, 0])
+    L10 = S_inverse[0, 1] / L00
+    return L00, L10, math.sqrt(max(S_inverse[1, 1] - L10 * L10, 0.0))
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
@@ -181,10 +217,7 @@ def adjoint_update(
             for i in range(3):
                 row[r * axes + first + i] -= orders[r] * (H[0, i] * w0 + H[1, i] * w1)
         row[3 * axes] -= drift[0] * w0 + drift[1] * w1
-    # The Cholesky factor of S^-1.
-    L00 = math.sqrt(S_inverse[0, 0])
-    L10 = S_inverse[0, 1] / L00
-    L11 = math.sqrt(max(S_inverse[1, 1] - L10 * L10, 0.0))
+    L00, L10, L11 = _factor(S_inverse)
     rows[count : count + 2] = 0.0
     for r in range(3):
         for i in range(3):

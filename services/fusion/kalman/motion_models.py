@@ -153,67 +153,103 @@ def predict_state(last: Array, F: Array, out: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
-def predict_cov(P: Array, F: Array, out: Array) -> None:
-    """F P F^T (D, D), F (N, 6), to out; the row and column of the clock's error become zero."""
-    size = P.shape[0]
-    axes = (size - 1) // 3
-    columns = np.empty((6, axes))
-    for j in range(axes):
-        for n in range(6):
-            columns[n, j] = F[j // 3, n]
-    c01, c02, c11, c12, c21, c22 = columns
-    for i in range(axes):  # F P
-        p, v, a = P[i], P[axes + i], P[2 * axes + i]
-        to_p, to_v, to_a = out[i], out[axes + i], out[2 * axes + i]
-        f01, f02, f11 = columns[0, i], columns[1, i], columns[2, i]
-        f12, f21, f22 = columns[3, i], columns[4, i], columns[5, i]
-        for j in range(size):
-            to_p[j] = p[j] + f01 * v[j] + f02 * a[j]
-            to_v[j] = f11 * v[j] + f12 * a[j]
-            to_a[j] = f21 * v[j] + f22 * a[j]
-    for i in range(3 * axes):  # (F P) F^T
-        p, v, a = out[i, :axes], out[i, axes : 2 * axes], out[i, 2 * axes : 3 * axes]
-        for j in range(axes):
-            p[j], v[j], a[j] = (
-                p[j] + c01[j] * v[j] + c02[j] * a[j],
-                c11[j] * v[j] + c12[j] * a[j],
-                c21[j] * v[j] + c22[j] * a[j],
-            )
-        out[i, 3 * axes] = 0.0
-    out[3 * axes] = 0.0
-
-
-@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
-def add_noise(
-    models: MotionModels, m: int, dt_s: float, shared: SharedNoise, alive: Bools, P: Array
-) -> None:
-    """Add model m's process noise over dt to a covariance (D, D), for landmarks that are alive."""
+def jerk_cov(models: MotionModels, m: int, shared: SharedNoise, alive: Bools) -> Array:
+    """Covariance (3 N, 3 N) of the jerk of model m's landmarks, zero of those not alive."""
     axes = shared.turn.shape[0]
-    Q = np.empty((3, 3))
-    unit_process_noise((models.velocity_rate[m], models.acceleration_rate[m]), dt_s, Q)
     turn, shift, own = models.turn[m], models.shift[m], models.own[m]
     count = alive.shape[0]
     speed = count * SLOW_M_S**2
     for i in range(axes):
         speed += shared.way[i, i]
     along = models.along[m] * count / speed
-    jerk = np.empty(axes)  # a row of the jerk's covariance
+    jerk = np.empty((axes, axes))
     for i in range(axes):
+        row, by_turn, by_way = jerk[i], shared.turn[i], shared.way[i]
         if not alive[i // 3]:
+            row[:] = 0.0
             continue
         for j in range(axes):
-            jerk[j] = turn * shared.turn[i, j] + along * shared.way[i, j]
+            row[j] = turn * by_turn[j] + along * by_way[j]
         for n in range(count):
             if alive[n]:
-                jerk[3 * n + i % 3] += shift
-        jerk[i] += own
-        for r in range(3):
-            for c in range(3):
-                row = P[r * axes + i, c * axes : (c + 1) * axes]
-                q = Q[r, c]
-                for j in range(axes):
-                    row[j] += q * jerk[j]
-        P[i, i] += models.walk[m] * dt_s
+                row[3 * n + i % 3] += shift
+        row[i] += own
+    return jerk
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
+def predict_cov(P: Array, F: Array, jerk: Array, Q: Array, out: Array) -> None:
+    """F P F^T and the noise of jerk (3 N, 3 N), to out (D, D); F (N, 6) by landmark.
+
+    Q (3, 3): of unit_process_noise. The row and column of the clock's error become zero.
+    """
+    axes = jerk.shape[0]
+    c01, c02, c11, c12, c21, c22 = _columns(F)
+    q00, q01, q02, q11, q12, q22 = Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 1], Q[1, 2], Q[2, 2]
+    for i in range(axes):
+        f01, f02, f11, f12, f21, f22 = c01[i], c02[i], c11[i], c12[i], c21[i], c22[i]
+        p, v, a = P[i], P[axes + i], P[2 * axes + i]
+        to_p, to_v, to_a, noise = out[i], out[axes + i], out[2 * axes + i], jerk[i]
+        # One pass: P is read, and out written, once.
+        for j in range(axes):
+            vp, vv, va = v[j], v[axes + j], v[2 * axes + j]
+            ap, av, aa = a[j], a[axes + j], a[2 * axes + j]
+            pp = p[j] + f01 * vp + f02 * ap
+            pv = p[axes + j] + f01 * vv + f02 * av
+            pa = p[2 * axes + j] + f01 * va + f02 * aa
+            vp, ap = f11 * vp + f12 * ap, f21 * vp + f22 * ap
+            vv, av = f11 * vv + f12 * av, f21 * vv + f22 * av
+            va, aa = f11 * va + f12 * aa, f21 * va + f22 * aa
+            q = noise[j]
+            to_p[j] = pp + c01[j] * pv + c02[j] * pa + q00 * q
+            to_p[axes + j] = c11[j] * pv + c12[j] * pa + q01 * q
+            to_p[2 * axes + j] = c21[j] * pv + c22[j] * pa + q02 * q
+            to_v[j] = vp + c01[j] * vv + c02[j] * va + q01 * q
+            to_v[axes + j] = c11[j] * vv + c12[j] * va + q11 * q
+            to_v[2 * axes + j] = c21[j] * vv + c22[j] * va + q12 * q
+            to_a[j] = ap + c01[j] * av + c02[j] * aa + q02 * q
+            to_a[axes + j] = c11[j] * av + c12[j] * aa + q12 * q
+            to_a[2 * axes + j] = c21[j] * av + c22[j] * aa + q22 * q
+    out[:, 3 * axes] = 0.0
+    out[3 * axes] = 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
+def predict_place_cov(P: Array, F: Array, jerk: Array, Q: Array, out: Array) -> None:
+    """The first rows of predict_cov, (3 N, D): of places with everything."""
+    axes = jerk.shape[0]
+    c01, c02, c11, c12, c21, c22 = _columns(F)
+    q00, q01, q02 = Q[0, 0], Q[0, 1], Q[0, 2]
+    for i in range(axes):
+        f01, f02 = c01[i], c02[i]
+        p, v, a, to, noise = P[i], P[axes + i], P[2 * axes + i], out[i], jerk[i]
+        for j in range(axes):
+            pp = p[j] + f01 * v[j] + f02 * a[j]
+            pv = p[axes + j] + f01 * v[axes + j] + f02 * a[axes + j]
+            pa = p[2 * axes + j] + f01 * v[2 * axes + j] + f02 * a[2 * axes + j]
+            q = noise[j]
+            to[j] = pp + c01[j] * pv + c02[j] * pa + q00 * q
+            to[axes + j] = c11[j] * pv + c12[j] * pa + q01 * q
+            to[2 * axes + j] = c21[j] * pv + c22[j] * pa + q02 * q
+        to[3 * axes] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _columns(F: Array) -> Array:
+    """F (N, 6) by landmark as rows by element, (6, 3 N)."""
+    columns = np.empty((6, 3 * F.shape[0]))
+    for j in range(columns.shape[1]):
+        for n in range(6):
+            columns[n, j] = F[j // 3, n]
+    return columns
+
+
+@njit(cache=True, error_model="numpy")
+def add_walk(models: MotionModels, m: int, dt_s: float, alive: Bools, P: Array) -> None:
+    """Add what alive landmarks' places wander by over dt in model m to a covariance (., D)."""
+    for i in range(3 * alive.shape[0]):
+        if alive[i // 3]:
+            P[i, i] += models.walk[m] * dt_s
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)

@@ -80,11 +80,23 @@ def own_noise(models: MotionModels, m: int, dt_s: float, Q: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def add_own(P: Array, k: int, density: float, Q: Array) -> None:
     """Add landmark k's own noise, Q (3, 3) of one axis, to a covariance (D, D)."""
-    axes = (P.shape[0] - 1) // 3
+    axes = (P.shape[1] - 1) // 3
     for r in range(3):
-        for c in range(3):
-            for i in range(3):
-                P[r * axes + 3 * k + i, c * axes + 3 * k + i] += density * Q[r, c]
+        _add_own_row(P, r * axes + 3 * k, 3 * k, density, Q[r])
+
+
+@njit(cache=True, error_model="numpy")
+def add_own_to_places(P: Array, k: int, density: float, Q: Array) -> None:
+    """The same to the rows of places (3 N, D)."""
+    _add_own_row(P, 3 * k, 3 * k, density, Q[0])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_own_row(P: Array, row: int, column: int, density: float, q: Array) -> None:
+    axes = (P.shape[1] - 1) // 3
+    for c in range(3):
+        for i in range(3):
+            P[row + i, c * axes + column + i] += density * q[c]
 
 
 @njit(cache=True, error_model="numpy")

@@ -20,13 +20,20 @@ from services.fusion.kalman.motion_models import (
     FAST_SUMS,
     MotionModels,
     SharedNoise,
-    add_noise,
+    add_walk,
     adjoint_predict,
-    predict_cov,
+    jerk_cov,
+    predict_place_cov,
     predict_state,
     turn_gram,
+    unit_process_noise,
 )
-from services.fusion.kalman.own_motion import add_own, carried_on, own_noise, transitions
+from services.fusion.kalman.own_motion import (
+    add_own_to_places,
+    carried_on,
+    own_noise,
+    transitions,
+)
 from services.fusion.kalman.rigid_motion import body_transform
 
 # Models less probable than this have no say in what is put out.
@@ -93,7 +100,7 @@ def _smooth_model(
             T = body_transform(history.state[before, m], history.alive[before])
             rows[:known] = rows[:known] @ T
     x = np.empty(size)
-    P = np.empty((size, size))
+    P = np.empty((3 * count, size))
     _predict_between(history, models, index, (ends, m), time_s, x, P)
     _combine(rows[:known], x, P, places, covs)
 
@@ -108,7 +115,7 @@ def _predict_between(
     x: Array,
     P: Array,
 ) -> None:
-    """The prediction x (D,), P (D, D) at time_s from the node before `index`; in place.
+    """The prediction x (D,) at time_s from the node before `index`, and P (3 N, D) of places.
 
     model: the one that predicts, and the one whose estimate at that node it goes on from.
     """
@@ -132,16 +139,18 @@ def _predict_between(
         T = body_transform(before_x, alive)
         before_x, before_P = T @ before_x, T @ before_P @ T.T
     predict_state(before_x, F, x)
-    predict_cov(before_P, F, P)
     gram = np.empty((3 * count, 3 * count))
     likeliest = int(np.argmax(history.probability[last]))
     turn_gram(history.state[last, likeliest], alive, gram)
-    add_noise(models, ends, dt_s, SharedNoise(gram, history.way[last]), alive, P)
+    jerk = jerk_cov(models, ends, SharedNoise(gram, history.way[last]), alive)
     Q = np.empty((3, 3))
+    unit_process_noise((models.velocity_rate[ends], models.acceleration_rate[ends]), dt_s, Q)
+    predict_place_cov(before_P, F, jerk, Q, P)
+    add_walk(models, ends, dt_s, alive, P)
     own_noise(models, ends, dt_s, Q)
     for k in range(count):
         if alive[k] and own[k] > 0.0:
-            add_own(P, k, own[k], Q)
+            add_own_to_places(P, k, own[k], Q)
 
 
 @njit(cache=True, error_model="numpy")

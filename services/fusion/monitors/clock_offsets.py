@@ -21,8 +21,8 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import CLOCK_SIGMA_MAX_S, View
-from services.fusion.intake.ray_interpolation import RayTrack
-from services.fusion.monitors.epipolar_error import EpipolarError, epipolar_error
+from services.fusion.intake.ray_interpolation import add_frame, no_tracks
+from services.fusion.monitors.epipolar_error import EpipolarError, epipolar_errors
 from services.fusion.monitors.height_window import HeightWindow
 from services.fusion.monitors.moved_camera import MovedCameraMonitor
 from services.fusion.monitors.shift_regression import NOTHING
@@ -77,7 +77,7 @@ class ClockOffsetEstimator:
     def reset(self) -> None:
         """Time starts anew: forget tracks and offsets."""
         cameras = len(self._names)
-        self._tracks = [[RayTrack() for _ in range(cameras)] for _ in range(self._landmarks)]
+        self._tracks = no_tracks(self._landmarks, cameras)
         self._updated_s = dict.fromkeys(self._pairs, -np.inf)
         # By camera: its announced offset (ns) and how far that may be off (s).
         self._announced: list[tuple[int, float] | None] = [None] * cameras
@@ -139,14 +139,7 @@ class ClockOffsetEstimator:
         Returns its camera's clock error and the sigma of that for pairing, both in s.
         """
         self.note_announced(view)
-        for landmark, time_s, ray, sigma in zip(
-            view.landmarks.tolist(),
-            times_s.tolist(),
-            view.rays.tolist(),
-            view.sigmas.tolist(),
-            strict=True,
-        ):
-            self._tracks[landmark][view.camera].add(time_s, ray, sigma)
+        add_frame(self._tracks, view.camera, view.landmarks, times_s, view.rays, view.sigmas)
         if len(times_s):
             newest_s = float(times_s.max())
             for index, pair in enumerate(self._pairs):
@@ -215,17 +208,13 @@ class ClockOffsetEstimator:
 
     def _errors(self, cameras: tuple[int, int], shift_s: float) -> dict[int, EpipolarError]:
         """The newest height difference of each landmark in two cameras that is not known yet."""
-        first, second = cameras
-        period_s = float(self._periods_s[second])
+        period_s = float(self._periods_s[cameras[1]])
+        found = epipolar_errors(self._pairs[cameras], self._tracks, cameras, shift_s, period_s)
         errors = {}
-        for landmark, tracks in enumerate(self._tracks):
-            error = epipolar_error(
-                self._pairs[cameras], tracks[first], tracks[second], shift_s, period_s
-            )
-            if error is None or self._compared_s.get((*cameras, landmark)) == error.time_s:
-                continue
-            self._compared_s[(*cameras, landmark)] = error.time_s
-            errors[landmark] = error
+        for landmark, error in found.items():
+            if self._compared_s.get((*cameras, landmark)) != error.time_s:
+                self._compared_s[(*cameras, landmark)] = error.time_s
+                errors[landmark] = error
         return errors
 
     def _bounds_s(self) -> Array:

@@ -17,8 +17,9 @@ from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
 from services.fusion.intake.ray_interpolation import (
     FRAMES_AFTER,
     RaySamples,
-    RayTrack,
+    RayTracks,
     interpolate,
+    samples_of,
 )
 
 # A landmark moves if its speed is this many times its uncertainty.
@@ -48,10 +49,14 @@ class EpipolarError:
     variance: float  # of the height difference: noise, and what interpolation may miss
 
 
-def epipolar_error(
-    pair: RectifiedPair, first: RayTrack, second: RayTrack, shift_s: float, period_s: float
-) -> EpipolarError | None:
-    """The newest height difference that both tracks of a landmark give; None if they give none.
+def epipolar_errors(
+    pair: RectifiedPair,
+    tracks: RayTracks,
+    cameras: tuple[int, int],
+    shift_s: float,
+    period_s: float,
+) -> dict[int, EpipolarError]:
+    """The newest height difference that both cameras' tracks of a landmark give, by landmark.
 
     shift_s is how much later the second camera's clock reads than the first's, period_s the second
     camera's frame time.
@@ -62,14 +67,33 @@ def epipolar_error(
     sample. (A slope of the same interpolation shares its noise; where that is 2 px, and not the .1
     px that is announced, the difference looks like a clock error of up to half a frame.)
     """
-    found = _newest_error(
-        (pair.R_rectified_from_first, pair.R_rectified_from_second),
-        (first.samples, second.samples),
-        (first.count, second.count),
-        shift_s,
-        period_s,
-    )
-    return EpipolarError(*found[1:]) if found[0] else None
+    rotations = pair.R_rectified_from_first, pair.R_rectified_from_second
+    rows = _newest_errors(rotations, tracks, cameras, shift_s, period_s)
+    return {int(row): EpipolarError(*numbers) for row, *numbers in rows.tolist()}
+
+
+@njit(cache=True)
+def _newest_errors(
+    rotations: tuple[Array, Array],
+    tracks: RayTracks,
+    cameras: tuple[int, int],
+    shift_s: float,
+    period_s: float,
+) -> Array:
+    """epipolar_errors as rows (n, 6): landmark, and what EpipolarError has."""
+    first, second = cameras
+    rows = np.empty((tracks.counts.shape[0], 6))
+    count = 0
+    for k in range(tracks.counts.shape[0]):
+        samples = samples_of(tracks, k, first), samples_of(tracks, k, second)
+        counts = tracks.counts[k, first], tracks.counts[k, second]
+        newest = _newest_error(rotations, samples, counts, shift_s, period_s)
+        if newest[0]:
+            rows[count, 0] = k
+            for i, number in enumerate(newest[1:]):
+                rows[count, 1 + i] = number
+            count += 1
+    return rows[:count]
 
 
 @njit(cache=True)
@@ -80,7 +104,7 @@ def _newest_error(
     shift_s: float,
     period_s: float,
 ) -> tuple[bool, float, float, float, float, float]:
-    """epipolar_error, and before it whether there is one."""
+    """A landmark's EpipolarError, and before it whether there is one."""
     R_first, R_second = rotations
     times_s, rays, sigmas = samples[0]
     ray, bend = np.empty(2), np.empty(2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from services.fusion.monitors.epipolar_error import EpipolarError
@@ -100,6 +102,6 @@ class HeightWindow:
         The mean of n instants has the variance one / n of noise and n walk^2 / 3 of drift.
         """
         of_one = found.variance * min(self._memory, self.instants)
-        if np.isfinite(of_one):
-            best = np.sqrt(3.0 * of_one) / self._walk_s
-            self._memory = float(np.clip(best, _MEMORY_MIN, _MEMORY_MAX))
+        if math.isfinite(of_one):
+            best = math.sqrt(3.0 * of_one) / self._walk_s
+            self._memory = min(max(best, _MEMORY_MIN), _MEMORY_MAX)

@@ -30,6 +30,8 @@ FIRST_M = 0.003
 # Steps of the fit; at each the variance of the shape grows with the square of how much more the
 # estimates contradict it than by chance.
 STEPS = 5
+# A step of less, m and rad, was the last: it is a thousandth of what anything is rounded to.
+SETTLED = 1e-9
 
 
 class ShapeMemory(NamedTuple):
@@ -85,7 +87,11 @@ def _fit_alike(before: Array, now: Array) -> tuple[RigidFit, Array]:
     for n in range(before.shape[0]):
         weights[n] = np.eye(3) / FLOOR_M**2
     for _ in range(STEPS):
+        before_step = fit.moved.copy()
         step_fit(fit, arms, now, weights)
+        # Metres and radians: a hand hardly turns in a frame, and three steps are the rule.
+        if np.abs(fit.moved - before_step).max() < SETTLED:
+            break
     return fit, arms
 
 

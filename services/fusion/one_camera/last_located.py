@@ -11,11 +11,18 @@ or else the filter.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
-from services.fusion.one_camera.carried_shape import carry_shape, no_shapes, note_shapes
-from services.fusion.one_camera.kept_shape import ShapeMemory
+from services.fusion.method import Estimates
+from services.fusion.one_camera.carried_shape import (
+    LocatedShapes,
+    carry_shape,
+    no_shapes,
+    note_shapes,
+)
+from services.fusion.one_camera.kept_shape import ShapeMemory, empty_memory, learn_deformation
 
 Estimate = tuple[Array, Array]  # position (3,) and covariance (3, 3), rig frame
 
@@ -34,43 +41,61 @@ _REACH_M = 1.0
 class LastLocated:
     """Where L landmarks were when two cameras saw each last, and what that tells of them now."""
 
-    def __init__(self, hand: Ints) -> None:
-        """hand (L,): whose each landmark is."""
-        self._hand = hand
-        self._shapes = no_shapes(hand.size)
+    def __init__(self, hand: Ints, eye_rig: Array, span_s: float) -> None:
+        """hand (L,): whose each landmark is; eye_rig (3,): the middle of the cameras.
 
-    def note(self, located: Bools, positions_m: Array, covs: Array, time_s: float) -> None:
-        """Positions (L, 3), covariances (L, 3, 3) of landmarks that two cameras see (L,)."""
-        note_shapes(self._shapes, located, positions_m, covs, time_s)
-
-    def tell(
-        self,
-        time_s: float,
-        are: tuple[Bools, Bools],
-        centres_rig: Array,
-        memory: tuple[ShapeMemory, float],
-        told: Estimate,
-    ) -> None:
-        """Estimates of all landmarks that one camera sees alone; told (L, 3), (L, 3, 3) in place.
-
-        are: who one camera sees alone (L,), and who two see; centres_rig (L, 3): of a camera that
-        sees each; memory: how the hands deformed lately, in spans of so many seconds.
+        span_s: from one instant to the next, usually.
         """
-        (alone, located), (means, covs) = are, told
+        self._hand, self._span_s = hand, span_s
+        self._shapes = no_shapes(hand.size)
+        # How the hands deformed lately.
+        self._memory = empty_memory(hand.size, eye_rig)
+        # An instant that is not learnt from yet: who was located, and all places.
+        self._taken: tuple[float, Bools, Estimate] | None = None
+
+    def take(self, time_s: float, estimates: Estimates) -> None:
+        """Remember what two cameras see at an instant.
+
+        That takes a while, which nobody waits for: settle() does it, or who asks next.
+        """
+        self.settle()
+        located = estimates.found & estimates.measured
+        places = estimates.positions_m.copy(), estimates.covariances_m2.copy()
+        self._taken = time_s, located, places
+
+    def settle(self) -> None:
+        """Learn from what was taken last."""
+        if self._taken is not None:
+            time_s, located, places = self._taken
+            self._taken = None
+            spans = time_s, self._span_s
+            _note(self._shapes, self._memory, self._hand, located, places, spans)
+
+    def tell_alone(self, time_s: float, centres_rig: Array, estimates: Estimates) -> None:
+        """Estimates of all landmarks that one camera sees alone, in place.
+
+        centres_rig (C, 3): of the cameras.
+        """
+        self.settle()
+        alone = estimates.found & ~estimates.measured & estimates.seen_by.any(axis=1)
+        located = estimates.found & estimates.measured
+        centres = centres_rig[estimates.seen_by.argmax(axis=1)]  # (L, 3) of one that sees each
+        means, covs = estimates.positions_m, estimates.covariances_m2
+        memory = self._memory, self._span_s
         places = means.copy(), covs.copy()
         rows = np.flatnonzero(alone).tolist()
         for row in rows:
             places[0][row], places[1][row] = self._ray(
-                row, time_s, (means[row], covs[row]), centres_rig[row]
+                row, time_s, (means[row], covs[row]), centres[row]
             )
         for row in rows:
             shape = np.empty(3), np.empty((3, 3))
             now = (time_s, *places)
             if carry_shape(self._shapes, memory, self._hand, row, (located, alone), now, shape):
-                means[row], covs[row] = self._held(row, time_s, shape, centres_rig[row])
+                means[row], covs[row] = self._held(row, time_s, shape, centres[row])
             else:
                 estimate = means[row], covs[row]
-                means[row], covs[row] = self.told(row, time_s, estimate, centres_rig[row])
+                means[row], covs[row] = self.told(row, time_s, estimate, centres[row])
 
     def told(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
         """The filter's estimate of a landmark by one camera at centre_rig (3,), its distance held.
@@ -123,3 +148,21 @@ class LastLocated:
         across = np.eye(3) - np.outer(along, along)
         told_cov = (told / own) ** 2 * (across @ cov @ across) + variance * np.outer(along, along)
         return centre_rig + told * along, told_cov
+
+
+@njit(cache=True, error_model="numpy")
+def _note(
+    shapes: LocatedShapes,
+    memory: ShapeMemory,
+    hand: Ints,
+    located: Bools,
+    places: Estimate,
+    times_s: tuple[float, float],
+) -> None:
+    """Remember the places (L, 3), (L, 3, 3) of those that two cameras see (L,).
+
+    times_s: the instant, and from one to the next.
+    """
+    time_s, span_s = times_s
+    note_shapes(shapes, located, places[0], places[1], time_s)
+    learn_deformation(memory, hand, located, places[0], time_s, span_s)

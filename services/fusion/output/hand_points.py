@@ -19,6 +19,7 @@ from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
 from services.fusion.output.hand_plausibility import coherent
+from services.fusion.output.known_paint import KnownPaint, correct_paint
 from services.fusion.output.systematic_error import Systematic, add_systematic
 
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
@@ -54,19 +55,21 @@ class PointMessages:
     def of(
         self,
         estimates: Estimates,
-        centres: tuple[Array, Array],
+        instant_ns: int,
+        paint: KnownPaint,
         errors: tuple[Systematic, Array],
         places: Array,
     ) -> tuple[dict[HandName, list[HandPoint]], int]:
         """The points of every hand, and how many were left out as they do not belong to theirs.
 
-        centres: positions (L, 3) and covariances (L, 3, 3), changed in place; errors: what is to be
-        added to these, as in add_systematic; places (L, 3) gets the positions, NaN of what was not
-        found.
+        estimates: of paint's centres, which become landmarks in place; errors: what is to be added
+        to their covariances, as in add_systematic; places (L, 3) gets the positions, NaN of what
+        was not found.
         """
+        centres = estimates.positions_m, estimates.covariances_m2
         seen = estimates.found, estimates.seen_by, estimates.detected
         numbers, kept, incoherent = _point_numbers(
-            centres, seen, self._hand_of, errors, self._extrinsics, places
+            centres, seen, self._hand_of, (paint, instant_ns), errors, self._extrinsics, places
         )
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
         seen_by, measured = estimates.seen_by.tolist(), estimates.measured.tolist()
@@ -100,6 +103,7 @@ def _point_numbers(
     centres: tuple[Array, Array],
     seen: tuple[Bools, Bools, Bools],
     hands: tuple[Ints, Array],
+    paint: tuple[KnownPaint, int],
     errors: tuple[Systematic, Array],
     cameras: Extrinsics,
     places: Array,
@@ -107,9 +111,11 @@ def _point_numbers(
     """Numbers of points (L, 12), rounded, which of them to tell (L,), and how many are incoherent.
 
     seen: found (L,), by which cameras (L, C), detected (L,). hands: whose a landmark is (L,), and
-    each one's reach. The others as in PointMessages.of.
+    each one's reach. paint: what is known of it, and the instant, ns. The others as in
+    PointMessages.of.
     """
     (positions, covariances), (found, seen_by, detected) = centres, seen
+    correct_paint(paint[0], paint[1], positions, covariances, seen_by, cameras)
     places[:] = np.nan
     for row in np.flatnonzero(found):
         places[row] = positions[row]

@@ -36,30 +36,15 @@ from rhot.geometry.transforms import Array
 from rhot.hand import JOINT_INDEX, HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
-from services.fusion.geometry.projection import Extrinsics, extrinsics
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.paint_centroid import expected_shift, shift_table
+from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
+from services.fusion.output.paint_centroid import shift_table
 
-# Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
-# from the figures above.
-SIGMA_UNKNOWN = (0.29, 0.16)
-# With the solver's directions, beside what their own uncertainty makes (paint_centroid.py), along
-# and across: SIDE of a finger seen from the side, and END times a power of the cosine between
-# finger and viewing ray. Errors of rendered tips at .5-.7 m with directions 7 deg off, all causes:
-# .4-.6 and .13 mm from the side, .7 and .25 at a cosine of -.6, 1.4-2.2 and .4-.5 pointing at the
-# cameras, where the visible end depends on the direction most.
-SIGMA_SIDE = (0.02, 0.012)
-SIGMA_END, _END_POWER = (0.2, 0.08), (4, 2)
-# Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.45 mm
-# deep, of which their sag explains 1.58.
-SIGMA_DAB = 0.025
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. (How long the paint is does not matter: paint_centroid.py.)
 _RADIUS_SD = {"tables": 0.12, "measured": 0.08}
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
-# A finger turns by up to 10 rad/s: an older direction is worth no more than none.
-_POSE_AGE_NS = 150_000_000
 
 
 def dab_sag_m(radius_m: float, limb_m: float) -> float:
@@ -94,14 +79,11 @@ class PaintToBone:
         cameras: tuple[Camera, ...],
     ) -> None:
         paints = [hands[landmark.hand].paint[landmark.name] for landmark in landmarks]
-        self._landmarks = landmarks
-        self._radii_m = np.array([paint.radius_m for paint in paints])  # (L,)
+        radii_m = np.array([paint.radius_m for paint in paints])  # (L,)
         # Diameters of dabs (L,), 0 for painted tips.
-        self._dabs_m = np.array(
-            [paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints]
-        )
+        dabs_m = np.array([paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints])
         # Which landmarks are painted all round (L,), as tips are.
-        self.round: Bools = self._radii_m > 0.0
+        self.round: Bools = radii_m > 0.0
         # Which landmarks are paint of some size (L,), not points.
         self.extended: Bools = np.array(
             [paint.radius_m > 0.0 or paint.extent_m > 0.0 for paint in paints], dtype=bool
@@ -121,28 +103,31 @@ class PaintToBone:
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
-        self._sags_m = np.array(
-            [
-                dab_sag_m(0.5 * dab_m, limb_m)
-                for dab_m, limb_m in zip(self._dabs_m, limbs_m, strict=True)
-            ]
+        sags_m = np.array(
+            [dab_sag_m(0.5 * dab_m, limb_m) for dab_m, limb_m in zip(dabs_m, limbs_m, strict=True)]
         )
-        self._tables = np.array(
+        tables = np.array(
             [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
         ).reshape(len(paints), -1)
-        self._radius_sds = np.array(
+        radius_sds = np.array(
             [_RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks]
         )
-        self._extrinsics = extrinsics(cameras)
-        # The middle of the cameras, which stands for all of them.
-        self._viewpoint_rig = np.mean([camera.centre_rig for camera in cameras], axis=0)
-        self.reset()
+        centres_rig = [camera.centre_rig for camera in cameras]
+        self.known = KnownPaint(
+            radii_m=radii_m,
+            dabs_m=dabs_m,
+            sags_m=sags_m,
+            tables=tables,
+            radius_sds=radius_sds,
+            directions=np.zeros((len(landmarks), 3)),
+            direction_sigmas=np.zeros(len(landmarks)),
+            stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
+            viewpoint_rig=np.mean(centres_rig, axis=0),
+        )
 
     def reset(self) -> None:
         """Time starts anew: no direction is known."""
-        self._directions = np.zeros((len(self._landmarks), 3))
-        self._direction_sigmas = np.zeros(len(self._landmarks))
-        self._stamps_ns = [-_POSE_AGE_NS - 1] * len(self._landmarks)
+        self.known.stamps_ns[:] = LONG_AGO_NS
 
     def directions(self, pose: HandPose) -> Directions:
         """A solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
@@ -165,31 +150,7 @@ class PaintToBone:
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
-        self._directions[told.rows] = told.directions
-        self._direction_sigmas[told.rows] = told.sigmas_rad
-        for row in told.rows.tolist():
-            self._stamps_ns[row] = told.stamp_ns
-
-    def correct(
-        self, positions_m: Array, covariances_m2: Array, seen_by: Bools, instant_ns: int
-    ) -> tuple[Array, Array]:
-        """Landmarks (L, 3) and covariances (L, 3, 3) from located paint centres.
-
-        seen_by (L, C) tells which cameras located them.
-        """
-        positions, covariances = positions_m.copy(), covariances_m2.copy()
-        ages_ns = [abs(instant_ns - stamp_ns) for stamp_ns in self._stamps_ns]
-        _correct(
-            positions,
-            covariances,
-            seen_by,
-            np.array([age_ns <= _POSE_AGE_NS for age_ns in ages_ns]),
-            (self._radii_m, self._dabs_m, self._sags_m),
-            (self._tables, self._directions, self._direction_sigmas, self._radius_sds),
-            self._extrinsics,
-            self._viewpoint_rig,
-        )
-        return positions, covariances
+        note_directions(self.known, told.rows, told.directions, told.sigmas_rad, told.stamp_ns)
 
 
 @njit(cache=True)
@@ -216,61 +177,6 @@ def turned_vectors(vectors: Array, quaternions: Array) -> Array:
     return turned
 
 
-@njit(cache=True)
-def _correct(
-    positions: Array,
-    covariances: Array,
-    seen_by: Bools,
-    told: Bools,
-    sizes: tuple[Array, Array, Array],
-    fingers: tuple[Array, Array, Array, Array],
-    cameras: Extrinsics,
-    viewpoint: Array,
-) -> None:
-    """PaintToBone.correct in place; told (L,): a pose says where a landmark's finger points.
-
-    sizes: radii of tips, diameters of dabs and how deep their middles lie, (L,) each. fingers:
-    tables (L, 61) of paint_centroid, directions (L, 3), their sigmas and those of radii (L,).
-    """
-    radii, dabs, sags = sizes
-    tables, directions, direction_sigmas, radius_sds = fingers
-    shift, shift_covariance = np.empty(3), np.empty((3, 3))
-    for row in range(positions.shape[0]):
-        ray = positions[row] - viewpoint  # away
-        ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
-        along, across = SIGMA_UNKNOWN  # in radii
-        if not told[row]:
-            # Skin that a camera sees faces it, more or less.
-            positions[row] -= sags[row] * ray
-        elif radii[row] == 0.0:
-            positions[row] += sags[row] * directions[row]
-        else:
-            # A tip, whose middle has no depth under it.
-            finger = directions[row], direction_sigmas[row], radius_sds[row]
-            chosen = _locating(cameras, seen_by[row])
-            if expected_shift(tables[row], positions[row], finger, chosen, shift, shift_covariance):
-                positions[row] -= shift
-                covariances[row] += shift_covariance
-                along, across = _tip_sigmas(ray @ directions[row])
-        dab = (SIGMA_DAB * dabs[row]) ** 2
-        along = (along * radii[row]) ** 2 + dab
-        across = (across * radii[row]) ** 2 + dab
-        for i in range(3):
-            for j in range(3):
-                both = ray[i] * ray[j]
-                covariances[row, i, j] += along * both + across * ((1.0 if i == j else 0.0) - both)
-
-
-@njit(cache=True)
-def _locating(cameras: Extrinsics, seen_by: Bools) -> Extrinsics:
-    """The cameras that locate a landmark: those that see it (C,), all where less than two do."""
-    count = np.count_nonzero(seen_by)
-    if count < 2 or count == seen_by.size:
-        return cameras
-    chosen = np.flatnonzero(seen_by)
-    return Extrinsics(cameras.R[chosen], cameras.t[chosen])
-
-
 def _direction_sigma(wrist_rad: float | None, finger_rad: float | None) -> float:
     """One standard deviation of a tip's direction about each axis across it.
 
@@ -280,15 +186,3 @@ def _direction_sigma(wrist_rad: float | None, finger_rad: float | None) -> float
     if wrist_rad is None or finger_rad is None:
         return _UNTOLD_DIRECTION_RAD
     return math.hypot(wrist_rad / math.sqrt(3.0), finger_rad)
-
-
-@njit(cache=True)
-def _tip_sigmas(cosine: float) -> tuple[float, float]:
-    """Sigmas along and across the viewing ray, in radii, of a tip whose direction is known.
-
-    cosine: of the angle between finger and viewing ray.
-    """
-    return (
-        math.hypot(SIGMA_SIDE[0], SIGMA_END[0] * cosine ** _END_POWER[0]),
-        math.hypot(SIGMA_SIDE[1], SIGMA_END[1] * cosine ** _END_POWER[1]),
-    )

@@ -60,31 +60,29 @@ class SystematicError:
         self._unit = np.array([1.0 / float(np.mean(camera.focal_px)) for camera in cameras])
         self.known = Systematic(np.zeros(len(extended)), OWN_PX * self._unit, extended)
 
-    def white_sigmas(self, view: View) -> Array:
-        """The part of a view's sigmas (n,) that changes from frame to frame; and remember them."""
-        white = np.empty(len(view.landmarks))
-        white_floor = WHITE_PX * float(self._unit[view.camera])
-        _split_sigmas(
-            self.known.running, self.known.extended, view.landmarks, view.sigmas, white_floor, white
-        )
-        return white
+    def white_sigmas(self, view: View, hidden: Array) -> Array:
+        """What changes of a view's rays from frame to frame, one standard deviation (n,).
+
+        That is a part of its sigmas, which are remembered, and what hidden paint adds (n,).
+        """
+        floor = WHITE_PX * float(self._unit[view.camera])
+        return _white_sigmas(self.known, view.landmarks, view.sigmas, hidden, floor)
 
 
 @njit(cache=True)
-def _split_sigmas(
-    running: Array, extended: Bools, landmarks: Ints, sigmas: Array, white_floor: float, out: Array
-) -> None:
-    """Update running sigmas (L,) by the sigmas (n,) of landmarks (n,); the white part to out (n,).
-
-    white_floor: WHITE_PX in the rays' units.
-    """
+def _white_sigmas(
+    known: Systematic, landmarks: Ints, sigmas: Array, hidden: Array, floor: float
+) -> Array:
+    """SystematicError.white_sigmas; floor: WHITE_PX in the rays' units."""
+    white = np.empty(landmarks.shape[0])
+    running = known.running
     for n in range(landmarks.shape[0]):
-        row = landmarks[n]
-        sigma = sigmas[n]
+        row, sigma = landmarks[n], sigmas[n]
         running[row] = sigma if running[row] == 0.0 else (1.0 - _NEW) * running[row] + _NEW * sigma
-        out[n] = (
-            min(sigma, math.hypot(white_floor, WHITE_SHARE * sigma)) if extended[row] else sigma
-        )
+        if known.extended[row]:
+            sigma = min(sigma, math.hypot(floor, WHITE_SHARE * sigma))
+        white[n] = math.hypot(sigma, hidden[n])
+    return white
 
 
 @njit(cache=True)

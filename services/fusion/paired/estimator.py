@@ -107,6 +107,9 @@ class PairedMethod:
             detected=seen_by.sum(axis=1) >= 2,
         )
 
+    def settle(self) -> None:
+        """Nothing waits."""
+
     def _rays(self, landmark: int, time_s: float) -> dict[int, InterpolatedRay]:
         """A landmark's rays at an instant, by the camera; of those that have one."""
         rays = {}

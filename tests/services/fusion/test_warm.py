@@ -4,31 +4,30 @@ from __future__ import annotations
 
 from services.fusion.alignment import offset_search
 from services.fusion.intake import observations, ray_interpolation
-from services.fusion.kalman import filtering, frame_update, smoother
+from services.fusion.kalman import estimator, filtering, frame_update, telling
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
-from services.fusion.one_camera import carried_shape
+from services.fusion.one_camera import carried_shape, last_located
 from services.fusion.output import hand_points, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
     frame_update.take_in,
-    frame_update.drop_lost,
     filtering.filter_from,
     filtering.oldest_with,
-    smoother.smooth_hand,
+    telling.tell,
+    estimator._keep_useful,
     carried_shape.carry_shape,
-    carried_shape.note_shapes,
-    paint_to_bone._correct,
+    last_located._note,
     hand_points._point_numbers,
     paint_to_bone.turned_vectors,
     observations._observed,
-    ray_interpolation._insert,
-    epipolar_error._newest_error,
+    ray_interpolation.add_frame,
+    epipolar_error._newest_errors,
     moved_camera.displaced_px,
     shift_regression._fit,
     mirrored_view._order,
-    offset_search._through,
+    offset_search._interpolate,
 )
 
 

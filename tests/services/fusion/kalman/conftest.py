@@ -11,7 +11,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
-from services.fusion.method import Counts
+from services.fusion.method import Counts, Estimates, no_estimates
 from testing.synthetic_points import Motion, MovingHand, SyntheticRig
 
 
@@ -46,8 +46,14 @@ class OneHand:
 
     def errors_m(self, time_s: float) -> tuple[Array, Array]:
         """Which landmarks (6,) have an estimate, and how far it is off (6, 3)."""
-        found, places, _ = self.filter.estimate(time_s)
-        return found, places - self.path(np.array([time_s]))[0]
+        told = self.told(time_s)
+        return told.found, told.positions_m - self.path(np.array([time_s]))[0]
+
+    def told(self, time_s: float) -> Estimates:
+        """What is known at an instant."""
+        told = no_estimates(6, 2)
+        self.filter.tell(time_s, np.full(2, time_s - 0.05), told)
+        return told
 
     def run(self, numbers: Iterable[int]) -> None:
         """Take in whole frames."""

@@ -20,8 +20,8 @@ def test_late_frames_give_the_same_estimate(one_hand):
     for k in order:
         mixed.see(given[k])
     time_s = 23 / 60.0
-    expected, found = in_order.filter.estimate(time_s), mixed.filter.estimate(time_s)
-    np.testing.assert_allclose(found[1], expected[1], atol=2e-5)
+    expected, found = in_order.told(time_s), mixed.told(time_s)
+    np.testing.assert_allclose(found.positions_m, expected.positions_m, atol=2e-5)
     assert mixed.counts.late == 0
 
 

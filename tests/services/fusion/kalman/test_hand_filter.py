@@ -69,10 +69,10 @@ def test_a_landmark_that_one_camera_sees_stays_with_its_hand(one_hand):
     hand.run(range(30))
     for k in range(30, 45):
         hand.see(hand.frame(k), seen=range(6) if k % 2 else (0, 1, 3, 4, 5))
-        found, places, covs = hand.filter.estimate(k / 60.0)
-        error = places[2] - hand.path(np.array([k / 60.0]))[0, 2]
-        assert found[2]
-        assert error @ np.linalg.solve(covs[2], error) < 30.0
+        told = hand.told(k / 60.0)
+        error = told.positions_m[2] - hand.path(np.array([k / 60.0]))[0, 2]
+        assert told.found[2]
+        assert error @ np.linalg.solve(told.covariances_m2[2], error) < 30.0
     assert hand.counts.dropped == 0
 
 

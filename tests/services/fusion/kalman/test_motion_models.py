@@ -9,9 +9,11 @@ from scipy.linalg import expm
 from services.fusion.kalman.hand_filter import MODELS
 from services.fusion.kalman.motion_models import (
     SharedNoise,
-    add_noise,
+    add_walk,
     adjoint_predict,
+    jerk_cov,
     predict_cov,
+    predict_place_cov,
     predict_state,
     transition,
     turn_gram,
@@ -88,9 +90,16 @@ def test_prediction_is_that_of_the_dense_matrices():
                 dense[6 * r + 3 * k + i, 6 * c + 3 * k + i] = matrix(each, 0.02)[r, c]
     out_x, out_P = np.empty(19), np.empty((19, 19))
     predict_state(x, F, out_x)
-    predict_cov(P, F, out_P)
+    jerk_root, Q_root = random.normal(size=(6, 6)), random.normal(size=(3, 3))
+    jerk, Q = jerk_root @ jerk_root.T, Q_root @ Q_root.T
+    predict_cov(P, F, jerk, Q, out_P)
+    noise = np.zeros((19, 19))
+    noise[:18, :18] = np.kron(Q, jerk)
     np.testing.assert_allclose(out_x, dense @ x, rtol=1e-12)
-    np.testing.assert_allclose(out_P, dense @ P @ dense.T, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(out_P, dense @ P @ dense.T + noise, rtol=1e-10, atol=1e-12)
+    of_places = np.empty((6, 19))
+    predict_place_cov(P, F, jerk, Q, of_places)
+    np.testing.assert_allclose(of_places, out_P[:6], rtol=1e-12)
     rows = np.stack([x, P[0], P[1]])
     adjoint_predict(rows, 2, F)
     np.testing.assert_allclose(rows[0], dense.T @ x, rtol=1e-12, atol=1e-14)
@@ -98,26 +107,23 @@ def test_prediction_is_that_of_the_dense_matrices():
     np.testing.assert_array_equal(rows[2], P[1])
 
 
-def test_noise_is_shared_by_those_that_are_alive():
+def test_jerk_is_shared_by_those_that_are_alive():
     alive = np.array([True, True, False])
-    P = np.zeros((28, 28))
-    add_noise(MODELS, 1, 0.02, SharedNoise(np.zeros((9, 9)), np.zeros((9, 9))), alive, P)
-    assert (
-        P[18, 18]
-        > P[18, 21]
-        > 0.9 * P[18, 18] * MODELS.shift[1] / (MODELS.shift[1] + MODELS.own[1])
-    )
-    assert P[18, 19] == 0.0
-    assert not P[24:27].any()
+    jerk = jerk_cov(MODELS, 1, SharedNoise(np.zeros((9, 9)), np.zeros((9, 9))), alive)
+    assert jerk[0, 3] == MODELS.shift[1]
+    assert jerk[0, 0] == MODELS.shift[1] + MODELS.own[1]
+    assert jerk[0, 1] == 0.0
+    assert not jerk[6:].any()
+    P = np.zeros((9, 28))
+    add_walk(MODELS, 0, 0.02, alive, P)
+    assert P[0, 0] == P[5, 5] == 0.02 * MODELS.walk[0] > P[6, 6] == 0.0
 
 
-def test_noise_along_a_way_moves_all_landmarks_as_they_moved():
+def test_jerk_along_a_way_moves_all_landmarks_as_they_moved():
     alive = np.array([True, True])
     velocity = np.array([0.5, 0.0, 0.0, 0.0, -0.25, 0.0])
     way = np.outer(velocity, velocity)
-    calm, P = np.zeros((19, 19)), np.zeros((19, 19))
-    add_noise(MODELS, 3, 0.02, SharedNoise(np.zeros((6, 6)), np.zeros((6, 6))), alive, calm)
-    add_noise(MODELS, 3, 0.02, SharedNoise(np.zeros((6, 6)), way), alive, P)
-    more = (P - calm)[12:18, 12:18]
+    calm = jerk_cov(MODELS, 3, SharedNoise(np.zeros((6, 6)), np.zeros((6, 6))), alive)
+    more = jerk_cov(MODELS, 3, SharedNoise(np.zeros((6, 6)), way), alive) - calm
     assert more[0, 0] > 0.0
     np.testing.assert_allclose(more, more[0, 0] * way / way[0, 0], atol=1e-9 * more[0, 0])

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.kalman.hand_filter import MODELS
-from services.fusion.kalman.motion_models import SharedNoise, add_noise, turn_gram
+from services.fusion.kalman.motion_models import (
+    SharedNoise,
+    add_walk,
+    jerk_cov,
+    turn_gram,
+    unit_process_noise,
+)
 from services.fusion.kalman.own_motion import add_own, own_noise, transitions
 
 
@@ -42,9 +48,10 @@ def test_smoothed_as_rauch_tung_striebel(one_hand):
         predicted = F @ P @ F.T + Q
         G = np.linalg.solve(predicted, F @ P).T
         mean, cov = x + G @ (mean - F @ x), P + G @ (cov - predicted) @ G.T
-    found, places, covs = hand.filter.estimate(float(history.time_s[nodes[-4]]))
-    assert found.all()
-    np.testing.assert_allclose(places.ravel(), mean[:18], atol=1e-6)
+    told = hand.told(float(history.time_s[nodes[-4]]))
+    covs = told.covariances_m2
+    assert told.found.all()
+    np.testing.assert_allclose(told.positions_m.ravel(), mean[:18], atol=1e-6)
     for n in range(6):
         np.testing.assert_allclose(
             covs[n], cov[3 * n : 3 * n + 3, 3 * n : 3 * n + 3], atol=1e-2 * covs[n].max()
@@ -58,8 +65,11 @@ def _noise(history, last, node, m):
     turn_gram(history.state[last, likeliest], history.alive[last], gram)
     dt_s = float(history.time_s[node] - history.time_s[last])
     shared = SharedNoise(gram, history.way[last])
-    add_noise(MODELS, m, dt_s, shared, history.alive[last], Q)
     one_axis = np.empty((3, 3))
+    rates = float(MODELS.velocity_rate[m]), float(MODELS.acceleration_rate[m])
+    unit_process_noise(rates, dt_s, one_axis)
+    Q[:54, :54] = np.kron(one_axis, jerk_cov(MODELS, m, shared, history.alive[last]))
+    add_walk(MODELS, m, dt_s, history.alive[last], Q)
     own_noise(MODELS, m, dt_s, one_axis)
     for k, density in enumerate(history.own[node, m].tolist()):
         if density > 0.0:

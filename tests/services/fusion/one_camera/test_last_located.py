@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from services.fusion.method import no_estimates
 from services.fusion.one_camera.last_located import LastLocated
 
 CENTRE = np.array([0.1, 0.0, 0.0])
@@ -15,8 +16,12 @@ COV = 1e-6 * np.eye(3) + 0.16 * np.outer(RAY, RAY)
 
 
 def located(time_s=1.0):
-    last = LastLocated(np.zeros(2, dtype=np.int64))
-    last.note(np.array([True, False]), np.stack([PLACE, PLACE]), np.stack([COV, COV]), time_s)
+    last = LastLocated(np.zeros(2, dtype=np.int64), CENTRE, 1.0 / 60.0)
+    estimates = no_estimates(2, 2)
+    estimates.found[0] = estimates.measured[0] = True
+    estimates.positions_m[:], estimates.covariances_m2[:] = PLACE, COV
+    last.take(time_s, estimates)
+    last.settle()
     return last
 
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import Array
+from rhot.hand import HANDS
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
 from services.fusion.output.hand_points import PointMessages
+from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import Systematic
-from testing.synthetic_points import SyntheticRig
+from testing.synthetic_points import SyntheticRig, point_hands
 
 CAMERAS = tuple(SyntheticRig().rig().values())
 LANDMARKS = (
@@ -21,6 +23,9 @@ LANDMARKS = (
     Landmark("right", "index_tip"),
 )
 NOTHING = Systematic(np.zeros(4), np.full(2, 1e-4), np.zeros(4, dtype=bool)), np.zeros((4, 2))
+
+# Of points without extent.
+PAINT = PaintToBone(LANDMARKS, dict.fromkeys(HANDS, point_hands()["right"]), CAMERAS).known
 
 
 @pytest.fixture
@@ -47,8 +52,7 @@ def positions() -> Array:
 
 def test_points_are_told_by_hand(messages: PointMessages, positions: Array) -> None:
     told, places = estimates(positions), np.zeros((4, 3))
-    centres = told.positions_m, told.covariances_m2
-    points, incoherent = messages.of(told, centres, NOTHING, places)
+    points, incoherent = messages.of(told, 0, PAINT, NOTHING, places)
     assert [[point.name for point in of] for of in points.values()] == [
         ["wrist", "index_tip"],
         ["index_tip"],
@@ -72,9 +76,7 @@ def test_what_is_no_number_or_of_another_hand_is_not_told(
     positions[1, 2] = np.inf
     told = estimates(positions)
     told.detected[:] = [True, True, True, True]
-    points, incoherent = messages.of(
-        told, (told.positions_m, told.covariances_m2), NOTHING, np.zeros((4, 3))
-    )
+    points, incoherent = messages.of(told, 0, PAINT, NOTHING, np.zeros((4, 3)))
     assert [point.name for point in points["left"]] == ["wrist"]
     # One of the two that two cameras detect is enough; of more than two that would be none.
     assert len(points["right"]) == 1

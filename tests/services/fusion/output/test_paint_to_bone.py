@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import (
+    Array,
     quaternion_from_rotation,
     rotation_from_quaternion,
     rotation_from_vector,
 )
 from rhot.hand import JOINTS, default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
+from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
+from services.fusion.output.known_paint import SIGMA_DAB, SIGMA_UNKNOWN, correct_paint
 from services.fusion.output.paint_to_bone import (
-    SIGMA_DAB,
-    SIGMA_UNKNOWN,
     PaintToBone,
     dab_sag_m,
     turned_vectors,
@@ -94,6 +95,14 @@ TOWARDS = tuple(quaternion_from_rotation(rotation_from_vector([0.5, 0.0, 0.0])).
 SAG_M = dab_sag_m(0.008, 0.021)
 
 
+def corrected(paint: PaintToBone, instant_ns: int, positions: Array = POSITIONS):
+    """Landmarks (2, 3) and covariances (2, 3, 3) that both cameras see at an instant."""
+    places, covariances = positions.copy(), COVARIANCES.copy()
+    cameras = extrinsics(tuple(SyntheticRig().rig().values()))
+    correct_paint(paint.known, instant_ns, places, covariances, BOTH, cameras)
+    return places, covariances
+
+
 def is_untouched(positions) -> bool:
     """The tip is where it was, the dab is nearer to the cameras by its sag."""
     return (
@@ -134,7 +143,7 @@ def test_two_cameras_locate_a_dab_at_its_rim():
 
 
 def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
-    positions, covariances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)
+    positions, covariances = corrected(paint, 10**18)
     assert is_untouched(positions)
     np.testing.assert_allclose(np.linalg.norm(positions[0] - POSITIONS[0]), SAG_M)
     depth_mm = 1e3 * np.sqrt(covariances[:, 2, 2])
@@ -144,20 +153,23 @@ def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
 
 def test_a_pose_corrects_tips_while_it_is_fresh(paint):
     paint.note(paint.directions(pose(10**18, TOWARDS)))
-    positions, covariances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18 + 33_000_000)
+    positions, covariances = corrected(paint, 10**18 + 33_000_000)
     # The palm side of the wrist, -y of its frame, turned with the hand.
     np.testing.assert_allclose(
         positions[0] - POSITIONS[0], SAG_M * np.array([0.0, -np.cos(0.5), -np.sin(0.5)]), atol=1e-12
     )
     assert -3e-3 < positions[1, 2] - POSITIONS[1, 2] < -1e-3
-    unknown = PaintToBone(
-        LANDMARKS, {"right": default_hand("right")}, tuple(SyntheticRig().rig().values())
-    ).correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1]
+    unknown = corrected(
+        PaintToBone(
+            LANDMARKS, {"right": default_hand("right")}, tuple(SyntheticRig().rig().values())
+        ),
+        10**18,
+    )[1]
     assert covariances[1, 2, 2] < 0.5 * unknown[1, 2, 2]
-    late, _ = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18 + 400_000_000)
+    late, _ = corrected(paint, 10**18 + 400_000_000)
     assert is_untouched(late)
     paint.reset()
-    assert is_untouched(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
+    assert is_untouched(corrected(paint, 10**18)[0])
 
 
 def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
@@ -166,9 +178,7 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
         turn = rotation_from_vector([angle, 0.0, 0.0])
         wxyz = tuple(quaternion_from_rotation(turn).tolist())
         paint.note(paint.directions(pose(10**18, wxyz, sigma_rad=0.03)))
-        sigmas_mm.append(
-            1e3 * np.sqrt(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1, [1, 2], [1, 2]])
-        )
+        sigmas_mm.append(1e3 * np.sqrt(corrected(paint, 10**18)[1][1, [1, 2], [1, 2]]))
     towards, tilted, side = np.array(sigmas_mm)
     assert np.all(towards > tilted)
     assert np.all(tilted > side)
@@ -183,7 +193,7 @@ def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
 def test_absurd_or_predicted_poses_are_ignored(paint, wxyz):
     paint.note(paint.directions(pose(10**18, wxyz)))
     paint.note(paint.directions(pose(10**18, TOWARDS, source="predicted")))
-    assert is_untouched(paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[0])
+    assert is_untouched(corrected(paint, 10**18)[0])
 
 
 def depth_sigmas_m(origin: str, sigma_rad: float | None) -> tuple[float, float]:
@@ -191,7 +201,7 @@ def depth_sigmas_m(origin: str, sigma_rad: float | None) -> tuple[float, float]:
     model = msgspec.structs.replace(default_hand("right"), origin=origin)
     paint = PaintToBone(LANDMARKS, {"right": model}, tuple(SyntheticRig().rig().values()))
     paint.note(paint.directions(pose(10**18, TOWARDS, sigma_rad=sigma_rad)))
-    variances = paint.correct(POSITIONS, COVARIANCES, BOTH, 10**18)[1][1]
+    variances = corrected(paint, 10**18)[1][1]
     return float(np.sqrt(variances[0, 0])), float(np.sqrt(variances[2, 2]))
 
 
@@ -218,9 +228,7 @@ def test_sigmas_hold_a_direction_that_is_off(random_fingers):
         # A digit's angles share the blame with the wrist.
         told = pose(10**18, tuple(quaternion_from_rotation(away).tolist()), sigma_rad=0.15)
         paint.note(paint.directions(told))
-        places, covariances = paint.correct(
-            np.array([POSITIONS[0], located]), COVARIANCES, BOTH, 10**18
-        )
+        places, covariances = corrected(paint, 10**18, np.array([POSITIONS[0], located]))
         error = places[1] - point
         squares.append(error @ np.linalg.solve(covariances[1], error) / 3.0)
     assert 0.2 < np.mean(squares) < 2.0

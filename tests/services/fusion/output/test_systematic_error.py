@@ -56,16 +56,20 @@ def covariances(errors: SystematicError, points: Array, seen_by: Bools, hidden: 
 
 
 def test_only_a_part_of_a_large_sigma_is_noise(errors):
-    paint_px, point_px = errors.white_sigmas(view(0.3)) * FOCAL_PX
+    paint_px, point_px = errors.white_sigmas(view(0.3), np.zeros(2)) * FOCAL_PX
     assert paint_px == pytest.approx(np.hypot(WHITE_PX, 0.3 * WHITE_SHARE), rel=0.01)
     assert point_px == pytest.approx(0.3)
+    # What is hidden of paint comes on top.
+    hidden = np.array([0.4, 0.0]) / FOCAL_PX
+    more_px, _ = errors.white_sigmas(view(0.3), hidden) * FOCAL_PX
+    assert more_px == pytest.approx(np.hypot(paint_px, 0.4))
     # A small sigma is not made larger.
-    assert errors.white_sigmas(view(0.05))[0] * FOCAL_PX == pytest.approx(0.05)
+    assert errors.white_sigmas(view(0.05), np.zeros(2))[0] * FOCAL_PX == pytest.approx(0.05)
 
 
 def test_own_errors_are_disparity_and_shared_ones_are_not(errors):
     for _ in range(100):
-        errors.white_sigmas(view(0.2))
+        errors.white_sigmas(view(0.2), np.zeros(2))
     found = covariances(errors, POINTS, BOTH, WHOLE)
     depth_per_px = DISTANCE_M**2 / (FOCAL_PX * 0.075)
     assert np.sqrt(found[0, 2, 2]) == pytest.approx(np.sqrt(2.0) * OWN_PX * depth_per_px, rel=0.02)
@@ -82,7 +86,7 @@ def test_a_point_seen_by_one_camera_counts_as_seen_by_all(errors):
 
 
 def test_points_behind_the_cameras_add_nothing_and_nan_nowhere(errors):
-    errors.white_sigmas(view(0.2))
+    errors.white_sigmas(view(0.2), np.zeros(2))
     assert not covariances(errors, -POINTS, BOTH, WHOLE).any()
     assert np.isfinite(covariances(errors, POINTS * 1e6, BOTH, WHOLE)).all()
 
