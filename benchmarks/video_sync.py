@@ -31,7 +31,7 @@ from rhot.messages import MarkerFrame
 from services.cli.offline.clocks.alignment import Clocks
 from services.cli.offline.clocks.camera_clock import CameraClock
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
-from services.fusion.alignment.offset_search import HeightTrack
+from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.geometry.rectified_pair import rectified_pair
 from testing.families.catalog import cases
 from testing.families.motions import SampledMotion, open_hand_m, stop_and_go_path

@@ -15,7 +15,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.alignment.offset_search import HeightTrack, interpolated
+from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.monitors.moved_camera import displaced_px
 from services.fusion.output.paint_to_bone import turned_vectors
 from services.fusion.step import FusionStep

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.alignment.offset_search import HeightTrack
+from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.alignment.recorded_rows import INSTANTS_HZ, ROWS_HZ, Rows, rows_of, take
 from services.fusion.monitors.shift_regression import Heights, Shift, fit_shift
 

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.alignment.offset_search import HeightTrack
+from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.arrays import Ints
 from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_rays
 from services.fusion.intake.observations import View

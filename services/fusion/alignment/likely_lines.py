@@ -14,12 +14,8 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from services.fusion.alignment.clock_line import ClockLine
-from services.fusion.alignment.offset_search import (
-    STEP_S,
-    HeightTrack,
-    lag_variances,
-    resampled,
-)
+from services.fusion.alignment.height_track import HeightTrack, resampled
+from services.fusion.alignment.offset_search import STEP_S, lag_variances
 
 # Clocks of cameras are within 100 ppm of the truth, cheap ones within 200.
 _DRIFT_MAX = 300e-6

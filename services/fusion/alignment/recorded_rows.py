@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.alignment.offset_search import HeightTrack, interpolated
+from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.arrays import Ints
 from services.fusion.monitors.shift_regression import Heights
 

@@ -106,23 +106,18 @@ class PaintToBone:
         sags_m = np.array(
             [dab_sag_m(0.5 * dab_m, limb_m) for dab_m, limb_m in zip(dabs_m, limbs_m, strict=True)]
         )
-        tables = np.array(
-            [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
-        ).reshape(len(paints), -1)
-        radius_sds = np.array(
-            [_RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks]
-        )
-        centres_rig = [camera.centre_rig for camera in cameras]
+        tables = [shift_table(paint.radius_m, paint.extent_m) for paint in paints]
+        sds = [_RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks]
         self.known = KnownPaint(
             radii_m=radii_m,
             dabs_m=dabs_m,
             sags_m=sags_m,
-            tables=tables,
-            radius_sds=radius_sds,
+            tables=np.array(tables).reshape(len(paints), -1),
+            radius_sds=np.array(sds),
             directions=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros(len(landmarks)),
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
-            viewpoint_rig=np.mean(centres_rig, axis=0),
+            viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
 
     def reset(self) -> None:

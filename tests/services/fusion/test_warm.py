@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.fusion.alignment import offset_search
+from services.fusion.alignment import height_track
 from services.fusion.intake import observations, ray_interpolation
 from services.fusion.kalman import estimator, filtering, frame_update, telling
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
@@ -27,7 +27,7 @@ LIVE = (
     moved_camera.displaced_px,
     shift_regression._fit,
     mirrored_view._order,
-    offset_search._interpolate,
+    height_track._interpolate,
 )
 
 

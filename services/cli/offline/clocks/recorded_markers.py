@@ -20,7 +20,7 @@ from rhot.errors import writing
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.messages import Marker, MarkerFrame
-from services.fusion.alignment.offset_search import HeightTrack
+from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.geometry.rectified_pair import rectify_rays
 from services.fusion.intake.undistortion import undistort
 

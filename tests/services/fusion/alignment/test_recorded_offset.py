@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.fusion.alignment.offset_search import HeightTrack
+from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.alignment.recorded_offset import find_recorded_offset
 from testing.families.motions import stop_and_go
 from testing.synthetic_points import Motion, MovingHand
