@@ -17,7 +17,7 @@ from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.monitors.moved_camera import displaced_px
-from services.fusion.output.paint_to_bone import turned_vectors
+from services.fusion.output.paint_to_bone import Directions, PaintToBone, turned_vectors
 from services.fusion.step import FusionStep
 
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
@@ -44,7 +44,10 @@ def warm_up(
             colors = config.colors[1:] if n and seq >= _ALONE_FROM else config.colors
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, colors)))
     # What only a pose that comes back, or some seconds of heights, would call.
-    turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
+    hand, nobody = next(iter(hands)), np.empty(0, dtype=np.int64)
+    directions = turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
+    paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
+    paint.note(Directions(hand, 0, nobody, directions, np.empty(0)))
     displaced_px(np.zeros(1))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     return messages + len(step.flush())

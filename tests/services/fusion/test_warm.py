@@ -7,7 +7,7 @@ from services.fusion.intake import observations, ray_interpolation
 from services.fusion.kalman import estimator, filtering, frame_update, telling
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
 from services.fusion.one_camera import carried_shape, last_located
-from services.fusion.output import hand_points, paint_to_bone
+from services.fusion.output import hand_points, known_paint, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
@@ -21,6 +21,7 @@ LIVE = (
     last_located._note,
     hand_points._point_numbers,
     paint_to_bone.turned_vectors,
+    known_paint.note_directions,
     observations._observed,
     ray_interpolation.add_frame,
     epipolar_error._newest_errors,
