@@ -19,7 +19,7 @@ from services.fusion.intake.observations import View
 class Estimates(NamedTuple):
     """All L landmarks at one instant, rig frame; rows whose `found` is false hold nothing.
 
-    Arrays are the receiver's to change, until the method is asked again.
+    Arrays hold until the method is asked again.
     """
 
     found: Bools  # (L,)

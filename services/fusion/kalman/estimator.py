@@ -71,12 +71,7 @@ class KalmanMethod:
     def observe(self, view: View, times_s: Array, clock_sigma_s: float) -> None:
         """Take in one camera's frame."""
         looks = FrameLooks(
-            view.camera,
-            view.landmarks,
-            times_s,
-            view.rays,
-            view.sigmas * view.sigmas,
-            clock_sigma_s**2,
+            view.camera, view.landmarks, times_s, view.rays, view.sigmas, clock_sigma_s**2
         )
         for rows, hand in zip(self._rows, self._hands, strict=True):
             mine = looks if len(self._hands) == 1 else _looks_at(looks, rows)
@@ -85,10 +80,10 @@ class KalmanMethod:
 
     def estimate(self, time_s: float) -> Estimates:
         """All landmarks at an instant."""
+        self.settle()
         told, alone = self._told, False
-        since_s = time_s - self._recent_s
         for hand, mine in zip(self._hands, self._told_of, strict=True):
-            alone |= hand.tell(time_s, since_s, mine)
+            alone |= hand.tell(time_s, self._recent_s, mine)
         self._located.take(time_s, told)
         if alone:
             self._located.tell_alone(time_s, self._centres_rig, told)
@@ -107,7 +102,7 @@ def _looks_at(looks: FrameLooks, rows: slice) -> FrameLooks:
         landmarks=looks.landmarks[mine] - rows.start,
         times_s=looks.times_s[mine],
         rays=looks.rays[mine],
-        variances=looks.variances[mine],
+        sigmas=looks.sigmas[mine],
     )
 
 

@@ -43,7 +43,7 @@ class FrameLooks(NamedTuple):
     landmarks: Ints  # (n,)
     times_s: Array  # (n,)
     rays: Array  # (n, 2)
-    variances: Array  # (n,) of each ray coordinate
+    sigmas: Array  # (n,) of each ray coordinate
     clock_variance: float  # s^2
 
 
@@ -94,7 +94,7 @@ def take_in(
         history.looked[node, k] = True
         history.delay_s[node, k] = looks.times_s[n] - time_s
         history.ray[node, k] = looks.rays[n]
-        history.ray_variance[node, k] = looks.variances[n]
+        history.ray_variance[node, k] = looks.sigmas[n] ** 2
         away_s = time_s - sights.accepted_s[k, looks.camera]
         fates.back[k] = min(alone_since(sights, k, time_s), away_s) > sights.hold_s
     filter_from(history, index, cameras, models, gate)

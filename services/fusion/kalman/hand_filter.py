@@ -15,12 +15,11 @@ from services.fusion.kalman.frame_update import (
     FrameLooks,
     Sights,
     no_fates,
-    take_in,
 )
+from services.fusion.kalman.held import Held, in_a_row, take_looks, tell_all
 from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
-from services.fusion.kalman.telling import tell
 from services.fusion.method import Counts, Estimates
 
 # From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
@@ -68,12 +67,14 @@ class HandFilter:
             np.full(shape, -np.inf), np.full(shape, -np.inf), np.full(landmarks, -np.inf), hold_s
         )
         self._fates = no_fates(landmarks)
+        self._row = in_a_row(
+            Held(self._history, self._sights, self._fates, cameras, MODELS, float(GATE))
+        )
 
     def observe(self, looks: FrameLooks) -> None:
         """Take in a frame's looks."""
-        fates, filters = self._fates, (MODELS, GATE)
-        outcome = take_in(self._history, self._sights, self._cameras, filters, looks, fates)
-        lost, used, alive = fates.counts.tolist()
+        outcome = take_looks(*looks, *self._row)
+        lost, used, alive = self._fates.counts.tolist()
         self._counts.dropped += lost
         if outcome == LATE:
             self._counts.late += len(looks.landmarks)
@@ -166,15 +167,12 @@ class HandFilter:
         if np.count_nonzero(~history.used[nodes, landmark]) >= CONTRADICTIONS:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
-    def tell(self, time_s: float, since_s: Array, told: Estimates) -> bool:
+    def tell(self, time_s: float, recent_s: Array, told: Estimates) -> bool:
         """Fill told with what is known at an instant; lost landmarks end (frame_update.drop_lost).
 
-        since_s (C,): from when on a camera's look counts as of that instant. Returns whether one
-        camera sees any landmark alone.
+        recent_s (C,): so old a camera's look may be to count as of that instant. Returns whether
+        one camera sees any landmark alone.
         """
-        filters = MODELS, GATE
-        lost, alone = tell(
-            self._history, self._sights, self._cameras, filters, time_s, since_s, told
-        )
+        lost, alone = tell_all(time_s, recent_s, *told, *self._row)
         self._counts.dropped += lost
-        return alone > 0
+        return bool(alone)

@@ -20,13 +20,13 @@ def tell(
     cameras: Extrinsics,
     filters: tuple[MotionModels, float],
     time_s: float,
-    since_s: Array,
+    recent_s: Array,
     told: Estimates,
 ) -> tuple[int, int]:
     """Fill told; how many landmarks were lost meanwhile, and how many one camera sees alone.
 
-    filters: the models, and the gate; since_s (C,): from when on a camera's look counts as of that
-    instant.
+    filters: the models, and the gate; recent_s (C,): so old a camera's look may be to count as of
+    that instant.
     """
     lost = drop_lost(history, sights, cameras, filters, time_s)
     told.found[:] = False
@@ -36,10 +36,10 @@ def tell(
     alone = 0
     for k in range(told.found.size):
         used, looked = 0, 0
-        for c in range(since_s.size):
-            told.seen_by[k, c] = sights.accepted_s[k, c] >= since_s[c]
+        for c in range(recent_s.size):
+            told.seen_by[k, c] = time_s - sights.accepted_s[k, c] <= recent_s[c]
             used += told.seen_by[k, c]
-            looked += sights.observed_s[k, c] >= since_s[c]
+            looked += time_s - sights.observed_s[k, c] <= recent_s[c]
         told.measured[k] = used >= 2
         told.detected[k] = looked >= 2
         alone += told.found[k] and used == 1

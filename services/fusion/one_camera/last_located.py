@@ -50,24 +50,23 @@ class LastLocated:
         self._shapes = no_shapes(hand.size)
         # How the hands deformed lately.
         self._memory = empty_memory(hand.size, eye_rig)
-        # An instant that is not learnt from yet: who was located, and all places.
-        self._taken: tuple[float, Bools, Estimate] | None = None
+        # An instant that is not learnt from yet, and who was located.
+        self._taken: tuple[float, Bools, Estimates] | None = None
 
     def take(self, time_s: float, estimates: Estimates) -> None:
         """Remember what two cameras see at an instant.
 
-        That takes a while, which nobody waits for: settle() does it, or who asks next.
+        That takes a while, which nobody waits for: settle() does it, as long as the places of
+        estimates are what they were.
         """
-        self.settle()
-        located = estimates.found & estimates.measured
-        places = estimates.positions_m.copy(), estimates.covariances_m2.copy()
-        self._taken = time_s, located, places
+        self._taken = time_s, estimates.found & estimates.measured, estimates
 
     def settle(self) -> None:
         """Learn from what was taken last."""
         if self._taken is not None:
-            time_s, located, places = self._taken
+            time_s, located, estimates = self._taken
             self._taken = None
+            places = estimates.positions_m, estimates.covariances_m2
             spans = time_s, self._span_s
             _note(self._shapes, self._memory, self._hand, located, places, spans)
 

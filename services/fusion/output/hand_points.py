@@ -62,9 +62,8 @@ class PointMessages:
     ) -> tuple[dict[HandName, list[HandPoint]], int]:
         """The points of every hand, and how many were left out as they do not belong to theirs.
 
-        estimates: of paint's centres, which become landmarks in place; errors: what is to be added
-        to their covariances, as in add_systematic; places (L, 3) gets the positions, NaN of what
-        was not found.
+        estimates: of paint's centres; errors: what is to be added to their covariances, as in
+        add_systematic; places (L, 3) gets the positions, NaN of what was not found.
         """
         centres = estimates.positions_m, estimates.covariances_m2
         seen = estimates.found, estimates.seen_by, estimates.detected
@@ -114,7 +113,8 @@ def _point_numbers(
     each one's reach. paint: what is known of it, and the instant, ns. The others as in
     PointMessages.of.
     """
-    (positions, covariances), (found, seen_by, detected) = centres, seen
+    positions, covariances = centres[0].copy(), centres[1].copy()
+    found, seen_by, detected = seen
     correct_paint(paint[0], paint[1], positions, covariances, seen_by, cameras)
     places[:] = np.nan
     for row in np.flatnonzero(found):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from services.fusion.alignment import height_track
 from services.fusion.intake import observations, ray_interpolation
-from services.fusion.kalman import estimator, filtering, frame_update, telling
+from services.fusion.kalman import estimator, filtering, held
 from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
 from services.fusion.one_camera import carried_shape, last_located
 from services.fusion.output import hand_points, known_paint, paint_to_bone
@@ -12,10 +12,10 @@ from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
-    frame_update.take_in,
+    held.take_looks,
     filtering.filter_from,
     filtering.oldest_with,
-    telling.tell,
+    held.tell_all,
     estimator._keep_useful,
     carried_shape.carry_shape,
     last_located._note,

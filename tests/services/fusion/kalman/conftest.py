@@ -39,10 +39,8 @@ class OneHand:
         """Take in the looks of a frame at some landmarks."""
         camera, times_s, rays = frame
         which = np.array(list(seen), dtype=np.int64)
-        variances = np.full(len(which), self.SIGMA**2)
-        self.filter.observe(
-            FrameLooks(camera, which, times_s[which], rays[which], variances, 1e-10)
-        )
+        sigmas = np.full(len(which), self.SIGMA)
+        self.filter.observe(FrameLooks(camera, which, times_s[which], rays[which], sigmas, 1e-10))
 
     def errors_m(self, time_s: float) -> tuple[Array, Array]:
         """Which landmarks (6,) have an estimate, and how far it is off (6, 3)."""
@@ -52,7 +50,7 @@ class OneHand:
     def told(self, time_s: float) -> Estimates:
         """What is known at an instant."""
         told = no_estimates(6, 2)
-        self.filter.tell(time_s, np.full(2, time_s - 0.05), told)
+        self.filter.tell(time_s, np.full(2, 0.05), told)
         return told
 
     def run(self, numbers: Iterable[int]) -> None:
