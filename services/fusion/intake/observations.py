@@ -124,8 +124,9 @@ class ObservationBuilder:
             np.array(claimed, dtype=np.int64),
             np.array(numbers),
             len(self.landmarks),
-            self._lenses[index],
-            (middle_row, frame.row_time_ns),
+            *self._lenses[index],
+            middle_row,
+            frame.row_time_ns,
         )
         return View(
             index,
@@ -161,28 +162,31 @@ def _observed(
     claimed: Ints,
     numbers: Array,
     landmarks: int,
-    lens: Lens,
-    rows: tuple[float, float],
+    size_px: tuple[int, int],
+    matrix: Array,
+    distortion: Array,
+    middle_row: float,
+    row_time_ns: float,
 ) -> tuple[Ints, Array, Array, Array, Array]:
     """Landmarks, delays, rays, sigmas and areas as in View, of the best usable marker of each.
 
     claimed (m,): the landmark that each marker is of; numbers (5 m,): x, y, sigma, area (px) and
-    quality of each. rows: the middle one, and the time from row to row, ns.
+    quality of each; the camera as in Lens.
     """
-    of = _best_markers(claimed, numbers.reshape(-1, 5), landmarks, lens.size_px)
+    of = _best_markers(claimed, numbers.reshape(-1, 5), landmarks, size_px)
     n = of.size
     markers = np.empty((n, 5))
     for k in range(n):
         markers[k] = numbers[5 * of[k] : 5 * of[k] + 5]
     rays, scale, valid = np.empty((n, 2)), np.empty(n), np.empty(n, dtype=np.bool_)
-    undistort_all(markers, lens.matrix, lens.distortion, rays, scale, valid)
+    undistort_all(markers, matrix, distortion, rays, scale, valid)
     delay_s, sigmas, areas = np.empty(n), np.empty(n), np.empty(n)
     kept = 0
     for k in range(n):
         if valid[k]:
             of[kept] = claimed[of[k]]
             rays[kept] = rays[k]
-            delay_s[kept] = (markers[k, 1] - rows[0]) * rows[1] * 1e-9
+            delay_s[kept] = (markers[k, 1] - middle_row) * row_time_ns * 1e-9
             sigmas[kept] = min(max(markers[k, 2], SIGMA_MIN_PX), SIGMA_MAX_PX) * scale[k]
             areas[kept] = markers[k, 3] * scale[k] ** 2
             kept += 1

@@ -146,10 +146,13 @@ class HandFilter:
         return True
 
     def _velocity(self, landmark: int) -> Array:
-        """What the others of the hand move by on average (3,); 0 without two of them."""
+        """What others of the hand move by on average (3,), if the newest frame's looks fit two.
+
+        Else 0: where a hand seems to jump, what the filter has of its motion is worth nothing.
+        """
         history = self._history
         newest = history.order[history.size[0] - 1]
-        others = history.alive[newest].copy()
+        others = history.used[newest] & history.alive[newest] & history.looked[newest]
         others[landmark] = False
         if np.count_nonzero(others) < 2:
             return np.zeros(3)

@@ -7,6 +7,7 @@ a call touches is cold by the next frame: many small ones cost more than what th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -27,6 +28,10 @@ from services.fusion.output.systematic_error import Systematic, add_systematic
 _PER_M = 1e6
 # Covariances to as many digits as sigmas' squares need.
 _PER_M2 = 1e13
+# Where the parts of a row end that _point_numbers is given.
+_ESTIMATES = len(Estimates._fields)
+_PAINT = _ESTIMATES + len(KnownPaint._fields)
+_SYSTEMATIC = _PAINT + len(Systematic._fields)
 # The upper triangle, as HandPoint.covariance_m2 has it.
 _ROWS, _COLUMNS = np.triu_indices(3)
 
@@ -65,10 +70,17 @@ class PointMessages:
         estimates: of paint's centres; errors: what is to be added to their covariances, as in
         add_systematic; places (L, 3) gets the positions, NaN of what was not found.
         """
-        centres = estimates.positions_m, estimates.covariances_m2
-        seen = estimates.found, estimates.seen_by, estimates.detected
+        systematic, hidden = errors
+        # Arrays by themselves: each in a tuple would cost .1 us more.
         numbers, kept, incoherent = _point_numbers(
-            centres, seen, self._hand_of, (paint, instant_ns), errors, self._extrinsics, places
+            instant_ns,
+            hidden,
+            places,
+            *self._hand_of,
+            *estimates,
+            *paint,
+            *systematic,
+            *self._extrinsics,
         )
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
         seen_by, measured = estimates.seen_by.tolist(), estimates.measured.tolist()
@@ -99,33 +111,29 @@ class PointMessages:
 
 @njit(cache=True)
 def _point_numbers(
-    centres: tuple[Array, Array],
-    seen: tuple[Bools, Bools, Bools],
-    hands: tuple[Ints, Array],
-    paint: tuple[KnownPaint, int],
-    errors: tuple[Systematic, Array],
-    cameras: Extrinsics,
-    places: Array,
+    instant_ns: int, hidden: Array, places: Array, hand_of: Ints, reach_m: Array, *row: Any
 ) -> tuple[Array, Bools, int]:
     """Numbers of points (L, 12), rounded, which of them to tell (L,), and how many are incoherent.
 
-    seen: found (L,), by which cameras (L, C), detected (L,). hands: whose a landmark is (L,), and
-    each one's reach. paint: what is known of it, and the instant, ns. The others as in
-    PointMessages.of.
+    hand_of (L,), reach_m: whose a landmark is, and each hand's reach. row: Estimates, KnownPaint,
+    Systematic and Extrinsics, one after the other. The others as in PointMessages.of.
     """
-    positions, covariances = centres[0].copy(), centres[1].copy()
-    found, seen_by, detected = seen
-    correct_paint(paint[0], paint[1], positions, covariances, seen_by, cameras)
+    estimates, paint = Estimates(*row[:_ESTIMATES]), KnownPaint(*row[_ESTIMATES:_PAINT])
+    systematic, cameras = Systematic(*row[_PAINT:_SYSTEMATIC]), Extrinsics(*row[_SYSTEMATIC:])
+    positions, covariances = estimates.positions_m.copy(), estimates.covariances_m2.copy()
+    found, seen_by = estimates.found, estimates.seen_by
+    correct_paint(paint, instant_ns, positions, covariances, seen_by, cameras)
     places[:] = np.nan
-    for row in np.flatnonzero(found):
-        places[row] = positions[row]
-    add_systematic(errors[0], errors[1], positions, seen_by, cameras, covariances)
+    for k in np.flatnonzero(found):
+        places[k] = positions[k]
+    add_systematic(systematic, hidden, positions, seen_by, cameras, covariances)
     usable = _usable(positions, covariances, found)
     kept = np.zeros_like(usable)
-    for hand in range(hands[1].size):
-        rows = np.flatnonzero(hands[0] == hand)
+    for hand in range(reach_m.size):
+        rows = np.flatnonzero(hand_of == hand)
+        detected = estimates.detected[rows]
         kept[rows] = coherent(
-            positions[rows], covariances[rows], usable[rows], detected[rows], hands[1][hand]
+            positions[rows], covariances[rows], usable[rows], detected, reach_m[hand]
         )
     incoherent = int(np.count_nonzero(usable) - np.count_nonzero(kept))
     return _rounded(positions, covariances), kept, incoherent

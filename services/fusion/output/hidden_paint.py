@@ -56,11 +56,14 @@ class HiddenPaint:
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
         return _compare(
-            (self._areas, self._seen_s, self.sigmas),
+            self._areas,
+            self._seen_s,
+            self.sigmas,
             self.places,
             self._centres,
             self._per_rad,
-            (view.camera, time_s),
+            view.camera,
+            time_s,
             view.landmarks,
             view.areas,
         )
@@ -68,17 +71,18 @@ class HiddenPaint:
 
 @njit(cache=True)
 def _compare(
-    state: tuple[Array, Array, Array],
+    known: Array,
+    seen_s: Array,
+    sigmas: Array,
     places: Array,
     centres: Array,
     per_rad: Array,
-    look: tuple[int, float],
+    camera: int,
+    time_s: float,
     landmarks: Ints,
     areas: Array,
 ) -> Array:
-    """Update areas, times and sigmas (L, C) by a look; the sigmas of its landmarks (n,)."""
-    known, seen_s, sigmas = state
-    camera, time_s = look
+    """Update known areas, times and sigmas (L, C) by a look; the sigmas of its landmarks (n,)."""
     out = np.zeros(landmarks.size)
     for n in range(landmarks.size):
         row = landmarks[n]

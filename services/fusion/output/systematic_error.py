@@ -66,20 +66,22 @@ class SystematicError:
         That is a part of its sigmas, which are remembered, and what hidden paint adds (n,).
         """
         floor = WHITE_PX * float(self._unit[view.camera])
-        return _white_sigmas(self.known, view.landmarks, view.sigmas, hidden, floor)
+        known = self.known
+        return _white_sigmas(
+            known.running, known.extended, view.landmarks, view.sigmas, hidden, floor
+        )
 
 
 @njit(cache=True)
 def _white_sigmas(
-    known: Systematic, landmarks: Ints, sigmas: Array, hidden: Array, floor: float
+    running: Array, extended: Bools, landmarks: Ints, sigmas: Array, hidden: Array, floor: float
 ) -> Array:
     """SystematicError.white_sigmas; floor: WHITE_PX in the rays' units."""
     white = np.empty(landmarks.shape[0])
-    running = known.running
     for n in range(landmarks.shape[0]):
         row, sigma = landmarks[n], sigmas[n]
         running[row] = sigma if running[row] == 0.0 else (1.0 - _NEW) * running[row] + _NEW * sigma
-        if known.extended[row]:
+        if extended[row]:
             sigma = min(sigma, math.hypot(floor, WHITE_SHARE * sigma))
         white[n] = math.hypot(sigma, hidden[n])
     return white
