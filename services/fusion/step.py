@@ -23,7 +23,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame
-from services.fusion.alignment.clock_alignment import ClockAlignment
+from services.fusion.alignment.clock_alignment import ClockAlignment, search_period_s
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
@@ -87,7 +87,11 @@ class FusionStep:
         self.clocks = ClockOffsetEstimator(
             self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
         )
-        self.alignment = ClockAlignment(self._cameras, enabled=config.fusion.tune_clocks)
+        self.alignment = ClockAlignment(
+            self._cameras,
+            enabled=config.fusion.tune_clocks,
+            every_s=search_period_s(config.rig.name),
+        )
         self.mirrors = MirrorMonitor(self._cameras)
         self.unseen_markers = UnseenMarkerMonitor(self._cameras, self._landmarks)
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)

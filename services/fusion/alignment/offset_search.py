@@ -124,7 +124,7 @@ def _scores(
     grids = [np.arange(begin, end, STEP_S) for begin, end in ends]
     a, ma = resampled([pair[0] for pair in pairs], grids[0])  # (L, N)
     b, mb = resampled([pair[1] for pair in pairs], grids[1])
-    length = a.shape[1] + b.shape[1]
+    length = fast_length(a.shape[1] + b.shape[1])
     lags = np.arange(length)
     lags[lags >= b.shape[1]] -= length
     offsets_s = lags * STEP_S + (ends[1][0] - ends[0][0])
@@ -136,6 +136,22 @@ def _scores(
     taken = np.flatnonzero((np.abs(offsets_s - near_s) <= range_s) & (weight.sum(axis=0) > 0.0))
     taken = taken[np.argsort(offsets_s[taken])]
     return offsets_s[taken], score[taken], explained[taken], weight.sum(axis=0)[taken]
+
+
+def fast_length(least: int) -> int:
+    """The next number from `least` on with no prime factor above 5: by others an FFT takes longer.
+
+    Of 1201 numbers, a prime, six times as long as of 1215.
+    """
+    length = least
+    while True:
+        left = length
+        for prime in (2, 3, 5):
+            while left % prime == 0:
+                left //= prime
+        if left == 1:
+            return length
+        length += 1
 
 
 def lag_variances(

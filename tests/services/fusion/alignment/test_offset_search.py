@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.fusion.alignment.offset_search import HeightTrack, find_offset, interpolated
+from services.fusion.alignment.height_track import HeightTrack, interpolated
+from services.fusion.alignment.offset_search import fast_length, find_offset
 from testing.families.motions import flapping, stop_and_go
 from testing.synthetic_points import Motion, MovingHand, RestingHand
 
@@ -99,3 +100,7 @@ def test_interpolation_is_exact_on_cubics_and_stops_at_gaps():
     heights, inside = interpolated(track, at)
     assert inside.tolist() == [False, True, False, True, False]
     np.testing.assert_allclose(heights[inside], (at**3 - at)[inside], atol=1e-12)
+
+
+def test_transforms_are_of_a_length_that_is_quick():
+    assert [fast_length(n) for n in (1200, 1201, 1199, 7)] == [1200, 1215, 1200, 8]
