@@ -56,8 +56,8 @@ class LastLocated:
     def take(self, time_s: float, estimates: Estimates) -> None:
         """Remember what two cameras see at an instant.
 
-        That takes a while, which nobody waits for: settle() does it, as long as the places of
-        estimates are what they were.
+        That takes a while, which nobody waits for: settle() does it, before the next instant is
+        taken and as long as the places of estimates are what they were.
         """
         self._taken = time_s, estimates.found & estimates.measured, estimates
 

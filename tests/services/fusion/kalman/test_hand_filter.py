@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from services.fusion.kalman.hand_filter import HandFilter
 from testing.synthetic_points import MovingHand
 
 
@@ -113,3 +114,21 @@ def test_what_contradicts_two_cameras_is_dropped(one_hand):
     assert found[others].all()
     assert np.linalg.norm(errors[others], axis=1).max() < 0.01
     assert not found[2] or np.linalg.norm(errors[2]) < 0.3
+
+
+def test_a_landmark_that_begins_is_taken_to_move_as_the_others_do(one_hand, monkeypatch):
+    """A second of a hand; a tip is seen for the last .05 s of it alone."""
+    errors_m = []
+    for known in (True, False):
+        if not known:
+            monkeypatch.setattr(HandFilter, "_velocity", lambda *_: np.zeros(3))
+        found = []
+        for seed in range(1, 9):
+            hand = one_hand(seed=seed)
+            for k in range(60):
+                hand.see(hand.frame(k), seen=range(6) if k >= 57 else (0, 1, 3, 4, 5))
+            alive, error_m = hand.errors_m(60 / 60.0)
+            assert alive.all()
+            found.append(np.linalg.norm(error_m[2]))
+        errors_m.append(np.sqrt(np.mean(np.square(found))))
+    assert errors_m[0] < 0.8 * errors_m[1]
