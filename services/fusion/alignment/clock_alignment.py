@@ -96,8 +96,7 @@ class ClockAlignment:
         since_s = 0.0 if newest_s is None else newest_s - self._searched_s.get(view.camera, -np.inf)
         wait_s = _AGAIN_S if view.camera in self._candidates else self._every_s
         due = known_s >= _FIRST_S and not 0.0 <= since_s < wait_s
-        reference = self._reference()
-        if due and newest_s is not None and view.camera != reference:
+        if due and newest_s is not None and view.camera != (reference := self._reference()):
             self._searched_s[view.camera] = newest_s
             changed |= self._search(reference, view.camera)
         return changed

@@ -16,14 +16,16 @@ A clock that was set anew (its announced offset jumps) starts the estimation aga
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import CLOCK_SIGMA_MAX_S, View
 from services.fusion.intake.ray_interpolation import add_frame, no_tracks
-from services.fusion.monitors.epipolar_error import EpipolarError, epipolar_errors
+from services.fusion.monitors.epipolar_error import epipolar_errors
 from services.fusion.monitors.height_window import HeightWindow
+from services.fusion.monitors.likeliest_clocks import likeliest_clocks
 from services.fusion.monitors.moved_camera import MovedCameraMonitor
 from services.fusion.monitors.shift_regression import NOTHING
 
@@ -41,15 +43,14 @@ _CLOCK_WALK_S = 1e-4
 # A clock is not taken to be farther off than this many of its announced sigmas, or this: two
 # cameras may then differ by 5 ms, which a track survives. What is farther off is another matter.
 _BOUND_SIGMAS, _BOUND_S = 3.0, 2.5e-3
-# Two seconds of motion that contradict the announced clocks by more sigmas than this outweigh them.
-_OUTWEIGHS, _INSTANTS = 4.0, 20
+# Two seconds of motion may outweigh the announced clocks.
+_INSTANTS = 20
 # The last instants (a second) outweigh what was learned before if they contradict it by so much:
 # by 4, noise of 3 px that lasts for some frames does so now and then. Looked at now and then.
 _RECENT, _CONTRADICTS, _LOOK_BACK = 10, 6.0, 4
-# What residuals explain by chance is not learned: a shift counts for what is beyond so many sigmas.
-_CHANCE = 1.3
 # Share of a new squared residual in its running mean: over the last hundred or so observations.
 _NEW_RESIDUAL = 0.01
+_MAX_RESIDUAL_PX2 = 1e6
 
 
 class ClockOffsetEstimator:
@@ -90,8 +91,9 @@ class ClockOffsetEstimator:
             for pair, place in self._pairs.items()
         }
         self._found = dict.fromkeys(self._pairs, NOTHING)
-        self._compared_s: dict[tuple[int, int, int], float] = {}
-        self._moved = MovedCameraMonitor(len(self._pairs))
+        # By pair: of each landmark, the instant that was compared last.
+        self._compared_s = {pair: np.full(self._landmarks, np.nan) for pair in self._pairs}
+        self._moved = MovedCameraMonitor(len(self._pairs), self._landmarks)
         self._late_s = np.zeros(cameras)  # (C,)
         self._cov = np.diag(np.full(cameras, CLOCK_SIGMA_MAX_S**2))  # (C, C)
         # By camera: what _of() says of it until something is learned.
@@ -183,19 +185,24 @@ class ClockOffsetEstimator:
         focal_px = self._pairs[cameras].focal_px
         window = self._windows[cameras]
         shift_s = float(self._late_s[second] - self._late_s[first])
-        errors = self._errors(cameras, shift_s)
-        if not errors:
-            return
-        self._moved.observe(
-            index, newest_s, {row: error.height * focal_px for row, error in errors.items()}
+        period_s = float(self._periods_s[second])
+        errors = epipolar_errors(
+            self._pairs[cameras],
+            self._tracks,
+            cameras,
+            shift_s,
+            period_s,
+            self._compared_s[cameras],
         )
-        for error in errors.values():
-            left_px2 = ((error.height - self._found[cameras].height) * focal_px) ** 2
-            self._residual_px2 += _NEW_RESIDUAL * (min(left_px2, 1e6) - self._residual_px2)
+        if not len(errors.landmarks):
+            return
+        self._moved.observe(index, newest_s, errors.landmarks, errors.heights * focal_px)
+        left_px = (errors.heights - self._found[cameras].height) * focal_px
+        self._residual_px2 = _running_mean(self._residual_px2, left_px)
         bound_s = float(self._bounds_s()[[first, second]].sum())
         taken = window.add(errors, shift_s, bound_s)
         self.updates += taken
-        self.gated += len(errors) - taken
+        self.gated += len(errors.landmarks) - taken
         found = window.fit(shift_s)
         if window.instants > 2 * _RECENT and window.newest % _LOOK_BACK == 0:
             recent = window.fit(shift_s, _RECENT)
@@ -205,17 +212,6 @@ class ClockOffsetEstimator:
                 found = recent
         window.adapt_memory(found)
         self._found[cameras] = found
-
-    def _errors(self, cameras: tuple[int, int], shift_s: float) -> dict[int, EpipolarError]:
-        """The newest height difference of each landmark in two cameras that is not known yet."""
-        period_s = float(self._periods_s[cameras[1]])
-        found = epipolar_errors(self._pairs[cameras], self._tracks, cameras, shift_s, period_s)
-        errors = {}
-        for landmark, error in found.items():
-            if self._compared_s.get((*cameras, landmark)) != error.time_s:
-                self._compared_s[(*cameras, landmark)] = error.time_s
-                errors[landmark] = error
-        return errors
 
     def _bounds_s(self) -> Array:
         """How far each camera's clock (C,) may be off."""
@@ -230,31 +226,15 @@ class ClockOffsetEstimator:
         """The clocks that the announced offsets and all pairs' shifts make likeliest."""
         if not self._enabled:
             return
-        sigmas, bounds_s = self._announced_s(), self._bounds_s()
-        told: list[tuple[Array, float, float]] = []
+        told = []
         for (first, second), found in self._found.items():
-            if not np.isfinite(found.variance):
-                continue
             window = self._windows[first, second]
             still_s = max(newest_s - window.moved_s, 0.0)
             variance = found.variance + _CLOCK_WALK_S**2 * still_s
-            both = [first, second]
-            announced = float(np.sum(sigmas[both] ** 2))
-            contradicts_s = _OUTWEIGHS * np.sqrt(announced + variance)
-            if window.instants >= _INSTANTS and abs(found.shift_s) > contradicts_s:
-                widened = np.minimum(0.5 * abs(found.shift_s), bounds_s[both])
-                sigmas[both] = np.maximum(sigmas[both], widened)
-            difference = np.zeros(len(self._names))  # (C,)
-            difference[both] = [-1.0, 1.0]
-            beyond = 1.0 - _CHANCE**2 * variance / max(found.shift_s**2, variance)
-            told.append((difference, max(beyond, 0.0) * found.shift_s, variance))
-        information = np.diag(1.0 / sigmas**2)  # (C, C)
-        weighted = np.zeros(len(self._names))  # (C,)
-        for difference, shift_s, variance in told:
-            information += np.outer(difference, difference) / variance
-            weighted += difference * shift_s / variance
-        self._cov = np.linalg.inv(information)
-        self._late_s = np.clip(self._cov @ weighted, -bounds_s, bounds_s)
+            told.append((first, second, found.shift_s, variance, window.instants >= _INSTANTS))
+        self._late_s, self._cov = likeliest_clocks(
+            np.array(told, dtype=np.float64), self._announced_s(), self._bounds_s()
+        )
         self._known.clear()
 
     def _pairing_sigma_s(self, camera: int) -> float:
@@ -267,3 +247,11 @@ class ClockOffsetEstimator:
         weights[camera] += 1.0
         variance = weights @ self._cov @ weights
         return float(np.sqrt(max(variance, 0.0) * n / max(n - 1, 1)))
+
+
+@njit(cache=True)
+def _running_mean(mean: float, left_px: Array) -> float:
+    """The running mean of squares after some more (n,)."""
+    for px in left_px:
+        mean += _NEW_RESIDUAL * (min(px**2, _MAX_RESIDUAL_PX2) - mean)
+    return mean

@@ -7,12 +7,13 @@ and their clocks agree.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.fusion.arrays import Ints
 from services.fusion.geometry.rectified_pair import RectifiedPair, rectify_ray
 from services.fusion.intake.ray_interpolation import (
     FRAMES_AFTER,
@@ -38,15 +39,15 @@ _REACH = FRAMES_AFTER["hermite"]
 _UNEVEN = 0.1
 
 
-@dataclass(frozen=True)
-class EpipolarError:
-    """One landmark's height in the first camera minus that in the second; normalised units."""
+class EpipolarErrors(NamedTuple):
+    """n landmarks' heights in the first camera minus those in the second; normalised units."""
 
-    time_s: float  # of the first camera's sample, by its own clock
-    height: float
-    speed: float  # 1/s, of the height; 0 if it is not known to move
-    span_s: float  # over which the speed was measured
-    variance: float  # of the height difference: noise, and what interpolation may miss
+    landmarks: Ints  # (n,) ascending
+    times_s: Array  # (n,) of the first camera's samples, by its own clock
+    heights: Array  # (n,)
+    speeds: Array  # (n,) 1/s, of the heights; 0 of one that is not known to move
+    spans_s: Array  # (n,) over which the speeds were measured
+    variances: Array  # (n,) of the heights: noise, and what interpolation may miss
 
 
 def epipolar_errors(
@@ -55,11 +56,13 @@ def epipolar_errors(
     cameras: tuple[int, int],
     shift_s: float,
     period_s: float,
-) -> dict[int, EpipolarError]:
-    """The newest height difference that both cameras' tracks of a landmark give, by landmark.
+    compared_s: Array,
+) -> EpipolarErrors:
+    """The newest height difference that both cameras' tracks of each landmark give.
 
     shift_s is how much later the second camera's clock reads than the first's, period_s the second
-    camera's frame time.
+    camera's frame time. compared_s (L,): the instants that were compared last, by the first
+    camera's clock, which are not compared again; takes on the new ones.
 
     The speed is that between the first camera's samples before and after its own. Noise in them
     does not pass for a clock error, however much it is and however it is correlated in time: it is
@@ -68,8 +71,9 @@ def epipolar_errors(
     px that is announced, the difference looks like a clock error of up to half a frame.)
     """
     rotations = pair.R_rectified_from_first, pair.R_rectified_from_second
-    rows = _newest_errors(rotations, tracks, cameras, shift_s, period_s)
-    return {int(row): EpipolarError(*numbers) for row, *numbers in rows.tolist()}
+    return EpipolarErrors(
+        *_newest_errors(rotations, tracks, cameras, shift_s, period_s, compared_s)
+    )
 
 
 @njit(cache=True)
@@ -79,21 +83,25 @@ def _newest_errors(
     cameras: tuple[int, int],
     shift_s: float,
     period_s: float,
-) -> Array:
-    """epipolar_errors as rows (n, 6): landmark, and what EpipolarError has."""
+    compared_s: Array,
+) -> tuple[Ints, Array, Array, Array, Array, Array]:
+    """What epipolar_errors has."""
     first, second = cameras
-    rows = np.empty((tracks.counts.shape[0], 6))
+    number = tracks.counts.shape[0]
+    landmarks, columns = np.empty(number, dtype=np.int64), np.empty((5, number))
     count = 0
-    for k in range(tracks.counts.shape[0]):
+    for k in range(number):
         samples = samples_of(tracks, k, first), samples_of(tracks, k, second)
         counts = tracks.counts[k, first], tracks.counts[k, second]
         newest = _newest_error(rotations, samples, counts, shift_s, period_s)
-        if newest[0]:
-            rows[count, 0] = k
-            for i, number in enumerate(newest[1:]):
-                rows[count, 1 + i] = number
+        if newest[0] and newest[1] != compared_s[k]:
+            compared_s[k] = newest[1]
+            landmarks[count] = k
+            for i, value in enumerate(newest[1:]):
+                columns[i, count] = value
             count += 1
-    return rows[:count]
+    times_s, heights, speeds, spans_s, variances = columns[:, :count]
+    return landmarks[:count], times_s, heights, speeds, spans_s, variances
 
 
 @njit(cache=True)
@@ -104,7 +112,7 @@ def _newest_error(
     shift_s: float,
     period_s: float,
 ) -> tuple[bool, float, float, float, float, float]:
-    """A landmark's EpipolarError, and before it whether there is one."""
+    """A landmark's row of EpipolarErrors, from its time on; before it whether there is one."""
     R_first, R_second = rotations
     times_s, rays, sigmas = samples[0]
     ray, bend = np.empty(2), np.empty(2)

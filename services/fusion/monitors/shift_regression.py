@@ -63,6 +63,14 @@ class Shift(NamedTuple):
     scale: float  # what is left, in the sigmas that were expected
 
 
+class Means(NamedTuple):
+    """Of each of L landmarks: weights added up, and weighted means of speeds and heights."""
+
+    weight: Array  # (L,) the ridge that draws means towards 0 included
+    speed: Array  # (L,)
+    height: Array  # (L,) as if the clocks agreed
+
+
 NOTHING = Shift(0.0, math.inf, 0.0, 1.0)
 
 
@@ -71,46 +79,76 @@ def fit_shift(rows: Heights, near_s: float, height_sigma: float) -> Shift:
 
     height_sigma: of a landmark's constant height difference, before anything is known.
     """
-    return Shift(*_fit(Heights._make(map(np.ascontiguousarray, rows)), near_s, height_sigma))
+    return Shift(
+        *fitted_shift(Heights._make(map(np.ascontiguousarray, rows)), near_s, height_sigma)
+    )
 
 
-@njit(cache=True)
-def _fit(rows: Heights, near_s: float, height_sigma: float) -> tuple[float, float, float, float]:
-    """fit_shift of contiguous columns."""
-    if len(rows.heights) == 0 or rows.instants[-1] - rows.instants[0] < _INSTANTS_MIN:
+@njit(cache=True, error_model="numpy")
+def fitted_shift(
+    rows: Heights, near_s: float, height_sigma: float
+) -> tuple[float, float, float, float]:
+    """fit_shift of contiguous columns, for kernels: what Shift has."""
+    n = len(rows.heights)
+    if n == 0 or rows.instants[-1] - rows.instants[0] < _INSTANTS_MIN:
         return 0.0, math.inf, 0.0, 1.0
     own = rows.landmarks - rows.landmarks.min()
-    ridge = 1.0 / height_sigma**2
-    shift_s, scale, speeds = near_s, 1.0, rows.speeds
-    weights: Array = rows.weights / rows.variances
-    recent = rows.weights > 0.1 * rows.weights.max()
-    total: Array = np.empty(0)
-    apart, heights, constant = speeds, rows.heights, speeds
-    for n in range(_ROUNDS):
-        heights = rows.heights + rows.shifts * speeds  # (n,) as if the clocks agreed
-        total = np.asarray(np.bincount(own, weights) + ridge)  # (L,)
-        constant = np.bincount(own, weights * (heights - shift_s * speeds)) / total
-        relative = np.abs(heights - shift_s * speeds - constant[own]) / np.sqrt(rows.variances)
-        scale = max(1.0, 1.48 * np.median(relative[recent]))
-        fits = np.maximum(1.0 - (relative / (_TUKEY * scale)) ** 2, 0.0) ** 2
-        weights = np.asarray(rows.weights * fits / (scale**2 * rows.variances))  # (n,)
-        if n:
-            noise = scale * np.sqrt(rows.variances)
-            speeds = np.where(np.abs(rows.speeds) * rows.spans > _MOVING * noise, rows.speeds, 0.0)
-            heights = rows.heights + rows.shifts * speeds
-        total = np.asarray(np.bincount(own, weights) + ridge)
-        mean_speed = np.bincount(own, weights * speeds) / total
-        mean_height = np.bincount(own, weights * heights) / total
-        apart = speeds - mean_speed[own]  # (n,)
-        information = np.sum(weights * (speeds * apart))
+    number, ridge = own.max() + 1, 1.0 / height_sigma**2
+    sigmas, relative, recent = np.sqrt(rows.variances), np.empty(n), np.empty(n)
+    weights, speeds = rows.weights / rows.variances, rows.speeds.copy()
+    means = Means(np.empty(number), np.empty(number), np.empty(number))
+    constant = np.empty(number)
+    least_recent = 0.1 * rows.weights.max()
+    shift_s, scale = near_s, 1.0
+    for k in range(_ROUNDS):
+        _average(rows, own, weights, speeds, ridge, means)
+        constant[:] = means.height - shift_s * means.speed
+        count = 0
+        for i in range(n):
+            left = rows.heights[i] + (rows.shifts[i] - shift_s) * speeds[i] - constant[own[i]]
+            relative[i] = abs(left) / sigmas[i]
+            if rows.weights[i] > least_recent:
+                recent[count] = relative[i]
+                count += 1
+        scale = max(1.0, 1.48 * np.median(recent[:count]))
+        for i in range(n):
+            fits = max(1.0 - (relative[i] / (_TUKEY * scale)) ** 2, 0.0) ** 2
+            weights[i] = rows.weights[i] * fits / (scale * sigmas[i]) ** 2
+            if k:
+                noise = scale * sigmas[i]
+                moves = abs(rows.speeds[i]) * rows.spans[i] > _MOVING * noise
+                speeds[i] = rows.speeds[i] if moves else 0.0
+        _average(rows, own, weights, speeds, ridge, means)
+        information, explained = 0.0, 0.0
+        for i in range(n):
+            pull = weights[i] * (speeds[i] - means.speed[own[i]])
+            information += pull * speeds[i]
+            explained += pull * (rows.heights[i] + rows.shifts[i] * speeds[i])
         if not information > 0.0:
-            return 0.0, math.inf, _overall(total - ridge, mean_height), scale
-        shift_s = np.sum(weights * (heights * apart)) / information
-        constant = mean_height - shift_s * mean_speed
-    residuals = heights - shift_s * speeds - constant[own]
-    variance = _variance(rows.instants, weights * apart * residuals, weights * apart**2)
+            return 0.0, math.inf, _overall(means.weight - ridge, means.height), scale
+        shift_s = explained / information
+        constant[:] = means.height - shift_s * means.speed
+    variance = _variance(rows, own, weights, speeds, means.speed, constant, shift_s)
     variance *= _UNKNOWN_KIND - (_UNKNOWN_KIND - 1.0) / scale
-    return shift_s, variance, _overall(total - ridge, constant), scale
+    return shift_s, variance, _overall(means.weight - ridge, constant), scale
+
+
+@njit(cache=True, error_model="numpy")
+def _average(
+    rows: Heights, own: Ints, weights: Array, speeds: Array, ridge: float, means: Means
+) -> None:
+    """Means, filled in place, of rows (n,) whose landmarks are own (n,) from 0."""
+    means.weight[:] = ridge
+    means.speed[:] = 0.0
+    means.height[:] = 0.0
+    for i in range(len(own)):
+        k = own[i]
+        means.weight[k] += weights[i]
+        means.speed[k] += weights[i] * speeds[i]
+        means.height[k] += weights[i] * (rows.heights[i] + rows.shifts[i] * speeds[i])
+    for k in range(len(means.weight)):
+        means.speed[k] /= means.weight[k]
+        means.height[k] /= means.weight[k]
 
 
 @njit(cache=True)
@@ -119,20 +157,36 @@ def _overall(known: Array, constant: Array) -> float:
     return np.sum(known * constant) / max(known.sum(), 1e-300)
 
 
-@njit(cache=True)
-def _variance(instants: Ints, scores: Array, information: Array) -> float:
-    """The variance of a shift, from its rows' scores and information (n,): Newey and West's."""
-    numbers = instants - instants[0]
-    of_instant = np.bincount(numbers, scores)  # (N,)
-    known = np.bincount(numbers, information)  # (N,)
+@njit(cache=True, error_model="numpy")
+def _variance(
+    rows: Heights,
+    own: Ints,
+    weights: Array,
+    speeds: Array,
+    mean_speeds: Array,
+    constant: Array,
+    shift_s: float,
+) -> float:
+    """The variance of a shift, from its rows' scores and information by instant: Newey and West's.
+
+    own, weights, speeds (n,) of the rows; mean_speeds, constant (L,) of the landmarks.
+    """
+    number = rows.instants[-1] - rows.instants[0] + 1
+    scores, known = np.zeros(number), np.zeros(number)
+    for i in range(len(own)):
+        k, instant = own[i], rows.instants[i] - rows.instants[0]
+        apart = speeds[i] - mean_speeds[k]
+        left = rows.heights[i] + (rows.shifts[i] - shift_s) * speeds[i] - constant[k]
+        scores[instant] += weights[i] * apart * left
+        known[instant] += weights[i] * apart**2
     total = known.sum()
     # Of how many instants it would be if they told alike.
     n = total**2 / np.sum(known * known)
     if n < _INSTANTS_MIN:
         return math.inf
-    meat = np.sum(of_instant * of_instant)
-    for lag in range(1, min(_LAGS, len(of_instant) - 1) + 1):
-        products = np.sum(of_instant[lag:] * of_instant[:-lag])
+    meat = np.sum(scores * scores)
+    for lag in range(1, min(_LAGS, number - 1) + 1):
+        products = np.sum(scores[lag:] * scores[:-lag])
         meat += 2.0 * (1.0 - lag / (_LAGS + 1.0)) * products
     meat *= (1.0 + _INSTANTS_GUESS / n) ** 2
     return max(meat / total**2, _CORRELATED / total)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from services.fusion.alignment import height_track
+from services.fusion.alignment import height_memory, height_track
 from services.fusion.intake import observations, ray_interpolation
 from services.fusion.kalman import estimator, filtering, held
-from services.fusion.monitors import epipolar_error, mirrored_view, moved_camera, shift_regression
+from services.fusion.monitors import (
+    clock_offsets,
+    epipolar_error,
+    height_window,
+    likeliest_clocks,
+    mirrored_view,
+    moved_camera,
+    shift_regression,
+)
 from services.fusion.one_camera import carried_shape, last_located
 from services.fusion.output import hand_points, known_paint, paint_to_bone
 from services.fusion.warm import warm_up
@@ -25,8 +33,13 @@ LIVE = (
     observations._observed,
     ray_interpolation.add_frame,
     epipolar_error._newest_errors,
-    moved_camera.displaced_px,
-    shift_regression._fit,
+    moved_camera._displaced,
+    height_window._append,
+    height_window._fit,
+    shift_regression.fitted_shift,
+    likeliest_clocks.likeliest_clocks,
+    clock_offsets._running_mean,
+    height_memory.heights_by_landmark,
     mirrored_view._order,
     height_track._interpolate,
 )

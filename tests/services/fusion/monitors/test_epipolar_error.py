@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.rectified_pair import rectified_pair
 from services.fusion.intake.ray_interpolation import add_frame, no_tracks
-from services.fusion.monitors.epipolar_error import EpipolarError, epipolar_errors
+from services.fusion.monitors.epipolar_error import EpipolarErrors, epipolar_errors
 from testing.synthetic_points import SyntheticRig
 
 PERIOD_S = 1.0 / 30.0
@@ -29,18 +31,36 @@ def track(camera: int, speed_m_s: float, late_s: float = 0.0, frames: int = 10) 
     return made
 
 
-def error_of(
-    first: Samples, second: Samples, shift_s: float = 0.0, sigma: float = 1e-4
-) -> EpipolarError | None:
+class Error(NamedTuple):
+    """One landmark's, of EpipolarErrors."""
+
+    time_s: float
+    height: float
+    speed: float
+    span_s: float
+    variance: float
+
+
+def errors_of(
+    first: Samples, second: Samples, shift_s: float = 0.0, sigma: float = 1e-4, compared_s=np.nan
+) -> EpipolarErrors:
     """Of the second of two landmarks, the other of which is not seen."""
     tracks = no_tracks(2, 2)
     for camera, samples in enumerate((first, second)):
         for time_s, ray in samples:
             frame = np.array([1]), np.array([time_s]), ray[None, :], np.array([sigma])
             add_frame(tracks, camera, *frame)
-    found = epipolar_errors(PAIR, tracks, (0, 1), shift_s, PERIOD_S)
-    assert set(found) <= {1}
-    return found.get(1)
+    compared = np.array([np.nan, compared_s])
+    found = epipolar_errors(PAIR, tracks, (0, 1), shift_s, PERIOD_S, compared)
+    assert found.times_s.tolist() == compared[1:].tolist() or not len(found.landmarks)
+    return found
+
+
+def error_of(first: Samples, second: Samples, shift_s: float = 0.0, sigma: float = 1e-4) -> Error:
+    """The only error that there is."""
+    landmarks, *columns = errors_of(first, second, shift_s, sigma)
+    assert landmarks.tolist() == [1]
+    return Error(*(float(column[0]) for column in columns))
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.004])
@@ -88,5 +108,11 @@ def test_noise_does_not_pass_for_a_late_clock(seed):
 
 
 def test_tracks_that_do_not_overlap_by_four_samples_give_none():
-    assert error_of(track(0, 0.5), track(1, 0.5, frames=3)) is None
-    assert error_of([], track(1, 0.5)) is None
+    assert not len(errors_of(track(0, 0.5), track(1, 0.5, frames=3)).landmarks)
+    assert not len(errors_of([], track(1, 0.5)).landmarks)
+
+
+def test_an_instant_is_compared_once():
+    known_s = error_of(track(0, 0.5), track(1, 0.5)).time_s
+    assert not len(errors_of(track(0, 0.5), track(1, 0.5), compared_s=known_s).landmarks)
+    assert len(errors_of(track(0, 0.5), track(1, 0.5), compared_s=known_s - PERIOD_S).landmarks)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from services.fusion.monitors.epipolar_error import EpipolarError
+from services.fusion.monitors.epipolar_error import EpipolarErrors
 from services.fusion.monitors.height_window import HeightWindow
 
 FOCAL_PX = 527.0
@@ -18,14 +16,18 @@ def window() -> HeightWindow:
     return HeightWindow(NOISE, 1.0 / FOCAL_PX, 1e-4 * np.sqrt(0.1))
 
 
-def errors(k: int, late_s: float, random, speed: float = 0.5) -> dict[int, EpipolarError]:
+def errors(k: int, late_s: float, random, speed: float = 0.5) -> EpipolarErrors:
     """The k-th instant of six landmarks that swing, of clocks late_s apart, found at no shift."""
-    found = {}
-    for landmark in range(6):
-        moving = speed * float(np.sin(0.7 * k + landmark))
-        height = late_s * moving + random.normal(0.0, NOISE)
-        found[landmark] = EpipolarError(0.1 * k, height, moving, 0.067, NOISE**2)
-    return found
+    moving = speed * np.sin(0.7 * k + np.arange(6))
+    heights = late_s * moving + random.normal(0.0, NOISE, 6)
+    return EpipolarErrors(
+        np.arange(6),
+        np.full(6, 0.1 * k),
+        heights,
+        moving,
+        np.full(6, 0.067),
+        np.full(6, NOISE**2),
+    )
 
 
 def test_a_shift_is_found_within_what_is_claimed():
@@ -52,9 +54,18 @@ def test_a_hand_that_rests_takes_no_moving_ones_place():
 def test_heights_that_no_clock_explains_are_left_out():
     rows, random = window(), np.random.default_rng(3)
     rows.add(errors(0, 0.003, random), 0.0, 0.005)
-    wrong = {row: EpipolarError(0.1, 0.3, 0.5, 0.067, 1e-8) for row in range(6)}
-    wrong[5] = EpipolarError(0.1, math.inf, 0.5, 0.067, 1e-8)
+    heights = np.array([0.3, 0.3, 0.3, -0.3, np.nan, np.inf])
+    wrong = errors(1, 0.003, random)._replace(heights=heights, speeds=np.full(6, 0.5))
     assert rows.add(wrong, 0.0, 0.005) == 0
+    assert rows.instants == 2
+
+
+def test_the_oldest_rows_make_room_for_new_ones():
+    rows, random = window(), np.random.default_rng(5)
+    for k in range(1000):
+        rows.add(errors(k, 0.003 if k < 800 else -0.002, random), 0.0, 0.005)
+    assert rows.instants == 150
+    assert rows.fit(0.0).shift_s == pytest.approx(-0.002, abs=1e-4)
 
 
 def test_little_noise_is_remembered_for_less_long_than_much():

@@ -13,7 +13,7 @@ class Watched:
     """A monitor of two pairs, of which the first is shown heights ten times a second."""
 
     def __init__(self) -> None:
-        self.monitor = MovedCameraMonitor(2)
+        self.monitor = MovedCameraMonitor(2, 6)
         self.time_s = 0.0
 
     def show(self, heights_px: Array, seconds: float = 2.0) -> list[float | None]:
@@ -21,8 +21,8 @@ class Watched:
         told = []
         for k in range(round(10 * seconds)):
             self.time_s += 0.1
-            row = heights_px[k % len(heights_px)].tolist()
-            self.monitor.observe(0, self.time_s, dict(enumerate(row)))
+            row = heights_px[k % len(heights_px)]
+            self.monitor.observe(0, self.time_s, np.arange(len(row)), row)
             told.append(self.monitor.height_px(0))
         return told
 
@@ -73,3 +73,17 @@ def test_it_is_taken_back_when_most_heights_fit_again():
 
 def test_an_infinite_height_counts_as_one_that_does_not_fit():
     assert Watched().show(constant(np.inf))[-1] == pytest.approx(1e3)
+
+
+def test_what_was_before_time_went_back_does_not_count():
+    watched = Watched()
+    assert watched.show(constant(4.0))[-1] is not None
+    watched.time_s = 0.0
+    assert watched.show(constant(0.1), 1.2)[-1] is None
+
+
+def test_heights_that_come_more_often_than_there_is_room_for():
+    monitor = MovedCameraMonitor(1, 1)
+    for k in range(500):
+        monitor.observe(0, 0.01 * k, np.zeros(1, dtype=np.int64), np.full(1, 0.1 * k))
+    assert monitor.height_px(0) == pytest.approx(48.0, abs=0.2)
