@@ -38,8 +38,20 @@ def test_both_directions_go_on_with_the_names_of_the_picture_they_begin_with() -
 
 
 def test_nothing_begins_where_no_picture_shows_every_dot_alone() -> None:
-    merged = (0, 1, 2, 7, 4, 5, 6, 7)
-    assert searched_again(_begin, NAMES, _pictures(), [merged] * COUNT, lambda: None) == []
-    missing = (0, 1, 2, -1, 4, 5, 6, 7)
-    assert searched_again(_begin, NAMES, _pictures(), [missing] * COUNT, lambda: None) == []
+    hidden = [SeenPatches(one.time_s, one.patches[:7]) for one in _pictures()]
+    merged, missing = (0, 1, 2, 6, 3, 4, 5, 6), (0, 1, 2, -1, 3, 4, 5, 6)
+    for told in (merged, missing):
+        assert searched_again(_begin, NAMES, hidden, [told] * COUNT, lambda: None) == []
     assert searched_again(_begin, NAMES, [], [], lambda: None) == []
+
+
+def test_names_that_were_lost_for_good_are_found_again_by_shape() -> None:
+    pictures = _pictures()
+    exchanged = (4, 5, 6, 7, 0, 1, 2, 3)
+    told = [RIGHT] * 5 + [exchanged] * (COUNT - 5)
+    found = searched_again(_begin, NAMES, pictures, told, lambda: None)
+    assert [account[COUNT - 1] for account in found].count(RIGHT) >= 2
+    lost = [RIGHT] * 5 + [(-1,) * 8] * (COUNT - 5)
+    found = searched_again(_begin, NAMES, pictures[5:], lost[5:], lambda: None)
+    assert all(account == dict.fromkeys(range(COUNT - 5), RIGHT) for account in found)
+    assert len(found) == 2
