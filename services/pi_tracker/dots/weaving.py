@@ -17,9 +17,8 @@ from services.pi_tracker.dots.hypothesis import Way
 Account = Mapping[int, Told]
 
 # An account goes on from the past of another with which it agrees in so many pictures in a row: two
-# postures with the same names need some to show which of them is right. (Of the ten clips of `grab`
-# with seeds under 30 that are told worst live, 4, 8 and 15 pictures: 99.36, 99.34 and 99.48 %
-# right; benchmarks/dots.py.)
+# postures with the same names need some to show which of them is right. (4, 8 and 15 pictures, ten
+# clips of `grab`, seeds 5 to 29 of benchmarks/dots.py: 99.36, 99.34 and 99.48 % right.)
 _AGREED = 15
 
 
