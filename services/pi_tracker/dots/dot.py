@@ -41,3 +41,10 @@ class Dot(NamedTuple):
     state: State
     area_px: float
     patch: int
+
+
+class SeenPatches(NamedTuple):
+    """The patches of a picture, in the order in which they were found."""
+
+    time_s: float
+    patches: list[Patch]

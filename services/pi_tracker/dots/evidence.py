@@ -36,44 +36,74 @@ class Begun(NamedTuple):
     size_px: tuple[int, int]  # the picture's
 
 
-def evidence(
-    begun: Begun,
-    pictures: Sequence[Patches],
-    times_s: Sequence[float],
-    told: Sequence[Told],
-) -> float:
-    """Log likelihood (nats) of the pictures after the first, of which `told` has dots' patches."""
-    areas = _usual_areas(pictures, told)
-    false = [len(p.areas) - len(set(own) - {-1}) for p, own in zip(pictures, told, strict=True)]
-    density = (float(np.mean(false)) + FEWEST_FALSE) / (begun.size_px[0] * begun.size_px[1])
-    state, scores, branch = begun.states, begun.scores, np.arange(len(begun.scores))
-    unseen, no_dots, nats = np.zeros(len(areas), np.int64), np.zeros((0, 2)), 0.0
-    for k, (patches, own) in enumerate(zip(pictures, told, strict=True)):
-        patch = np.array(own)
-        if k:
-            view = View(Known(0.0, areas, unseen, no_dots), patches, density)
-            nats += view.claims(patch)
-            elapsed_s = motion.between(times_s[k - 1], times_s[k])
-            parent, state, scores = _followed(begun.skeleton, state, scores, view, patch, elapsed_s)
-            rows = _best(scores, branch[parent])
-            state, scores, branch = state.take(rows), scores[rows], branch[parent[rows]]
-        unseen = np.where(patch < 0, unseen + 1, 0)
-        no_dots = np.delete(patches.places, patch[patch >= 0], axis=0)
-    return nats + float(scores.max())
+class Trace(NamedTuple):
+    """What is known after a picture, if dots were called so until then."""
+
+    states: motion.State
+    scores: Array  # (k,) nats of all pictures so far
+    branch: npt.NDArray[np.int64]  # (k,) which of the postures at the start each came from
+    unseen: npt.NDArray[np.int64]  # (n,) pictures in a row in which each dot was not seen
+    false: Array  # (f, 2) patches of the last picture that are no dots
+
+    @property
+    def nats(self) -> float:
+        """Log likelihood of all pictures so far."""
+        return float(self.scores.max())
+
+
+class Judge:
+    """Follows accounts of the pictures of a recording; all by the same measure."""
+
+    def __init__(
+        self,
+        begun: Begun,
+        pictures: Sequence[Patches],
+        times_s: Sequence[float],
+        told: Sequence[Told],
+    ) -> None:
+        """told is an account of all, if a rough one: it says how large dots are as a rule."""
+        self._begun, self._pictures, self._times_s = begun, pictures, times_s
+        self._areas = _usual_areas(pictures, told)
+        false = [len(p.areas) - len(set(own) - {-1}) for p, own in zip(pictures, told, strict=True)]
+        width, height = begun.size_px
+        self._false_density = (float(np.mean(false)) + FEWEST_FALSE) / (width * height)
+
+    def begin(self, told: Told) -> Trace:
+        """After the first picture."""
+        begun, patch = self._begun, np.array(told)
+        return Trace(
+            begun.states,
+            begun.scores,
+            np.arange(len(begun.scores)),
+            (patch < 0).astype(np.int64),
+            np.delete(self._pictures[0].places, patch[patch >= 0], axis=0),
+        )
+
+    def follow(self, before: Trace, number: int, told: Told) -> Trace:
+        """After picture `number`, of which `told` has dots' patches; before is that before it."""
+        patches, patch = self._pictures[number], np.array(told)
+        known = Known(0.0, self._areas, before.unseen, before.false)
+        view = View(known, patches, self._false_density)
+        elapsed_s = motion.between(self._times_s[number - 1], self._times_s[number])
+        parent, states, scores = _followed(self._begun.skeleton, before, view, patch, elapsed_s)
+        scores, branch = scores + view.claims(patch), before.branch[parent]
+        rows = _best(scores, branch)
+        return Trace(
+            states.take(rows),
+            scores[rows],
+            branch[rows],
+            np.where(patch < 0, before.unseen + 1, 0),
+            np.delete(patches.places, patch[patch >= 0], axis=0),
+        )
 
 
 def _followed(
-    skeleton: Skeleton,
-    state: motion.State,
-    scores: Array,
-    view: View,
-    patch: npt.NDArray[np.int64],
-    elapsed_s: float,
+    skeleton: Skeleton, before: Trace, view: View, patch: npt.NDArray[np.int64], elapsed_s: float
 ) -> tuple[npt.NDArray[np.int64], motion.State, Array]:
     """Each state with each acceleration: what it came from, what it is and its score."""
     ways = motion.levels(skeleton, elapsed_s)
-    parent, level = (part.ravel() for part in np.mgrid[: len(scores), : len(ways)])
-    ahead = motion.coasted(skeleton, state, elapsed_s).take(parent.tolist())
+    parent, level = (part.ravel() for part in np.mgrid[: len(before.scores), : len(ways)])
+    ahead = motion.coasted(skeleton, before.states, elapsed_s).take(parent.tolist())
     ahead = ahead._replace(covs=ahead.covs + np.array([cov for cov, _ in ways])[level])
     seen, places, variances = view.measured(patch)
     count = len(parent)
@@ -85,7 +115,7 @@ def _followed(
         np.tile(variances, (count, 1)),
     )
     priors = np.array([prior for _, prior in ways])[level]
-    return parent, after.state, scores[parent] + after.nats + priors
+    return parent, after.state, before.scores[parent] + after.nats + priors
 
 
 def _best(scores: Array, branch: npt.NDArray[np.int64]) -> list[int]:

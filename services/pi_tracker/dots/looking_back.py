@@ -1,35 +1,28 @@
 """Dots of one colour in a recording, told apart with hindsight. Pure.
 
-Live, the likeliest account of the moment is told, which later pictures may contradict. Of a
-recording each picture is told as that account has it which is the likeliest in the end; and the
-whole is searched in several ways (search.py), of which the one counts whose account makes all
-pictures together the likeliest (evidence.py). Names that were exchanged for a while, by a search
-that gave up the right account too soon, are then right from where they were lost.
+Live, the likeliest account of the moment is told, which later pictures may contradict. A recording
+is searched from its start in several ways (search.py), and from pictures in the middle of it
+forwards and backwards (again.py). Of what these accounts say, the way through all pictures is told
+that makes them the likeliest (weaving.py, evidence.py). Names that were exchanged for a while, by a
+search that gave up the right account too soon, are then right from where they were lost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from services.pi_tracker.dots.dot import Dot, Patch
-from services.pi_tracker.dots.evidence import evidence
+from services.pi_tracker.dots.again import searched_again
+from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
+from services.pi_tracker.dots.evidence import Judge
 from services.pi_tracker.dots.hypothesis import SHARED
-from services.pi_tracker.dots.search import SEVERAL, Search
+from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
+from services.pi_tracker.dots.weaving import Account, woven
 
-# How often each picture is searched.
-LOOKS = len(SEVERAL)
-
-
-class SeenPatches(NamedTuple):
-    """The patches of a picture, in the order in which they were found."""
-
-    time_s: float
-    patches: list[Patch]
-
+# How often each picture is searched: from the start in each way, and from the middle.
+LOOKS = len(SEVERAL) + 1
 
 Begin = Callable[[Search], DotTracker]
 
@@ -40,26 +33,38 @@ def look_back(
     """The dots of all pictures by landmark, empty ones before tracking has started.
 
     begin makes a tracker that remembers, of the given search; advance is called LOOKS times for
-    each picture. Takes five times as long as following the dots once.
+    each picture.
     """
-    best: list[dict[str, Dot]] = [{} for _ in pictures]
-    accounts: list[list[tuple[int, ...]]] = []
-    most = -np.inf
-    for search in SEVERAL:
-        tracker = begin(search)
+    trackers = [begin(search) for search in SEVERAL]
+    for tracker in trackers:
         for picture in pictures:
             tracker.step(picture.patches, picture.time_s)
             advance()
-        told = [one.patch for one in tracker.way()]
-        if tracker.begun is None or told in accounts:
-            continue
-        accounts.append(told)
-        seen = pictures[len(pictures) - len(told) :]
-        arrays = [arrays_of(one.patches) for one in seen]
-        nats = evidence(tracker.begun, arrays, [one.time_s for one in seen], told)
-        if nats > most:
-            most, best = nats, _dots(tracker.names, told, [one.patches for one in pictures])
-    return best
+    begun, names = trackers[0].begun, trackers[0].names
+    if begun is None:
+        return [{} for _ in pictures]
+    accounts: list[Account] = [
+        dict(enumerate(one.patch for one in tracker.way())) for tracker in trackers
+    ]
+    count = len(accounts[0])
+    seen = pictures[len(pictures) - count :]
+    judge = Judge(
+        begun,
+        [arrays_of(one.patches) for one in seen],
+        [one.time_s for one in seen],
+        list(accounts[0].values()),
+    )
+    for _ in range(len(pictures) - count):
+        advance()
+    told = woven(judge, accounts, count)
+    accounts += searched_again(
+        lambda seeds: DotTracker(names, begun.size_px, seeds, LIVE, remembers=True),
+        names,
+        seen,
+        told,
+        advance,
+    )
+    return _dots(names, woven(judge, accounts, count), [one.patches for one in pictures])
 
 
 def _dots(

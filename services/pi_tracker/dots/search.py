@@ -25,14 +25,6 @@ class Search(NamedTuple):
 
 
 LIVE = Search()
-# A recording is searched in each of these ways, and the one with the most evidence counts
-# (looking_back.py). Which is best differs from one recording to the next, the widest not being
-# right more often: what counts is that they err at different pictures. (Of `grab`, seeds 13, 22,
-# 23, 28 and 29, the first is right by 58, 80, 93, 93 and 98 %, the second 88, 99, 90, 94 and 100 %,
-# the third 98, 98, 94, 99 and 94 %. One more that keeps four states of each posture of the start
-# was chosen for seed 28 alone, and takes as long as these two.)
-SEVERAL = (
-    LIVE,
-    Search(192, 96, 64, 32),
-    Search(96, 96, 16, 8, each_acceleration=True),
-)
+# A recording is searched in each of these ways from its start (looking_back.py): what counts is
+# that they err at different pictures.
+SEVERAL = (LIVE, Search(96, 96, 16, 8, each_acceleration=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.pi_tracker.dots.evidence import evidence
+from services.pi_tracker.dots.evidence import Judge
 from services.pi_tracker.dots.hypothesis import Patches
 from services.pi_tracker.dots.tracker import DotTracker, arrays_of
 from testing.dot_patches import NAMES, REST, SIZE, patches_at
@@ -21,7 +21,11 @@ def _evidence(told: list[tuple[int, ...]], pictures: list[Patches]) -> float:
     tracker = DotTracker(NAMES, SIZE)
     tracker.step(patches_at(REST), 0.0)
     assert tracker.begun is not None
-    return evidence(tracker.begun, pictures, TIMES, told)
+    judge = Judge(tracker.begun, pictures, TIMES, told)
+    trace = judge.begin(told[0])
+    for number in range(1, len(told)):
+        trace = judge.follow(trace, number, told[number])
+    return trace.nats
 
 
 def test_exchanged_and_missing_names_are_less_likely() -> None:
