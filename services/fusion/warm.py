@@ -47,7 +47,7 @@ def warm_up(
     hand, nobody = next(iter(hands)), np.empty(0, dtype=np.int64)
     directions = turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
     paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
-    paint.note(Directions(hand, 0, nobody, directions, np.empty(0)))
+    paint.note(Directions(hand, 0, nobody, directions, directions, np.empty((0, 2))))
     displaced_px(np.zeros(1))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     return messages + len(step.flush())
