@@ -29,7 +29,7 @@ _ROUNDING = 1e-6
 _SLOWER = 5.0
 # Bounds of what that may do to variances. A hand at rest fits whatever its bones are; a message
 # that fits nothing (a hand that jumps) counts no more than a bad model.
-_LEAST, _MOST = 0.1, 9.0
+_LEAST, _MOST = 0.25, 9.0
 # Share of the fit's own covariance that is published: its prior allows for more postures than a
 # hand takes. On fourteen rendered captures of hands that were known exactly, squared errors over
 # variances were .47 (wrist), .28 (orientation), .33 (fingers) with all of it.
@@ -59,14 +59,14 @@ def variances(
     is_unsure = errors.sigmas.any()
     if is_unsure:
         _carry_along(chains, observations, estimate, errors)
+    # A size that is wrong leaves no residual: what it does is as unsure as ever.
+    share = max(errors.misfit[0], _LEAST)
     for i in range(UNKNOWNS):
-        found[i] = _FIT_SHARE * estimate.covariance[i, i]
+        found[i] = _FIT_SHARE * share * estimate.covariance[i, i]
         if is_unsure:
             for k in range(errors.sigmas.size):
-                found[i] += (errors.effect[i, k] * errors.sigmas[k]) ** 2
-        # A size that is wrong moves the wrist and leaves no residual.
-        if not 3 <= i < 6:
-            found[i] *= max(errors.misfit[0], _LEAST)
+                by_error = (errors.effect[i, k] * errors.sigmas[k]) ** 2
+                found[i] += by_error if k == _SIZE else share * by_error
     return found
 
 

@@ -17,9 +17,9 @@ Two cures go with that: landmarks are told to the fit no more precisely than the
 (`landmark_m2`), and a hand that was measured has small errors, one that is known exactly none.
 
 B is that of all people. One person's hand may be nearly the tables', or another hand altogether;
-how far its landmarks miss the model once it is fitted tells which. So the variances of orientation
-and angles are scaled by what fits of the last seconds left of them, squared, over what is usual
-(`Spread.residual_m`): a posteriori, as geodesists call it.
+how far its landmarks miss the model once it is fitted tells which. So variances are scaled by what
+fits of the last seconds left of them, squared, over what is usual (`Spread.residual_m`): a
+posteriori, as geodesists call it. But for what a wrong size does, which leaves no residual.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class Spread(NamedTuple):
 # 11.1, 10.3 and 9.4 deg RMS, orientation by 8.5, 7.7, 7.3 and 7.0; beyond, hands of the tables'
 # proportions lose more than others gain. Residuals: tuning captures, ten of them of the tables' own
 # hand, two of others within a tenth, two of recorded hands that differ by more. Squared errors over
-# variances of orientation were .01-.20, .14-.20 and 1.3-4.3 without, .07-.9, .35-.46 and 1.4-1.7
-# scaled so.
-_TABLES = Spread(0.05, 0.06, 3e-3, (5e-4, 5e-4, 2e-3), (3e-3, 1e-3, 3e-3), 5e-3, 2.4e-3)
+# variances of orientation were .01-.14, .14-.20 and 1.3-4.3 without, .01-.4, .20-.25 and 1.0-1.4
+# scaled so; of points .3-.9, .4-.5 and 1.4-2.3 before, .4-1.2, .6 and 1.2-2.6.
+_TABLES = Spread(0.05, 0.06, 3e-3, (5e-4, 5e-4, 2e-3), (3e-3, 1e-3, 3e-3), 5e-3, 1.6e-3)
 # What `rhot calibrate hand` leaves: knuckles within 3 mm, and paint that is put on anew.
 _MEASURED = Spread(0.0, 0.02, 1e-3, (5e-4, 5e-4, 1e-3), (1e-3, 5e-4, 1e-3), 1e-3)
 _EXACT = Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
