@@ -38,7 +38,7 @@ from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
-from services.fusion.output.visible_paint import shift_table
+from services.fusion.output.visible_paint import dab_sag_m, shift_table
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
@@ -58,18 +58,6 @@ _TAPER_SEEN = 0.8
 _MOST_TAPER = 0.2
 # The axis about which a joint bends, in its own frame.
 _HINGE = (1.0, 0.0, 0.0)
-
-
-def dab_sag_m(radius_m: float, limb_m: float) -> float:
-    """How deep under its highest point two cameras locate a dab of radius_m.
-
-    On skin that curves both ways with radius limb_m, as at a joint. Each camera weighs the skin by
-    how much it faces it, so the centre of a cap moves from view to view as the middle of its *rim*
-    does: from a direction t off the axis, a cap of half-angle p on a ball R has its centre at R
-    cos(p) sin(t) beside the ball's. On a cylinder it is 3/4 of that deep. 0 for a limb of no
-    thickness.
-    """
-    return limb_m - math.sqrt(limb_m**2 - radius_m**2) if limb_m > radius_m else 0.0
 
 
 def _taper(hand: HandModel, landmark: str) -> float:

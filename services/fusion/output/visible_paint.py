@@ -1,4 +1,4 @@
-"""Where the middle of what is visible of a painted finger tip lies, by ray-casting; compiled.
+"""Where the middle of what is visible of paint lies: of a finger tip by ray-casting, of a dab.
 
 The tip is a tapered capsule (radius of the paint at its end) that ends in a half ball, painted over
 extent_m from its end; the landmark is the middle of the painted stretch of the axis. Seen from
@@ -106,3 +106,15 @@ def shift_table(radius_m: float, extent_m: float, taper: float = 0.0) -> Array:
     if radius_m > 0.0 and extent_m > 0.0:
         _fill_table(radius_m, extent_m, taper, table)
     return table
+
+
+def dab_sag_m(radius_m: float, limb_m: float) -> float:
+    """How deep under its highest point two cameras locate a dab of radius_m.
+
+    On skin that curves both ways with radius limb_m, as at a joint. Each camera weighs the skin by
+    how much it faces it, so the centre of a cap moves from view to view as the middle of its *rim*
+    does: from a direction t off the axis, a cap of half-angle p on a ball R has its centre at R
+    cos(p) sin(t) beside the ball's. On a cylinder it is 3/4 of that deep. 0 for a limb of no
+    thickness.
+    """
+    return limb_m - math.sqrt(limb_m**2 - radius_m**2) if limb_m > radius_m else 0.0

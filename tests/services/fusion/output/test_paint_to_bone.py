@@ -23,9 +23,9 @@ from services.fusion.output.known_paint import (
 )
 from services.fusion.output.paint_to_bone import (
     PaintToBone,
-    dab_sag_m,
     turned_vectors,
 )
+from services.fusion.output.visible_paint import dab_sag_m
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M = 0.0068
@@ -113,37 +113,6 @@ def is_untouched(positions) -> bool:
         np.array_equal(positions[1], POSITIONS[1])
         and np.linalg.norm(positions[0]) < np.linalg.norm(POSITIONS[0]) - 0.9 * SAG_M
     )
-
-
-def located_depth_m(normals, weights, places):
-    """How deep below the top two cameras 9 degrees apart locate skin.
-
-    Each by the middle of what it sees, weighted by how the skin faces it.
-    """
-    shifts = []
-    for angle in (-0.08, 0.08):
-        facing = weights * (normals @ [np.sin(angle), 0.0, np.cos(angle)])
-        shifts.append(np.average(places @ [np.cos(angle), 0.0, -np.sin(angle)], weights=facing))
-    return 0.021 - (shifts[0] - shifts[1]) / (2.0 * np.sin(0.08))
-
-
-def test_two_cameras_locate_a_dab_at_its_rim():
-    """Against points spread over the cap of a ball, and over a cylinder.
-
-    A dab on nothing lies where it is seen.
-    """
-    side = np.linspace(-0.008, 0.008, 801)
-    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
-    inside = x**2 + y**2 < 0.008**2
-    x, y = x[inside], y[inside]
-    ball = np.column_stack([x, y, np.sqrt(0.021**2 - x**2 - y**2)])
-    # As seen from above, a patch of skin is larger than it looks by 1 / cosine.
-    deep_m = located_depth_m(ball / 0.021, 0.021 / ball[:, 2], ball)
-    assert dab_sag_m(0.008, 0.021) == pytest.approx(deep_m, rel=0.01)
-    roll = np.column_stack([x, y, np.sqrt(0.021**2 - x**2)])
-    deep_m = located_depth_m(roll * [1.0, 0.0, 1.0] / 0.021, 0.021 / roll[:, 2], roll)
-    assert 0.75 * dab_sag_m(0.008, 0.021) == pytest.approx(deep_m, rel=0.03)
-    assert dab_sag_m(0.008, 0.0) == 0.0
 
 
 def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
