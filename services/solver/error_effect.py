@@ -25,6 +25,11 @@ from services.solver.whole_hand.residuals import Pose, whitened
 _SIZE, _BONES, _ROOTS, PAINT = 0, 1, 16, 31
 # Eigenvalues this much above 1 are rounding: covariances of 26 unknowns are inverted to about 1e-9.
 _ROUNDING = 1e-6
+# How far landmarks miss is forgotten so much more slowly than what errors did to angles: in 2 s.
+_SLOWER = 5.0
+# Bounds of what that may do to variances. A hand at rest fits whatever its bones are; a message
+# that fits nothing (a hand that jumps) counts no more than a bad model.
+_LEAST, _MOST = 0.25, 9.0
 # Share of the fit's own covariance that is published: its prior allows for more postures than a
 # hand takes. On fourteen rendered captures of hands that were known exactly, squared errors over
 # variances were .47 (wrist), .28 (orientation), .33 (fingers) with all of it.
@@ -35,11 +40,14 @@ class Errors(NamedTuple):
     """The errors of a model as a kernel takes them on to a message."""
 
     effect: Array  # (26, b) S, changed in place
-    sigmas: Array  # (b,) standard deviations
+    sigmas: Array  # (b,) standard deviations; all 0: the model is exact
     paint_columns: Integers  # (m,) first columns of the paint of a message's landmarks
+    misfit: Array  # (1,) squared residuals of landmarks over what is usual, changed in place
+    # (2,) what is usual, per degree of freedom (0: not known); and what of a landmark's variance,
+    # as the fit is told, is the model's.
+    landmark_m2: Array
     # How much of an old error's effect on the angles is left; 0: of its effect on anything.
     keep: float
-    any: bool  # False: the model is exact
 
 
 @njit(cache=True, fastmath=FUSED)
@@ -48,13 +56,17 @@ def variances(
 ) -> Array:
     """`ModelError.pose_variances`, for kernels; carries the effect of the errors along."""
     found = np.empty(UNKNOWNS)
-    if errors.any:
+    is_unsure = errors.sigmas.any()
+    if is_unsure:
         _carry_along(chains, observations, estimate, errors)
+    # A size that is wrong leaves no residual: what it does is as unsure as ever.
+    share = max(errors.misfit[0], _LEAST)
     for i in range(UNKNOWNS):
-        found[i] = _FIT_SHARE * estimate.covariance[i, i]
-        if errors.any:
+        found[i] = _FIT_SHARE * share * estimate.covariance[i, i]
+        if is_unsure:
             for k in range(errors.sigmas.size):
-                found[i] += (errors.effect[i, k] * errors.sigmas[k]) ** 2
+                by_error = (errors.effect[i, k] * errors.sigmas[k]) ** 2
+                found[i] += by_error if k == _SIZE else share * by_error
     return found
 
 
@@ -66,6 +78,7 @@ def _carry_along(
     S, m = errors.effect, observations.joint.size
     if errors.keep == 0.0:
         S[:] = 0.0
+        errors.misfit[0] = 1.0
     for i in range(6, UNKNOWNS):
         for k in range(S.shape[1]):
             S[i, k] *= errors.keep
@@ -73,6 +86,7 @@ def _carry_along(
     H, J, of_one = np.zeros((3 * m, UNKNOWNS)), np.zeros((3 * m, S.shape[1])), np.empty((3, 10))
     frames = digit_frames(chains, estimate.angles_rad)
     pose = Pose(estimate.rotation, estimate.position_m, estimate.angles_rad)
+    residuals = np.empty(3 * m)
     for n in range(m):
         error = whitened(frames, observations, n, pose, of_one)
         for a in range(6 + observations.depth[n]):
@@ -80,6 +94,7 @@ def _carry_along(
             for r in range(3):
                 H[3 * n + r, i] = of_one[r, a]
         for i in range(3):
+            residuals[3 * n + i] = error[i]
             # The hand's size moves a landmark along its own way from the wrist.
             J[3 * n + i, _SIZE] = error[i]
             for k in range(i + 1):
@@ -87,8 +102,35 @@ def _carry_along(
                 J[3 * n + i, _SIZE] += observations.whitening[n, i, k] * way
         _by_errors(frames, observations, n, pose.rotation, errors.paint_columns[n], J)
     gain = estimate.covariance @ H.T
-    gain *= _consistent_share(H @ gain)
+    B = H @ gain
+    _learn_misfit(observations.whitening, B, residuals, errors)
+    gain *= _consistent_share(B)
     S -= gain @ (H @ S + J)
+
+
+@njit(cache=True)
+def _learn_misfit(whitening: Array, B: Array, residuals: Array, errors: Errors) -> None:
+    """Take errors.misfit on to a fit's residuals (3 m,), in standard deviations.
+
+    whitening (m, 3, 3) of its landmarks. Of B = H P H' (3 m, 3 m) what the fit is free to follow
+    leaves no residual; what is noise of the landmarks leaves all of it, so what is known badly
+    counts little.
+    """
+    usual_m2, model_m2 = errors.landmark_m2
+    if usual_m2 == 0.0:
+        return
+    found, usual = 0.0, 0.0
+    for i in range(residuals.size):
+        information = 0.0
+        for k in range(3):
+            information += whitening[i // 3, i % 3, k] ** 2
+        by_model = min(model_m2 * information, 1.0)
+        freedom = max(1.0 - B[i, i], 0.0)
+        found += by_model**2 * residuals[i] ** 2
+        usual += by_model**2 * freedom * (usual_m2 * information + 1.0 - by_model)
+    if usual > 0.0:
+        old = errors.keep ** (1.0 / _SLOWER)
+        errors.misfit[0] = old * errors.misfit[0] + (1.0 - old) * min(found / usual, _MOST)
 
 
 @njit(cache=True, inline="always")

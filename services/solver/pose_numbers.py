@@ -89,8 +89,9 @@ def _dls_numbers_unpacked(
     effect: Array,
     sigmas: Array,
     paint_columns: Integers,
+    misfit: Array,
+    landmark_m2: Array,
     keep: float,
-    any_errors: bool,
     max_iterations: int,
     tolerance_m: float,
 ) -> Array:
@@ -100,7 +101,7 @@ def _dls_numbers_unpacked(
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
     estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)
     observations = Observations(joint, digit, depth, offset_m, points_m, whitening)
-    errors = Errors(effect, sigmas, paint_columns, keep, any_errors)
+    errors = Errors(effect, sigmas, paint_columns, misfit, landmark_m2, keep)
     spread = variances(chains, observations, estimate, errors)
     return pose_numbers(chains, wrist, fingers, spread)
 

@@ -77,7 +77,8 @@ class _Hand:
         estimate = self.tracker.track(points.stamp_ns, observed)
         if estimate is None:
             return None
-        errors = self._model_error.errors(points.stamp_ns, observed.names)
+        misfit_m2 = self.tracker.misfit_m2
+        errors = self._model_error.errors(points.stamp_ns, observed.names, misfit_m2)
         numbers = self._numbers(estimate, observed, errors)
         sources = self._sources(observed)
         return hand_pose(points, self._settings.method, numbers, self._radii, sources)

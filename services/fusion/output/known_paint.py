@@ -11,23 +11,29 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.output.paint_centroid import expected_shift
+from services.fusion.output.paint_centroid import Finger, expected_shift
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
 SIGMA_UNKNOWN = (0.29, 0.16)
 # With the solver's directions, beside what their own uncertainty makes (paint_centroid.py), along
 # and across: SIDE of a finger seen from the side, and END times a power of the cosine between
-# finger and viewing ray. Errors of rendered tips at .5-.7 m with directions 7 deg off, all causes:
-# .4-.6 and .13 mm from the side, .7 and .25 at a cosine of -.6, 1.4-2.2 and .4-.5 pointing at the
-# cameras, where the visible end depends on the direction most.
+# finger and viewing ray, where little of the paint shows. What directions do not explain of tips of
+# hands that are known exactly, playing at .5 m and moving at .7: across .03-.05 radii beyond a
+# cosine of -.8, along .06-.15; less than .02 and nothing from the side.
 SIGMA_SIDE = (0.02, 0.012)
-SIGMA_END, _END_POWER = (0.2, 0.08), (4, 2)
-# Of a dab, in every direction, as a share of its diameter: rendered wrists (16 mm) lie 1.45 mm
-# deep, of which their sag explains 1.58.
-SIGMA_DAB = 0.025
+SIGMA_END, _END_POWER = (0.1, 0.035), (4, 2)
+# Light falls on the side that cameras see: tips are located so much before their axis, in radii
+# (tuning captures: .01 to .06; without, depths are 3 % worse).
+_LIT = 0.025
+# Of the skin under a dab whose direction nobody tells: what a camera sees faces it, more or less.
+SIGMA_FACING_RAD = 0.5
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
+# A direction that is less sure than that says less than none: some of those that it may be would
+# hide the paint. Closing hands a tenth larger than told, 95 % and maximum at no lag: 4.6 and 13 mm
+# with 1.0, 3.3 and 8.1 with .6, 3.5 and 8.7 with .45; a recorded wave 10.4, 10.4 and 10.1.
+_MOST_UNSURE_RAD = 0.5
 # A stamp that is older than any.
 LONG_AGO_NS = -_POSE_AGE_NS - 1
 
@@ -36,23 +42,29 @@ class KnownPaint(NamedTuple):
     """The paint of L landmarks, and where the fingers pointed that a pose told of last."""
 
     radii_m: Array  # (L,) of painted tips, 0 for dabs
-    dabs_m: Array  # (L,) diameters of dabs, 0 for painted tips
     sags_m: Array  # (L,) how deep a dab's middle lies under the landmark
     tables: Array  # (L, 61) shifts of tips (paint_centroid.py)
-    radius_sds: Array  # (L,) how unsure the radius is, as a share
+    radius_sds: Array  # (L,) how unsure the radius of a finger or limb is, as a share
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
-    direction_sigmas: Array  # (L,) rad
+    hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
+    direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
     stamps_ns: Ints  # (L,) of the pose that told it
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
 
 
 @njit(cache=True)
 def note_directions(
-    paint: KnownPaint, rows: Ints, directions: Array, sigmas_rad: Array, stamp_ns: int
+    paint: KnownPaint,
+    rows: Ints,
+    directions: Array,
+    hinges: Array,
+    sigmas_rad: Array,
+    stamp_ns: int,
 ) -> None:
-    """Remember which way the fingers of landmarks (n,) point: (n, 3), as sure as (n,)."""
+    """Remember how fingers of landmarks (n,) point (n, 3) and bend (n, 3), as sure as (n, 2)."""
     for n in range(rows.size):
         paint.directions[rows[n]] = directions[n]
+        paint.hinges[rows[n]] = hinges[n]
         paint.direction_sigmas[rows[n]] = sigmas_rad[n]
         paint.stamps_ns[rows[n]] = stamp_ns
 
@@ -74,28 +86,45 @@ def correct_paint(
     for row in range(positions.shape[0]):
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
+        is_told = abs(instant_ns - paint.stamps_ns[row]) <= _POSE_AGE_NS
+        is_told &= paint.direction_sigmas[row, 0] <= _MOST_UNSURE_RAD
+        if paint.radii_m[row] == 0.0:
+            normal, sigma_rad = -ray, SIGMA_FACING_RAD
+            if is_told:
+                normal, sigma_rad = paint.directions[row], paint.direction_sigmas[row, 0]
+            # Deeper than the skin, by as much as the limb is thinner.
+            sag_m = paint.sags_m[row]
+            positions[row] += sag_m * normal
+            sigmas = paint.radius_sds[row] * sag_m, sigma_rad * sag_m
+            _add_about(normal, sigmas, covariances[row])
+            continue
         along, across = SIGMA_UNKNOWN  # in radii
-        if not abs(instant_ns - paint.stamps_ns[row]) <= _POSE_AGE_NS:
-            # Skin that a camera sees faces it, more or less.
-            positions[row] -= paint.sags_m[row] * ray
-        elif paint.radii_m[row] == 0.0:
-            positions[row] += paint.sags_m[row] * paint.directions[row]
-        else:
+        if is_told:
             # A tip, whose middle has no depth under it.
-            finger = paint.directions[row], paint.direction_sigmas[row], paint.radius_sds[row]
+            finger = Finger(
+                paint.directions[row],
+                paint.hinges[row],
+                paint.direction_sigmas[row],
+                paint.radius_sds[row],
+            )
             chosen = _locating(cameras, seen_by[row])
             place, table = positions[row], paint.tables[row]
             if expected_shift(table, place, finger, chosen, shift, shift_covariance):
-                positions[row] -= shift
+                positions[row] += _LIT * paint.radii_m[row] * ray - shift
                 covariances[row] += shift_covariance
                 along, across = _tip_sigmas(ray @ paint.directions[row])
-        dab = (SIGMA_DAB * paint.dabs_m[row]) ** 2
-        along = (along * paint.radii_m[row]) ** 2 + dab
-        across = (across * paint.radii_m[row]) ** 2 + dab
-        for i in range(3):
-            for j in range(3):
-                both = ray[i] * ray[j]
-                covariances[row, i, j] += along * both + across * ((1.0 if i == j else 0.0) - both)
+        radius_m = paint.radii_m[row]
+        _add_about(ray, (along * radius_m, across * radius_m), covariances[row])
+
+
+@njit(cache=True)
+def _add_about(axis: Array, sigmas: tuple[float, float], cov: Array) -> None:
+    """Add to cov (3, 3) the squares of sigmas (along, across) a unit axis (3,)."""
+    along, across = sigmas[0] ** 2, sigmas[1] ** 2
+    for i in range(3):
+        cov[i, i] += across
+        for j in range(3):
+            cov[i, j] += (along - across) * axis[i] * axis[j]
 
 
 @njit(cache=True)

@@ -1,16 +1,15 @@
-"""Where a camera sees the centre of a painted finger tip, against the landmark on the bone's axis.
+"""Where cameras locate the centre of a painted finger tip, against the landmark on the bone's axis.
 
-The tip is a capsule (radius of the paint) that ends in a half ball, painted over extent_m from its
-end; the landmark is the middle of the painted stretch of the axis. Seen from afar, the centroid of
-what is visible lies off the landmark along the finger's direction in the image, by an amount that
-depends only on the angle between finger and viewing ray: `centroid_shift`. What that does to a
-point located from several cameras follows by least squares: `located_shift`. Skin is taken as
-evenly bright; nothing else hides the paint. Compiled.
+Each camera sees the centroid of what is visible off the landmark along the finger's direction in
+the image (visible_paint.py): `centroid_shift`. What that does to a point located from several
+cameras follows by least squares; `expected_shift` is that of a finger whose direction and thickness
+are not known exactly. Compiled.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,104 +18,16 @@ from rhot.geometry.transforms import Array
 from services.fusion.geometry.normal_equations import invert_symmetric, multiply
 from services.fusion.geometry.projection import Extrinsics, project
 
-# Angles of the table, 0 to 180 deg: 3 deg apart, linear between them is right to 20 um for a 7 mm
-# finger.
-_ANGLES = 61
-# Rays per radius in each direction: edges are then known to 1 / 40 radius, the centroid to 10 um.
-_FINENESS = 40
-
-
-@njit(cache=True)
-def _centroid_shift(radius_m: float, extent_m: float, sine: float, cosine: float) -> float:
-    """centroid_shift by ray-casting: parallel rays over a grid.
-
-    The finger points along (sine, 0, cosine), rays along (0, 0, 1); u is a ray's x, w its y.
-    """
-    step = radius_m / _FINENESS
-    half = 0.5 * extent_m + radius_m
-    n_u = int(half / step) + 1
-    # From the landmark to the centre of the end's ball.
-    centre_u = (0.5 * extent_m - radius_m) * sine
-    area = 0.0
-    moment = 0.0
-    for i in range(-n_u, n_u + 1):
-        u = i * step - centre_u
-        for j in range(_FINENESS):
-            w = (j + 0.5) * step
-            z = _first_hit(u, w, radius_m, sine, cosine)
-            # Painted: no further than extent_m from the end.
-            if z < np.inf and u * sine + z * cosine >= radius_m - extent_m:
-                area += 1.0
-                moment += i * step
-    return moment / area if area > 0.0 else 0.0
-
-
-@njit(cache=True)
-def _first_hit(u: float, w: float, radius_m: float, sine: float, cosine: float) -> float:
-    """z at which the ray through (u, w) meets the capsule; infinite if it does not.
-
-    The centre of the capsule's ball is the origin; its cylinder runs away from (sine, 0, cosine).
-    """
-    z = np.inf
-    inside = radius_m**2 - u * u - w * w
-    if inside > 0.0:
-        z = -math.sqrt(inside)
-    # Cylinder about the finger's direction d: |q|^2 - (q.d)^2 = r^2 for q = (u, w, z), on the side
-    # away from the end.
-    a = sine * sine
-    b = -u * sine * cosine
-    c = u * u * (1.0 - sine * sine) + w * w - radius_m**2
-    discriminant = b * b - a * c
-    if a > 1e-9 and discriminant > 0.0:
-        side = (-b - math.sqrt(discriminant)) / a
-        if side < z and u * sine + side * cosine <= 0.0:
-            z = side
-    return z
-
-
-@njit(cache=True)
-def _fill_table(radius_m: float, extent_m: float, table: Array) -> None:
-    for k in range(table.shape[0]):
-        angle = math.pi * k / (table.shape[0] - 1)
-        table[k] = _centroid_shift(radius_m, extent_m, math.sin(angle), math.cos(angle))
-
-
-def shift_table(radius_m: float, extent_m: float) -> Array:
-    """centroid_shift for angles from 0 (the finger points away) to pi (it points at the camera).
-
-    (61,) m, zero for flat dabs.
-    """
-    table = np.zeros(_ANGLES)
-    if radius_m > 0.0 and extent_m > 0.0:
-        _fill_table(radius_m, extent_m, table)
-    return table
-
 
 @njit(cache=True)
 def centroid_shift(table: Array, cosine: float) -> float:
     """Metres from the landmark to the visible centroid, towards the finger's end.
 
-    cosine: of the angle between finger and viewing ray.
+    table: of visible_paint.shift_table; cosine: of the angle between finger and viewing ray.
     """
     place = math.acos(min(1.0, max(-1.0, cosine))) / math.pi * (table.shape[0] - 1)
     k = min(int(place), table.shape[0] - 2)
     return table[k] + (place - k) * (table[k + 1] - table[k])
-
-
-@njit(cache=True)
-def located_shift(
-    table: Array, p_rig: Array, direction: Array, cameras: Extrinsics, shift: Array
-) -> bool:
-    """Where the cameras locate the visible centroid, minus the landmark p_rig (3,); to shift (3,).
-
-    direction (3,) is the finger's, towards its end, of unit length. Least squares over the cameras'
-    rays. False if they cannot locate it.
-    """
-    H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
-    if not _sights(p_rig, cameras, H, A_inverse):
-        return False
-    _least_squares(table, p_rig, direction, cameras, (H, A_inverse), work, shift)
-    return True
 
 
 @njit(cache=True)
@@ -146,7 +57,11 @@ def _least_squares(
     work: Array,
     shift: Array,
 ) -> None:
-    """located_shift from what _sights found; work (2, 3) is written over."""
+    """Where the cameras locate the visible centroid, minus the landmark p_rig (3,); to shift (3,).
+
+    direction (3,) is the finger's, towards its end, of unit length. Least squares over the cameras'
+    rays, from what _sights found; work (2, 3) is written over.
+    """
     H, A_inverse = sights
     b, seen_shift = work[0], work[1]
     b[:] = 0.0  # H^T (shift of the ray), summed
@@ -161,57 +76,53 @@ def _least_squares(
     multiply(A_inverse, b, shift)
 
 
+class Finger(NamedTuple):
+    """A painted finger as far as it is known; sigmas are one standard deviation."""
+
+    direction: Array  # (3,) towards its end
+    hinge: Array  # (3,) the axis about which it bends, across its direction
+    sigmas_rad: Array  # (2,) of its direction, about the hinge and sideways
+    radius_sd: float  # how unsure its radius is, as a share
+
+
 @njit(cache=True)
 def expected_shift(
     table: Array,
     p_rig: Array,
-    finger: tuple[Array, float, float],
+    finger: Finger,
     cameras: Extrinsics,
     shift: Array,
     covariance: Array,
 ) -> bool:
-    """located_shift of a finger that is not known exactly, and its covariance (3, 3).
+    """What cameras locate minus the landmark p_rig (3,): its mean (3,) and covariance (3, 3).
 
-    finger: its direction (3,), one standard deviation of that in rad about each axis across it, and
-    of its radius as a share. The direction is tried so far to either side about two axes (an
-    unscented transform); beyond a radian it is not known at all. False if the cameras cannot locate
-    it.
+    By four directions, turned to either side about the hinge and sideways (the cubature rule of
+    Arasaratnam & Haykin, IEEE Trans. Automatic Control 54(6), 2009). Where a finger points at the
+    cameras the mean is another than the shift of the mean direction. False if the cameras cannot
+    locate it.
     """
-    direction, sigma_rad, radius_sd = finger
     H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
     if not _sights(p_rig, cameras, H, A_inverse):
         return False
     sights = H, A_inverse
-    _least_squares(table, p_rig, direction, cameras, sights, work, shift)
+    across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((4, 3))
+    _cross(finger.hinge, finger.direction, across[0])
+    across[1] = finger.hinge
+    shift[:] = 0.0
+    for n in range(4):
+        angle = math.sqrt(2.0) * finger.sigmas_rad[n // 2] * (1.0 if n % 2 else -1.0)
+        for i in range(3):
+            turned[i] = math.cos(angle) * finger.direction[i] + math.sin(angle) * across[n // 2, i]
+        _least_squares(table, p_rig, turned, cameras, sights, work, shifts[n])
+        shift += 0.25 * shifts[n]
     covariance[:] = 0.0
+    for n in range(4):
+        shifts[n] -= shift
+        _add_square(shifts[n], 0.25, covariance)
     # The shift of a longer or shorter stretch of paint is the same to .1 mm, that of a thicker
     # finger larger in proportion.
-    _add_square(shift, radius_sd**2, covariance)
-    cosine, sine = math.cos(min(sigma_rad, 1.0)), math.sin(min(sigma_rad, 1.0))
-    across, turned, tried = np.empty((2, 3)), np.empty(3), np.empty(3)
-    _across(direction, across)
-    for n in range(4):
-        sign = 1.0 if n < 2 else -1.0
-        for i in range(3):
-            turned[i] = cosine * direction[i] + sign * sine * across[n % 2, i]
-        _least_squares(table, p_rig, turned, cameras, sights, work, tried)
-        tried -= shift
-        _add_square(tried, 0.5, covariance)
+    _add_square(shift, finger.radius_sd**2, covariance)
     return True
-
-
-@njit(cache=True)
-def _across(direction: Array, out: Array) -> None:
-    """Two unit vectors (2, 3) across a unit direction and each other."""
-    least = 0
-    for i in range(1, 3):
-        if abs(direction[i]) < abs(direction[least]):
-            least = i
-    axis = np.zeros(3)
-    axis[least] = 1.0
-    _cross(direction, axis, out[0])
-    out[0] /= math.sqrt(out[0] @ out[0])
-    _cross(direction, out[0], out[1])
 
 
 @njit(cache=True)

@@ -110,6 +110,11 @@ class HandTracker:
         return self._told.estimate
 
     @property
+    def misfit_m2(self) -> float:
+        """How far landmarks lie from the model's, as learned (model_misfit.py); a variance."""
+        return self._misfit_m2
+
+    @property
     def challenge_due(self) -> bool:
         """Whether challenge() has something to do."""
         return self._to_challenge is not None

@@ -174,6 +174,44 @@ def test_a_covariance_wider_than_its_landmarks_leave_makes_no_error_grow() -> No
     assert added[:, 3:6].max() < 0.05**2
 
 
+def test_a_hand_that_fits_is_surer_than_one_that_does_not() -> None:
+    """By what fits of some seconds leave of the landmarks, between a fourth and nine times; no
+    longer than the hand is followed. What a wrong size does stays: it leaves nothing.
+    """
+    model = default_hand()
+    chains, landmarks = hand_chains(model), hand_landmarks(model)
+    joints = forward(model, np.eye(3), np.array([0.0, 0.0, 0.5]), np.full((5, 4), 0.2))
+    random, place = np.random.default_rng(6), np.array([0.0, 0.0, 0.5])
+    estimate = HandEstimate(np.eye(3), place, np.full((5, 4), 0.2), 1e-6 * np.eye(26), 1.0, 3)
+    found = []
+    for off_m in (0.0, 0.006, 0.1):
+        errors = ModelError(model, chains)
+        away = {name: random.normal(size=3) for name in NAMES}
+        observed = {
+            name: Observation(
+                landmark_point(model, name, *joints)
+                + off_m * away[name] / np.linalg.norm(away[name]),
+                2.6e-5 * np.eye(3),
+                True,
+            )
+            for name in NAMES
+        }
+        told = tuple(observed), observation_arrays(landmarks, observed)
+        first = errors.pose_variances(10**18, estimate, *told)
+        for frame in range(1, 500):
+            last = errors.pose_variances(10**18 + 33_000_000 * frame, estimate, *told)
+        begun = errors.pose_variances(10**18 + 60 * 10**9, estimate, *told)
+        np.testing.assert_allclose(begun, first)
+        found.append(last)
+    fits, misses, nothing = found
+    angles = slice(6, None)
+    assert np.all(fits <= misses)
+    assert np.all(fits[angles] < 0.6 * misses[angles])
+    ratio = nothing / fits
+    assert np.all(ratio < 36.1)
+    assert np.median(ratio[angles]) > 20.0
+
+
 def test_landmarks_are_known_no_better_than_where_they_sit() -> None:
     for origin, at_least_m in (("tables", 4e-3), ("measured", 1.2e-3), ("simulated", 1e-3)):
         model = msgspec.structs.replace(default_hand(), origin=origin)

@@ -16,12 +16,16 @@ from rhot.hand import JOINTS, default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import SIGMA_DAB, SIGMA_UNKNOWN, correct_paint
+from services.fusion.output.known_paint import (
+    SIGMA_FACING_RAD,
+    SIGMA_UNKNOWN,
+    correct_paint,
+)
 from services.fusion.output.paint_to_bone import (
     PaintToBone,
-    dab_sag_m,
     turned_vectors,
 )
+from services.fusion.output.visible_paint import dab_sag_m
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M = 0.0068
@@ -111,44 +115,54 @@ def is_untouched(positions) -> bool:
     )
 
 
-def located_depth_m(normals, weights, places):
-    """How deep below the top two cameras 9 degrees apart locate skin.
-
-    Each by the middle of what it sees, weighted by how the skin faces it.
-    """
-    shifts = []
-    for angle in (-0.08, 0.08):
-        facing = weights * (normals @ [np.sin(angle), 0.0, np.cos(angle)])
-        shifts.append(np.average(places @ [np.cos(angle), 0.0, -np.sin(angle)], weights=facing))
-    return 0.021 - (shifts[0] - shifts[1]) / (2.0 * np.sin(0.08))
-
-
-def test_two_cameras_locate_a_dab_at_its_rim():
-    """Against points spread over the cap of a ball, and over a cylinder.
-
-    A dab on nothing lies where it is seen.
-    """
-    side = np.linspace(-0.008, 0.008, 801)
-    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
-    inside = x**2 + y**2 < 0.008**2
-    x, y = x[inside], y[inside]
-    ball = np.column_stack([x, y, np.sqrt(0.021**2 - x**2 - y**2)])
-    # As seen from above, a patch of skin is larger than it looks by 1 / cosine.
-    deep_m = located_depth_m(ball / 0.021, 0.021 / ball[:, 2], ball)
-    assert dab_sag_m(0.008, 0.021) == pytest.approx(deep_m, rel=0.01)
-    roll = np.column_stack([x, y, np.sqrt(0.021**2 - x**2)])
-    deep_m = located_depth_m(roll * [1.0, 0.0, 1.0] / 0.021, 0.021 / roll[:, 2], roll)
-    assert 0.75 * dab_sag_m(0.008, 0.021) == pytest.approx(deep_m, rel=0.03)
-    assert dab_sag_m(0.008, 0.0) == 0.0
-
-
 def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
     positions, covariances = corrected(paint, 10**18)
     assert is_untouched(positions)
     np.testing.assert_allclose(np.linalg.norm(positions[0] - POSITIONS[0]), SAG_M)
     depth_mm = 1e3 * np.sqrt(covariances[:, 2, 2])
     assert depth_mm[1] == pytest.approx(0.29 * 6.8, rel=0.05)
-    assert depth_mm[0] == pytest.approx(SIGMA_DAB * 16.0, rel=0.05)
+    # The skin under the dab faces the cameras, more or less.
+    across_mm = 1e3 * np.sqrt(covariances[0, 0, 0])
+    assert across_mm == pytest.approx(1e3 * SAG_M * SIGMA_FACING_RAD, rel=0.05)
+
+
+def test_a_dab_is_as_unsure_as_the_skin_under_it(paint):
+    """Beside it by the wrist's orientation, deep by its limb's thickness."""
+    found = []
+    for sigma_rad in (0.05, 0.2):
+        told = msgspec.structs.replace(
+            pose(10**18, (1.0, 0.0, 0.0, 0.0)), wrist_sigma_rad=sigma_rad
+        )
+        paint.note(paint.directions(told))
+        found.append(np.sqrt(corrected(paint, 10**18)[1][0].diagonal() - 1e-8))
+    for sigma_rad, (x, y, z) in zip((0.05, 0.2), found, strict=True):
+        # The normal of the wrist's skin is -y.
+        assert x == pytest.approx(SAG_M * sigma_rad / np.sqrt(3.0), rel=1e-3)
+        assert z == pytest.approx(x, rel=1e-3)
+        assert y == pytest.approx(0.08 * SAG_M, rel=1e-3)
+
+
+def test_what_tapers_is_corrected_as_that(paint):
+    """A finger that points at the cameras, tilted by half a radian, thicker at its joint or not."""
+    table = default_hand("right")
+    straight = [
+        msgspec.structs.replace(
+            digit, radii_m=(*digit.radii_m[:2], digit.radii_m[3], digit.radii_m[3])
+        )
+        for digit in table.digits
+    ]
+    plain = PaintToBone(
+        LANDMARKS,
+        {"right": msgspec.structs.replace(table, digits=tuple(straight))},
+        tuple(SyntheticRig().rig().values()),
+    )
+    places = []
+    for known in (paint, plain):
+        known.note(known.directions(pose(10**18, TOWARDS, sigma_rad=0.02)))
+        places.append(corrected(known, 10**18)[0][1])
+    # Towards its end, which is up in the pictures and nearer.
+    assert 0.15e-3 < np.linalg.norm(places[0][:2] - places[1][:2]) < 0.6e-3
+    assert places[0][2] < places[1][2]
 
 
 def test_a_pose_corrects_tips_while_it_is_fresh(paint):
@@ -209,7 +223,7 @@ def test_an_unsure_direction_makes_an_unsure_tip():
     """As unsure as without a direction, or nearly so, once it may be any."""
     for axis in range(2):
         told = [depth_sigmas_m("simulated", sigma)[axis] for sigma in (0.02, 0.1, 0.3, 0.8)]
-        assert np.all(np.diff(told) > 0.0)
+        assert told[0] < told[1] < min(told[2:])
     assert depth_sigmas_m("simulated", 0.05)[1] < depth_sigmas_m("simulated", None)[1]
     unknown = 0.29 * 6.8e-3
     assert depth_sigmas_m("simulated", 0.02)[1] < 0.55 * unknown
