@@ -34,7 +34,7 @@ from rhot.hand import DIGITS
 from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import SeenPatches
-from services.pi_tracker.dots.looking_back import look_back
+from services.pi_tracker.dots.hindsight.looking_back import look_back
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints

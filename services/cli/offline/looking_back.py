@@ -11,7 +11,7 @@ import msgspec
 from rhot.messages import MarkerFrame
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.progress import Progress
-from services.pi_tracker.dots.looking_back import LOOKS
+from services.pi_tracker.dots.hindsight.looking_back import LOOKS
 from services.pi_tracker.step import TrackerStep
 
 

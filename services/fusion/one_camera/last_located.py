@@ -3,9 +3,9 @@
 The filter goes on with the velocity it had. Within some tenths of a second that velocity's error
 takes the landmark decimetres along the ray, metres within seconds, far outside what its covariance
 says, as all of it rests on one straight line through a turn. So the distance from the camera is
-told as that of the last sight by two cameras, as unsure as hands move, weighed against what else
-tells it: the shape of its hand, where two cameras see others of the hand (carried_shape.py),
-or else the filter.
+told as that of the last sight by two cameras, weighed against what else tells it: the shape of its
+hand, where two cameras see others of the hand (carried_shape.py), or else the filter. It is as
+unsure as hands move, in the second case as that hand lately did (distance_motion.py).
 """
 
 from __future__ import annotations
@@ -22,13 +22,20 @@ from services.fusion.one_camera.carried_shape import (
     no_shapes,
     note_shapes,
 )
+from services.fusion.one_camera.distance_motion import (
+    DistanceMotion,
+    learn_motion,
+    moved_sigma_m,
+    no_motion,
+)
 from services.fusion.one_camera.kept_shape import ShapeMemory, empty_memory, learn_deformation
 
 Estimate = tuple[Array, Array]  # position (3,) and covariance (3, 3), rig frame
 
-# How far a hand's distance changes, 1 sigma: as fast as this at first, never more than so far.
-# Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s, stop and go at 14 m/s^2),
-# one camera gone for 2 s.
+# How far a hand's distance changes, 1 sigma, beside what a shape tells: as fast as this at first,
+# never more than so far. Tuning motions (sinusoids of .5 m/s, Leap grab, the glove's first 20 s,
+# stop and go at 14 m/s^2), one camera gone for 2 s. As the hand itself lately moved is no better
+# here: three tips of the glove 3.0 -> 10.0 mm.
 _RATE_M_S, _FARTHEST_M = 0.35, 0.12
 # The filter's own sigma along the ray is worth half in so long: alone, and where a shape tells the
 # distance. Tuning motions of benchmarks/one_camera.py, three tips, .5 s, geometric mean of RMS:
@@ -50,6 +57,7 @@ class LastLocated:
         self._shapes = no_shapes(hand.size)
         # How the hands deformed lately.
         self._memory = empty_memory(hand.size, eye_rig)
+        self._motion = no_motion(hand.size)
         # An instant that is not learnt from yet, and who was located.
         self._taken: tuple[float, Bools, Estimates] | None = None
 
@@ -68,7 +76,8 @@ class LastLocated:
             self._taken = None
             places = estimates.positions_m, estimates.covariances_m2
             spans = time_s, self._span_s
-            _note(self._shapes, self._memory, self._hand, located, places, spans)
+            learnt = self._shapes, self._memory, self._motion
+            _note(learnt, self._hand, located, places, spans)
 
     def tell_alone(self, time_s: float, centres_rig: Array, estimates: Estimates) -> None:
         """Estimates of all landmarks that one camera sees alone, in place.
@@ -91,7 +100,8 @@ class LastLocated:
             shape = np.empty(3), np.empty((3, 3))
             now = (time_s, *places)
             if carry_shape(self._shapes, memory, self._hand, row, (located, alone), now, shape):
-                means[row], covs[row] = self._held(row, time_s, shape, centres[row])
+                sigma_m = min(_RATE_M_S * (time_s - self._shapes.time_s[row]), _FARTHEST_M)
+                means[row], covs[row] = self._weighed(row, time_s, shape, centres[row], sigma_m)
             else:
                 estimate = means[row], covs[row]
                 means[row], covs[row] = self.told(row, time_s, estimate, centres[row])
@@ -102,12 +112,8 @@ class LastLocated:
         As it is if two cameras never saw the landmark.
         """
         worn = self._worn(row, time_s, estimate, centre_rig, _TRUST_S)
-        return self._held(row, time_s, worn, centre_rig)
-
-    def _held(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
-        """An estimate weighed against the last distance, as unsure as hands move."""
-        sigma_m = min(_RATE_M_S * (time_s - self._shapes.time_s[row]), _FARTHEST_M)
-        return self._weighed(row, time_s, estimate, centre_rig, sigma_m)
+        sigma_m = moved_sigma_m(self._motion, row, time_s - self._shapes.time_s[row])
+        return self._weighed(row, time_s, worn, centre_rig, sigma_m)
 
     def _ray(self, row: int, time_s: float, estimate: Estimate, centre_rig: Array) -> Estimate:
         """The filter's estimate with hardly anything said of the distance."""
@@ -151,8 +157,7 @@ class LastLocated:
 
 @njit(cache=True, error_model="numpy")
 def _note(
-    shapes: LocatedShapes,
-    memory: ShapeMemory,
+    learnt: tuple[LocatedShapes, ShapeMemory, DistanceMotion],
     hand: Ints,
     located: Bools,
     places: Estimate,
@@ -162,6 +167,7 @@ def _note(
 
     times_s: the instant, and from one to the next.
     """
-    time_s, span_s = times_s
+    (time_s, span_s), (shapes, memory, motion) = times_s, learnt
+    learn_motion(motion, located, places[0], memory.eye, time_s, span_s)
     note_shapes(shapes, located, places[0], places[1], time_s)
     learn_deformation(memory, hand, located, places[0], time_s, span_s)

@@ -15,7 +15,7 @@ from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
-from services.pi_tracker.dots.looking_back import look_back
+from services.pi_tracker.dots.hindsight.looking_back import look_back
 from services.pi_tracker.dots.parts import parts_of
 from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.tracker import DotTracker

@@ -31,9 +31,10 @@ def test_the_ray_is_kept_and_the_distance_is_the_last_one(drift):
     position, cov = located().told(0, 1.6, estimate, CENTRE)
     assert np.linalg.norm(np.cross(position - CENTRE, RAY)) < 1e-12
     assert np.linalg.norm(position - PLACE) < 0.05
-    # As unsure along the ray as a hand moves, and across it as an angle is at that distance.
+    # As unsure along the ray as a hand of which nothing is known, and across it as an angle is at
+    # that distance.
     sigma_m = np.sqrt(np.linalg.eigvalsh(cov))
-    assert 0.08 < sigma_m[2] < 0.13
+    assert 0.05 < sigma_m[2] < 0.09
     assert np.allclose(sigma_m[:2], 1e-3 / (1.0 + drift), rtol=0.15)
 
 
@@ -52,3 +53,17 @@ def test_what_two_cameras_never_saw_is_told_as_the_filter_has_it():
     ):
         assert np.array_equal(place, PLACE)
         assert np.array_equal(cov, COV)
+
+
+@pytest.mark.parametrize(("swing_m", "least_m", "most_m"), [(0.0, 0.01, 0.04), (0.1, 0.08, 0.13)])
+def test_the_distance_is_as_unsure_as_the_hand_lately_moved(swing_m, least_m, most_m):
+    last = LastLocated(np.zeros(1, dtype=np.int64), CENTRE, 1.0 / 60.0)
+    estimates = no_estimates(1, 2)
+    estimates.found[0] = estimates.measured[0] = True
+    for k in range(300):
+        place = PLACE + swing_m * np.sin(4.0 * k / 60.0) * RAY
+        estimates.positions_m[0], estimates.covariances_m2[0] = place, COV
+        last.take(1.0 + k / 60.0, estimates)
+        last.settle()
+    _, cov = last.told(0, 1.0 + 299 / 60.0 + 0.5, (place, COV), CENTRE)
+    assert least_m < np.sqrt(np.linalg.eigvalsh(cov)[2]) < most_m

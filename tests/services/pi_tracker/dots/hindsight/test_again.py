@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
-from services.pi_tracker.dots.again import searched_again
 from services.pi_tracker.dots.dot import SeenPatches
+from services.pi_tracker.dots.hindsight.again import searched_again
 from services.pi_tracker.dots.search import LIVE
 from services.pi_tracker.dots.tracker import DotTracker
 from testing.dot_patches import NAMES, REST, SIZE, patches_at

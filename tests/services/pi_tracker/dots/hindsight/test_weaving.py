@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from services.pi_tracker.dots.evidence import Judge, Told
+from services.pi_tracker.dots.hindsight.weaving import Account, woven
 from services.pi_tracker.dots.tracker import DotTracker, arrays_of
-from services.pi_tracker.dots.weaving import Account, woven
 from testing.dot_patches import NAMES, REST, SIZE, patches_at
 
 COUNT = 64

@@ -9,7 +9,7 @@ import numpy as np
 from rhot.hand import DIGITS
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
-from services.pi_tracker.dots.looking_back import LOOKS, look_back
+from services.pi_tracker.dots.hindsight.looking_back import LOOKS, look_back
 from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording

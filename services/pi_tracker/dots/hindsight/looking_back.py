@@ -13,13 +13,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from services.pi_tracker.dots.again import searched_again
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
 from services.pi_tracker.dots.evidence import Judge
+from services.pi_tracker.dots.hindsight.again import searched_again
+from services.pi_tracker.dots.hindsight.weaving import Account, woven
 from services.pi_tracker.dots.hypothesis import SHARED
 from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
-from services.pi_tracker.dots.weaving import Account, woven
 
 # How often each picture is searched: from the start in each way, and from the middle.
 LOOKS = len(SEVERAL) + 1
