@@ -53,6 +53,16 @@ def _only(*rows: int) -> MotionModels:
     return MotionModels(*(column[list(rows)] for column in _MODELS))
 
 
+class _PaintAsItIs(PaintToBone):
+    """Paint of no extent, of which nothing is known."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        nothing = np.zeros_like(self.known.radii_m)
+        tables = np.zeros_like(self.known.tables)
+        self.known = self.known._replace(radii_m=nothing, sags_m=nothing, tables=tables)
+
+
 # Landmarks that have nothing in common but how lively they are.
 _EACH_BY_ITSELF = _MODELS._replace(
     shift=np.zeros_like(_MODELS.shift),
@@ -115,7 +125,7 @@ PARTS: dict[str, Part] = {
     "finger direction": Part("no poses come back from the solver", feedback=False),
     "paint to bone": Part(
         "the visible middle of paint is told as it is, its covariance too",
-        _replaced((PaintToBone, "correct", lambda _self, p, covs, _seen, _at: (p, covs))),
+        _replaced((fusion_step, "PaintToBone", _PaintAsItIs)),
     ),
     "systematic error": Part(
         "all of a marker's sigma is white noise",
