@@ -37,6 +37,7 @@ from scale_rigs import Machine, rig_name, running
 from rhot import topics
 from rhot.bus.zenoh_config import client_config
 from rhot.messages import HandPose, MarkerFrame
+from rhot.messages.health import Health
 
 # A frame is put this long after its stamp.
 TRACKER_S = 0.015
@@ -83,7 +84,9 @@ class Feed:
         return lambda sample: self._poses.append((n, time.time_ns(), sample.payload.to_bytes()))
 
     def _note_health(self, sample: zenoh.Sample) -> None:
-        self._running.add(str(sample.key_expr))
+        # A service beats while it still compiles.
+        if msgspec.json.decode(sample.payload.to_bytes(), type=Health).state == "running":
+            self._running.add(str(sample.key_expr))
 
     def wait(self, seconds: float) -> None:
         """Until fusion and solver of all rigs say that they run."""
