@@ -135,11 +135,11 @@ class _SeenMarkers:
         order, times_s, heights = heights_by_landmark(
             self._landmarks[rows], self._times_s[rows], self._rays[rows], R_rectified_from_camera
         )
-        found, begins = np.unique(order, return_index=True)
-        ends = [*begins.tolist()[1:], len(order)]
+        found, counts = np.unique(order, return_counts=True)
+        ends = np.cumsum(counts).tolist()
         return {
-            landmark: HeightTrack(times_s[begin:end], heights[begin:end])
-            for landmark, begin, end in zip(found.tolist(), begins.tolist(), ends, strict=True)
+            landmark: HeightTrack(times_s[end - count : end], heights[end - count : end])
+            for landmark, count, end in zip(found.tolist(), counts.tolist(), ends, strict=True)
         }
 
 

@@ -46,3 +46,37 @@ def test_a_clock_that_jumps_ends_what_was_before():
     assert memory.newest_s(0) is None
     assert memory.length_s(0) == 0.0
     assert memory.length_s(1) > 0.9
+
+
+def test_frames_without_markers_tell_nothing():
+    nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 2)), np.empty(0)
+    empty = [
+        view._replace(landmarks=nothing[0], delay_s=nothing[1], rays=nothing[2], sigmas=nothing[3])
+        for view in VIEWS
+    ]
+    pair = rectified_pairs(tuple(CAMERAS.values()))[0, 1]
+    assert remembered(empty).length_s(0) == pytest.approx(MEMORY_S, abs=0.05)
+    assert remembered(empty).tracks(0, 1, pair) == ([], [])
+    one_sees = [seen if view.camera else view for view, seen in zip(VIEWS, empty, strict=True)]
+    assert remembered(one_sees).tracks(0, 1, pair) == ([], [])
+    # Markers come and go, and rays that point backwards have no height.
+    late = remembered([*empty[:300], *VIEWS[300:400]])
+    assert [len(track.times_s) for track in late.tracks(0, 1, pair)[0]] == [50] * 6
+    behind = [view._replace(rays=np.full_like(view.rays, np.nan)) for view in VIEWS]
+    assert remembered(behind).tracks(0, 1, pair) == ([], [])
+
+
+def test_more_markers_than_there_is_room_for_at_first():
+    many = [
+        view._replace(
+            landmarks=np.repeat(view.landmarks, 9),
+            delay_s=np.repeat(view.delay_s, 9),
+            rays=np.repeat(view.rays, 9, axis=0),
+        )
+        for view in VIEWS
+    ]
+    pair = rectified_pairs(tuple(CAMERAS.values()))[0, 1]
+    few, more = (remembered(views).tracks(0, 1, pair)[0] for views in (VIEWS, many))
+    for one, other in zip(few, more, strict=True):
+        assert np.array_equal(np.repeat(one.times_s, 9), other.times_s)
+        assert np.array_equal(np.repeat(one.heights, 9), other.heights)
