@@ -261,3 +261,18 @@ def test_what_points_do_not_wait_for_is_the_same_whoever_does_it():
         two.settle()
         assert one.step(frame) == told
     assert two.clocks.updates > 0
+
+
+def test_cameras_may_see_nothing_for_as_long_as_they_like():
+    """Also while clocks that are off are searched for, which rests on seconds of markers."""
+    setup = SyntheticRig()
+    step = FusionStep(setup.config(), setup.rig(), point_hands())
+    told = [
+        points
+        for frame in frames(setup, MovingHand(), 8.0)
+        for points in step.step(msgspec.structs.replace(frame, markers=[]))
+    ]
+    step.settle()
+    assert len(told) > 200
+    assert not any(points.points for points in told)
+    assert step.alignment.searches > 1
