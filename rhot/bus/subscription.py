@@ -130,6 +130,8 @@ class Subscription(Generic[T]):
                 f"topic {topic.template} carries {topic.media_type}, no message; use raw()"
             )
         self.stats = stats
+        # How long the last message had waited for its reader; told to one who is to be in time.
+        self.waited_s = 0.0
         self._topic = topic
         self._standing = standing
         self._raw = RawSubscription(loop, stats, capacity, objects_only=True, expected=expected)
@@ -172,7 +174,8 @@ class Subscription(Generic[T]):
         """A sample decoded, and counted; None if it is no message, or has waited for too long."""
         if self._standing is not None:
             now_ns = clock.now_ns()
-            if self._standing.skips((now_ns - sample.received_ns) * 1e-9, now_ns * 1e-9):
+            self.waited_s = (now_ns - sample.received_ns) * 1e-9
+            if self._standing.skips(self.waited_s, now_ns * 1e-9):
                 self.stats.dropped += 1
                 return None
         message = self._decode(sample)

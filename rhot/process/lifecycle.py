@@ -6,7 +6,8 @@ and the watchdog; whatever fails there ends the process with a message and a cod
 mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT end it with code 0;
 new calibration files end it with code 75, to be started with them at once.
 While the router is away at start, the service waits for it. Fusion, solver, object tracker and
-viewer may serve several rigs (rhot/process/rigs/).
+viewer may serve several rigs (rhot/process/rigs/); no thread interrupts their loop
+(rhot/process/thread_turns.py).
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ from rhot.process.restart_hold import hold_back
 from rhot.process.rigs.files import rig_files
 from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.service import Service, rhot_version
+from rhot.process.thread_turns import keep_the_turn
 
 Serve = Callable[[Service], Awaitable[None]]
 
@@ -92,7 +94,8 @@ def command(
         parser.exit(EXIT_USER, f"{program}: error: {error}\n")
     if several_rigs and (len(options.config) > 1 or options.config[0].is_dir()):
         sys.exit(run_several(name, options.name, options.config, serve, options.connect))
-    sys.exit(run(name, options.name, options.config[0], serve, options.connect))
+    served = name, options.name, options.config[0], serve, options.connect
+    sys.exit(run(*served, keeps_turn=several_rigs))
 
 
 def _parser(
@@ -127,15 +130,25 @@ def _parser(
 
 
 def run(
-    name: str, instance: str, config_path: Path, serve: Serve, connect: Sequence[str] = ()
+    name: str,
+    instance: str,
+    config_path: Path,
+    serve: Serve,
+    connect: Sequence[str] = (),
+    *,
+    keeps_turn: bool = False,
 ) -> int:
-    """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml."""
+    """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml.
+
+    keeps_turn: all that counts happens in the event loop, which no thread is to interrupt. (Threads
+    that wait for a camera or for SteamVR note when something came.)
+    """
     started_s = time.monotonic()
     files = [config_path, config_path.parent / "calibration"]
     try:
         config = _load(config_path, connect)
         files = [config_path, config.calibration_dir]
-        run_loop(_live(_serve_rig(name, instance, config, serve)))
+        run_loop(_live(_serve_rig(name, instance, config, serve), keeps_turn))
     except Exception as error:
         code = _explain(error, name, instance)
         if code != EXIT_AGAIN:
@@ -156,7 +169,7 @@ def run_several(
         lambda error: _explain(error, name, instance) == EXIT_AGAIN,
     )
     try:
-        run_loop(_live(keeper.keep_all(rig_files(paths))))
+        run_loop(_live(keeper.keep_all(rig_files(paths)), keeps_turn=True))
     except Exception as error:
         return _explain(error, name, instance)
     finally:
@@ -204,12 +217,17 @@ def _load(path: Path, connect: Sequence[str]) -> RigConfig:
     return msgspec.structs.replace(config, bus=bus)
 
 
-async def _live(work: Coroutine[Any, Any, None]) -> None:
+async def _live(work: Coroutine[Any, Any, None], keeps_turn: bool) -> None:
     """Do the process's work until it ends, or a signal comes."""
     stopping = stop_on_signals()
     with cancelled_by(stopping):
         async with fed_watchdog():
-            await work
+            turn = asyncio.create_task(keep_the_turn()) if keeps_turn else None
+            try:
+                await work
+            finally:
+                if turn is not None:
+                    turn.cancel()
 
 
 async def _serve_rig(name: str, instance: str, config: RigConfig, serve: Serve) -> None:

@@ -30,6 +30,7 @@ class HealthFigures:
             values["step_p50_us"] = 1e6 * sorted(self._busy_s)[len(self._busy_s) // 2]
         values["epipolar_px"] = step.clocks.epipolar_px
         values["moved_pairs"] = float(len(step.clocks.moved_px))
+        values["frames_unlearned"] = float(step.unlearned)
         values["late_poses"] = float(step.late_poses)
         values["mirrored_pairs"] = float(len(step.mirrors.mirrored))
         for camera, late_s in step.clocks.late_s.items():

@@ -29,6 +29,8 @@ from services.fusion.step import FusionStep
 from services.fusion.warm import warm_up
 
 _LOOK_S = 1.0
+# A frame that has waited for so long waited for other rigs', or other programs have the processor.
+_BEHIND_S = 0.005
 # A second master is there to stay; trackers, which ask each second, name it sooner.
 _ASK_MASTERS_S = 5.0
 
@@ -55,7 +57,7 @@ async def serve(service: Service) -> None:
         began_s = time.perf_counter()
         for points in step.step(frame):
             publishers[points.hand].put(points)
-        step.settle()
+        step.settle(behind=frames.waited_s > _BEHIND_S)
         health.note_frame(time.perf_counter() - began_s)
 
     await frames.each(take)
@@ -96,8 +98,7 @@ async def _serve_without_depth(service: Service) -> None:
 
 async def _note_poses(service: Service, step: FusionStep) -> None:
     """Where the fingers point tells where in its paint a tip is."""
-    async for pose in service.bus.latest(topics.POSE):
-        step.note_pose(pose)
+    await service.bus.latest(topics.POSE).each(step.note_pose)
 
 
 def _serve_session_and_clock(service: Service) -> SessionState:

@@ -44,6 +44,9 @@ from services.fusion.paired.estimator import PairedMethod
 # Reasons and cameras for which rejected frames are counted apart: a rig has four reasons for each
 # of some cameras.
 _MAX_REJECTED = 64
+# Of frames of a loop that is behind, one of so many is learned from (docs/notes/scale.md; with six,
+# poses came no sooner).
+_LEARN_ONE_OF = 3
 
 
 class FusionStep:
@@ -97,6 +100,8 @@ class FusionStep:
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
         self._admission = FrameAdmission(len(self._cameras))
         self._schedule = OutputSchedule(self._fps, self._lag_frames)
+        # Frames that nothing was learned from, as others waited; and how many of them in a row.
+        self.unlearned, self._passed_over = 0, 0
         # What of the last frame is not done yet: settle().
         self._unsettled: list[Callable[[], None]] = []
         self._epoch_ns = 0
@@ -148,15 +153,20 @@ class FusionStep:
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
         return [] if due_ns is None else self._points_at(due_ns)
 
-    def settle(self) -> None:
+    def settle(self, *, behind: bool = False) -> None:
         """Do what a frame's points do not wait for: watch it, and learn the clocks from it.
 
         After the points are out; the next step() does it where nobody has. Counts from the next
-        frame on.
+        frame on. behind: other frames wait, which is worth more than to learn from all of them.
         """
         unsettled, self._unsettled = self._unsettled, []
-        for work in unsettled:
-            work()
+        if unsettled:
+            self._passed_over = self._passed_over + 1 if behind else 0
+            if self._passed_over % _LEARN_ONE_OF:
+                self.unlearned += 1
+            else:
+                for work in unsettled:
+                    work()
         self.method.settle()
 
     def _watch(self, view: View, times_s: Array) -> None:

@@ -53,12 +53,14 @@ async def test_who_is_to_answer_in_time_skips_what_has_waited_once_it_cannot_kee
     subscription = receiver.in_time(topics.POINTS, 8192)
     publisher = await publisher_of(sender, topics.POINTS, hand="right")
     taken: list[int] = []
+    waited_s: list[float] = []
     sent = 0
 
     def take(message: HandPoints) -> None:
         """Four more come for each that is answered."""
         nonlocal sent
         taken.append(message.seq)
+        waited_s.append(subscription.waited_s)
         for _ in range(4):
             sent += 1
             publisher.put(points(sent))
@@ -71,6 +73,8 @@ async def test_who_is_to_answer_in_time_skips_what_has_waited_once_it_cannot_kee
         await subscription.each(take)
     assert taken == sorted(set(taken))
     assert taken[-1] - len(taken) >= 99
+    # A reader is told how late it is: from at once to more than what is skipped.
+    assert 0.0 < waited_s[0] < 0.2 < max(waited_s)
 
 
 async def test_latest_keeps_the_newest_of_each_key(pair):

@@ -44,12 +44,16 @@ class Heard:
 
     points: dict[int, HandPoints] = field(default_factory=dict)
     poses: dict[int, HandPose] = field(default_factory=dict)
-    # That came to fusion after points which they should have counted for, by its own count.
+    # By fusion's own count: poses that came after points which they should have counted for, and
+    # frames that it had no time to learn from.
     late_poses: float = 0.0
+    unlearned: float = 0.0
 
     def in_time(self, expected: list[int]) -> bool:
-        """Whether each pose that offline has came before the points that rest on it."""
-        return not self.late_poses and all(
+        """Whether each pose that offline has came before the points that rest on it, and fusion
+        had time for each frame.
+        """
+        return not (self.late_poses or self.unlearned) and all(
             stamp_ns in self.poses
             and all(
                 points.sent_ns > self.poses[stamp_ns].sent_ns + _ON_ITS_WAY_NS
@@ -143,7 +147,9 @@ async def _played_live(recording: Capture, rate: float) -> Heard:
         beats = bus.every(topics.HEALTH, 8, service="fusion", instance="main")
         async with asyncio.timeout(START_S):
             for _ in range(2):
-                heard.late_poses = (await anext(beats)).values["late_poses"]
+                values = (await anext(beats)).values
+                heard.late_poses = values["late_poses"]
+                heard.unlearned = values["frames_unlearned"]
         for listener in listeners:
             listener.cancel()
     return heard

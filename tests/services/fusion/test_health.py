@@ -25,7 +25,7 @@ def test_figures_of_a_second():
     assert values["epipolar_px"] < 0.2
     assert {"late_left_ms", "late_right_ms", "height_left_right_px"} <= values.keys()
     assert [values[name] for name in ("dropped", "incoherent", "moved_pairs")] == [0.0, 0.0, 0.0]
-    assert values["late_poses"] == 0.0
+    assert values["late_poses"] == values["frames_unlearned"] == 0.0
     assert values["started"] == 6.0
 
 

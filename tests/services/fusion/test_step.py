@@ -263,6 +263,23 @@ def test_what_points_do_not_wait_for_is_the_same_whoever_does_it():
     assert two.clocks.updates > 0
 
 
+def test_a_loop_that_is_behind_learns_less_and_tells_as_much():
+    """The clocks from a third of the frames; they come out the same all the same."""
+    given_frames = frames(SETUP, MOVING, 4.0)
+    ready, behind = (FusionStep(SETUP.config(), SETUP.rig(), point_hands()) for _ in range(2))
+    told: dict[FusionStep, int] = {ready: 0, behind: 0}
+    for frame in given_frames:
+        for step in told:
+            told[step] += len(step.step(frame))
+            step.settle(behind=step is behind)
+    assert ready.unlearned == 0
+    assert behind.unlearned == pytest.approx(2 / 3 * len(given_frames), abs=2)
+    assert told[behind] == told[ready] > 100
+    assert 0 < behind.clocks.updates < ready.clocks.updates
+    for camera, late_s in ready.clocks.late_s.items():
+        assert behind.clocks.late_s[camera] == pytest.approx(late_s, abs=5e-4)
+
+
 def test_cameras_may_see_nothing_for_as_long_as_they_like():
     """Also while clocks that are off are searched for, which rests on seconds of markers."""
     setup = SyntheticRig()
