@@ -1,8 +1,9 @@
 """The solver: hand/<h>/points in, hand/<h>/pose out, for every hand of rig.toml.
 
-Only the newest points count (latest): a solver that is behind skips. Missing points: no pose is
-published. A hand that was never measured is solved with the tables' bones at the scale of rig.toml,
-and health says so. Health also tells how long a pose takes. A new hand.<hand>.json starts it anew.
+Points that come at once have their poses all the same; a solver that is further behind skips the
+oldest. Missing points: no pose is published. A hand that was never measured is solved with the
+tables' bones at the scale of rig.toml, and health says so. Health also tells how long a pose takes.
+A new hand.<hand>.json starts it anew.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from rhot.process.service import Service
 from services.solver.step import SolverStep
 from services.solver.warm import warm_up
 
+# Points of one hand that may wait: what fusion, held up by something else, tells in one go.
+_WAITING = 4
 # A challenge, which takes 5 ms, waits so long after its pose: the other hand's points come at once
 # after those of this one, the next ones after 8 ms at the least.
 _CHALLENGE_S = 0.002
@@ -43,7 +46,7 @@ async def serve(service: Service) -> None:
     await asyncio.get_running_loop().run_in_executor(None, warm_up, config, hands)
     streams = {
         name: (
-            service.bus.latest(topics.POINTS, hand=name),
+            service.bus.every(topics.POINTS, _WAITING, hand=name),
             service.bus.publisher(topics.POSE, hand=name),
         )
         for name in hands

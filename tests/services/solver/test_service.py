@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import msgspec
 import pytest
 
 from rhot import topics
-from rhot.bus.bus import Bus, open_bus
+from rhot.bus.bus import Bus, Subscription, open_bus
 from rhot.errors import CalibrationError, ConfigError
 from rhot.files.calibration import save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import HandTable, RigTable
 from rhot.hand import default_hand
+from rhot.messages import HandPoints, HandPose
 from rhot.process.service import Service
 from services.solver.service import serve
 
@@ -65,7 +67,7 @@ async def test_points_in_poses_out_with_garbage_between(
         def send() -> None:
             nonlocal count
             count += 1
-            # `latest` keeps the newest only, whatever it is: each kind gets a moment of its own.
+            # Few may wait, whatever they are: each kind gets a moment of its own.
             kind = count % 3
             if kind == 0:
                 bus.put_raw(
@@ -91,6 +93,47 @@ async def test_points_in_poses_out_with_garbage_between(
         assert service.state == "running"
         assert service.values["right_from_tables"] == 1.0
         assert service.values["right_solve_ms"] > 0.0
+
+
+async def test_points_that_come_at_once_have_their_poses(
+    router: str, tmp_path: Path, world: Callable
+) -> None:
+    """As from a fusion that something held up: the first of five is skipped."""
+    ours = world("right")
+    message = ours.message(ours.points(ours.motion(1, 1)[0]), 0)
+
+    def numbered(seq: int) -> HandPoints:
+        return msgspec.structs.replace(message, seq=seq, stamp_ns=10**18 + seq * 20_000_000)
+
+    async with running(router, rig(tmp_path, "right")) as (_, bus):
+        points, poses = bus.publisher(topics.POINTS, hand="right"), bus.every(topics.POSE, 16)
+        sent = 0
+
+        def send() -> None:
+            nonlocal sent
+            sent += 1
+            points.put(numbered(sent))
+
+        def send_at_once() -> None:
+            """The solver shares this event loop: all of them come before it can take one."""
+            for seq in range(1001, 1006):
+                points.put(numbered(seq))
+            time.sleep(0.5)
+
+        sender = asyncio.create_task(_sending(send))
+        await anext(poses)
+        sender.cancel()
+        await asyncio.sleep(0.2)
+        send_at_once()
+        told = [seq async for seq in _seqs(poses, 1005)]
+    assert [seq for seq in told if seq > 1000] == [1002, 1003, 1004, 1005]
+
+
+async def _seqs(poses: Subscription[HandPose], last: int) -> AsyncIterator[int]:
+    async for pose in poses:
+        yield pose.seq
+        if pose.seq >= last:
+            return
 
 
 async def test_a_measured_hand_is_used(router: str, tmp_path: Path) -> None:
