@@ -31,7 +31,7 @@ _TIMES_SPEED, _TIMES_RANGE = 1.5, 2.0
 # A hand that rested may set off, and one that is fast is not lost at once: least and most.
 _RATE_M_S, _FARTHEST_M = (0.05, 1.0), (0.02, 0.3)
 # Taken for granted before anything is learnt: speed and standard deviation.
-_FIRST_M_S, _FIRST_M = 0.15, 0.05
+_FIRST_M_S, _FIRST_M = 0.15, 0.035
 # Instants that are farther apart than so many are not of one motion.
 _GAP_SPANS = 3.5
 
