@@ -31,11 +31,13 @@ _MAX_RAY_SIGMA_M = 1.0
 # A point that no camera sees is trusted a third as much as one seen: its sigma says how it was
 # filtered, not that it turned.
 _PREDICTED_SIGMA_FACTOR = 3.0
-# What a single camera sees is predicted along its ray, and all landmarks of a hand are wrong there
-# together. Tips of turning hands seen by one camera (synthetic points, .06 px; fists and random
-# motions), for .3 s and then to 1 s, mm RMS: at 3 9.3 and 69, at 6 10.1 and 56, at 10 12.2 and 45,
-# at 1000 50 and 77; without such points 17 and 106.
-_RAY_SIGMA_FACTOR = 5.0
+# What a single camera sees is predicted along its ray, and the landmarks of a hand are wrong there
+# together: six of them tell its distance no better than one. Beyond that, bones and the habitual
+# posture decide how far away the hand is: at 5 a hand that plays drifted by 14 mm within a second,
+# whose points were 6 mm off. Tips over a second of one camera, and three tips for .5 s (tuning half
+# of benchmarks/one_camera_poses.py, geometric mean, mm): at 1 14.7 and 3.1, at 2 14.5 and 2.4, at
+# this 14.6 and 2.4, at 5 18.4 and 2.5.
+_RAY_SIGMA_FACTOR = math.sqrt(6.0)
 # So many of its own sigmas further than it reaches may a point seem to be: the distance along a
 # single camera's ray is hardly known.
 _VAGUE_SIGMAS = 2.0

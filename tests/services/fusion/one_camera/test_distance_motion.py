@@ -41,14 +41,22 @@ def test_it_grows_with_time_up_to_the_range():
     motion = seen(swing(0.05))
     grown = [moved_sigma_m(motion, 0, age_s) for age_s in (0.05, 0.1, 0.5, 5.0)]
     assert grown[0] == pytest.approx(0.5 * grown[1])
-    assert grown[1] < grown[2] == grown[3] == pytest.approx(0.05, rel=0.3)
+    assert grown[1] < grown[2] == grown[3] == pytest.approx(0.07, rel=0.3)
+
+
+def test_it_covers_the_other_end_of_a_way():
+    distances_m = swing(0.12)
+    half_s = np.pi / 5.0
+    apart_m = distances_m[round(half_s / SPAN_S) :] - distances_m[: -round(half_s / SPAN_S)]
+    sigma_m = moved_sigma_m(seen(distances_m), 0, half_s)
+    assert sigma_m == pytest.approx(np.sqrt(np.mean(apart_m**2)), rel=0.2)
 
 
 def test_a_resting_hand_may_set_off_and_a_fast_one_is_not_lost():
     resting, fast = seen(np.full(240, 0.6)), seen(swing(0.3))
     assert 0.0 < moved_sigma_m(resting, 0, 0.1) < 0.01
     assert moved_sigma_m(resting, 0, 1.0) == pytest.approx(0.02)
-    assert moved_sigma_m(fast, 0, 1.0) == pytest.approx(0.12)
+    assert moved_sigma_m(fast, 0, 1.0) == pytest.approx(0.3)
 
 
 def test_a_gap_is_no_motion():

@@ -55,7 +55,7 @@ def test_what_two_cameras_never_saw_is_told_as_the_filter_has_it():
         assert np.array_equal(cov, COV)
 
 
-@pytest.mark.parametrize(("swing_m", "least_m", "most_m"), [(0.0, 0.01, 0.04), (0.1, 0.08, 0.13)])
+@pytest.mark.parametrize(("swing_m", "least_m", "most_m"), [(0.0, 0.01, 0.04), (0.1, 0.08, 0.15)])
 def test_the_distance_is_as_unsure_as_the_hand_lately_moved(swing_m, least_m, most_m):
     last = LastLocated(np.zeros(1, dtype=np.int64), CENTRE, 1.0 / 60.0)
     estimates = no_estimates(1, 2)
