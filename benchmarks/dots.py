@@ -11,7 +11,7 @@ names. Beside the tracker of dots: each dot takes the nearest blob, and the opti
 all dots to blobs within 60 px. Live, each picture is told as it comes; with hindsight, as `rhot
 track` does it, all of a clip are known before the first is told. Constants of motion were chosen on
 `grab` with even seeds of 0 to 4, how blobs are cut and the ways of hindsight on 8 dots with seeds 0
-to 29; here are other seeds, other recordings, and 15 dots.
+to 29 and on 15 dots with seeds 0 to 3; here are other seeds and other recordings.
 """
 
 from __future__ import annotations

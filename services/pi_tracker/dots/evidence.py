@@ -8,7 +8,8 @@ names are given, so that many postures and accelerations are followed, and accou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -62,11 +63,35 @@ class Judge:
         told: Sequence[Told],
     ) -> None:
         """told is an account of all, if a rough one: it says how large dots are as a rule."""
-        self._begun, self._pictures, self._times_s = begun, pictures, times_s
-        self._areas = _usual_areas(pictures, told)
+        self._begun, self.pictures, self.times_s = begun, pictures, times_s
+        # (n,) px^2, as a rule.
+        self.areas = _usual_areas(pictures, told)
         false = [len(p.areas) - len(set(own) - {-1}) for p, own in zip(pictures, told, strict=True)]
         width, height = begun.size_px
-        self._false_density = (float(np.mean(false)) + FEWEST_FALSE) / (width * height)
+        # Patches that are no dots, per px^2.
+        self.false_density = (float(np.mean(false)) + FEWEST_FALSE) / (width * height)
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The hand whose dots they are."""
+        return self._begun.skeleton
+
+    def backwards(self, last: Trace) -> Judge:
+        """The same of the pictures from the last to the first; `last` is a trace after the last."""
+        states = motion.reversed_in_time(self.skeleton, last.states)
+        turned = copy(self)
+        turned._begun = self._begun._replace(states=states, scores=last.scores - last.nats)
+        turned.pictures = self.pictures[::-1]
+        turned.times_s = [-time_s for time_s in self.times_s[::-1]]
+        return turned
+
+    def retraced(self, told: Sequence[Told]) -> Iterator[Trace]:
+        """What is known after each picture of an account of all."""
+        trace = self.begin(told[0])
+        yield trace
+        for number in range(1, len(told)):
+            trace = self.follow(trace, number, told[number])
+            yield trace
 
     def begin(self, told: Told) -> Trace:
         """After the first picture."""
@@ -76,16 +101,16 @@ class Judge:
             begun.scores,
             np.arange(len(begun.scores)),
             (patch < 0).astype(np.int64),
-            np.delete(self._pictures[0].places, patch[patch >= 0], axis=0),
+            np.delete(self.pictures[0].places, patch[patch >= 0], axis=0),
         )
 
     def follow(self, before: Trace, number: int, told: Told) -> Trace:
         """After picture `number`, of which `told` has dots' patches; before is that before it."""
-        patches, patch = self._pictures[number], np.array(told)
-        known = Known(0.0, self._areas, before.unseen, before.false)
-        view = View(known, patches, self._false_density)
-        elapsed_s = motion.between(self._times_s[number - 1], self._times_s[number])
-        parent, states, scores = _followed(self._begun.skeleton, before, view, patch, elapsed_s)
+        patches, patch = self.pictures[number], np.array(told)
+        known = Known(0.0, self.areas, before.unseen, before.false)
+        view = View(known, patches, self.false_density)
+        elapsed_s = motion.between(self.times_s[number - 1], self.times_s[number])
+        parent, states, scores = _followed(self.skeleton, before, view, patch, elapsed_s)
         scores, branch = scores + view.claims(patch), before.branch[parent]
         rows = _best(scores, branch)
         return Trace(

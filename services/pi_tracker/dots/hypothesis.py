@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.skeleton import Skeleton
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,8 @@ HIDDEN, AREA_NOISE = 0.34, 0.25
 # A dot's area varies by so much (sigma of its logarithm) below and above what it was of late, and
 # no patch is judged by more than so many nats on it.
 _AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (2.0, 4.0)
+# No account is kept that is so much (nats) less likely than the best.
+_WORSE_NATS = 14.0
 # Weight of a new area.
 _AREA_WEIGHT = 0.1
 
@@ -197,10 +200,20 @@ class View:
         return np.asarray((patch >= 0) & (counts[patch] > 1))
 
 
-def normalised(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The same with the best score 0."""
-    best = max(one.score for one in hypotheses)
-    return [replace(one, score=one.score - best) for one in hypotheses]
+def pruned(hypotheses: list[Hypothesis], search: Search) -> list[Hypothesis]:
+    """The best with the best score 0, best first; few of those that agree in two pictures."""
+    kept: list[Hypothesis] = []
+    alike: dict[tuple[tuple[int, ...], tuple[int, ...]], set[int]] = {}
+    for one in sorted(hypotheses, key=lambda one: -one.score):
+        branches = alike.setdefault((one.patch, one.before), set())
+        if one.branch not in branches and len(branches) < search.alike:
+            branches.add(one.branch)
+            kept.append(one)
+        if len(kept) >= search.kept:
+            break
+    best = kept[0].score
+    likely = [one for one in kept if one.score - best > -_WORSE_NATS]
+    return [replace(one, score=one.score - best) for one in likely]
 
 
 def _false_density(places: Array, before: Array, density: float) -> Array:

@@ -62,10 +62,9 @@ class State(NamedTuple):
 
 
 class Update(NamedTuple):
-    """k states with their measurements: squared innovations (k,), log likelihoods (k,)."""
+    """k states with their measurements, and log likelihoods (k,)."""
 
     state: State
-    squared: Array
     nats: Array
 
 
@@ -105,6 +104,13 @@ def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:
     covs = step @ state.covs @ step.T
     covs[:, person, person] += (1.0 - stay**2) * skeleton.person**2
     return _folded(state._replace(means=state.means @ step.T, covs=covs))
+
+
+def reversed_in_time(skeleton: Skeleton, state: State) -> State:
+    """The states as time that runs backwards has them: what moves goes where it came from."""
+    signs = np.ones(skeleton.size + skeleton.moving)
+    signs[skeleton.size :] = -1.0
+    return state._replace(means=state.means * signs, covs=state.covs * np.outer(signs, signs))
 
 
 def _accelerated(skeleton: Skeleton, hand: int, angles: int, elapsed_s: float) -> Array:
@@ -158,38 +164,48 @@ def updated(
     Also with what hands do: usual angles, and joints' ends. The log likelihood is that of the dots'
     places, per px^2 each, times how usual the posture is.
     """
-    count, dots = seen.shape
-    first, usual = 2 * dots, len(skeleton.targets)
-    total = first + usual + skeleton.angles
-    rows = np.zeros((count, total, state.means.shape[1]))
-    rows[:, first : first + usual, : skeleton.size] = skeleton.rows
+    # What is usual is linear: it is entered once, before dots are linearised again and again.
+    state, usual = _usual(skeleton, state)
+    (count, dots), size = seen.shape, skeleton.size
+    first, total = 2 * dots, 2 * dots + skeleton.angles
+    rows = np.zeros((count, total, size))
     spread = np.ones((count, total))
     spread[:, :first] = np.repeat(np.where(seen, variances, 1.0), 2, axis=1)
-    spread[:, first : first + usual] = skeleton.variances / _USUAL_SHARE
     offsets = np.zeros((count, total))
-    shift, now = np.zeros_like(state.means), state
+    shift, now = np.zeros_like(state.means), _folded(state)
     for _ in range(_ROUNDS):
         pixels, slopes = skeleton.project(now.means, now.rotations, now.sides)
         slopes *= seen[:, :, None, None]
-        rows[:, :first, : skeleton.size] = slopes.reshape(count, first, -1)
+        rows[:, :first] = slopes.reshape(count, first, size)
         offsets[:, :first] = ((places - pixels) * seen[..., None]).reshape(count, first)
-        usually = now.means[:, : skeleton.size] @ skeleton.rows.T
-        offsets[:, first : first + usual] = skeleton.targets - usually
         _limit(skeleton, now, rows, offsets, spread)
-        residuals = offsets + np.einsum("kmd,kd->km", rows, shift)
-        cross = state.covs @ rows.swapaxes(1, 2)
-        cov = rows @ cross
+        residuals = offsets + np.einsum("kms,ks->km", rows, shift[:, :size])
+        cross = state.covs[:, :, :size] @ rows.swapaxes(1, 2)
+        cov = rows @ cross[:, :size]
         cov[:, np.arange(total), np.arange(total)] += spread
-        inverse = np.linalg.inv(cov)
-        gain = cross @ inverse
-        shift = np.einsum("kdm,km->kd", gain, residuals)
+        weighed = np.linalg.solve(cov, residuals[..., None])
+        shift = (cross @ weighed)[..., 0]
         now = _folded(state._replace(means=state.means + shift))
-    squared = np.einsum("km,kmn,kn->k", residuals, inverse, residuals)
+    squared = np.einsum("km,km->k", residuals, weighed[..., 0])
     # Dots have a density, postures a weight.
     log_det = np.linalg.slogdet(cov)[1] - np.log(spread[:, first:]).sum(axis=1)
-    nats = -0.5 * (squared + log_det) - seen.sum(axis=1) * np.log(2.0 * np.pi)
-    covs = state.covs - gain @ cross.swapaxes(1, 2)
-    return Update(now._replace(covs=0.5 * (covs + covs.swapaxes(1, 2))), squared, nats)
+    nats = usual - 0.5 * (squared + log_det) - seen.sum(axis=1) * np.log(2.0 * np.pi)
+    covs = state.covs - cross @ np.linalg.solve(cov, cross.swapaxes(1, 2))
+    return Update(now._replace(covs=0.5 * (covs + covs.swapaxes(1, 2))), nats)
+
+
+def _usual(skeleton: Skeleton, state: State) -> tuple[State, Array]:
+    """k states with the angles that are usual, and how usual theirs are (k,), nats."""
+    rows, spread = skeleton.rows, skeleton.variances / _USUAL_SHARE
+    cross = state.covs[:, :, : skeleton.size] @ rows.T  # (k, d, r)
+    cov = rows @ cross[:, : skeleton.size] + np.diag(spread)
+    residuals = skeleton.targets - state.means[:, : skeleton.size] @ rows.T
+    gain = cross @ np.linalg.inv(cov)
+    weighed = np.linalg.solve(cov, residuals[..., None])
+    squared = np.einsum("kr,kr->k", residuals, weighed[..., 0])
+    nats = -0.5 * (squared + np.linalg.slogdet(cov)[1] - np.log(spread).sum())
+    means = state.means + (cross @ weighed)[..., 0]
+    return state._replace(means=means, covs=state.covs - gain @ cross.swapaxes(1, 2)), nats
 
 
 def _limit(skeleton: Skeleton, now: State, rows: Array, offsets: Array, spread: Array) -> None:

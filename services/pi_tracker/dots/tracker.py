@@ -27,7 +27,7 @@ from services.pi_tracker.dots.hypothesis import (
     Patches,
     Surroundings,
     Way,
-    normalised,
+    pruned,
 )
 from services.pi_tracker.dots.search import LIVE, Search
 from services.pi_tracker.dots.skeleton import Skeleton
@@ -36,8 +36,6 @@ from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 
 Array = npt.NDArray[np.float64]
 
-# No account is kept that is so much (nats) less likely than the best.
-_WORSE_NATS = 14.0
 # Of the number of false patches: weight of a new picture.
 _FALSE_WEIGHT = 0.05
 # At the start no dot is known better than to this share of the root of its area.
@@ -97,7 +95,7 @@ class DotTracker:
         arrays = arrays_of(patches)
         around = self._around(elapsed_s)
         found = extend(self._hypotheses, arrays, around, elapsed_s, self._search)
-        self._hypotheses = _pruned(found, self._search)
+        self._hypotheses = pruned(found, self._search)
         false = len(patches) - len({p for p in self._hypotheses[0].patch if p >= 0})
         self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)
@@ -236,17 +234,3 @@ def arrays_of(patches: Sequence[Patch]) -> Patches:
         np.array([p.whole for p in patches], np.int64),
         np.array([p.whole_px for p in patches]).reshape(count, 2),
     )
-
-
-def _pruned(hypotheses: list[Hypothesis], search: Search) -> list[Hypothesis]:
-    """The best, best first; of those that agree in the last two pictures, of different starts."""
-    kept: list[Hypothesis] = []
-    alike: dict[tuple[tuple[int, ...], tuple[int, ...]], set[int]] = {}
-    for one in sorted(hypotheses, key=lambda one: -one.score):
-        branches = alike.setdefault((one.patch, one.before), set())
-        if one.branch not in branches and len(branches) < search.alike:
-            branches.add(one.branch)
-            kept.append(one)
-        if len(kept) >= search.kept:
-            break
-    return [one for one in normalised(kept) if one.score > -_WORSE_NATS]

@@ -4,7 +4,8 @@ Live, the likeliest account of the moment is told, which later pictures may cont
 is searched from its start in several ways (search.py), and from pictures in the middle of it
 forwards and backwards (again.py). Of what these accounts say, the way through all pictures is told
 that makes them the likeliest (weaving.py, evidence.py). Names that were exchanged for a while, by a
-search that gave up the right account too soon, are then right from where they were lost.
+search that gave up the right account too soon, are then right from where they were lost. What all
+searches have lost is searched on from the posture that this way has until there (resumed.py).
 """
 
 from __future__ import annotations
@@ -15,14 +16,15 @@ import numpy as np
 
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
 from services.pi_tracker.dots.evidence import Judge
+from services.pi_tracker.dots.hindsight import resumed
 from services.pi_tracker.dots.hindsight.again import searched_again
 from services.pi_tracker.dots.hindsight.weaving import Account, woven
 from services.pi_tracker.dots.hypothesis import SHARED
 from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
 
-# How often each picture is searched: from the start in each way, and from the middle.
-LOOKS = len(SEVERAL) + 1
+# How often each picture is looked at: from the start in each way, from the middle, and resumed.
+LOOKS = len(SEVERAL) + 1 + resumed.LOOKS
 
 Begin = Callable[[Search], DotTracker]
 
@@ -54,7 +56,7 @@ def look_back(
         [one.time_s for one in seen],
         list(accounts[0].values()),
     )
-    for _ in range(len(pictures) - count):
+    for _ in range((LOOKS - len(SEVERAL)) * (len(pictures) - count)):
         advance()
     told = woven(judge, accounts, count)
     accounts += searched_again(
@@ -64,7 +66,8 @@ def look_back(
         told,
         advance,
     )
-    return _dots(names, woven(judge, accounts, count), [one.patches for one in pictures])
+    told = resumed.resumed(judge, woven(judge, accounts, count), advance)
+    return _dots(names, told, [one.patches for one in pictures])
 
 
 def _dots(

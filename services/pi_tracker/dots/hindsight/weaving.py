@@ -19,7 +19,7 @@ Account = Mapping[int, Told]
 # An account goes on from the past of another with which it agrees in so many pictures in a row: two
 # postures with the same names need some to show which of them is right. (4, 8 and 15 pictures, ten
 # clips of `grab`, seeds 5 to 29 of benchmarks/dots.py: 99.36, 99.34 and 99.48 % right.)
-_AGREED = 15
+AGREED = 15
 
 
 class _Thread(NamedTuple):
@@ -68,7 +68,7 @@ def _joined(
     """The likeliest thread of those that agree, for each account that agrees with any."""
     alike: dict[tuple[Told | None, ...], list[int]] = {}
     for k, own in enumerate(accounts):
-        late = tuple(own.get(number - back) for back in range(min(_AGREED, number + 1)))
+        late = tuple(own.get(number - back) for back in range(min(AGREED, number + 1)))
         if None not in late:
             alike.setdefault(late, []).append(k)
     found: dict[int, _Thread] = {}

@@ -17,15 +17,15 @@ def _pictures() -> list[Patches]:
     return [arrays_of(patches_at(REST + np.array([4.0, -2.0]) * k)) for k in range(12)]
 
 
-def _evidence(told: list[tuple[int, ...]], pictures: list[Patches]) -> float:
+def _judge(told: list[tuple[int, ...]], pictures: list[Patches]) -> Judge:
     tracker = DotTracker(NAMES, SIZE)
     tracker.step(patches_at(REST), 0.0)
     assert tracker.begun is not None
-    judge = Judge(tracker.begun, pictures, TIMES, told)
-    trace = judge.begin(told[0])
-    for number in range(1, len(told)):
-        trace = judge.follow(trace, number, told[number])
-    return trace.nats
+    return Judge(tracker.begun, pictures, TIMES, told)
+
+
+def _evidence(told: list[tuple[int, ...]], pictures: list[Patches]) -> float:
+    return list(_judge(told, pictures).retraced(told))[-1].nats
 
 
 def test_exchanged_and_missing_names_are_less_likely() -> None:
@@ -55,3 +55,19 @@ def test_no_dot_needs_to_be_seen_and_one_picture_is_none_after_the_first() -> No
     empty = [pictures[0], *[arrays_of([])] * 11]
     assert np.isfinite(_evidence([RIGHT] + [nothing] * 11, empty))
     assert np.isfinite(_evidence([RIGHT], pictures[:1]))
+
+
+def test_backwards_the_same_names_are_right() -> None:
+    pictures, right = _pictures(), [RIGHT] * 12
+    judge = _judge(right, pictures)
+    back = judge.backwards(list(judge.retraced(right))[-1])
+    traces = list(back.retraced(right))
+    pixels, _ = judge.skeleton.project(*traces[-1].states[:3])
+    assert np.abs(pixels[0] - pictures[0].places).max() < 3.0
+    tips = (0, 1, 2, 7, 4, 5, 6, 3)
+    exchanged = list(back.retraced([RIGHT] * 6 + [tips] * 6))
+    assert exchanged[-1].nats < traces[-1].nats - 10.0
+    # Where the hand goes backwards, too.
+    ahead = list(judge.retraced(right))[6].states.means[0, judge.skeleton.size :][:2]
+    behind = traces[6].states.means[0, judge.skeleton.size :][:2]
+    assert np.all(ahead * behind < 0.0)

@@ -76,3 +76,18 @@ def test_a_hidden_tip_goes_along_with_its_finger(begun: list[tuple[float, motion
     assert moved > 60.0
     assert np.linalg.norm(pixels[best, 7] - _seen(0.7)[7]) < 0.25 * moved
     assert np.linalg.eigvalsh(state.covs[best]).min() > 0.0
+
+
+def test_time_that_runs_backwards_leads_back(begun: list[tuple[float, motion.State]]) -> None:
+    state = motion.together([one for _, one in begun])
+    size = SKELETON.size
+    means = state.means.copy()
+    means[:, size:] = np.linspace(-1.0, 1.0, SKELETON.moving)
+    ahead = motion.coasted(SKELETON, state._replace(means=means), 0.01)
+    back = motion.coasted(SKELETON, motion.reversed_in_time(SKELETON, ahead), 0.01)
+    # Velocities fade by a twenty-fifth meanwhile.
+    away, left = ahead.means[:, :3] - means[:, :3], back.means[:, :3] - means[:, :3]
+    assert np.all(np.abs(left) < 0.05 * np.abs(away))
+    assert np.linalg.eigvalsh(back.covs).min() > 0.0
+    twice = motion.reversed_in_time(SKELETON, motion.reversed_in_time(SKELETON, ahead))
+    assert all(np.array_equal(a, b) for a, b in zip(twice, ahead, strict=True))
