@@ -123,17 +123,21 @@ class HandFilter:
             return False
         index = int(indices[0])
         node = history.order[index]
-        history.begins[node, landmark] = True
         # From the first look's instant to its node's.
         back_s = -history.delay_s[node, landmark]
         motion = start.motion.copy()
         motion[:3] += back_s * motion[3:6]
         history.motion[node, landmark] = motion
-        for later in history.order[index : history.size[0]]:
-            history.ends[later, landmark] = False
-            if later != node:
-                history.begins[later, landmark] = False
+        since = history.order[index : history.size[0]]
+        before = history.begins[since, landmark], history.ends[since, landmark]
+        history.begins[since, landmark] = since == node
+        history.ends[since, landmark] = False
         self._filter_from(index)
+        if not self._has_depth(landmark, indices):
+            history.begins[since, landmark], history.ends[since, landmark] = before
+            self._filter_from(index)
+            self._counts.refused += 1
+            return False
         for k in indices.tolist():
             at = history.order[k]
             if history.used[at, landmark]:
@@ -144,6 +148,21 @@ class HandFilter:
         self._counts.started += 1
         self._sights.begun_s[landmark] = now_s
         return True
+
+    def _has_depth(self, landmark: int, indices: Ints) -> bool:
+        """Whether the filter took looks of two cameras, of what a landmark has begun with.
+
+        Of the second one more than one, where it has more: a single one tells where the landmark
+        was, not how it moves along the other's ray. (A finger that tapped was 210 mm off so.)
+        """
+        history = self._history
+        nodes = history.order[indices]
+        taken, offered = (
+            np.bincount(history.camera[nodes[which]], minlength=len(self._cameras.t))
+            for which in (history.used[nodes, landmark], np.ones(len(nodes), dtype=bool))
+        )
+        second = np.argsort(offered)[-2]
+        return bool(taken[second] >= min(offered[second], 2))
 
     def _velocity(self, landmark: int) -> Array:
         """What others of the hand move by on average (3,), if the newest frame's looks fit two.
