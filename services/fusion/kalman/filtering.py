@@ -218,7 +218,8 @@ def _update(
         look, innovation = look_of(history, node, k, cameras), innovation_of(history, node, m, k)
         begins, strikes = history.begins[node, k], history.strikes[node, m, k]
         stray = STRAY - (0 if begins else min(strikes, 3)) * AGAIN
-        determinant = innovate(x, P, taken, known, look, innovation)
+        far = gate if history.returns[node, k] else 0.0
+        determinant = innovate(x, P, taken, known, look, far, innovation)
         price = 0.0
         if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
             own = own_motion(look, innovation, determinant, Q, usual)
@@ -226,7 +227,7 @@ def _update(
                 add_own(P, k, own.density, Q)
                 history.own[node, m, k] += own.density
                 price = own.price
-                determinant = innovate(x, P, taken, known, look, innovation)
+                determinant = innovate(x, P, taken, known, look, 0.0, innovation)
         used = determinant > 0.0 and innovation.distance[0] <= gate
         history.used_by[node, m, k] = used
         if used:

@@ -20,6 +20,8 @@ from services.fusion.kalman.motion_models import MotionModels
 
 # What one camera alone has seen for longer is forgotten: by then its distance says nothing.
 ONE_CAMERA_S = 2.0
+# What one camera has seen alone for longer may be far off along its ray: three frames at 30 fps.
+ALONE_S = 0.1
 # A landmark that two cameras have seen lately and whose sigma is above both, absolutely and against
 # the median of its hand, begins again with no fewer looks: from any number, with a fifth of the
 # markers missing, it began up to 437 mm off.
@@ -96,7 +98,9 @@ def take_in(
         history.ray[node, k] = looks.rays[n]
         history.ray_variance[node, k] = looks.sigmas[n] ** 2
         away_s = time_s - sights.accepted_s[k, looks.camera]
-        fates.back[k] = min(alone_since(sights, k, time_s), away_s) > sights.hold_s
+        alone_s = min(alone_since(sights, k, time_s), away_s)
+        history.returns[node, k] = alone_s > ALONE_S
+        fates.back[k] = alone_s > sights.hold_s
     filter_from(history, index, cameras, models, gate)
     for n in range(looks.landmarks.size):
         k, at_s = looks.landmarks[n], looks.times_s[n]

@@ -17,6 +17,11 @@ from services.fusion.geometry.projection import project_at
 from services.fusion.kalman.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
+# A look that moves its landmark by more than this is linearised anew where that leaves it; from
+# twice a landmark's distance to it takes five rounds. Moves beyond the largest room are none.
+_NEAR_M, _FARTHEST_M, _ROUNDS = 0.02, 100.0, 8
+
+Shift = tuple[float, float, float]
 
 
 class Look(NamedTuple):
@@ -42,45 +47,108 @@ class Innovation(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def predict_ray(x: Array, look: Look, out: Innovation) -> bool:
-    """H, drift and nu of a look, by a state (D,); False if it is not in front of the camera."""
+def predict_ray(x: Array, look: Look, shift: Shift, out: Innovation) -> bool:
+    """H, drift and nu of a look, by a state (D,); False if it is not in front of the camera.
+
+    H is of the landmark's place shifted by so much (m), and nu what follows from it for the state.
+    """
     axes = (x.shape[0] - 1) // 3
     first = 3 * look.landmark
     delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
     place_x = x[first] + delay_s * x[axes + first] + half * x[2 * axes + first]
     place_y = x[first + 1] + delay_s * x[axes + first + 1] + half * x[2 * axes + first + 1]
     place_z = x[first + 2] + delay_s * x[axes + first + 2] + half * x[2 * axes + first + 2]
+    place_x, place_y, place_z = place_x + shift[0], place_y + shift[1], place_z + shift[2]
     if not project_at(place_x, place_y, place_z, look.R, look.t, out.nu, out.H):
         return False
     for k in range(2):
-        out.drift[k] = 0.0
+        out.drift[k], along = 0.0, 0.0
         for i in range(3):
             out.drift[k] += out.H[k, i] * x[axes + first + i]
-        out.nu[k] = look.ray[k] - out.nu[k] - out.drift[k] * x[3 * axes]
+            along += out.H[k, i] * shift[i]
+        out.nu[k] = look.ray[k] - out.nu[k] + along - out.drift[k] * x[3 * axes]
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def innovate(x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation) -> float:
+def innovate(
+    x: Array, P: Array, taken: Array, known: int, look: Look, far: float, out: Innovation
+) -> float:
     """The innovation of a look by a state (D,), (D, D); returns det(S).
 
     Of the frame's looks that take() took, P knows nothing yet: what they say of it are the first
     `known` rows of taken (n, D). Of the clock's error P knows its own variance only. The
     determinant is not positive, and the innovation of no use, if the landmark is not in front of
     the camera.
+
+    Within a squared distance of `far` it is linearised anew where it moves the landmark far (an
+    iterated extended Kalman filter: Bell, Cathey, IEEE Trans. Automatic Control 38(2), 1993): a
+    landmark that one camera saw alone may be decimetres off along its ray, and the other camera's
+    first look threw it as far to the other side. With 0 it is not: a landmark that both see is
+    near, and some place far off would explain a look that is of another thing.
     """
-    if not predict_ray(x, look, out):
+    if not predict_ray(x, look, (0.0, 0.0, 0.0), out):
         return 0.0
     _cross_cov(P, taken, known, look, out)
     determinant = _invert_innovation_cov(out.K, look, out)
     if determinant > 0.0:
-        nu, S_inverse = out.nu, out.S_inverse
-        out.distance[0] = (
-            nu[0] * nu[0] * S_inverse[0, 0]
-            + 2.0 * nu[0] * nu[1] * S_inverse[0, 1]
-            + nu[1] * nu[1] * S_inverse[1, 1]
-        )
+        out.distance[0] = _squared_distance(out)
+        if out.distance[0] <= far:
+            return _linearised_where_it_leads(x, P, taken, known, look, determinant, out)
     return determinant
+
+
+@njit(cache=True, error_model="numpy")
+def _linearised_where_it_leads(
+    x: Array, P: Array, taken: Array, known: int, look: Look, determinant: float, out: Innovation
+) -> float:
+    """An innovation, linearised anew as long as it moves the landmark far; returns det(S)."""
+    shift = (0.0, 0.0, 0.0)
+    for _ in range(_ROUNDS):
+        moved = _shift(look, out)
+        off = (moved[0] - shift[0]) ** 2 + (moved[1] - shift[1]) ** 2 + (moved[2] - shift[2]) ** 2
+        if not _NEAR_M**2 < off < _FARTHEST_M**2:
+            break
+        # Past the camera: half the way may be in front of it.
+        while not predict_ray(x, look, moved, out):
+            moved = (0.5 * moved[0], 0.5 * moved[1], 0.5 * moved[2])
+        shift = moved
+        _cross_cov(P, taken, known, look, out)
+        determinant = _invert_innovation_cov(out.K, look, out)
+        if determinant <= 0.0:
+            return determinant
+        out.distance[0] = _squared_distance(out)
+    return determinant
+
+
+@njit(cache=True, error_model="numpy")
+def _squared_distance(innovation: Innovation) -> float:
+    """Squared Mahalanobis distance of an innovation."""
+    nu, S_inverse = innovation.nu, innovation.S_inverse
+    return float(
+        nu[0] * nu[0] * S_inverse[0, 0]
+        + 2.0 * nu[0] * nu[1] * S_inverse[0, 1]
+        + nu[1] * nu[1] * S_inverse[1, 1]
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _shift(look: Look, innovation: Innovation) -> Shift:
+    """How far (m) a look moves its landmark, as seen at its instant; K has P H^T."""
+    PHt, nu, S_inverse = innovation.K, innovation.nu, innovation.S_inverse
+    axes = (PHt.shape[1] - 1) // 3
+    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
+    by0 = S_inverse[0, 0] * nu[0] + S_inverse[0, 1] * nu[1]
+    by1 = S_inverse[1, 0] * nu[0] + S_inverse[1, 1] * nu[1]
+    p = 3 * look.landmark
+    v, a = p + axes, p + 2 * axes
+    x = by0 * (PHt[0, p] + delay_s * PHt[0, v] + half * PHt[0, a])
+    y = by0 * (PHt[0, p + 1] + delay_s * PHt[0, v + 1] + half * PHt[0, a + 1])
+    z = by0 * (PHt[0, p + 2] + delay_s * PHt[0, v + 2] + half * PHt[0, a + 2])
+    x += by1 * (PHt[1, p] + delay_s * PHt[1, v] + half * PHt[1, a])
+    y += by1 * (PHt[1, p + 1] + delay_s * PHt[1, v + 1] + half * PHt[1, a + 1])
+    z += by1 * (PHt[1, p + 2] + delay_s * PHt[1, v + 2] + half * PHt[1, a + 2])
+    return x, y, z
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)

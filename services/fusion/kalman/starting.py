@@ -101,7 +101,7 @@ def _fit_round(
             cameras.t[camera],
         )
         # The ray that a filter linearised at x must be given to act as one linearised at `motion`.
-        if not predict_ray(at, look, innovation):
+        if not predict_ray(at, look, (0.0, 0.0, 0.0), innovation):
             return None
         by_order = np.array([1.0, delay_s, 0.5 * delay_s**2])
         H = np.concatenate([weight * innovation.H for weight in by_order], axis=1)  # (2, 9)

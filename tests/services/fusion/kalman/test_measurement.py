@@ -41,6 +41,7 @@ def state() -> tuple[np.ndarray, np.ndarray]:
 
 
 NONE_TAKEN = np.empty((0, SIZE)), 0
+HERE, GATE = (0.0, 0.0, 0.0), 30.0
 
 
 def empty() -> Innovation:
@@ -67,15 +68,15 @@ def dense_jacobian(innovation: Innovation, landmark: int = LANDMARK) -> np.ndarr
 def test_jacobian_by_finite_differences(look, state):
     x, _ = state
     innovation = empty()
-    assert predict_ray(x, look, innovation)
+    assert predict_ray(x, look, HERE, innovation)
     H = dense_jacobian(innovation)
     x[27] = 0.0  # the drift itself depends on the velocity, by clock errors of .1 ms
     for i in range(27):
         step = np.zeros(SIZE)
         step[i] = 1e-6
         ahead, back = empty(), empty()
-        predict_ray(x + step, look, ahead)
-        predict_ray(x - step, look, back)
+        predict_ray(x + step, look, HERE, ahead)
+        predict_ray(x - step, look, HERE, back)
         np.testing.assert_allclose((back.nu - ahead.nu) / 2e-6, H[:, i], atol=1e-6)
 
 
@@ -86,7 +87,7 @@ def test_update_by_several_looks_is_the_dense_one(look, state):
     for landmark in (0, LANDMARK):
         one = look._replace(landmark=landmark)
         innovation = empty()
-        determinant = innovate(new_x, new_P, taken, known, one, innovation)
+        determinant = innovate(new_x, new_P, taken, known, one, GATE, innovation)
         known = take(new_x, taken, known, innovation)
         H = dense_jacobian(innovation, landmark)
         S = H @ P @ H.T + one.ray_variance * np.eye(2)
@@ -104,22 +105,52 @@ def test_update_by_several_looks_is_the_dense_one(look, state):
 def test_an_innovation_changes_nothing_by_itself(look, state):
     x, P = state
     new_x, new_P = x.copy(), P.copy()
-    innovate(new_x, new_P, *NONE_TAKEN, look, empty())
+    innovate(new_x, new_P, *NONE_TAKEN, look, GATE, empty())
     np.testing.assert_array_equal(new_x, x)
     np.testing.assert_array_equal(new_P, P)
+
+
+@pytest.mark.parametrize("off_m", [-0.3, -0.1, 0.1, 0.327, 0.6])
+def test_the_other_camera_s_first_look_finds_what_one_saw_alone(off_m: float):
+    """Test: a landmark at .5 m, off along the first camera's ray, as unsure as that.
+
+    Expected: it is where the rays meet; one linearisation alone leaves it up to .6 m off.
+    """
+    cameras = extrinsics(tuple(SyntheticRig().rig().values()))
+    place, axes = np.array([0.03, -0.02, 0.5]), (SIZE - 1) // 3
+    eye = -cameras.R[0].T @ cameras.t[0]
+    way = (place - eye) / np.linalg.norm(place - eye)
+    x, P = np.zeros(SIZE), 1e-12 * np.eye(SIZE)
+    first = 3 * LANDMARK
+    x[first : first + 3] = place + off_m * way
+    P[first : first + 3, first : first + 3] = 1e-8 * np.eye(3) + off_m**2 * np.outer(way, way)
+    seen = cameras.R[1] @ place + cameras.t[1]
+    look = Look(LANDMARK, 0.0, seen[:2] / seen[2], 1e-8, cameras.R[1], cameras.t[1])
+    taken, innovation = np.empty((2, SIZE)), empty()
+    assert innovate(x, P, taken, 0, look, GATE, innovation) > 0.0
+    take(x, taken, 0, innovation)
+    assert np.linalg.norm(x[first : first + 3] - place) < 5e-3
+    assert not x[axes:].any()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
+def test_a_state_that_is_no_state_ends_all_the_same(look, state, value: float):
+    x, P = state
+    P[3 * LANDMARK : 3 * LANDMARK + 3] = value
+    innovate(x, P, *NONE_TAKEN, look, np.inf, empty())
 
 
 def test_what_is_behind_the_camera_gives_no_innovation(look, state):
     x, P = state
     x[3 * LANDMARK + 2] = -0.5
-    assert not innovate(x, P, *NONE_TAKEN, look, empty()) > 0.0
+    assert not innovate(x, P, *NONE_TAKEN, look, GATE, empty()) > 0.0
 
 
 def test_adjoint_is_the_dense_one(look, state):
     x, P = state
     innovation = empty()
     new_x, new_P = x.copy(), P.copy()
-    innovate(new_x, new_P, *NONE_TAKEN, look, innovation)
+    innovate(new_x, new_P, *NONE_TAKEN, look, GATE, innovation)
     take(new_x, np.empty((2, SIZE)), 0, innovation)
     H = dense_jacobian(innovation)
     random = np.random.default_rng(2)
