@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Patch
+from services.pi_tracker.dots.hypothesis import Patches
 from services.pi_tracker.dots.parts import parts_of
 from testing.synthetic_dots import DotFrame
 
@@ -36,3 +39,16 @@ def patches_of(frame: DotFrame, dot_area_px2: float) -> list[Patch]:
         else:
             found += [Patch(*place, area, 2.0, 0.5, number, (x, y)) for *place, area in parts]
     return found
+
+
+def share_right(
+    told: Sequence[tuple[int, ...]], pictures: Sequence[Patches], frames: Sequence[DotFrame]
+) -> float:
+    """The share of dots that show whose patch (of each picture, -1 for none) is at their place."""
+    right = []
+    for own, patches, frame in zip(told, pictures, frames, strict=True):
+        near = max(10.0, 1.3 * frame.radius)
+        for dot in np.flatnonzero(frame.visible > 0.35):
+            away = patches.places[own[dot]] - frame.places[dot]
+            right.append(own[dot] >= 0 and bool(np.hypot(*away) < near))
+    return float(np.mean(right))

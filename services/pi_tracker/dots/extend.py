@@ -16,7 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, View
+from services.pi_tracker.dots.hypothesis import (
+    Hypothesis,
+    Patches,
+    Surroundings,
+    View,
+    pruned,
+    rescored,
+)
 from services.pi_tracker.dots.search import LIVE, Search
 
 Array = npt.NDArray[np.float64]
@@ -58,6 +65,26 @@ class _Beam(NamedTuple):
             self.patch[rows],
             self.taken[rows],
         )
+
+
+def searched_on(
+    hypotheses: list[Hypothesis],
+    patches: Patches,
+    around: Surroundings,
+    elapsed_s: float,
+    search: Search = LIVE,
+) -> list[Hypothesis]:
+    """What is kept of hypotheses after the next picture: at least one, the best first with score 0.
+
+    Of postures that are searched apart (search.apart_nats) each has a beam of its own.
+    """
+    if search.apart_nats <= 0.0:
+        return rescored(pruned(extend(hypotheses, patches, around, elapsed_s, search), search))
+    found: list[Hypothesis] = []
+    for branch in {one.branch for one in hypotheses}:
+        own = [one for one in hypotheses if one.branch == branch]
+        found += pruned(extend(own, patches, around, elapsed_s, search), search)
+    return [one for one in rescored(found) if one.score > -search.apart_nats]
 
 
 def extend(

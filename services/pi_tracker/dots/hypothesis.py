@@ -201,7 +201,7 @@ class View:
 
 
 def pruned(hypotheses: list[Hypothesis], search: Search) -> list[Hypothesis]:
-    """The best with the best score 0, best first; few of those that agree in two pictures."""
+    """The best, best first; few of those that agree in two pictures."""
     kept: list[Hypothesis] = []
     alike: dict[tuple[tuple[int, ...], tuple[int, ...]], set[int]] = {}
     for one in sorted(hypotheses, key=lambda one: -one.score):
@@ -212,8 +212,13 @@ def pruned(hypotheses: list[Hypothesis], search: Search) -> list[Hypothesis]:
         if len(kept) >= search.kept:
             break
     best = kept[0].score
-    likely = [one for one in kept if one.score - best > -_WORSE_NATS]
-    return [replace(one, score=one.score - best) for one in likely]
+    return [one for one in kept if one.score - best > -_WORSE_NATS]
+
+
+def rescored(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """The same, best first, with the best score 0."""
+    ordered = sorted(hypotheses, key=lambda one: -one.score)
+    return [replace(one, score=one.score - ordered[0].score) for one in ordered]
 
 
 def _false_density(places: Array, before: Array, density: float) -> Array:

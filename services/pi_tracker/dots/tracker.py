@@ -18,7 +18,7 @@ from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.evidence import Begun
-from services.pi_tracker.dots.extend import extend
+from services.pi_tracker.dots.extend import searched_on
 from services.pi_tracker.dots.hypothesis import (
     AREA_NOISE,
     FEWEST_FALSE,
@@ -27,7 +27,6 @@ from services.pi_tracker.dots.hypothesis import (
     Patches,
     Surroundings,
     Way,
-    pruned,
 )
 from services.pi_tracker.dots.search import LIVE, Search
 from services.pi_tracker.dots.skeleton import Skeleton
@@ -94,8 +93,7 @@ class DotTracker:
         self._time_s = time_s
         arrays = arrays_of(patches)
         around = self._around(elapsed_s)
-        found = extend(self._hypotheses, arrays, around, elapsed_s, self._search)
-        self._hypotheses = pruned(found, self._search)
+        self._hypotheses = searched_on(self._hypotheses, arrays, around, elapsed_s, self._search)
         false = len(patches) - len({p for p in self._hypotheses[0].patch if p >= 0})
         self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)

@@ -20,7 +20,7 @@ from services.pi_tracker.dots.hindsight import resumed
 from services.pi_tracker.dots.hindsight.again import searched_again
 from services.pi_tracker.dots.hindsight.weaving import Account, woven
 from services.pi_tracker.dots.hypothesis import SHARED
-from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
+from services.pi_tracker.dots.search import AGAIN, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
 
 # How often each picture is looked at: from the start in each way, from the middle, and resumed.
@@ -60,7 +60,7 @@ def look_back(
         advance()
     told = woven(judge, accounts, count)
     accounts += searched_again(
-        lambda seeds: DotTracker(names, begun.size_px, seeds, LIVE, remembers=True),
+        lambda seeds: DotTracker(names, begun.size_px, seeds, AGAIN, remembers=True),
         names,
         seen,
         told,

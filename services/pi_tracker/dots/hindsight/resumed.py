@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.evidence import Judge, Told, Trace
-from services.pi_tracker.dots.extend import extend
+from services.pi_tracker.dots.extend import searched_on
 from services.pi_tracker.dots.hindsight.weaving import AGREED, Account, woven
-from services.pi_tracker.dots.hypothesis import Hypothesis, Surroundings, Way, pruned
+from services.pi_tracker.dots.hypothesis import Hypothesis, Surroundings, Way
 from services.pi_tracker.dots.search import Search
 
 # As where one may be lost: one in so many pictures is begun with.
@@ -100,8 +100,7 @@ def _gone_on(judge: Judge, trace: Trace, number: int, told: list[Told]) -> list[
         elapsed_s = motion.between(judge.times_s[k - 1], judge.times_s[k])
         levels = motion.levels(skeleton, elapsed_s)
         around = Surroundings(skeleton, levels, judge.false_density)
-        found = extend(hypotheses, judge.pictures[k], around, elapsed_s, _WIDE)
-        hypotheses = pruned(found, _WIDE)
+        hypotheses = searched_on(hypotheses, judge.pictures[k], around, elapsed_s, _WIDE)
         late = _last(hypotheses[0].way, AGREED)
         if k - number >= _LEAST and late == told[k - AGREED + 1 : k + 1]:
             break

@@ -11,12 +11,11 @@ from rhot.hand import DIGITS
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.evidence import Judge, Told
 from services.pi_tracker.dots.hindsight.resumed import LOOKS, resumed
-from services.pi_tracker.dots.hypothesis import Patches
 from services.pi_tracker.dots.tracker import DotTracker, arrays_of
 from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints
-from testing.dot_patches import NAMES, REST, SIZE, patches_at, patches_of
-from testing.synthetic_dots import DotFrame, dot_frames, scene_of
+from testing.dot_patches import NAMES, REST, SIZE, patches_at, patches_of, share_right
+from testing.synthetic_dots import dot_frames, scene_of
 
 COUNT = 60
 RIGHT: Told = tuple(range(8))
@@ -33,7 +32,7 @@ def _judge() -> Judge:
     return Judge(tracker.begun, pictures, times, [RIGHT] * COUNT)
 
 
-def test_names_that_were_lost_for_good_are_found_from_where_they_were_right() -> None:
+def test_names_that_were_lost_for_good_are_found_from_where_they_wereshare_right() -> None:
     for wrong in (FINGERS, NOTHING):
         lost = [RIGHT] * 25 + [wrong] * (COUNT - 25)
         assert resumed(_judge(), lost, lambda: None) == [RIGHT] * COUNT
@@ -51,17 +50,6 @@ def test_right_names_stay_and_every_look_is_told() -> None:
     assert looks["a"] == LOOKS * COUNT
     assert resumed(_judge(), [RIGHT], lambda: looks.update("a")) == [RIGHT]
     assert looks["a"] == LOOKS * (COUNT + 1)
-
-
-def _right(told: list[Told], pictures: list[Patches], frames: list[DotFrame]) -> float:
-    """The share of visible dots whose patch is at their place."""
-    right = []
-    for own, patches, frame in zip(told, pictures, frames, strict=True):
-        near = max(10.0, 1.3 * frame.radius)
-        for dot in np.flatnonzero(frame.visible > 0.35):
-            away = patches.places[own[dot]] - frame.places[dot]
-            right.append(own[dot] >= 0 and bool(np.hypot(*away) < near))
-    return float(np.mean(right))
 
 
 def test_a_fist_that_opens_at_once_is_followed(rhot_data: Path) -> None:
@@ -83,5 +71,5 @@ def test_a_fist_that_opens_at_once_is_followed(rhot_data: Path) -> None:
     live = [one.patch for one in tracker.way()]
     assert tracker.begun is not None
     told = resumed(Judge(tracker.begun, pictures, times, live), live, lambda: None)
-    assert _right(live, pictures, frames) < 0.9
-    assert _right(told, pictures, frames) > 0.98
+    assert share_right(live, pictures, frames) < 0.9
+    assert share_right(told, pictures, frames) > 0.98
