@@ -94,8 +94,9 @@ def command(
         parser.exit(EXIT_USER, f"{program}: error: {error}\n")
     if several_rigs and (len(options.config) > 1 or options.config[0].is_dir()):
         sys.exit(run_several(name, options.name, options.config, serve, options.connect))
-    served = name, options.name, options.config[0], serve, options.connect
-    sys.exit(run(*served, keeps_turn=several_rigs))
+    config = options.config[0]
+    code = run(name, options.name, config, serve, options.connect, keeps_turn=several_rigs)
+    sys.exit(code)
 
 
 def _parser(

@@ -36,8 +36,8 @@ _APART_NATS = 40.0
 # that they err at different pictures.
 SEVERAL = (
     Search(apart_nats=_APART_NATS),
-    Search(96, 96, 16, 8, each_acceleration=True, apart_nats=_APART_NATS),
+    Search(beam=96, updated=96, each_acceleration=True, apart_nats=_APART_NATS),
 )
 # And from pictures in the middle of it so (again.py). (Of 15 dots of `grab`, seed 9, 57 % are right
 # before resumed.py if 48 partial assignments are kept and 24 updated, 95 % so.)
-AGAIN = Search(192, 12, 8, 8, apart_nats=_APART_NATS)
+AGAIN = Search(beam=192, updated=12, kept=8, apart_nats=_APART_NATS)
