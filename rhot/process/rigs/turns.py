@@ -1,4 +1,4 @@
-"""When a rig does what every rig of its process does once in a while: each at an instant of its own.
+"""When a rig does what every rig of its process does once in a while: at an instant of its own.
 
 What all of them do at once keeps the messages of all waiting: 32 beats of health, and what else
 fusion does once a second, are 20 ms of it. So each has its own share of a period, by its name.
