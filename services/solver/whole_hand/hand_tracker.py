@@ -4,8 +4,8 @@
   (initialise.py): from one camera's first look they may be anywhere along its rays.
 - From then on every message is fitted from the motion prior.
 - A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
-  and every three seconds. It initialises the hand as if nothing were known, once the pose is out
-  (`challenge`), and counts from the next message on. Another pose that
+  and about every three seconds. It initialises the hand as if nothing were known, once the pose is
+  out (`challenge`), and counts from the next message on. Another pose that
   explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
   won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
 - What fits cost says how far the hand model is to be believed (model_misfit.py).
