@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from rhot.bus.bus import Bus
 from rhot.bus.clock_exchange import MasterChoice, several_masters
@@ -50,11 +50,13 @@ async def follow_master(
             estimator.follow_step(step_ns)
 
 
-async def watch_masters(bus: Bus, own_ns: Callable[[], int], tell: Tell, period_s: float) -> None:
-    """For the master itself: ask who else answers for its clock, for ever."""
+async def watch_masters(
+    bus: Bus, own_ns: Callable[[], int], tell: Tell, pause: Callable[[], Awaitable[None]]
+) -> None:
+    """For the master itself: ask who else answers for its clock, for ever, a pause apart."""
     while True:
         tell(several_masters(await bus.echoes(own_ns)))
-        await asyncio.sleep(period_s)
+        await pause()
 
 
 async def _step_ns(own_ns: Callable[[], int]) -> int:

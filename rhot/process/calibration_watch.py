@@ -54,7 +54,7 @@ async def _end_on_change(
     """Wait until the files differ from the loaded ones and can be read."""
     seen = rejected = loaded
     while True:
-        await asyncio.sleep(_PERIOD_S)
+        await service.turn(_PERIOD_S)
         before, seen = seen, _stamps(loaded)
         if seen == loaded:
             service.faults.clear(_FAULT, _SUBJECT)

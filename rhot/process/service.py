@@ -26,6 +26,7 @@ from rhot.process import systemd
 from rhot.process.fault_log import FaultLog
 from rhot.process.health.namesakes import Namesakes
 from rhot.process.health.slow_streams import SlowStreams
+from rhot.process.rigs.turns import until_turn_s
 
 log = logging.getLogger("rhot.service")
 
@@ -111,6 +112,10 @@ class Service:
         self.errors += 1
         self.faults.event(code, text, text if subject is None else subject)
 
+    async def turn(self, period_s: float) -> None:
+        """Wait until this rig is to do again what every rig of this process does every period_s."""
+        await asyncio.sleep(until_turn_s(self.config.rig.name, period_s, time.monotonic()))
+
     def second_clock(self, text: str | None) -> None:
         """Report that more than one master answers, or with None that one does."""
         self.faults.replace("second_clock", {} if text is None else {"": text})
@@ -122,7 +127,7 @@ class Service:
         publisher = self.bus.publisher(topics.HEALTH, service=self.name, instance=self.instance)
         last_s, last_cpu_s = time.monotonic(), time.process_time()
         while True:
-            await asyncio.sleep(_BEAT_S)
+            await self.turn(_BEAT_S)
             now_s, cpu_s = time.monotonic(), time.process_time()
             elapsed_s = now_s - last_s
             told = [stats for stats in self.bus.streams if stats.topic is not topics.HEALTH]

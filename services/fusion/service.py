@@ -69,7 +69,7 @@ async def _look_every_second(
     """Figures and faults, also while no frame comes."""
     faults = FusionFaults(step, service.config, service.faults, time.monotonic())
     while True:
-        await asyncio.sleep(_LOOK_S)
+        await service.turn(_LOOK_S)
         health.renew(time.monotonic())
         faults.look(time.monotonic(), session_running=state.session.running)
 
@@ -130,9 +130,12 @@ def _serve_session_and_clock(service: Service) -> SessionState:
             if arrival.alive and arrival.service == "pi_tracker":
                 publisher.put(state.session)
 
+    async def ask_later() -> None:
+        await service.turn(_ASK_MASTERS_S)
+
     service.tasks.create_task(follow_broadcasts())
     service.tasks.create_task(repeat_to_trackers())
     service.tasks.create_task(
-        watch_masters(service.bus, clock.now_ns, service.second_clock, _ASK_MASTERS_S)
+        watch_masters(service.bus, clock.now_ns, service.second_clock, ask_later)
     )
     return state

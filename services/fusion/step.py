@@ -103,7 +103,7 @@ class FusionStep:
         # Frames that nothing was learned from, as others waited; and how many of them in a row.
         self.unlearned, self._passed_over = 0, 0
         # What of the last frame is not done yet: settle().
-        self._unsettled: list[Callable[[], None]] = []
+        self._unsettled: list[Callable[[bool], None]] = []
         self._epoch_ns = 0
         self._seq = 0
 
@@ -166,18 +166,18 @@ class FusionStep:
                 self.unlearned += 1
             else:
                 for work in unsettled:
-                    work()
+                    work(behind)
         self.method.settle()
 
-    def _watch(self, view: View, times_s: Array) -> None:
+    def _watch(self, view: View, times_s: Array, _behind: bool) -> None:
         """Learn from an admitted frame, whose observations have times_s (n,)."""
         self.mirrors.observe(view)
         self.unseen_markers.observe(view)
         self.clocks.observe(view, times_s)
 
-    def _align(self, view: View) -> None:
+    def _align(self, view: View, behind: bool) -> None:
         """Look in a frame, as announced, for clocks that are off by more."""
-        if self.alignment.observe(view):
+        if self.alignment.observe(view, behind=behind):
             self._restart(self._admission.newest_ns or view.instant_ns)
 
     def note_pose(self, pose: HandPose) -> None:

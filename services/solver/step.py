@@ -10,6 +10,7 @@ sigmas that say so (model_error.py). Absurd points are dropped (whole_hand/point
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from itertools import compress
 
@@ -24,12 +25,14 @@ from services.solver.model_error import ModelError
 from services.solver.pose_message import hand_pose, joint_sources
 from services.solver.pose_numbers import dls_numbers, pose_numbers, rounded
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, HandTracker
+from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, RESTART_INTERVAL, HandTracker
 from services.solver.whole_hand.landmarks import Observed, hand_landmarks
 from services.solver.whole_hand.point_check import usable_points
 
 # Sets of measured landmarks whose joints' sources are remembered: fingers come and go.
 _MAX_SETS = 256
+# Share of the time between restarts by which rigs differ.
+_APART = 0.4
 
 
 class SolverStep:
@@ -37,7 +40,7 @@ class SolverStep:
 
     def __init__(self, config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
         """Raises CalibrationError when a hand model cannot be solved with."""
-        self._hands = {name: _Hand(config, model) for name, model in hands.items()}
+        self._hands = {name: _Hand(config, name, model) for name, model in hands.items()}
 
     def step(self, points: HandPoints) -> HandPose | None:
         """The pose at the instant of points, or None while that hand has not been found.
@@ -59,14 +62,24 @@ class SolverStep:
         self._hands[hand].tracker.challenge()
 
 
+def restart_interval(name: str) -> int:
+    """Updates from one restart of a hand to the next, by the names of rig and hand.
+
+    Rigs of one process whose hands come into view together would all restart at once, every time.
+    """
+    return round(RESTART_INTERVAL * (1.0 + _APART * (zlib.crc32(name.encode()) / 2**32 - 0.5)))
+
+
 class _Hand:
     """One hand: its model in the forms the kernels use, and its tracker."""
 
-    def __init__(self, config: RigConfig, model: HandModel) -> None:
+    def __init__(self, config: RigConfig, name: HandName, model: HandModel) -> None:
         check_model(model)
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
-        self.tracker = HandTracker(model, self._landmarks)
+        self.tracker = HandTracker(
+            model, self._landmarks, restart_interval(f"{config.rig.name}/{name}")
+        )
         self._model_error = ModelError(model, self.tracker.chains)
         # By the landmarks of a message, and which of them were measured.
         self._known_sources: dict[tuple[tuple[str, ...], bytes], list[JointSource]] = {}

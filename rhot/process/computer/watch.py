@@ -27,14 +27,14 @@ async def watch_computer(service: Service, root: Path = Path("/")) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as token:
         while True:
             if not token.getsockname() and not _taken(token, f"\0rhot-computer-{config.rig.name}"):
-                await asyncio.sleep(_PERIOD_S)
+                await service.turn(_PERIOD_S)
                 continue
             computer = await asyncio.to_thread(read_computer, folders, root)
             service.values.update(values_of(computer))
             standing = [fault.code for fault in service.faults.standing()]
             for code, texts in faults_of(computer, host, standing).items():
                 service.faults.replace(code, texts)
-            await asyncio.sleep(_PERIOD_S)
+            await service.turn(_PERIOD_S)
 
 
 def _taken(token: socket.socket, name: str) -> bool:

@@ -24,6 +24,8 @@ from services.fusion.intake.observations import View
 # A search takes 2 to 4 ms; every two seconds that is one or two in a thousand. The first comes when
 # there is enough to compare, and one that found something is soon followed by another.
 _EVERY_S, _FIRST_S, _AGAIN_S = 2.0, 3.0, 1.0
+# A search is put off in so many frames at most: one or two seconds of those that are learned from.
+_MOST_PUT_OFF = 30
 # Share of these two seconds by which rigs differ.
 _APART = 0.2
 # The tuner reaches so far: three announced sigmas, 5 ms at least; beyond 15 ms this is quicker.
@@ -78,6 +80,8 @@ class ClockAlignment:
         # By camera: how many frames in a row were refused.
         self._astray = [0] * len(cameras)
         self._searched_s: dict[int, float] = {}
+        # By camera: in how many frames a search was due, and other frames waited.
+        self._put_off = [0] * len(cameras)
         self.searches = 0
 
     @property
@@ -85,8 +89,11 @@ class ClockAlignment:
         """The cameras whose clocks are put right."""
         return {self._names[camera]: one for camera, one in sorted(self._corrections.items())}
 
-    def observe(self, view: View) -> bool:
-        """Take in a frame as announced; whether clocks are put right otherwise than before."""
+    def observe(self, view: View, *, behind: bool = False) -> bool:
+        """Take in a frame as announced; whether clocks are put right otherwise than before.
+
+        behind: other frames wait, also for a search, which is then put off for some frames.
+        """
         if not self.enabled:
             return False
         changed = self.note_announced(view)
@@ -96,7 +103,10 @@ class ClockAlignment:
         since_s = 0.0 if newest_s is None else newest_s - self._searched_s.get(view.camera, -np.inf)
         wait_s = _AGAIN_S if view.camera in self._candidates else self._every_s
         due = known_s >= _FIRST_S and not 0.0 <= since_s < wait_s
-        if due and newest_s is not None and view.camera != (reference := self._reference()):
+        if due and behind and self._put_off[view.camera] < _MOST_PUT_OFF:
+            self._put_off[view.camera] += 1
+        elif due and newest_s is not None and view.camera != (reference := self._reference()):
+            self._put_off[view.camera] = 0
             self._searched_s[view.camera] = newest_s
             changed |= self._search(reference, view.camera)
         return changed

@@ -33,7 +33,7 @@ from numba import njit
 
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
-from rhot.hand import JOINT_INDEX, HandModel, HandName
+from rhot.hand import DIGITS, JOINT_INDEX, HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
@@ -56,6 +56,8 @@ _SIDEWAYS = 0.45
 _TAPER_SEEN = 0.8
 # Hands of the tables taper by .04 to .08. Of a bone hardly longer than thick, it says nothing.
 _MOST_TAPER = 0.2
+# Landmark of each digit's tip.
+_TIP_OF = {digit: f"{digit}_tip" for digit in DIGITS}
 # The axis about which a joint bends, in its own frame.
 _HINGE = (1.0, 0.0, 0.0)
 
@@ -118,9 +120,8 @@ class PaintToBone:
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
-        sags_m = np.array(
-            [dab_sag_m(0.5 * dab_m, limb_m) for dab_m, limb_m in zip(dabs_m, limbs_m, strict=True)]
-        )
+        self._hinges = np.tile(_HINGE, (len(landmarks), 1))
+        sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
         tables = [
             shift_table(paint.radius_m, paint.extent_m, _taper(hands[landmark.hand], landmark.name))
             for landmark, paint in zip(landmarks, paints, strict=True)
@@ -145,7 +146,7 @@ class PaintToBone:
     def directions(self, pose: HandPose) -> Directions:
         """A solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
         sigmas = {
-            f"{finger.name}_tip": _direction_sigmas(pose.wrist_sigma_rad, finger.sigma_rad)
+            _TIP_OF[finger.name]: _direction_sigmas(pose.wrist_sigma_rad, finger.sigma_rad)
             for finger in pose.fingers
         }
         of_the_wrist = _direction_sigmas(pose.wrist_sigma_rad, 0.0)
@@ -161,7 +162,7 @@ class PaintToBone:
         of = np.array(rows, dtype=np.int64)
         turns = np.array(quaternions).reshape(-1, 4)
         directions = turned_vectors(self._outwards[of], turns)
-        hinges = turned_vectors(np.tile(_HINGE, (len(of), 1)), turns)
+        hinges = turned_vectors(self._hinges[: len(of)], turns)
         spreads = np.array(sigmas_rad).reshape(-1, 2)
         return Directions(pose.hand, pose.stamp_ns, of, directions, hinges, spreads)
 

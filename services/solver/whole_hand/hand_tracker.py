@@ -4,8 +4,8 @@
   (initialise.py): from one camera's first look they may be anywhere along its rays.
 - From then on every message is fitted from the motion prior.
 - A restart is due when the fit is bad, when a landmark is seen that the last restart did not see,
-  and every three seconds. It initialises the hand as if nothing were known, once the pose is out
-  (`challenge`), and counts from the next message on. Another pose that
+  and about every three seconds. It initialises the hand as if nothing were known, once the pose is
+  out (`challenge`), and counts from the next message on. Another pose that
   explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
   won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
 - What fits cost says how far the hand model is to be believed (model_misfit.py).
@@ -62,8 +62,10 @@ START_ODDS = -4.0
 class HandTracker:
     """Follows one hand; pure: time comes in as stamps."""
 
-    def __init__(self, model: HandModel, landmarks: Landmarks) -> None:
-        """landmarks: those of the model (landmarks.hand_landmarks)."""
+    def __init__(
+        self, model: HandModel, landmarks: Landmarks, restart_every: int = RESTART_INTERVAL
+    ) -> None:
+        """landmarks: those of the model (landmarks.hand_landmarks); restart_every: updates."""
         self.chains = hand_chains(model)
         posture = posture_prior(model)
         # As kernels are given them.
@@ -76,7 +78,7 @@ class HandTracker:
         self._stamp_ns = 0
         # When there last were enough landmarks.
         self._located_ns = 0
-        self._updates_to_restart = RESTART_INTERVAL
+        self._restart_every = self._updates_to_restart = restart_every
         self._misfit_m2 = 0.0
         self._rival: Rival | None = None
         self._restart_landmarks: frozenset[str] = frozenset()
@@ -195,7 +197,7 @@ class HandTracker:
         if bad or not names <= self._restart_landmarks:
             self._updates_to_restart = min(self._updates_to_restart, RESTART_INTERVAL_BAD)
         if self._updates_to_restart <= 0 and len(names) > MIN_LANDMARKS:
-            self._updates_to_restart, self._restart_landmarks = RESTART_INTERVAL, names
+            self._updates_to_restart, self._restart_landmarks = self._restart_every, names
             self._to_challenge = estimate, self.fitted
 
     def _cost_without_history(self, estimate: HandEstimate, observations: Observations) -> float:

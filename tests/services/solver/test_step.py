@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rhot.files.config import RigConfig
-from rhot.files.rig_tables import Solver
+from rhot.files.rig_tables import RigTable, Solver
 from rhot.geometry.transforms import angle_between, rotation_from_quaternion
 from rhot.hand import (
     BASIC_LANDMARKS,
@@ -22,7 +22,8 @@ from rhot.hand import (
     forward,
 )
 from rhot.messages import HandPose
-from services.solver.step import SolverStep
+from services.solver.step import SolverStep, restart_interval
+from services.solver.whole_hand.hand_tracker import RESTART_INTERVAL
 
 METHODS = ("dls", "fabrik", "analytic", "dls-paper", "fabrik-paper")
 KNUCKLE = (*BASIC_LANDMARKS, "middle_proximal")
@@ -259,3 +260,24 @@ def test_a_tip_out_of_reach_says_so(world: Callable) -> None:
     assert pose.fingers[1].residual_m > 0.01
     reached = np.array(pose.joints[JOINTS.index("index_tip")].position_m) - places["index_proximal"]
     assert reached @ outwards / np.linalg.norm(reached) / np.linalg.norm(outwards) > 0.9
+
+
+def test_rigs_whose_hands_come_together_restart_at_times_of_their_own(world: Callable) -> None:
+    """Restarts take 5 ms: of 32 rigs at once, poses would wait for a tenth of a second."""
+    rigs = [f"room{n}" for n in range(32)]
+    intervals = np.array([restart_interval(f"{rig}/right") for rig in rigs])
+    assert np.mean(intervals) == pytest.approx(RESTART_INTERVAL, rel=0.1)
+    assert 0.8 * RESTART_INTERVAL <= intervals.min() <= intervals.max() <= 1.2 * RESTART_INTERVAL
+    assert np.bincount(intervals).max() <= 3
+    ours = world("right")
+    steps = [
+        SolverStep(RigConfig(rig=RigTable(name=rig)), {"right": ours.model}) for rig in rigs[:2]
+    ]
+    due: list[list[int]] = [[], []]
+    for frame, instant in enumerate(ours.motion(12, round(1.5 * RESTART_INTERVAL))):
+        for step, frames in zip(steps, due, strict=True):
+            step.step(ours.message(ours.points(instant, LANDMARKS), frame))
+            if step.challenge_due("right"):
+                frames.append(frame)
+    # Once as soon as each is found, and then so much later.
+    assert [np.diff(frames)[-1] for frames in due] == intervals[:2].tolist()

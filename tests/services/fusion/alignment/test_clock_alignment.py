@@ -135,3 +135,29 @@ def test_a_view_is_shifted_by_what_was_found():
     assert view.instant_ns - shifted.instant_ns == pytest.approx(2e9, abs=1.5e6)
     assert shifted.clock_sigma_s == pytest.approx(1.5e-3)
     np.testing.assert_array_equal(shifted.rays, view.rays)
+
+
+def test_a_search_waits_while_others_do_but_not_for_ever():
+    given = with_clock_error(frames(RIG, MOTIONS["sinusoids"], 8.0), "right", 0.137)
+    cameras = RIG.rig()
+    builder = ObservationBuilder(RIG.config(), cameras)
+    ready, briefly, always = (ClockAlignment(tuple(cameras.values()), enabled=True) for _ in "123")
+    searches: dict[ClockAlignment, list[int]] = {ready: [], briefly: [], always: []}
+    for number, frame in enumerate(given):
+        view = builder.build(frame)
+        for alignment, told in searches.items():
+            before = alignment.searches
+            # Others wait while the first search is due, and six frames longer; or all the time.
+            begun = bool(searches[ready])
+            behind = alignment is always or (
+                alignment is briefly and begun and number <= searches[ready][0] + 6
+            )
+            alignment.observe(view, behind=behind)
+            if alignment.searches > before:
+                told.append(number)
+    first = searches[ready][0]
+    assert first + 6 < searches[briefly][0] <= first + 8
+    # Two cameras: every second frame is of the one that is searched for.
+    assert first + 58 <= searches[always][0] <= first + 62
+    for alignment in searches:
+        assert alignment.corrections["right"].late_s == pytest.approx(0.137, abs=1.5e-3)

@@ -165,3 +165,16 @@ def test_a_challenge_is_the_same_whoever_asks_for_it(world: Callable, tracker: H
         other.challenge()
         assert not other.challenge_due
     assert asked
+
+
+def test_restarts_are_as_far_apart_as_asked(world: Callable) -> None:
+    """From the second on: the first comes as soon as a hand is found."""
+    ours = world("right")
+    tracker = HandTracker(ours.model, hand_landmarks(ours.model), 7)
+    due = []
+    for frame, instant in enumerate(ours.motion(5, 40)):
+        tracker.track(frame * FRAME_NS, _observed(ours.points(instant)))
+        if tracker.challenge_due:
+            due.append(frame)
+    assert np.diff(due).tolist() == [7] * (len(due) - 1)
+    assert len(due) > 3
