@@ -30,8 +30,9 @@ from services.fusion.method import Counts, Estimates
 # Places wander in most models: skin, tremor and fingers are livelier than white jerk that is
 # smoothed over some frames. Tuning half of points, beyond three sigmas at lags 0, 1 and 2 of 22,449
 # points: while only a hand at rest did 231, 266 and 330, now 137, 169 and 194, and RMS is none the
-# worse. With 2e-7 in the second and third models 10 fewer, but four cameras' sigmas are too large;
-# with any in the fifth, or more in the fourth, flapping hands are beyond five sigmas more often.
+# worse (the noise of own motion was mended between). From 7e-8 in the second and third models on
+# four cameras' sigmas are too large, with 1e-5 in the fifth a hand that jumps is found late, and
+# with 3e-7 in the fourth flapping hands are beyond five sigmas more often (tests of fusion).
 _SLOWING = 1.0 / 0.3
 MODELS = MotionModels(
     velocity_rate=np.array([0.5, 0.0, 0.0, 2.9, 12.0, 15.0]),
