@@ -14,6 +14,7 @@ from services.fusion.step import FusionStep
 from services.solver.step import SolverStep
 from testing.families.case import Bools, Case
 from testing.families.spline_bound import spline_bound
+from testing.point_errors import THREE_SIGMAS, share_within, squared_distances
 from testing.synthetic_points import START_NS
 
 LAGS = (0, 1, 2)
@@ -82,7 +83,8 @@ def scores(
     """Figures of a case by lag, mm; names end in the lag, or in `spline`.
 
     share: of instants and landmarks that all cameras see (per cent), those with a point. Errors are
-    over those too; unhidden_max over markers that are seen whole. alone: over points of landmarks
+    over those too; unhidden_max over markers that are seen whole. within: of those `count` points
+    (per cent), how many are within three sigmas; `beyond` are not. alone: over points of landmarks
     that not all cameras see.
     """
     figures: Figures = {}
@@ -111,6 +113,9 @@ def _figures(case: Case, told: Told) -> Figures:
     figures = _spread(lengths_mm[both])
     figures["share"] = 100.0 * float(both.sum() / max(seen.sum(), 1))
     figures["nees"], figures["nees_median"] = _mean_and_median(squares[both])
+    figures["within"] = share_within(3.0 * squares[both])
+    figures["count"] = float(both.sum())
+    figures["beyond"] = float(np.count_nonzero(3.0 * squares[both] > THREE_SIGMAS))
     figures["unhidden_max"] = _largest(lengths_mm[given & unhidden])
     figures["alone_count"] = float(alone.sum())
     if alone.any():
@@ -122,8 +127,7 @@ def _figures(case: Case, told: Told) -> Figures:
 def _normalised(errors: Array, covariances: Array, given: Bools) -> Array:
     """Squared errors over covariance, a third of the sum of three axes; (n, L), NaN elsewhere."""
     squares = np.full(given.shape, np.nan)
-    solved = np.linalg.solve(covariances[given], errors[given][..., None])[..., 0]
-    squares[given] = np.einsum("ni,ni->n", errors[given], solved) / 3.0
+    squares[given] = squared_distances(errors[given], covariances[given]) / 3.0
     return squares
 
 

@@ -22,6 +22,7 @@ from one_camera import motions
 
 from testing.families.case import Case, Half
 from testing.families.points import Gaps, point_case
+from testing.point_errors import squared_distances
 from testing.synthetic_points import Motion
 
 FAR_MM, SIGMAS = 50.0, 6.0
@@ -55,8 +56,7 @@ def found(case: Case) -> Found:
     off = told.points_m - case.truth(told.instants_s)
     lengths_mm = 1e3 * np.linalg.norm(off, axis=2)
     known = np.isfinite(lengths_mm)
-    solved = np.linalg.solve(told.covariances_m2[known], off[known][..., None])[..., 0]
-    squares = np.einsum("ni,ni->n", off[known], solved)
+    squares = squared_distances(off[known], told.covariances_m2[known])
     errors_mm = lengths_mm[known]
     astray = errors_mm[(errors_mm > FAR_MM) & (squares > SIGMAS**2)]
     return Found(

@@ -12,6 +12,10 @@ from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoints
 from testing.synthetic_points import START_NS, Motion
 
+# Of a Gaussian in space this squared Mahalanobis distance holds 99.7 %, as three sigmas do of one
+# axis.
+THREE_SIGMAS = 13.93
+
 
 @dataclass(frozen=True, eq=False)
 class PointErrors:
@@ -46,6 +50,17 @@ class PointErrors:
             self.sigmas_m[inside],
             self.measured[inside],
         )
+
+
+def squared_distances(errors_m: Array, covariances_m2: Array) -> Array:
+    """Squared Mahalanobis distances (n,) of errors (n, 3) by their whole covariances (n, 3, 3)."""
+    solved = np.linalg.solve(covariances_m2, errors_m[..., None])[..., 0]
+    return np.asarray(np.einsum("ni,ni->n", errors_m, solved))
+
+
+def share_within(squares: Array) -> float:
+    """How many of n squared distances are within three sigmas, per cent; NaN of none."""
+    return 100.0 * float(np.mean(squares <= THREE_SIGMAS)) if len(squares) else float("nan")
 
 
 def point_errors(messages: Iterable[HandPoints], motion: Motion) -> PointErrors:

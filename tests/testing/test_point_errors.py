@@ -7,7 +7,7 @@ import pytest
 
 from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import HandPoint, HandPoints
-from testing.point_errors import point_errors
+from testing.point_errors import point_errors, share_within, squared_distances
 from testing.synthetic_points import START_NS, MovingHand
 
 
@@ -38,3 +38,14 @@ def test_errors_are_those_of_every_point_at_its_own_instant():
     early = found.within(0.0, 1.0)
     assert early.rms_mm == pytest.approx(3.0)
     assert len(found.within(1.0).instants_s) == 6
+
+
+def test_three_sigmas_of_the_whole_covariance_hold_997_of_a_thousand():
+    rng = np.random.default_rng(1)
+    spread = rng.normal(0.0, 1e-3, (3, 3))
+    errors = rng.normal(0.0, 1.0, (100_000, 3)) @ spread.T
+    covariances = np.broadcast_to(spread @ spread.T, (len(errors), 3, 3))
+    assert share_within(squared_distances(errors, covariances)) == pytest.approx(99.7, abs=0.06)
+    # Sigmas that are a third too small do not, whatever their axes.
+    assert share_within(squared_distances(errors, covariances / 1.5**2)) < 98.0
+    assert np.isnan(share_within(np.empty(0)))

@@ -26,6 +26,7 @@ from services.fusion.kalman.measurement import (
     take,
 )
 from services.fusion.kalman.motion_models import (
+    RESTING,
     MotionModels,
     SharedNoise,
     add_walk,
@@ -79,7 +80,7 @@ def filter_node(
     gram = np.empty((3 * before.shape[0], 3 * before.shape[0]))
     turn_gram(history.state[last, likeliest], before, gram)
     shared = SharedNoise(gram, history.way[last])
-    Q = np.empty((3, 3))
+    Q, by_itself = np.empty((3, 3)), np.empty((2, 3, 3))
     for m in range(models.own.shape[0]):
         parent = likeliest if _goes_on_from(history, last, m, likeliest) else m
         history.parent[node, m] = parent
@@ -91,7 +92,7 @@ def filter_node(
         F = transitions(models, m, own, dt_s)
         jerk = jerk_cov(models, m, shared, before)
         unit_process_noise((models.velocity_rate[m], models.acceleration_rate[m]), dt_s, Q)
-        if parent != m and models.walk[m] > 0.0:
+        if parent != m and m == RESTING:
             T = body_transform(history.state[last, parent], before)
             predict_state(T @ history.state[last, parent], F, x)
             predict_cov(T @ history.cov[last, parent] @ T.T, F, jerk, Q, P)
@@ -99,16 +100,16 @@ def filter_node(
             predict_state(history.state[last, parent], F, x)
             predict_cov(history.cov[last, parent], F, jerk, Q, P)
         add_walk(models, m, dt_s, before, P)
-        own_noise(models, m, dt_s, Q)
+        own_noise(models, m, dt_s, by_itself)
         for k in range(own.shape[0]):
             if before[k] and own[k] > 0.0:
-                add_own(P, k, own[k], Q)
+                add_own(P, k, own[k], by_itself[1])
     _begin(history, node, before)
     log_likelihoods = np.zeros(models.own.shape[0])
     for m in range(models.own.shape[0]):
         history.strikes[node, m] = history.strikes[last, history.parent[node, m]]
-        own_noise(models, m, dt_s, Q)
-        log_likelihoods[m] = _update(history, node, m, cameras, gate, (Q, models.own[m]))
+        own_noise(models, m, dt_s, by_itself)
+        log_likelihoods[m] = _update(history, node, m, cameras, gate, (by_itself, models.own[m]))
     _weigh(history, last, node, log_likelihoods)
     likeliest = int(np.argmax(history.probability[node]))
     alive, after = history.alive[node], history.way[node]
@@ -203,9 +204,9 @@ def _update(
 ) -> float:
     """Update a model by the looks within its gate; the log-likelihood of all.
 
-    Q (3, 3): noise of one axis for own motion of density 1 since the node before.
+    noise: of own_noise since the node before (2, 3, 3), and the density that the model has for all.
     """
-    Q, usual = noise
+    by_itself, usual = noise
     x, P = history.state[node, m], history.cov[node, m]
     clock = x.shape[0] - 1
     P[clock, clock] = history.clock_variance[node]
@@ -222,6 +223,7 @@ def _update(
         determinant = innovate(x, P, taken, known, look, far, innovation)
         price = 0.0
         if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
+            Q = by_itself[1 if history.carried[node, m, k] > 0.0 else 0]
             own = own_motion(look, innovation, determinant, Q, usual)
             if own.density > 0.0:
                 add_own(P, k, own.density, Q)

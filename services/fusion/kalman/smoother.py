@@ -18,6 +18,7 @@ from services.fusion.kalman.history import HandHistory, nodes_until
 from services.fusion.kalman.measurement import adjoint_update
 from services.fusion.kalman.motion_models import (
     FAST_SUMS,
+    RESTING,
     MotionModels,
     SharedNoise,
     add_walk,
@@ -96,7 +97,7 @@ def _smooth_model(
         dt_s = history.time_s[node] - before_s
         adjoint_predict(rows, known, transitions(models, m, history.carried[node, m], dt_s))
         ends, m = m, history.parent[node, m]
-        if ends != m and k > index and models.walk[ends] > 0.0:
+        if ends != m and k > index and ends == RESTING:
             T = body_transform(history.state[before, m], history.alive[before])
             rows[:known] = rows[:known] @ T
     x = np.empty(size)
@@ -135,7 +136,7 @@ def _predict_between(
         carried[:] = own
     F = transitions(models, ends, carried, dt_s)
     before_x, before_P = history.state[last, m], history.cov[last, m]
-    if ends != m and models.walk[ends] > 0.0:
+    if ends != m and ends == RESTING:
         T = body_transform(before_x, alive)
         before_x, before_P = T @ before_x, T @ before_P @ T.T
     predict_state(before_x, F, x)
@@ -147,10 +148,11 @@ def _predict_between(
     unit_process_noise((models.velocity_rate[ends], models.acceleration_rate[ends]), dt_s, Q)
     predict_place_cov(before_P, F, jerk, Q, P)
     add_walk(models, ends, dt_s, alive, P)
-    own_noise(models, ends, dt_s, Q)
+    by_itself = np.empty((2, 3, 3))
+    own_noise(models, ends, dt_s, by_itself)
     for k in range(count):
         if alive[k] and own[k] > 0.0:
-            add_own_to_places(P, k, own[k], Q)
+            add_own_to_places(P, k, own[k], by_itself[1 if carried[k] > 0.0 else 0])
 
 
 @njit(cache=True, error_model="numpy")
