@@ -1,7 +1,8 @@
 """Hands with dots of one colour on their joints, rendered, with where each dot is and what shows.
 
 The simulator's hands, skin, light and noise, through one camera; dots lie on the skin of fingers'
-backs, sides or palm side, not in the middle of joints. Pure but for what marker_cache.py keeps.
+backs, sides or palm side, not in the middle of joints. Motions are of two halves, one to tune on.
+Pure.
 """
 
 from __future__ import annotations
@@ -9,15 +10,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import dropwhile
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from rhot.errors import CalibrationError
 from rhot.files.calibration import Colors
 from rhot.files.config import RigConfig, load_rig
 from rhot.geometry.transforms import Array
-
 from rhot.hand import DIGITS, HandModel, Paint, landmark_point
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.image.frame import Frame
@@ -46,6 +48,9 @@ DOTS = {
     15: tuple((digit, joint) for digit in range(5) for joint in (1, 2, 3)),
 }
 
+# A clip begins with a picture in which of each dot so much shows, so far from its edge, px.
+_BEGINS, _EDGE_PX = 0.3, 6.0
+
 
 @dataclass(frozen=True)
 class DottedHand:
@@ -71,7 +76,6 @@ class DottedHand:
     light: Light = field(default_factory=Light)
     skin: Rgb = SKIN.albedo
     color: str = "magenta"
-    speed: float = 1.0
     exposure_s: float = 0.008
     noise: float = 5.0
     seconds: float = 5.0
@@ -119,7 +123,6 @@ class DottedHand:
             noise=self.noise,
             light=self.light,
             skin=self.skin,
-            speed=self.speed,
         )
         model, seed = self.hand(), seed or self.seed
         scene = build_scene(self.config(), spec, "families", seed, models={model.hand: model})
@@ -155,8 +158,91 @@ def colors_of(clip: DottedHand) -> Colors:
     return fit_ranges({clip.color: np.concatenate(dots)}, other, "", "testing/families")
 
 
+# What hands do: a gesture and a path that they are carried along, or a Leap recording's name.
+_MOTIONS: dict[str, dict[str, Moves | str]] = {
+    "tuning": {
+        "fist": Moves("fist"),
+        "wave": Moves("wave"),
+        "pinch": Moves("pinch"),
+        "Leap splay": "HandSplay-110fps",
+        "Leap wave": "wave",
+        "Leap grab": "grab",
+    },
+    "held out": {
+        "piano": Moves("piano"),
+        "fist, turning": Moves("fist", "roll", 25.0, 0.5),
+        "pinch, flapping": Moves("pinch", "flap", 20.0, 1.0),
+        "wandering, stop and go": Moves("random", "stop_and_go", 8.0),
+        "Leap pinch": "pinch",
+    },
+}
+HALVES = tuple(_MOTIONS)
+# Lightly tanned, dark, pale.
+_SKINS: tuple[Rgb, ...] = (SKIN.albedo, (0.16, 0.085, 0.055), (0.72, 0.47, 0.37))
+
+
+def clips(half: str, dots: int, count: int) -> Iterator[tuple[str, DottedHand]]:
+    """Clips of one of HALVES, so many of each motion, with what the motion is called.
+
+    People, sides that the hand is seen from, dots and skin differ. Those that never show all dots
+    at once are left out.
+    """
+    for number, (name, motion) in enumerate(_MOTIONS[half].items()):
+        found = 0
+        for seed in range(20 * HALVES.index(half), 20 * HALVES.index(half) + 20):
+            one = _clip(motion, dots, seed, number)
+            if found < count and _can_begin(one):
+                found += 1
+                yield name, one
+
+
+def _clip(motion: Moves | str, dots: int, seed: int, number: int) -> DottedHand:
+    random = np.random.default_rng([seed, dots, number])
+    # Dots are on the back, or on the palm's side, and the camera is there; thumb and index finger
+    # may be seen from the thumb's side.
+    palm = 180.0 * float(random.random() < 0.3)
+    few = dots == 8
+    yaw_deg = random.uniform(100.0, 190.0) if few else 180.0 - palm + random.uniform(-30.0, 30.0)
+    around_deg = random.uniform(-50.0, 0.0) if few else palm + random.uniform(-20.0, 20.0)
+    return DottedHand(
+        dots=dots,
+        moves=Moves() if isinstance(motion, str) else motion,
+        recording=motion if isinstance(motion, str) else "",
+        person=Person(seed=seed + 1),
+        diameter_mm=random.uniform(6.0, 9.0),
+        around_deg=around_deg,
+        thumb_deg=random.uniform(20.0, 70.0) if few else 70.0,
+        tilt_deg=random.uniform(0.0, 35.0),
+        yaw_deg=yaw_deg,
+        roll_deg=random.uniform(-30.0, 30.0),
+        distance_m=random.uniform(0.28, 0.42),
+        skin=_SKINS[seed % len(_SKINS)],
+        seed=seed + 1,
+    )
+
+
+def _can_begin(clip: DottedHand) -> bool:
+    """Whether its colour can be calibrated, and enough pictures follow one that shows all dots."""
+    try:
+        colors_of(clip)
+    except CalibrationError:
+        return False
+    enough = int(0.5 * clip.seconds * clip.config().camera[0].fps)
+    return sum(1 for _ in pictures_of(clip)) > enough
+
+
 def pictures_of(clip: DottedHand) -> Iterator[DottedPicture]:
-    """All pictures of a clip."""
+    """All pictures of a clip from the first that shows all dots."""
+    return dropwhile(lambda picture: not _shows_all(picture), _all_pictures(clip))
+
+
+def _shows_all(picture: DottedPicture) -> bool:
+    furthest = np.array(picture.frame.size_px) - _EDGE_PX
+    inside = (picture.places > _EDGE_PX) & (picture.places < furthest)
+    return bool(picture.visible.min() >= _BEGINS and inside.all())
+
+
+def _all_pictures(clip: DottedHand) -> Iterator[DottedPicture]:
     scene = clip.scene()
     (hand,) = scene.hands.values()
     model, names = clip.hand(), clip.landmarks

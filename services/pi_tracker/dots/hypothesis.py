@@ -25,7 +25,7 @@ Mask = npt.NDArray[np.bool_]
 
 # Probability that a dot is found in a picture: where it was in the last one, where it was not, and
 # where its skin faces away; it does at the first of these cosines, and shows well at the second.
-_FOUND, _FOUND_AGAIN, _FACES_AWAY, _TURNED = 0.97, 0.6, 0.03, (-0.1, 0.4)
+_FOUND, _FOUND_AGAIN, _FACES_AWAY, _TURNED = 0.97, 0.6, 0.2, (-0.4, 0.3)
 # Of each picture so many patches that are no dots, at least.
 FEWEST_FALSE = 0.1
 # Where a dot lies behind or beside another's it shares that one's patch, with this probability.

@@ -45,7 +45,7 @@ _COUPLING, _COUPLING_SIGMA = 2.0 / 3.0, 0.35
 _LENGTH_SIGMA, _ROOT_SIGMA, _LOOSE_SIGMA = 0.12, 0.007, 0.015
 # Dots are so many radii of skin above the bone, with so much spread, and aside; 0 would be ink
 # within the joint, as the Leap recordings have it. That of a tip is so much before its end.
-_UP, _UP_SIGMA, _ASIDE_SIGMA, _BEFORE_END = 0.8, 0.35, 0.5, 0.5
+_UP, _UP_SIGMA, _ASIDE_SIGMA, _BEFORE_END = 0.5, 0.5, 0.5, 0.5
 
 
 class _Chains(NamedTuple):

@@ -67,7 +67,9 @@ def test_fingers_that_all_close_within_a_fifth_of_a_second_keep_their_names() ->
         posture[0, 6 : skeleton.moving] = np.tile([0.0, 0.2, 0.2, 0.15], 5)
         posture[0, 10 : skeleton.moving] += bend * np.tile([0.0, 1.0, 1.0, 0.6], 4)
         turn = turned(np.array([[1.4, 0.5, 0.1]]))
-        truth = skeleton.project(posture, turn, np.ones(1))[0][0]
+        if tracker is None:
+            facing = skeleton.facing(posture, turn, np.ones(1))
+        truth = skeleton.project(posture, turn, np.ones(1), facing)[0][0]
         shown = [dot for dot in order if dot < 12 or not 5 <= number <= 7]
         if tracker is None:
             tracker = DotTracker(
