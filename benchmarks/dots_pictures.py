@@ -1,7 +1,7 @@
 """Dots of one colour on rendered hands, told apart: which dot is which, through the real tracker.
 
     RHOT_DATA=FOLDER python benchmarks/dots_pictures.py [--tuning] [--dots 8] [--clips 3]
-                                                        [--live] [--json FILE]
+                                                        [--hindsight 8] [--json FILE]
 
 Rendered hands (testing/families/dotted_hands.py): people, sides, skins; dots lie on the skin and
 are hidden as fingers close. One camera, 30 pictures a second, 640x480. Seeds are clicks of the
@@ -10,7 +10,8 @@ first picture, 1.5 px off. A dot counts if a third of its disc shows or more. Of
     lost       told as nowhere
     exchanged  told where another one is
     longest    pictures for which names were exchanged at worst, one after the other
-for plain assignment to the nearest patches, rhot live, and rhot with hindsight. Only the half that
+for plain assignment to the nearest patches, rhot live, and, with as many dots as --hindsight says,
+rhot with hindsight, which takes long. Only the half that
 is held out is evidence; --tuning is what constants were chosen on.
 """
 
@@ -26,8 +27,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from dots import judge
+from dots import Told, judge
 
+from rhot.geometry.transforms import Array
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.dot import SeenPatches
@@ -46,17 +48,16 @@ CLICK_PX = 1.5
 REACH_PX = 60.0
 COUNTS = ("right", "lost", "exchanged", "elsewhere")
 
-Told = list[dict[str, tuple[float, float]]]
 
-
-def followed(clip: DottedHand, *, hindsight: bool) -> tuple[list[DottedPicture], dict[str, Told]]:
+def followed(
+    clip: DottedHand, *, hindsight: bool
+) -> tuple[list[DottedPicture], dict[str, list[Told]]]:
     """The pictures of a clip, and where each method tells its dots in each."""
     config, names = clip.config(), clip.landmarks
     table = compile_colors(colors_of(clip), config.colors)
     random = np.random.default_rng(clip.seed)
     pictures: list[DottedPicture] = []
-    seen: list[SeenPatches] = []
-    live: Told = []
+    live: list[Told] = []
     finder: DotFinder | None = None
     for picture in pictures_of(clip):
         if finder is None:
@@ -75,8 +76,7 @@ def followed(clip: DottedHand, *, hindsight: bool) -> tuple[list[DottedPicture],
         live.append({n: (d.x_px, d.y_px) for n, d in dots.items() if d.state != "carried"})
         pictures.append(picture)
     assert finder is not None
-    seen = finder.seen
-    told = {"optimal assignment": _nearest(names, clicks, seen), "rhot": live}
+    told = {"optimal assignment": _nearest(names, clicks, finder.seen), "rhot": live}
     if hindsight:
         told["rhot, with hindsight"] = [
             {name: (dot.x_px, dot.y_px) for name, dot in dots.items()}
@@ -85,9 +85,10 @@ def followed(clip: DottedHand, *, hindsight: bool) -> tuple[list[DottedPicture],
     return pictures, told
 
 
-def _nearest(names: Sequence[str], clicks: np.ndarray, seen: Sequence[SeenPatches]) -> Told:
+def _nearest(names: Sequence[str], clicks: Array, seen: Sequence[SeenPatches]) -> list[Told]:
     """What the assignment of least distance to where dots were tells."""
-    last, told = clicks.copy(), []
+    last = clicks.copy()
+    told: list[Told] = []
     for picture in seen:
         places = np.array([(p.x_px, p.y_px) for p in picture.patches]).reshape(-1, 2)
         apart = np.linalg.norm(last[:, None] - places[None], axis=2)
@@ -106,8 +107,7 @@ def measured(half: str, dots: int, count: int, *, hindsight: bool) -> dict[str, 
         began_s = time.perf_counter()
         pictures, told = followed(clip, hindsight=hindsight)
         for method, places in told.items():
-            frames = iter(places)
-            own = judge(pictures, clip.landmarks, lambda _, __, frames=frames: next(frames))
+            own = judge(pictures, clip.landmarks, places)
             for name in (motion, "all"):
                 total = found.setdefault(name, {}).setdefault(method, {"clips": 0, "least": 100.0})
                 longest = max(total.get("longest", 0), own["longest"])
@@ -152,7 +152,9 @@ def main() -> int:
     parser.add_argument("--tuning", action="store_true", help="the half that constants rest on")
     parser.add_argument("--dots", type=int, choices=(8, 15), help="only so many")
     parser.add_argument("--clips", type=int, default=3, help="of each motion")
-    parser.add_argument("--live", action="store_true", help="without hindsight, which takes long")
+    parser.add_argument(
+        "--hindsight", type=int, nargs="*", default=[8], help="dots that are looked back at, too"
+    )
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     data = Path(os.environ.get("RHOT_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -164,7 +166,7 @@ def main() -> int:
     result: dict[str, Any] = {}
     for dots in [options.dots] if options.dots else [8, 15]:
         half = HALVES[0] if options.tuning else HALVES[1]
-        found = measured(half, dots, options.clips, hindsight=not options.live)
+        found = measured(half, dots, options.clips, hindsight=dots in options.hindsight)
         show(found, dots)
         result[str(dots)] = figures(found)
     if options.json:
