@@ -95,15 +95,7 @@ class Skeleton:
         self.usual, self.spread = np.array(_USUAL)[kind].ravel(), np.array(_SPREAD)[kind].ravel()
         self.least, self.most = np.array(_LEAST)[kind].ravel(), np.array(_MOST)[kind].ravel()
         self.thumb = np.repeat(rows == 0, 4)  # (angles,)
-        roots = np.where(rows == 0, _LOOSE_SIGMA, _ROOT_SIGMA)
-        self.person = np.concatenate(
-            [
-                np.full(3 * len(rows), _LENGTH_SIGMA),
-                np.repeat(roots, 3),
-                np.full(3 * len(loose), _LOOSE_SIGMA),
-                np.tile([_UP_SIGMA, _ASIDE_SIGMA], groups),
-            ]
-        )
+        self.person = _people(rows, len(loose), groups)
         # What is usual as linear rows (r, size) with targets and variances: angles, couplings.
         last = 6 + 4 * np.flatnonzero(rows > 0) + 3
         count = self.angles + len(last)
@@ -193,19 +185,23 @@ class Skeleton:
         skins[:, :, 3] = turn
         return _Chains(joints, skins, axes, bones)
 
+    def _to_skin(self, postures: Array, skins: Array, facing: Array) -> tuple[Array, Array, Array]:
+        """Of each joint's dot (k, f, 4, 3) m: a radius up, one aside, and where it is beside it."""
+        cosine, sine = np.cos(facing)[:, :, None, None], np.sin(facing)[:, :, None, None]
+        radii = self._radii[:, :, None]
+        up = radii * (cosine * skins[..., 1] + sine * skins[..., 0])
+        aside = radii * (cosine * skins[..., 0] - sine * skins[..., 1])
+        shares = postures[:, self._ups : self.size].reshape(len(postures), -1, 2)[:, self._group]
+        offsets = (_UP + shares[:, :, None, :1]) * up + shares[:, :, None, 1:] * aside
+        offsets[:, :, 3] += _BEFORE_END * self._radii[:, 3:] * skins[:, :, 3, :, 2]
+        return up, aside, offsets
+
     def _in_hand(self, postures: Array, facing: Array) -> tuple[Array, Array]:
         """Dots and derivatives by angles, lengths and shifts alone, about the hand's middle."""
         count, own, fingers = len(postures), self._roots, self.fingers
         joints, skins, axes, bones = self._chains(postures)
         slopes = np.zeros((count, fingers, 4, 3, self.size))
-        # From the bone to the skin.
-        cosine, sine = np.cos(facing)[:, :, None, None], np.sin(facing)[:, :, None, None]
-        radii = self._radii[:, :, None]
-        up = radii * (cosine * skins[..., 1] + sine * skins[..., 0])
-        aside = radii * (cosine * skins[..., 0] - sine * skins[..., 1])
-        shares = postures[:, self._ups : self.size].reshape(count, -1, 2)[:, self._group]
-        offsets = (_UP + shares[:, :, None, :1]) * up + shares[:, :, None, 1:] * aside
-        offsets[:, :, 3] += _BEFORE_END * self._radii[:, 3:] * skins[:, :, 3, :, 2]
+        up, aside, offsets = self._to_skin(postures, skins, facing)
         dots = joints + offsets
         each = np.arange(fingers)
         for j in range(4):
@@ -231,6 +227,19 @@ class Skeleton:
         points = np.concatenate([dots.reshape(count, -1, 3), loose], axis=1)
         every = np.concatenate([slopes.reshape(count, -1, 3, self.size), bare], axis=1)
         return points[:, self._points], every[:, self._points]
+
+
+def _people(rows: npt.NDArray[np.int64], loose: int, groups: int) -> Array:
+    """How people differ in what does not move of a posture, sigmas."""
+    roots = np.where(rows == 0, _LOOSE_SIGMA, _ROOT_SIGMA)
+    return np.concatenate(
+        [
+            np.full(3 * len(rows), _LENGTH_SIGMA),
+            np.repeat(roots, 3),
+            np.full(3 * loose, _LOOSE_SIGMA),
+            np.tile([_UP_SIGMA, _ASIDE_SIGMA], groups),
+        ]
+    )
 
 
 def turned(vectors: Array) -> Array:
