@@ -24,12 +24,13 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS
 from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.chains import finger_landmarks
@@ -52,8 +53,10 @@ SIZE_PX, FPS, FIRST_SEED = (1280, 720), 30.0, 100
 REACH_PX = 60.0
 
 Seeds = dict[str, tuple[float, float]]
-# Where each dot is (None: not seen), of a frame and its time.
-Method = Callable[[DotFrame, float], dict[str, tuple[float, float] | None]]
+# Where each dot is, by landmark; None or missing: not seen.
+Told = Mapping[str, tuple[float, float] | None]
+# That, of a frame and its time.
+Method = Callable[[DotFrame, float], Told]
 
 
 def ours(names: list[str], seeds: Seeds, _: list[DotFrame]) -> Method:
@@ -124,15 +127,25 @@ METHODS: dict[str, Make] = {
 }
 
 
-def judge(frames: list[DotFrame], names: list[str], method: Method) -> dict[str, int]:
+class Shown(Protocol):
+    """A picture of n dots: places (n, 2) px, visible shares (n,), their mean radius, px."""
+
+    @property
+    def places(self) -> Array: ...
+    @property
+    def visible(self) -> Array: ...
+    @property
+    def radius(self) -> float: ...
+
+
+def judge(frames: Sequence[Shown], names: list[str], told: Sequence[Told]) -> dict[str, int]:
     """Counts of visible dots, and the longest exchange of names in frames."""
     counts = dict.fromkeys(("dots", "right", "lost", "exchanged", "elsewhere", "longest"), 0)
     running = np.zeros(len(names), np.int64)
-    for number, frame in enumerate(frames):
-        told = method(frame, number / FPS)
+    for frame, own in zip(frames, told, strict=True):
         near = max(10.0, 1.3 * frame.radius)
         for k, name in enumerate(names):
-            place, truth = told.get(name), frame.places[k]
+            place, truth = own.get(name), frame.places[k]
             apart = np.full(len(names), np.inf)
             if place is not None:
                 apart = np.linalg.norm(frame.places - np.array(place), axis=1)
@@ -166,7 +179,9 @@ def run(
             for film in films:
                 places = film[0].places + np.random.default_rng(1).normal(0.0, 2.0, (len(names), 2))
                 seeds = {n: (float(x), float(y)) for n, (x, y) in zip(names, places, strict=True)}
-                counts = judge(film, names, make(names, seeds, film))
+                follow = make(names, seeds, film)
+                told = [follow(frame, number / FPS) for number, frame in enumerate(film)]
+                counts = judge(film, names, told)
                 longest = max(total.get("longest", 0), counts["longest"])
                 total = {key: total.get(key, 0) + value for key, value in counts.items()}
                 total["longest"] = longest

@@ -108,8 +108,10 @@ class Judge:
         """After picture `number`, of which `told` has dots' patches; before is that before it."""
         patches, patch = self.pictures[number], np.array(told)
         known = Known(0.0, self.areas, before.unseen, before.false)
-        view = View(known, patches, self.false_density)
         elapsed_s = motion.between(self.times_s[number - 1], self.times_s[number])
+        likeliest = before.states.take([int(before.scores.argmax())])
+        ahead = motion.coasted(self.skeleton, likeliest, elapsed_s)
+        view = View(known, patches, self.false_density, self.skeleton.showing(*ahead[:4])[0])
         parent, states, scores = _followed(self.skeleton, before, view, patch, elapsed_s)
         scores, branch = scores + view.claims(patch), before.branch[parent]
         rows = _best(scores, branch)

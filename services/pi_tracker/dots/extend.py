@@ -78,13 +78,25 @@ def searched_on(
 
     Of postures that are searched apart (search.apart_nats) each has a beam of its own.
     """
+    return rescored(searched(hypotheses, patches, around, elapsed_s, search))
+
+
+def searched(
+    hypotheses: list[Hypothesis],
+    patches: Patches,
+    around: Surroundings,
+    elapsed_s: float,
+    search: Search,
+) -> list[Hypothesis]:
+    """The same, in no order; scores go on from those before."""
     if search.apart_nats <= 0.0:
-        return rescored(pruned(extend(hypotheses, patches, around, elapsed_s, search), search))
+        return pruned(extend(hypotheses, patches, around, elapsed_s, search), search)
     found: list[Hypothesis] = []
     for branch in {one.branch for one in hypotheses}:
         own = [one for one in hypotheses if one.branch == branch]
         found += pruned(extend(own, patches, around, elapsed_s, search), search)
-    return [one for one in rescored(found) if one.score > -search.apart_nats]
+    least = max(one.score for one in found) - search.apart_nats
+    return [one for one in found if one.score > least]
 
 
 def extend(
@@ -97,7 +109,11 @@ def extend(
     """What hypotheses may become, the likely ones, in no order; at least one."""
     skeleton = around.skeleton
     still = motion.coasted(skeleton, motion.together([p.state for p in parents]), elapsed_s)
-    views = [View(parent, patches, around.false_density) for parent in parents]
+    showing = skeleton.showing(*still[:4])
+    views = [
+        View(parent, patches, around.false_density, shows)
+        for parent, shows in zip(parents, showing, strict=True)
+    ]
     beam = _searched(_begun(views, still, around), _tables(views, patches), search)
     before = still.take(beam.view.tolist())
     added = np.array([cov for cov, _ in around.levels])
@@ -116,7 +132,7 @@ def extend(
 def _begun(views: list[View], still: motion.State, around: Surroundings) -> _Beam:
     """Every account with every acceleration, without any patch yet."""
     skeleton, levels = around.skeleton, around.levels
-    pixels, slopes = skeleton.project(still.means, still.rotations, still.sides)
+    pixels, slopes = skeleton.project(*still[:4])
     count, dots, size = len(pixels), pixels.shape[1], skeleton.size
     rows = slopes.reshape(count, 1, 2 * dots, size)
     added = np.array([cov[:size, :size] for cov, _ in levels])

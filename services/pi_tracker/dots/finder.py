@@ -76,12 +76,17 @@ class DotFinder:
             self._seen.append(SeenPatches(time_s, patches))
         return self.tracker.step(patches, time_s)
 
+    @property
+    def seen(self) -> list[SeenPatches]:
+        """The patches of all pictures so far; none if nothing is remembered."""
+        return self._seen or []
+
     def looked_back(self, advance: Callable[[], None] = lambda: None) -> list[dict[str, Dot]]:
         """The dots of all pictures so far, with hindsight; none if nothing is remembered.
 
         advance is called looking_back.LOOKS times for each picture.
         """
-        return look_back(self._begun, self._seen or [], advance)
+        return look_back(self._begun, self.seen, advance)
 
     def _begun(self, search: Search) -> DotTracker:
         return DotTracker(*self._given, search, remembers=True)

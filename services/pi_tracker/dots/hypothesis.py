@@ -23,8 +23,9 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
-# Probability that a dot is found in a picture: where it was in the last one, and where it was not.
-_FOUND, _FOUND_AGAIN = 0.97, 0.6
+# Probability that a dot is found in a picture: where it was in the last one, where it was not, and
+# where its skin faces away; it does at the first of these cosines, and shows well at the second.
+_FOUND, _FOUND_AGAIN, _FACES_AWAY, _TURNED = 0.97, 0.6, 0.2, (-0.4, 0.3)
 # Of each picture so many patches that are no dots, at least.
 FEWEST_FALSE = 0.1
 # Where a dot lies behind or beside another's it shares that one's patch, with this probability.
@@ -104,9 +105,14 @@ class Hypothesis:
 class View:
     """A hypothesis looking at the next picture: assignments, and how likely each is."""
 
-    def __init__(self, parent: Hypothesis | Known, patches: Patches, false_density: float) -> None:
+    def __init__(
+        self, parent: Hypothesis | Known, patches: Patches, false_density: float, showing: Array
+    ) -> None:
+        """showing (n,) is how far each dot is turned to the camera (skeleton.py)."""
         self.parent, self.patches = parent, patches
+        shows = np.clip((showing - _TURNED[0]) / (_TURNED[1] - _TURNED[0]), 0.0, 1.0)
         found = np.where(parent.unseen == 0, _FOUND, _FOUND_AGAIN)
+        found = _FACES_AWAY + shows * (found - _FACES_AWAY)
         self._found, self._missed = np.log(found), np.log1p(-found)
         false = _false_density(patches.places, parent.false, false_density)
         # The parts of a blob are false together, as one.

@@ -36,7 +36,7 @@ _PERSON_TIME_S = 1.0
 # A gap longer than this tells nothing of where dots have gone meanwhile.
 _LONGEST_GAP_S = 0.5
 # Speeds at the start: m/s, rad/s.
-_START_M_S, _START_RAD_S = 0.5, 2.0
+START_M_S, START_RAD_S = 0.5, 2.0
 # What is usual counts in each picture by a share, as pictures that follow each other say the same.
 _USUAL_SHARE = 0.1
 # Joints yield beyond what they do by so much, rad.
@@ -46,7 +46,8 @@ _ROUNDS = 3
 
 
 class State(NamedTuple):
-    """k states: means (k, d), rotations (k, 3, 3), sides (k,) and covariances (k, d, d).
+    """k states: means (k, d), rotations (k, 3, 3), sides (k,), facing (k, fingers), rad, and
+    covariances (k, d, d).
 
     d is the posture's size and that of what moves: velocities.
     """
@@ -54,6 +55,7 @@ class State(NamedTuple):
     means: Array
     rotations: Array
     sides: Array
+    facing: Array
     covs: Array
 
     def take(self, rows: list[int]) -> State:
@@ -78,16 +80,18 @@ def together(states: list[State]) -> State:
     return State(*(np.concatenate(parts) for parts in zip(*states, strict=True)))
 
 
-def start(skeleton: Skeleton, posture: Array, rotation: Array, side: float, cov: Array) -> State:
-    """A hand at a posture (size,) of a covariance, with any velocity."""
-    speeds = np.full(skeleton.moving, _START_RAD_S)
-    speeds[:3] = _START_M_S
+def start(
+    skeleton: Skeleton, posture: Array, rotation: Array, side: float, facing: Array, cov: Array
+) -> State:
+    """A hand at a posture (size,) of a covariance, with any velocity; facing (fingers,)."""
+    speeds = np.full(skeleton.moving, START_RAD_S)
+    speeds[:3] = START_M_S
     size, count = skeleton.size, skeleton.size + skeleton.moving
     mean, covs = np.zeros((1, count)), np.zeros((1, count, count))
     mean[0, :size] = posture
     covs[0, :size, :size] = cov
     covs[0, size:, size:] = np.diag(speeds**2)
-    return State(mean, rotation[None], np.array([side]), covs)
+    return State(mean, rotation[None], np.array([side]), facing[None], covs)
 
 
 def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:
@@ -119,7 +123,7 @@ def _accelerated(skeleton: Skeleton, hand: int, angles: int, elapsed_s: float) -
     sigmas = np.repeat(_HAND[hand], 3)
     squares = np.zeros((moving, moving))
     squares[:6, :6] = np.diag(sigmas**2)
-    squares[6:, 6:] = _ANGLES[angles] ** 2 * _angle_shares(skeleton)
+    squares[6:, 6:] = _ANGLES[angles] ** 2 * angle_shares(skeleton)
     cov = np.zeros((size + moving, size + moving))
     # A constant acceleration for the whole time.
     cov[:moving, :moving] = 0.25 * elapsed_s**4 * squares
@@ -141,7 +145,7 @@ def levels(skeleton: Skeleton, elapsed_s: float) -> tuple[tuple[Array, float], .
     )
 
 
-def _angle_shares(skeleton: Skeleton) -> Array:
+def angle_shares(skeleton: Skeleton) -> Array:
     """Covariance (angles, angles) of accelerations, one that is sharp having about 1."""
     flexion = np.tile([0.0, 1.0, 1.0, 0.8], skeleton.fingers)
     finger = np.repeat(np.eye(skeleton.fingers), 4, axis=0)
@@ -174,7 +178,7 @@ def updated(
     offsets = np.zeros((count, total))
     shift, now = np.zeros_like(state.means), _folded(state)
     for _ in range(_ROUNDS):
-        pixels, slopes = skeleton.project(now.means, now.rotations, now.sides)
+        pixels, slopes = skeleton.project(*now[:4])
         slopes *= seen[:, :, None, None]
         rows[:, :first] = slopes.reshape(count, first, size)
         offsets[:, :first] = ((places - pixels) * seen[..., None]).reshape(count, first)

@@ -18,7 +18,7 @@ from services.pi_tracker.dots import motion
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.evidence import Begun
-from services.pi_tracker.dots.extend import searched_on
+from services.pi_tracker.dots.extend import searched
 from services.pi_tracker.dots.hypothesis import (
     AREA_NOISE,
     FEWEST_FALSE,
@@ -27,9 +27,11 @@ from services.pi_tracker.dots.hypothesis import (
     Patches,
     Surroundings,
     Way,
+    rescored,
 )
 from services.pi_tracker.dots.search import LIVE, Search
 from services.pi_tracker.dots.skeleton import Skeleton
+from services.pi_tracker.dots.start.anew import LastKnown
 from services.pi_tracker.dots.start.posture import postures
 from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
 
@@ -39,6 +41,8 @@ Array = npt.NDArray[np.float64]
 _FALSE_WEIGHT = 0.05
 # At the start no dot is known better than to this share of the root of its area.
 _WANDER = 0.15
+# How large a dot is as a whole is its largest area lately; forgotten by this share a picture.
+_SHRINKS = 0.995
 # What is left of a patch's quality where several dots share it.
 MERGED_QUALITY = 0.3
 
@@ -79,6 +83,9 @@ class DotTracker:
         self._hypotheses: list[Hypothesis] = []
         self._false_patches = 0.0
         self._time_s = 0.0
+        # (n,) px^2: how large each dot is when all of it shows.
+        self._whole: Array = np.zeros(0)
+        self._known = LastKnown()
         # The hand in the picture with which tracking started, None before.
         self.begun: Begun | None = None
         # What a person should know of the start; empty if all is well.
@@ -93,8 +100,15 @@ class DotTracker:
         self._time_s = time_s
         arrays = arrays_of(patches)
         around = self._around(elapsed_s)
-        self._hypotheses = searched_on(self._hypotheses, arrays, around, elapsed_s, self._search)
-        false = len(patches) - len({p for p in self._hypotheses[0].patch if p >= 0})
+        parents, search = self._hypotheses, self._search
+        found = searched(parents, arrays, around, elapsed_s, search)
+        self._hypotheses = rescored(
+            self._known.against(found, parents[0], arrays, around, elapsed_s, search)
+        )
+        best = self._hypotheses[0]
+        self._whole = _grown(self._whole, best.patch, arrays.areas)
+        self._known.note(best, arrays.areas, self._whole)
+        false = len(patches) - len({p for p in best.patch if p >= 0})
         self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)
 
@@ -117,8 +131,8 @@ class DotTracker:
 
     @property
     def dot_area_px2(self) -> float:
-        """How large a dot is as a rule, 0 while it is unknown."""
-        return float(np.median(self._hypotheses[0].areas)) if self._hypotheses else 0.0
+        """How large a dot is that shows as a whole, 0 while it is unknown."""
+        return float(np.median(self._whole)) if self._hypotheses else 0.0
 
     def _start(self, patches: Sequence[Patch], time_s: float) -> None:
         if self._seeds:
@@ -134,6 +148,7 @@ class DotTracker:
         areas = np.array([p.area_px for p in patches]) if patches else np.array([100.0])
         typical = float(np.median(areas))
         own = [typical if p < 0 else patches[p].area_px for p in found.patch]
+        self._whole = np.array(own)
         missing = np.array([p < 0 for p in found.patch], np.int64)
         places = arrays_of(patches).places
         false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
@@ -179,10 +194,19 @@ class DotTracker:
     def _expected(self, best: Hypothesis) -> tuple[Array, Array]:
         """Where the hand has its dots (n, 2), and their sigmas (n,), px."""
         state = best.state
-        pixels, slopes = self._skeleton.project(state.means, state.rotations, state.sides)
+        pixels, slopes = self._skeleton.project(*state[:4])
         size = self._skeleton.size
         covs = slopes[0] @ state.covs[0, :size, :size] @ slopes[0].swapaxes(1, 2)
         return pixels[0], np.sqrt(0.5 * np.trace(covs, axis1=1, axis2=2))
+
+
+def _grown(whole: Array, told: Sequence[int], areas: Array) -> Array:
+    """How large dots are as a whole (n,) after a picture in which `told` are their patches."""
+    grown = _SHRINKS * whole
+    for dot, patch in enumerate(told):
+        if patch >= 0 and told.count(patch) == 1:
+            grown[dot] = max(grown[dot], float(areas[patch]))
+    return grown
 
 
 def _seen(

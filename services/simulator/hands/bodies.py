@@ -157,17 +157,16 @@ def add_hand(
     metacarpals, with thenar, hypothenar and webs. The palm side of the wrist is where
     rhot.hand.Paint says, wrist_radius_m from the joint.
     """
+    dabs = {name for name in paints if name not in TIPS or model.paint[name].radius_m == 0.0}
     for digit in model.digits:
-        painted = (
-            paints.get(f"{digit.name}_tip", -1),
-            model.paint[f"{digit.name}_tip"].extent_m,
-        )
+        tip = f"{digit.name}_tip"
+        painted = (-1 if tip in dabs else paints.get(tip, -1), model.paint[tip].extent_m)
         lean_m = (leans_m or {}).get(f"{digit.name}_tip", _O)
         _add_digit(shapes, digit, first, skin, (*painted, lean_m))
     _add_palm(shapes, model, first, skin)
     _add_forearm(shapes, model, first, skin)
     for name, surface in paints.items():
-        if name not in TIPS:
+        if name in dabs:
             paint = model.paint[name]
             shapes.dab(first + JOINT_INDEX[name], paint.offset_m, paint.extent_m, surface)
 

@@ -56,11 +56,19 @@ def postures(
     fits, costs, told = _fitted(skeleton, places, sigmas, fits, _LAST_ROUNDS)
     scores = -costs - 0.5 * np.linalg.slogdet(told)[1]
     kept = _distinct(skeleton, fits, scores)
+    facing = skeleton.facing(*fits)
     best, covs = float(scores[kept[0]]), np.asarray(np.linalg.inv(told), np.float64)
     return [
         (
             float(scores[k]) - best,
-            start(skeleton, fits.postures[k], fits.rotations[k], float(fits.sides[k]), covs[k]),
+            start(
+                skeleton,
+                fits.postures[k],
+                fits.rotations[k],
+                float(fits.sides[k]),
+                facing[k],
+                covs[k],
+            ),
         )
         for k in kept[:_KEPT]
         if scores[k] > best - _WORSE_NATS
@@ -69,7 +77,7 @@ def postures(
 
 def _distinct(skeleton: Skeleton, fits: _Fits, scores: Array) -> list[int]:
     """Rows of fits that differ, the best first."""
-    points = skeleton.place(*fits)[0] - fits.postures[:, None, :3]
+    points = skeleton.place(*fits, skeleton.facing(*fits))[0] - fits.postures[:, None, :3]
     kept: list[int] = []
     for k in np.argsort(-scores).tolist():
         if not any(
@@ -90,7 +98,8 @@ def _placed(skeleton: Skeleton, places: Array, rotations: Array, sides: Array) -
     """Relaxed hands of some directions, turned about the line of sight, put where the dots are."""
     begun = np.zeros((len(sides), skeleton.size))
     begun[:, 6 : skeleton.moving] = skeleton.usual
-    points, _ = skeleton.place(begun, rotations, sides)
+    facing = skeleton.facing(begun, rotations, sides)
+    points, _ = skeleton.place(begun, rotations, sides, facing)
     middles = points.mean(axis=1)
     flat, seen = (points - middles[:, None])[..., :2], places - places.mean(axis=0)
     across = (flat[..., 0] * seen[:, 1] - flat[..., 1] * seen[:, 0]).sum(axis=1)
@@ -143,7 +152,7 @@ def _slopes(
     skeleton: Skeleton, places: Array, sigmas: Array, fits: _Fits
 ) -> tuple[Array, Array, Array]:
     """Costs (k,), their derivatives (k, size) and the information (k, size, size)."""
-    pixels, slopes = skeleton.project(*fits)
+    pixels, slopes = skeleton.project(*fits, skeleton.facing(*fits))
     count, size = len(pixels), skeleton.size
     rows = (slopes / sigmas[:, None, None]).reshape(count, -1, size)
     residuals = ((pixels - places) / sigmas[:, None]).reshape(count, -1)

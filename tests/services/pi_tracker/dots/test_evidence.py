@@ -62,7 +62,7 @@ def test_backwards_the_same_names_are_right() -> None:
     judge = _judge(right, pictures)
     back = judge.backwards(list(judge.retraced(right))[-1])
     traces = list(back.retraced(right))
-    pixels, _ = judge.skeleton.project(*traces[-1].states[:3])
+    pixels, _ = judge.skeleton.project(*traces[-1].states[:4])
     assert np.abs(pixels[0] - pictures[0].places).max() < 3.0
     tips = (0, 1, 2, 7, 4, 5, 6, 3)
     exchanged = list(back.retraced([RIGHT] * 6 + [tips] * 6))

@@ -21,7 +21,8 @@ def _seen(bend: float) -> np.ndarray:
     posture[0, :3] = 0.01, 0.02, 0.4
     posture[0, 6 : SKELETON.moving] = SKELETON.usual
     posture[0, 11:14] += bend * np.array([1.0, 1.0, 0.6])
-    return SKELETON.project(posture, ROTATION, SIDE)[0][0]
+    facing = np.array([[0.4, 0.2]])
+    return SKELETON.project(posture, ROTATION, SIDE, facing)[0][0]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def test_the_first_picture_allows_several_postures_that_all_show_it(
     assert begun[0][0] == 0.0
     assert len(begun) > 1
     for _, state in begun:
-        pixels, _ = SKELETON.project(state.means, state.rotations, state.sides)
+        pixels, _ = SKELETON.project(*state[:4])
         assert np.linalg.norm(pixels[0] - _seen(-0.3), axis=1).max() < 4.0
 
 
@@ -70,7 +71,7 @@ def test_a_hidden_tip_goes_along_with_its_finger(begun: list[tuple[float, motion
         )
         state, total = after.state, total + after.nats
     best = int(total.argmax())
-    pixels, _ = SKELETON.project(state.means, state.rotations, state.sides)
+    pixels, _ = SKELETON.project(*state[:4])
     # It has moved by 130 px, and the bend of the last joint was not seen.
     moved = np.linalg.norm(_seen(0.7)[7] - _seen(-0.3)[7])
     assert moved > 60.0

@@ -100,6 +100,33 @@ def test_a_lost_dot_is_found_again_and_no_false_patch_is_taken_for_it() -> None:
         assert dots["index_intermediate"].state == ("carried" if 20 <= frame < 35 else "seen")
 
 
+def test_a_hand_that_comes_back_elsewhere_is_found_as_it_was_known() -> None:
+    """Its account has followed what was left of it, one dot, to somewhere else meanwhile."""
+    tracker = _tracker()
+    for frame in range(1, 10):
+        tracker.step(patches_at(REST), frame / 30)
+    stays = Patch(REST[0, 0], REST[0, 1], 300.0)
+    for frame in range(10, 70):
+        # What is taken for the thumb's root wanders off; then the hand is there again.
+        stays = Patch(stays.x_px + 3.0, stays.y_px - 3.0, 300.0)
+        tracker.step([stays], frame / 30)
+    middle = REST.mean(axis=0)
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    back = middle + (REST - middle) @ turn + np.array([40.0, 30.0])
+    for frame in range(70, 82):
+        dots = tracker.step(patches_at(back), frame / 30)
+    assert _errors(dots, back).max() < 1.0
+
+
+def test_dots_that_are_half_hidden_do_not_make_a_whole_one_large() -> None:
+    tracker = _tracker()
+    for frame in range(1, 20):
+        patches = patches_at(REST[:2])
+        patches += [Patch(x, y, 300.0 - 14.0 * frame) for x, y in REST[2:].tolist()]
+        tracker.step(patches, frame / 30)
+        assert tracker.dot_area_px2 > 250.0
+
+
 def test_no_patches_at_all_is_no_error_and_time_may_stand_still() -> None:
     tracker = _tracker()
     dots = tracker.step([], 1 / 30)

@@ -52,13 +52,13 @@ def test_right_names_stay_and_every_look_is_told() -> None:
     assert looks["a"] == LOOKS * (COUNT + 1)
 
 
-def test_a_fist_that_opens_at_once_is_followed(rhot_data: Path) -> None:
-    """A recorded hand with 15 dots opens within 4 pictures; live, 75 % are right here."""
+def test_what_is_lost_where_a_fist_opens_is_found_in_part(rhot_data: Path) -> None:
+    """A recorded hand with 15 dots; live, 73 % are right here, searched on 83 %."""
     recorded = load_recording(rhot_data / "hand_motion" / "leap" / "grab.csv")
     assert isinstance(recorded, RecordedJoints)
     dots = tuple((digit, joint) for digit in range(5) for joint in (1, 2, 3))
     names = [finger_landmarks(DIGITS[digit])[joint] for digit, joint in dots]
-    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 3), 3)[96:145]
+    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 7), 7)[48:97]
     seeds = {
         name: (float(x), float(y)) for name, (x, y) in zip(names, frames[0].places, strict=True)
     }
@@ -71,5 +71,6 @@ def test_a_fist_that_opens_at_once_is_followed(rhot_data: Path) -> None:
     live = [one.patch for one in tracker.way()]
     assert tracker.begun is not None
     told = resumed(Judge(tracker.begun, pictures, times, live), live, lambda: None)
-    assert share_right(live, pictures, frames) < 0.9
-    assert share_right(told, pictures, frames) > 0.98
+    before, after = share_right(live, pictures, frames), share_right(told, pictures, frames)
+    assert before < 0.8
+    assert after > before + 0.05
