@@ -1,7 +1,7 @@
 """Dots of one colour on rendered hands, told apart: which dot is which, through the real tracker.
 
     RHOT_DATA=FOLDER python benchmarks/dots_pictures.py [--tuning] [--dots 8] [--clips 3]
-                                                        [--hindsight 8] [--json FILE]
+                                     [--motion PART] [--hindsight [8 15]] [--json FILE]
 
 Rendered hands (testing/families/dotted_hands.py): people, sides, skins; dots lie on the skin and
 are hidden as fingers close. One camera, 30 pictures a second, 640x480. Seeds are clicks of the
@@ -100,10 +100,12 @@ def _nearest(names: Sequence[str], clicks: Array, seen: Sequence[SeenPatches]) -
     return told
 
 
-def measured(half: str, dots: int, count: int, *, hindsight: bool) -> dict[str, dict[str, Any]]:
-    """Counts by motion and method, and of all motions."""
+def measured(
+    half: str, dots: int, count: int, part: str, *, hindsight: bool
+) -> dict[str, dict[str, Any]]:
+    """Counts by motion and method, and of all motions whose name has this part."""
     found: dict[str, dict[str, Any]] = {}
-    for motion, clip in clips(half, dots, count):
+    for motion, clip in clips(half, dots, count, part):
         began_s = time.perf_counter()
         pictures, told = followed(clip, hindsight=hindsight)
         for method, places in told.items():
@@ -150,6 +152,7 @@ def figures(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tuning", action="store_true", help="the half that constants rest on")
+    parser.add_argument("--motion", default="", help="only those whose name has this in it")
     parser.add_argument("--dots", type=int, choices=(8, 15), help="only so many")
     parser.add_argument("--clips", type=int, default=3, help="of each motion")
     parser.add_argument(
@@ -166,7 +169,9 @@ def main() -> int:
     result: dict[str, Any] = {}
     for dots in [options.dots] if options.dots else [8, 15]:
         half = HALVES[0] if options.tuning else HALVES[1]
-        found = measured(half, dots, options.clips, hindsight=dots in options.hindsight)
+        found = measured(
+            half, dots, options.clips, options.motion, hindsight=dots in options.hindsight
+        )
         show(found, dots)
         result[str(dots)] = figures(found)
     if options.json:

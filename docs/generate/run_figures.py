@@ -60,6 +60,9 @@ RUNS = {
     ),
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
     "dots": _script("dots", "", "--clips 1", 4),
+    "dots_pictures": _script(
+        "dots_pictures", "", "--dots 8 --clips 1 --motion pinch --hindsight", 15
+    ),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
     "grasp_metrology": _script("grasp_metrology", "", "--seeds 1", 0.5),

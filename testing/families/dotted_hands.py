@@ -181,14 +181,14 @@ HALVES = tuple(_MOTIONS)
 _SKINS: tuple[Rgb, ...] = (SKIN.albedo, (0.16, 0.085, 0.055), (0.72, 0.47, 0.37))
 
 
-def clips(half: str, dots: int, count: int) -> Iterator[tuple[str, DottedHand]]:
-    """Clips of one of HALVES, so many of each motion, with what the motion is called.
+def clips(half: str, dots: int, count: int, part: str = "") -> Iterator[tuple[str, DottedHand]]:
+    """Clips of one of HALVES, so many of each motion whose name has this part, with that name.
 
     People, sides that the hand is seen from, dots and skin differ. Those that never show all dots
     at once are left out.
     """
     for number, (name, motion) in enumerate(_MOTIONS[half].items()):
-        found = 0
+        found = 0 if part in name else count
         for seed in range(20 * HALVES.index(half), 20 * HALVES.index(half) + 20):
             one = _clip(motion, dots, seed, number)
             if found < count and _can_begin(one):
