@@ -4,7 +4,8 @@ Identity at the start comes from seeds, which are given points, or from the cons
 constellation.py), afterwards from the hand whose dots they are: its posture is followed
 (skeleton.py, motion.py). Several accounts are kept side by side (hypothesis.py), from several
 postures that the first picture allows (posture.py); what is told is the likeliest one's, so that a
-mix-up is undone as soon as the next pictures speak against it. Pure: time is an argument.
+mix-up is undone as soon as the next pictures speak against it. A hand that all of them have lost is
+found again as it was known (anew.py). Pure: time is an argument.
 """
 
 from __future__ import annotations
