@@ -32,8 +32,8 @@ _LOST, _PAUSE, _MOST, _KNOWN = 6, 2, 0.8, 5
 _FEW = 0.6
 # No dot is smaller than this share of a whole one.
 _SPECK = 0.3
-# A hand comes back within so much (sigma) of where it was, turned and bent by so much, m and rad, or
-# by these shares of it. (The same clips: with 1 alone 93.4 %.)
+# A hand comes back within so much (sigma) of where it was, turned and bent by so much, m and
+# rad, or by these shares of it. (The same clips: with 1 alone 93.4 %.)
 _PLACE_M, _TURN_RAD, _BENT_RAD = 0.06, 0.3, 0.4
 _SHARES = (0.5, 1.0, 2.0)
 # Log probability that a hand is somewhere else than where it was followed to.
