@@ -32,9 +32,9 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS
-from services.pi_tracker.dots.assignment import assign
+from services.pi_tracker.dots.assignment import Indices, assign
 from services.pi_tracker.dots.chains import finger_landmarks
-from services.pi_tracker.dots.dot import SeenPatches
+from services.pi_tracker.dots.dot import Patch, SeenPatches
 from services.pi_tracker.dots.hindsight.looking_back import look_back
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
@@ -73,6 +73,22 @@ def ours(names: list[str], seeds: Seeds, _: list[DotFrame]) -> Method:
     return step
 
 
+def moved_to_nearest(last: Array, patches: Sequence[Patch], *, optimal: bool) -> Indices:
+    """The patch of each dot (n,), -1 for none, of least distance to `last` (n, 2), px, which moves.
+
+    optimal: of all dots at once; else each takes its nearest.
+    """
+    places = np.array([(p.x_px, p.y_px) for p in patches]).reshape(-1, 2)
+    apart = np.linalg.norm(last[:, None] - places[None], axis=2)
+    gains = np.where(apart < REACH_PX, 1e3 - apart, -np.inf)
+    if optimal:
+        found = assign(gains)
+    else:
+        found = np.array([int(r.argmax()) if (r > 0.0).any() else -1 for r in gains])
+    last[found >= 0] = places[found[found >= 0]]
+    return found
+
+
 def plain(optimal: bool) -> Make:
     """Nearest blobs: each dot's own, or the optimal assignment."""
 
@@ -80,15 +96,7 @@ def plain(optimal: bool) -> Make:
         last = np.array([seeds[name] for name in names])
 
         def step(frame: DotFrame, _: float) -> dict[str, tuple[float, float] | None]:
-            places = np.array([(p.x_px, p.y_px) for p in patches_of(frame, 0.0)]).reshape(-1, 2)
-            apart = np.linalg.norm(last[:, None] - places[None], axis=2)
-            gains = np.where(apart < REACH_PX, 1e3 - apart, -np.inf)
-            if optimal:
-                found = assign(gains)
-            else:
-                found = np.array([int(r.argmax()) if (r > 0.0).any() else -1 for r in gains])
-            seen = found >= 0
-            last[seen] = places[found[seen]]
+            seen = moved_to_nearest(last, patches_of(frame, 0.0), optimal=optimal) >= 0
             return {
                 name: (float(last[k, 0]), float(last[k, 1])) if seen[k] else None
                 for k, name in enumerate(names)

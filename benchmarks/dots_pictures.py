@@ -11,8 +11,8 @@ first picture, 1.5 px off. A dot counts if a third of its disc shows or more. Of
     exchanged  told where another one is
     longest    pictures for which names were exchanged at worst, one after the other
 for plain assignment to the nearest patches, rhot live, and, with as many dots as --hindsight says,
-rhot with hindsight, which takes long. Only the half that
-is held out is evidence; --tuning is what constants were chosen on.
+rhot with hindsight, which takes long. Only the half that is held out is evidence; --tuning is what
+constants were chosen on.
 """
 
 from __future__ import annotations
@@ -27,11 +27,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from dots import Told, judge
+from dots import Told, judge, moved_to_nearest
 
 from rhot.geometry.transforms import Array
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.dots.dot import SeenPatches
 from services.pi_tracker.dots.finder import DotFinder
 from testing.families.dotted_hands import (
@@ -44,8 +43,6 @@ from testing.families.dotted_hands import (
 )
 
 CLICK_PX = 1.5
-# A plain method takes no patch that is further than this from where a dot was.
-REACH_PX = 60.0
 COUNTS = ("right", "lost", "exchanged", "elsewhere")
 
 
@@ -90,10 +87,7 @@ def _nearest(names: Sequence[str], clicks: Array, seen: Sequence[SeenPatches]) -
     last = clicks.copy()
     told: list[Told] = []
     for picture in seen:
-        places = np.array([(p.x_px, p.y_px) for p in picture.patches]).reshape(-1, 2)
-        apart = np.linalg.norm(last[:, None] - places[None], axis=2)
-        own = assign(np.where(apart < REACH_PX, 1e3 - apart, -np.inf))
-        last[own >= 0] = places[own[own >= 0]]
+        own = moved_to_nearest(last, picture.patches, optimal=True)
         told.append(
             {n: (float(last[k, 0]), float(last[k, 1])) for k, n in enumerate(names) if own[k] >= 0}
         )

@@ -25,17 +25,14 @@ from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.image.frame import Frame
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.files.fit_colors import fit_ranges, sample_pixels
-from services.simulator.hands.gestures import Motion
-from services.simulator.recorded_motion.before_cameras import RecordedGesture
-from services.simulator.recorded_motion.playback import Playback
 from services.simulator.render.renderer import Renderer
-from services.simulator.scene.actors import MIDDLE_M
 from services.simulator.scene.catalog import Light, SceneSpec
 from services.simulator.scene.paints import SKIN, Rgb
-from services.simulator.scene.scene import Scene, build_scene
+from services.simulator.scene.scene import Scene
 from testing.families.people import TABLES, Person
 from testing.families.picture_motions import Moves
 from testing.families.recordings import leap_hand
+from testing.families.staged import staged
 from testing.synthetic_points import START_NS
 
 _RIG = Path(__file__).parents[2] / "config" / "sim.toml"
@@ -124,17 +121,8 @@ class DottedHand:
             light=self.light,
             skin=self.skin,
         )
-        model, seed = self.hand(), seed or self.seed
-        scene = build_scene(self.config(), spec, "families", seed, models={model.hand: model})
-        hand = dataclasses.replace(scene.hands[model.hand], motion=self._motion(model, seed))
-        return dataclasses.replace(scene, hands={model.hand: hand})
-
-    def _motion(self, model: HandModel, seed: int) -> Motion:
-        if not self.recording:
-            return self.moves.motion(model, 2 * seed + 1)
-        driven = leap_hand(self.recording)
-        playback = Playback(float(driven.times_s[-1]), to_and_fro=True)
-        return RecordedGesture(driven, playback, MIDDLE_M)
+        motion = self.recording or self.moves
+        return staged(self.config(), spec, self.hand(), motion, seed or self.seed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ _PERSON_TIME_S = 1.0
 # A gap longer than this tells nothing of where dots have gone meanwhile.
 _LONGEST_GAP_S = 0.5
 # Speeds at the start: m/s, rad/s.
-START_M_S, START_RAD_S = 0.5, 2.0
+_START_M_S, _START_RAD_S = 0.5, 2.0
 # What is usual counts in each picture by a share, as pictures that follow each other say the same.
 _USUAL_SHARE = 0.1
 # Joints yield beyond what they do by so much, rad.
@@ -84,14 +84,19 @@ def start(
     skeleton: Skeleton, posture: Array, rotation: Array, side: float, facing: Array, cov: Array
 ) -> State:
     """A hand at a posture (size,) of a covariance, with any velocity; facing (fingers,)."""
-    speeds = np.full(skeleton.moving, START_RAD_S)
-    speeds[:3] = START_M_S
     size, count = skeleton.size, skeleton.size + skeleton.moving
     mean, covs = np.zeros((1, count)), np.zeros((1, count, count))
     mean[0, :size] = posture
     covs[0, :size, :size] = cov
-    covs[0, size:, size:] = np.diag(speeds**2)
+    covs[0, size:, size:] = any_speed(skeleton)
     return State(mean, rotation[None], np.array([side]), facing[None], covs)
+
+
+def any_speed(skeleton: Skeleton) -> Array:
+    """The covariance of velocities (moving, moving) of which nothing is known."""
+    speeds = np.full(skeleton.moving, _START_RAD_S)
+    speeds[:3] = _START_M_S
+    return np.diag(speeds**2)
 
 
 def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:

@@ -130,6 +130,5 @@ def _moved(skeleton: Skeleton, share: float) -> Array:
     cov[3:6, 3:6] = _TURN_RAD**2 * np.eye(3)
     cov[6:moving, 6:moving] = _BENT_RAD**2 * motion.angle_shares(skeleton)
     cov *= share**2
-    speeds = np.concatenate([np.full(3, motion.START_M_S), np.full(moving - 3, motion.START_RAD_S)])
-    cov[size:, size:] = np.diag(speeds**2)
+    cov[size:, size:] = motion.any_speed(skeleton)
     return cov
