@@ -30,7 +30,9 @@ ALONE_S = 0.1
 # may have told all the while where it was, better than two looks do. (With a fifth of the markers
 # of a smooth motion missing, one that was known to 4 mm began 204 mm off. Points 50 mm and six
 # sigmas off, of motions like the tuning half's with gaps: with any sigma 47, from .005 on 49, from
-# .01 42, from .02 45, from .03 63.)
+# .01 42, from .02 45, from .03 63.) Where one look of each camera is not to be had at once, within
+# RESTART_WINDOW_S: what a single look makes of a place decimetres off is not near enough to go on
+# from (42 -> 35).
 RESTART_WINDOW_S = 0.1
 ASTRAY_SIGMA_M, ASTRAY_RATIO, ASTRAY_LOOKS = 0.01, 3.0, 6
 
@@ -41,7 +43,17 @@ class Sights(NamedTuple):
     accepted_s: Array  # (N, C) an observation that was used
     observed_s: Array  # (N, C) any observation
     begun_s: Array  # (N,) when it began last
+    returned_s: Array  # (N,) when a second camera saw it again, unsure as it was by then
     hold_s: float  # so long a landmark stays that nobody sees
+
+
+def no_sights(landmarks: int, cameras: int, hold_s: float) -> Sights:
+    """Of landmarks that were never seen."""
+    by_camera, each = (landmarks, cameras), (landmarks,)
+    accepted, observed, begun, returned = (
+        np.full(shape, -np.inf) for shape in (by_camera, by_camera, each, each)
+    )
+    return Sights(accepted, observed, begun, returned, hold_s)
 
 
 class FrameLooks(NamedTuple):
@@ -60,7 +72,7 @@ class Fates(NamedTuple):
 
     alive: Bools  # (N,) the landmark has an estimate
     used: Bools  # (N,) the look updated it
-    back: Bools  # (N,) another camera saw it alone for longer than hold_s, and it got unsure
+    back: Bools  # (N,) another camera saw it alone for hold_s, it got unsure, and has not begun yet
     astray: Bools  # (N,) it is known much worse than its hand
     counts: Ints  # (3,) of landmarks that ended before, of looks used, of looks at those alive
 
@@ -108,7 +120,10 @@ def take_in(
         alone_s = min(alone_since(sights, k, time_s), away_s)
         history.returns[node, k] = alone_s > ALONE_S
         unsure = _largest_variance(history, before, k) > ASTRAY_SIGMA_M**2
-        fates.back[k] = unsure and alone_s > sights.hold_s
+        if unsure and alone_s > sights.hold_s:
+            sights.returned_s[k] = time_s
+        back_s = time_s - sights.returned_s[k]
+        fates.back[k] = back_s < min(RESTART_WINDOW_S, time_s - sights.begun_s[k])
     filter_from(history, index, cameras, models, gate)
     for n in range(looks.landmarks.size):
         k, at_s = looks.landmarks[n], looks.times_s[n]
