@@ -1,1 +1,1 @@
-"""Pictures of hands by VTK, which share no code with the simulator; see clips.py."""
+"""Pictures of hands by VTK, which share no code with the simulator; clips.py has cases."""

@@ -6,7 +6,7 @@ Pure data.
 from __future__ import annotations
 
 from testing.families.case import Half
-from testing.second_renderer.clips import Clip, Rig
+from testing.second_renderer.clip import Clip, Rig
 from testing.second_renderer.motion import Carried, Play
 from testing.second_renderer.paint import Job
 from testing.second_renderer.pictures import Shutter

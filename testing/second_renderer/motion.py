@@ -104,7 +104,9 @@ class Play:
     def _placed(self) -> tuple[Array, Array]:
         """Turn (3, 3) from the recording to the rig, and where its middle comes to lie."""
         _, axes_of, _ = _recorded(self.recording)
-        mean = _orthonormal(axes_of(self._recorded_s(np.linspace(0.0, 10.0, 60))).mean(axis=0)[None])[0]
+        mean = _orthonormal(
+            axes_of(self._recorded_s(np.linspace(0.0, 10.0, 60))).mean(axis=0)[None]
+        )[0]
         # Palm to the cameras, fingers up: columns are where right, back of the hand and arm go.
         facing = np.stack([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]], axis=1)
         seen = Rotation.from_euler(
@@ -114,7 +116,11 @@ class Play:
 
     def _carry(self, times_s: Array) -> tuple[Array, Array]:
         """Turns (n, 3, 3) about the middle, and shifts (n, 3)."""
-        kind, size, phase = self.carried.kind, self.carried.size, 2 * np.pi * self.carried.hz * times_s
+        kind, size, phase = (
+            self.carried.kind,
+            self.carried.size,
+            2 * np.pi * self.carried.hz * times_s,
+        )
         shift = np.zeros((len(times_s), 3))
         way = np.sin(phase)
         if kind == "wait":
@@ -124,8 +130,13 @@ class Play:
         if kind == "flap":
             way = np.tanh(_SHARP * np.sin(phase)) / np.tanh(_SHARP)
         if kind == "drift":
-            shift = 1e-3 * size * np.stack(
-                [np.sin(phase), 0.5 * np.sin(0.73 * phase + 1.0), 0.8 * np.sin(0.61 * phase)], axis=1
+            shift = (
+                1e-3
+                * size
+                * np.stack(
+                    [np.sin(phase), 0.5 * np.sin(0.73 * phase + 1.0), 0.8 * np.sin(0.61 * phase)],
+                    axis=1,
+                )
             )
         vector = np.zeros((len(times_s), 3))
         if kind in ("roll", "wait"):

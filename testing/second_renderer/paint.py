@@ -26,6 +26,8 @@ PAINTS = {
     "green": (0.02, 0.42, 0.12),
     "lime": (0.42, 0.70, 0.04),
 }
+# So many vertices tell the skin's height under the dab.
+_ABOUT_DAB = 40
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,13 @@ def painted(mesh: Mesh, job: Job) -> Painted:
 def _dab(mesh: Mesh, job: Job, rng: np.random.Generator) -> tuple[Array, Array]:
     angle = rng.uniform(0.0, 2.0 * np.pi)
     x, z = 1e-3 * job.dab_off_mm * np.array([np.cos(angle), np.sin(angle)])
-    palm_side = mesh.normals[:, 1] < -0.3
+    palm_side = (mesh.normals[:, 1] < -0.3) & (mesh.weights[:, PALM] > 0.9)
     near = np.hypot(mesh.vertices[:, 0] - x, mesh.vertices[:, 2] - z)
-    nearest = np.argsort(np.where(palm_side & (mesh.weights[:, PALM] > 0.9), near, 1.0))[:6]
-    middle = mesh.vertices[nearest].mean(axis=0)
+    around = np.argsort(np.where(palm_side, near, 1.0))[:_ABOUT_DAB]
+    # The skin's height about there, as a polynomial of second order.
+    dx, height, dz = (mesh.vertices[around] - [x, 0.0, z]).T
+    terms = np.stack([np.ones_like(dx), dx, dz, dx * dx, dx * dz, dz * dz], axis=1)
+    middle = np.array([x, np.linalg.lstsq(terms, height, rcond=None)[0][0], z])
     away = np.linalg.norm(mesh.vertices - middle, axis=1)
     turn = np.arctan2(mesh.vertices[:, 2] - middle[2], mesh.vertices[:, 0] - middle[0])
     waves = np.sin(2 * turn + rng.uniform(0, 6)) + 0.7 * np.sin(3 * turn + rng.uniform(0, 6))

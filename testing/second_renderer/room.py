@@ -1,4 +1,4 @@
-"""Lamps, and a room with things in it, for VTK. Metres; the rig's frame: x right, y down, z away."""
+"""Lamps, and a room with things in it, for VTK. Metres, in the rig's frame (x right, y down)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,11 @@ def add_lamps(renderer: Any, light: Light, target: Array) -> None:
         one.SetIntensity(max(lamp.color))
         renderer.AddLight(one)
     # Far lamps without shadows stand for what walls throw back.
-    for place, share in (((-3.0, 1.0, -2.0), 0.5), ((3.0, 0.4, -2.0), 0.35), ((0.0, -4.0, 0.8), 0.4)):
+    for place, share in (
+        ((-3.0, 1.0, -2.0), 0.5),
+        ((3.0, 0.4, -2.0), 0.35),
+        ((0.0, -4.0, 0.8), 0.4),
+    ):
         one = vtk.vtkLight()
         one.SetLightTypeToSceneLight()
         one.SetPositional(True)
@@ -170,7 +174,9 @@ def _wall(rng: np.random.Generator) -> Array:
     while x < width - 30:
         w, h = int(rng.integers(8, 26)), int(rng.integers(70, 110))
         grey = rng.uniform(0.05, 0.5)
-        picture[130 - min(h, 100) : 130, x : x + w] = np.clip(grey + rng.uniform(-0.15, 0.15, 3), 0.02, 0.8)
+        picture[130 - min(h, 100) : 130, x : x + w] = np.clip(
+            grey + rng.uniform(-0.15, 0.15, 3), 0.02, 0.8
+        )
         x += w + int(rng.integers(1, 6))
     return picture
 

@@ -18,7 +18,7 @@ from testing.second_renderer.motion import Array, Bones
 
 # Bones: the palm with the forearm is 0, three of each digit follow.
 PALM = 0
-_VOXEL_M = 0.0013
+_VOXEL_M = 0.0016
 # How far parts blend into each other.
 _BLEND_M = 0.0035
 _WEIGHT_M = 0.0022
@@ -136,21 +136,23 @@ def _parts(joints: Array, frames: Array, size: float, build: Build) -> list[_Par
                 way = (end - begin) / np.linalg.norm(end - begin)
                 end = end + (_PULP_M - radii[3]) * way
             squash = (_WIDE, _FLAT) if k == 2 else (1.0, 1.0)
-            parts.append(
-                _Part(bone, begin, end, (radii[k], radii[k + 1]), frames[bone], squash)
-            )
-    thick = size * build.palm
-    wrist = np.array([0.0, 0.0, 0.0])
+            parts.append(_Part(bone, begin, end, (radii[k], radii[k + 1]), frames[bone], squash))
+    return [*parts, *_palm(joints, size, size * build.palm)]
+
+
+def _palm(joints: Array, size: float, thick: float) -> list[_Part]:
+    """Four rays from the wrist to the knuckles, the ball of the thumb, and a flat forearm."""
+    upright, plain = np.eye(3), (1.0, 1.0)
+    parts = []
     for digit, x_mm in zip(range(1, 5), (-14.0, -4.0, 6.0, 14.0), strict=True):
-        begin = wrist + 1e-3 * size * np.array([x_mm, 0.0, -4.0])
+        begin = 1e-3 * size * np.array([x_mm, 0.0, -4.0])
         radii = (0.0135 * thick, 0.0118 * thick)
-        parts.append(_Part(PALM, begin, joints[digit, 0], radii, np.eye(3), (1.0, 1.0)))
-    thenar = joints[0, 0] + 1e-3 * size * np.array([4.0, -2.0, 0.0])
-    parts.append(_Part(PALM, thenar, joints[1, 0] * 0.55, (0.013 * thick, 0.012 * thick), np.eye(3), (1.0, 1.0)))
-    arm = np.array([0.0, 0.0, 0.13])
-    parts.append(
-        _Part(PALM, wrist + [0, 0, 0.004], arm, (0.0215 * thick, 0.029 * thick), np.eye(3), (1.28, 0.86))
-    )
+        parts.append(_Part(PALM, begin, joints[digit, 0], radii, upright, plain))
+    ball, towards = joints[0, 0] + 1e-3 * size * np.array([4.0, -2.0, 0.0]), 0.55 * joints[1, 0]
+    parts.append(_Part(PALM, ball, towards, (0.013 * thick, 0.012 * thick), upright, plain))
+    begin, end = np.array([0.0, 0.0, 0.004]), np.array([0.0, 0.0, 0.13])
+    radii = (0.0215 * thick, 0.029 * thick)
+    parts.append(_Part(PALM, begin, end, radii, upright, (1.28, 0.86)))
     return parts
 
 
@@ -183,7 +185,10 @@ def _union(parts: list[_Part], points: Array) -> Array:
 def _gradient(parts: list[_Part], points: Array) -> Array:
     step = 4e-4
     normals = np.stack(
-        [_union(parts, points + step * axis) - _union(parts, points - step * axis) for axis in np.eye(3)],
+        [
+            _union(parts, points + step * axis) - _union(parts, points - step * axis)
+            for axis in np.eye(3)
+        ],
         axis=1,
     )
     return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
