@@ -114,7 +114,8 @@ def test_landmarks_that_their_hand_tells_do_not_begin_again(fuse):
     """Test: a hand moves smoothly; a fifth of all markers are missing, some for .2 s in a camera.
 
     One that was known to 4 mm began again with two looks as the other camera came back, 204 mm off;
-    of these, 29 mm. Expected: each begins once; the largest error with two frames of lag, as measured and a half.
+    of these, 29 mm. Expected: each begins once; the largest error with two frames of lag, as
+    measured and a half.
     """
     motion, rig = MovingHand(finger_share=0.0), SyntheticRig()
     given = with_gaps(frames(rig, motion, 12.0), Gaps(share=0.2, seed=3), rig)
