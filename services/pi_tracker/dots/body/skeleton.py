@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 # A camera's focal length by its picture's longer side, if nobody knows: that of phones and webcams.
-_FOCAL = 0.75
+FOCAL = 0.75
 # No joint is nearer to a camera than this, m.
 _NEAREST_M = 0.05
 # Usual angles and their spread, rad: abduction and three flexions of the thumb, of a finger; wide,
@@ -48,6 +48,10 @@ _LENGTH_SIGMA, _ROOT_SIGMA, _LOOSE_SIGMA = 0.12, 0.007, 0.015
 # clips of 8 dots like the tuning half of benchmarks/dots_pictures.py, before dots that turn away
 # were expected as early: .8 and .35 up 82 % right, .5 and .5 88 %.)
 _UP, _UP_SIGMA, _ASIDE_SIGMA, _BEFORE_END = 0.5, 0.5, 0.5, 0.5
+
+# Shares of a flexion's acceleration: its own, its finger's (the thumb's is half) and of all
+# fingers; and of an abduction.
+_OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
 
 
 class _Chains(NamedTuple):
@@ -81,7 +85,7 @@ class Skeleton:
         self._group = np.unique(np.minimum(rows, 1), return_inverse=True)[1]
         groups = len(np.unique(self._group))
         self.size = self._ups + 2 * groups
-        self.focal_px = _FOCAL * max(size_px)
+        self.focal_px = FOCAL * max(size_px)
         self.middle_px = 0.5 * (np.array(size_px) - 1.0)
         model = default_hand("right")
         rest, _ = forward(model, np.eye(3), np.zeros(3), np.zeros((5, 4)))
@@ -96,7 +100,7 @@ class Skeleton:
         kind = np.minimum(rows, 1)
         self.usual, self.spread = np.array(_USUAL)[kind].ravel(), np.array(_SPREAD)[kind].ravel()
         self.least, self.most = np.array(_LEAST)[kind].ravel(), np.array(_MOST)[kind].ravel()
-        self.thumb = np.repeat(rows == 0, 4)  # (angles,)
+        self.shares = _shares(rows)
         self.person = _people(rows, len(loose), groups)
         # What is usual as linear rows (r, size) with targets and variances: angles, couplings.
         last = 6 + 4 * np.flatnonzero(rows > 0) + 3
@@ -133,7 +137,7 @@ class Skeleton:
         slopes[..., :3] = np.eye(3)
         # A turn w shifts a point p by w x p.
         for axis in range(3):
-            slopes[..., 3 + axis] = _cross(np.eye(3)[axis], points)
+            slopes[..., 3 + axis] = cross(np.eye(3)[axis], points)
         return points + postures[:, None, :3], slopes
 
     def facing(self, postures: Array, rotations: Array, sides: Array) -> Array:
@@ -211,11 +215,11 @@ class Skeleton:
                 slopes[:, each, j, :, self.moving + 3 * each + k] = bones[k].swapaxes(0, 1)
             for k in range(j + 1):
                 axis, start = axes[k]
-                turning = _cross(axis, dots[:, :, j] - start).swapaxes(0, 1)
+                turning = cross(axis, dots[:, :, j] - start).swapaxes(0, 1)
                 slopes[:, each, j, :, 6 + 4 * each + k] = turning
             if j < 3:
                 # Skin over a joint goes half way with the bone beyond it.
-                turning = 0.5 * _cross(axes[j + 1][0], offsets[:, :, j]).swapaxes(0, 1)
+                turning = 0.5 * cross(axes[j + 1][0], offsets[:, :, j]).swapaxes(0, 1)
                 slopes[:, each, j, :, 6 + 4 * each + j + 1] = turning
             for k in range(3):
                 slopes[:, each, j, k, own + 3 * each + k] = 1.0
@@ -244,6 +248,21 @@ def _people(rows: npt.NDArray[np.int64], loose: int, groups: int) -> Array:
     )
 
 
+def _shares(rows: npt.NDArray[np.int64]) -> Array:
+    """Covariance (angles, angles) of accelerations, one that is sharp having about 1."""
+    flexion = np.tile([0.0, 1.0, 1.0, 0.8], len(rows))
+    finger = np.repeat(np.eye(len(rows)), 4, axis=0)
+    columns = np.concatenate(
+        [
+            np.diag(np.where(flexion > 0.0, _OWN, _SPLAY)),
+            _FINGER * flexion[:, None] * finger,
+            (_ALL * flexion * np.where(np.repeat(rows == 0, 4), 0.5, 1.0))[:, None],
+        ],
+        axis=1,
+    )
+    return np.asarray(columns @ columns.T)
+
+
 def turned(vectors: Array) -> Array:
     """Rotations (k, 3, 3) by vectors (k, 3), rad."""
     angles = np.linalg.norm(vectors, axis=1) + 1e-12
@@ -261,7 +280,7 @@ def _mirrored(rotations: Array, sides: Array) -> Array:
     return frames
 
 
-def _cross(first: Array, second: Array) -> Array:
+def cross(first: Array, second: Array) -> Array:
     """Cross products (..., 3); numpy's own takes five times as long for a few."""
     product = np.empty(np.broadcast_shapes(first.shape, second.shape))
     for k, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
