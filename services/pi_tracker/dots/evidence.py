@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.hypothesis import FEWEST_FALSE, Known, Patches, View
 from services.pi_tracker.dots.body.body import Body
+from services.pi_tracker.dots.hypothesis import FEWEST_FALSE, Known, Patches, View
 
 Array = npt.NDArray[np.float64]
 Told = tuple[int, ...]

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.search import Search
 from services.pi_tracker.dots.body.body import Body
+from services.pi_tracker.dots.search import Search
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]

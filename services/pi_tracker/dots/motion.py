@@ -1,8 +1,8 @@
 """How a hand moves, and what measured dots say of it: an extended Kalman filter of its posture.
 
-Postures are those of a body (body/). What moves (place, turn, angles) has a velocity, which fades; people's
-lengths do not move. A hand rests or jerks, and so do fingers: each acceleration is one of a few
-levels, and fingers close together. Several states are updated at once. Pure.
+Postures are those of a body (body/). What moves (place, turn, angles) has a velocity, which fades;
+people's lengths do not move. A hand rests or jerks, and so do fingers: each acceleration is one of
+a few levels, and fingers close together. Several states are updated at once. Pure.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots.body.body import Body
-from services.pi_tracker.dots.body.skeleton import turned
+from services.pi_tracker.dots.body.rotations import turned
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -148,9 +148,7 @@ def levels(body: Body, elapsed_s: float) -> tuple[tuple[Array, float], ...]:
     )
 
 
-def updated(
-    body: Body, state: State, seen: Mask, places: Array, variances: Array
-) -> Update:
+def updated(body: Body, state: State, seen: Mask, places: Array, variances: Array) -> Update:
     """k states with dots that are `seen` (k, n) at places (k, n, 2) of variances (k, n), px.
 
     Also with what hands do: usual angles, and joints' ends. The log likelihood is that of the dots'

@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
+from services.pi_tracker.dots.body.cloud import Cloud
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.evidence import Begun
@@ -31,9 +34,6 @@ from services.pi_tracker.dots.hypothesis import (
     rescored,
 )
 from services.pi_tracker.dots.search import LIVE, Search
-from services.pi_tracker.dots.body.body import Body
-from services.pi_tracker.dots.body.cloud import Cloud
-from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.start.anew import LastKnown
 from services.pi_tracker.dots.start.posture import postures
 from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape

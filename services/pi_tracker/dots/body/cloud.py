@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
-from services.pi_tracker.dots.body.skeleton import FOCAL, cross
+from services.pi_tracker.dots.body.rotations import cross
+from services.pi_tracker.dots.body.skeleton import FOCAL
 
 Array = npt.NDArray[np.float64]
 
@@ -65,6 +66,7 @@ class Cloud:
         self, postures: Array, rotations: Array, sides: Array, facing: Array
     ) -> tuple[Array, Array]:
         """Pixels (k, n, 2) of the dots, and their derivatives (k, n, 2, size)."""
+        del sides, facing  # a cloud has neither
         count = len(postures)
         own = _LENGTH_M * postures[:, 6 : self.size].reshape(count, self._count, 2)
         turned = (self._flat + own) @ rotations[:, :, :2].swapaxes(1, 2)
@@ -83,4 +85,5 @@ class Cloud:
 
     def showing(self, postures: Array, rotations: Array, sides: Array, facing: Array) -> Array:
         """1 of each dot (k, n): nobody knows which way it faces."""
+        del rotations, sides, facing
         return np.ones((len(postures), self._count))

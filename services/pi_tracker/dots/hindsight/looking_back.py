@@ -24,8 +24,8 @@ from services.pi_tracker.dots.hypothesis import SHARED
 from services.pi_tracker.dots.search import AGAIN, CLOUD, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
 
-# How often each picture is looked at: from the start in each way, and as what hangs on no hand; from
-# the middle, and resumed.
+# How often each picture is looked at: from the start in each way, and as what hangs on no hand;
+# from the middle, and resumed.
 LOOKS = len(SEVERAL) + 2 + resumed.LOOKS
 
 Begin = Callable[[Search], DotTracker]

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
 from services.pi_tracker.dots.extend import extend, searched
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, pruned
 from services.pi_tracker.dots.search import Search
-from services.pi_tracker.dots.body.body import Body
 
 Array = npt.NDArray[np.float64]
 

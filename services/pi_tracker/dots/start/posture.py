@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rhot.geometry.transforms import rotation_from_quaternion
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.motion import State, start
-from services.pi_tracker.dots.body.skeleton import Skeleton, turned
 
 Array = npt.NDArray[np.float64]
 

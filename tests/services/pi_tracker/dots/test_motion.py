@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import finger_landmarks
-from services.pi_tracker.dots.body.skeleton import Skeleton, turned
 from services.pi_tracker.dots.start.posture import postures
 
 NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
