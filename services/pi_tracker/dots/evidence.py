@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
 from services.pi_tracker.dots.hypothesis import FEWEST_FALSE, Known, Patches, View
-from services.pi_tracker.dots.skeleton import Skeleton
 
 Array = npt.NDArray[np.float64]
 Told = tuple[int, ...]
@@ -31,7 +31,7 @@ _KEPT, _ALIKE, _WORSE_NATS = 8, 3, 16.0
 class Begun(NamedTuple):
     """The hand's states in the first picture, and their scores (nats)."""
 
-    skeleton: Skeleton
+    body: Body
     states: motion.State
     scores: Array
     size_px: tuple[int, int]  # the picture's
@@ -72,13 +72,13 @@ class Judge:
         self.false_density = (float(np.mean(false)) + FEWEST_FALSE) / (width * height)
 
     @property
-    def skeleton(self) -> Skeleton:
+    def body(self) -> Body:
         """The hand whose dots they are."""
-        return self._begun.skeleton
+        return self._begun.body
 
     def backwards(self, last: Trace) -> Judge:
         """The same of the pictures from the last to the first; `last` is a trace after the last."""
-        states = motion.reversed_in_time(self.skeleton, last.states)
+        states = motion.reversed_in_time(self.body, last.states)
         turned = copy(self)
         turned._begun = self._begun._replace(states=states, scores=last.scores - last.nats)
         turned.pictures = self.pictures[::-1]
@@ -110,9 +110,9 @@ class Judge:
         known = Known(0.0, self.areas, before.unseen, before.false)
         elapsed_s = motion.between(self.times_s[number - 1], self.times_s[number])
         likeliest = before.states.take([int(before.scores.argmax())])
-        ahead = motion.coasted(self.skeleton, likeliest, elapsed_s)
-        view = View(known, patches, self.false_density, self.skeleton.showing(*ahead[:4])[0])
-        parent, states, scores = _followed(self.skeleton, before, view, patch, elapsed_s)
+        ahead = motion.coasted(self.body, likeliest, elapsed_s)
+        view = View(known, patches, self.false_density, self.body.showing(*ahead[:4])[0])
+        parent, states, scores = _followed(self.body, before, view, patch, elapsed_s)
         scores, branch = scores + view.claims(patch), before.branch[parent]
         rows = _best(scores, branch)
         return Trace(
@@ -125,17 +125,17 @@ class Judge:
 
 
 def _followed(
-    skeleton: Skeleton, before: Trace, view: View, patch: npt.NDArray[np.int64], elapsed_s: float
+    body: Body, before: Trace, view: View, patch: npt.NDArray[np.int64], elapsed_s: float
 ) -> tuple[npt.NDArray[np.int64], motion.State, Array]:
     """Each state with each acceleration: what it came from, what it is and its score."""
-    ways = motion.levels(skeleton, elapsed_s)
+    ways = motion.levels(body, elapsed_s)
     parent, level = (part.ravel() for part in np.mgrid[: len(before.scores), : len(ways)])
-    ahead = motion.coasted(skeleton, before.states, elapsed_s).take(parent.tolist())
+    ahead = motion.coasted(body, before.states, elapsed_s).take(parent.tolist())
     ahead = ahead._replace(covs=ahead.covs + np.array([cov for cov, _ in ways])[level])
     seen, places, variances = view.measured(patch)
     count = len(parent)
     after = motion.updated(
-        skeleton,
+        body,
         ahead,
         np.tile(seen, (count, 1)),
         np.tile(places, (count, 1, 1)),

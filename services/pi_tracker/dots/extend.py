@@ -107,9 +107,9 @@ def extend(
     search: Search = LIVE,
 ) -> list[Hypothesis]:
     """What hypotheses may become, the likely ones, in no order; at least one."""
-    skeleton = around.skeleton
-    still = motion.coasted(skeleton, motion.together([p.state for p in parents]), elapsed_s)
-    showing = skeleton.showing(*still[:4])
+    body = around.body
+    still = motion.coasted(body, motion.together([p.state for p in parents]), elapsed_s)
+    showing = body.showing(*still[:4])
     views = [
         View(parent, patches, around.false_density, shows)
         for parent, shows in zip(parents, showing, strict=True)
@@ -121,7 +121,7 @@ def extend(
     own = [views[k] for k in beam.view.tolist()]
     measured = zip(*(v.measured(p) for v, p in zip(own, beam.patch, strict=True)), strict=True)
     seen, places, variances = (np.array(part) for part in measured)
-    after = motion.updated(skeleton, before, seen, places, variances)
+    after = motion.updated(body, before, seen, places, variances)
     nats = after.nats + np.array([prior for _, prior in around.levels])[beam.level]
     return [
         own[k].become(parents[row], beam.patch[k], after.state.take([k]), float(nats[k]))
@@ -131,9 +131,9 @@ def extend(
 
 def _begun(views: list[View], still: motion.State, around: Surroundings) -> _Beam:
     """Every account with every acceleration, without any patch yet."""
-    skeleton, levels = around.skeleton, around.levels
-    pixels, slopes = skeleton.project(*still[:4])
-    count, dots, size = len(pixels), pixels.shape[1], skeleton.size
+    body, levels = around.body, around.levels
+    pixels, slopes = body.project(*still[:4])
+    count, dots, size = len(pixels), pixels.shape[1], body.size
     rows = slopes.reshape(count, 1, 2 * dots, size)
     added = np.array([cov[:size, :size] for cov, _ in levels])
     covs = rows @ (still.covs[:, None, :size, :size] + added) @ rows.swapaxes(2, 3)

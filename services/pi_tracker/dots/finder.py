@@ -15,6 +15,7 @@ from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
+from services.pi_tracker.dots.either import EitherTracker
 from services.pi_tracker.dots.hindsight.looking_back import look_back
 from services.pi_tracker.dots.parts import parts_of
 from services.pi_tracker.dots.search import Search
@@ -55,7 +56,7 @@ class DotFinder:
         self._color, self._settings = color, settings
         self._noise = Noise()
         self.use(table)
-        self.tracker = DotTracker(landmarks, size_px, seeds)
+        self.tracker = EitherTracker(landmarks, size_px, seeds)
 
     def use(self, table: ColorTable) -> None:
         """Search with another table from the next frame on; dots keep their names."""

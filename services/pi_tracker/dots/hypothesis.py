@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
 from services.pi_tracker.dots.search import Search
-from services.pi_tracker.dots.skeleton import Skeleton
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -66,7 +66,7 @@ class Patches(NamedTuple):
 class Surroundings:
     """What all accounts share."""
 
-    skeleton: Skeleton
+    body: Body
     # What accelerations add to a covariance, and the log probability of each: at rest first.
     levels: tuple[tuple[Array, float], ...]
     false_density: float  # patches that are no dots, per px^2

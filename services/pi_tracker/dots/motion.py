@@ -1,8 +1,8 @@
 """How a hand moves, and what measured dots say of it: an extended Kalman filter of its posture.
 
-Postures are skeleton.py's. What moves (place, turn, angles) has a velocity, which fades; people's
-lengths do not move. A hand rests or jerks, and so do fingers: each acceleration is one of a few
-levels, and fingers close together. Several states are updated at once. Pure.
+Postures are those of a body (body/). What moves (place, turn, angles) has a velocity, which fades;
+people's lengths do not move. A hand rests or jerks, and so do fingers: each acceleration is one of
+a few levels, and fingers close together. Several states are updated at once. Pure.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from services.pi_tracker.dots.skeleton import Skeleton, turned
+from services.pi_tracker.dots.body.body import Body
+from services.pi_tracker.dots.body.rotations import turned
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -26,9 +27,6 @@ _VELOCITY_TIME_S = 0.25
 _HAND, _ANGLES = ((2.0, 15.0), (20.0, 150.0)), (8.0, 50.0, 300.0)
 # Log probability of each step to what is sharper.
 _SHARP = -1.7
-# Shares of a flexion's acceleration: its own, its finger's (the thumb's is half) and of all
-# fingers; and of an abduction.
-_OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
 # What was learnt of the person fades, too: it was learnt from a posture that may be wrong. (15 dots
 # of `splay`, seeds 2 and 4, with an earlier search: 44 and 77 % right without, 90 and 99 % so;
 # .4 s: 93 % of seed 2, but of `grab` with seed 4 42 instead of 46 %.)
@@ -81,27 +79,27 @@ def together(states: list[State]) -> State:
 
 
 def start(
-    skeleton: Skeleton, posture: Array, rotation: Array, side: float, facing: Array, cov: Array
+    body: Body, posture: Array, rotation: Array, side: float, facing: Array, cov: Array
 ) -> State:
     """A hand at a posture (size,) of a covariance, with any velocity; facing (fingers,)."""
-    size, count = skeleton.size, skeleton.size + skeleton.moving
+    size, count = body.size, body.size + body.moving
     mean, covs = np.zeros((1, count)), np.zeros((1, count, count))
     mean[0, :size] = posture
     covs[0, :size, :size] = cov
-    covs[0, size:, size:] = any_speed(skeleton)
+    covs[0, size:, size:] = any_speed(body)
     return State(mean, rotation[None], np.array([side]), facing[None], covs)
 
 
-def any_speed(skeleton: Skeleton) -> Array:
+def any_speed(body: Body) -> Array:
     """The covariance of velocities (moving, moving) of which nothing is known."""
-    speeds = np.full(skeleton.moving, _START_RAD_S)
+    speeds = np.full(body.moving, _START_RAD_S)
     speeds[:3] = _START_M_S
     return np.diag(speeds**2)
 
 
-def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:
+def coasted(body: Body, state: State, elapsed_s: float) -> State:
     """The states after a time without any acceleration."""
-    size, moving = skeleton.size, skeleton.moving
+    size, moving = body.size, body.moving
     fade = float(np.exp(-elapsed_s / _VELOCITY_TIME_S))
     # How far a velocity that fades carries.
     reach_s = _VELOCITY_TIME_S * (1.0 - fade)
@@ -111,24 +109,24 @@ def coasted(skeleton: Skeleton, state: State, elapsed_s: float) -> State:
     person = np.arange(moving, size)
     step[person, person] = stay = float(np.exp(-elapsed_s / _PERSON_TIME_S))
     covs = step @ state.covs @ step.T
-    covs[:, person, person] += (1.0 - stay**2) * skeleton.person**2
+    covs[:, person, person] += (1.0 - stay**2) * body.person**2
     return _folded(state._replace(means=state.means @ step.T, covs=covs))
 
 
-def reversed_in_time(skeleton: Skeleton, state: State) -> State:
+def reversed_in_time(body: Body, state: State) -> State:
     """The states as time that runs backwards has them: what moves goes where it came from."""
-    signs = np.ones(skeleton.size + skeleton.moving)
-    signs[skeleton.size :] = -1.0
+    signs = np.ones(body.size + body.moving)
+    signs[body.size :] = -1.0
     return state._replace(means=state.means * signs, covs=state.covs * np.outer(signs, signs))
 
 
-def _accelerated(skeleton: Skeleton, hand: int, angles: int, elapsed_s: float) -> Array:
+def _accelerated(body: Body, hand: int, angles: int, elapsed_s: float) -> Array:
     """What accelerations of these levels add to a covariance (d, d) in a time."""
-    moving, size = skeleton.moving, skeleton.size
+    moving, size = body.moving, body.size
     sigmas = np.repeat(_HAND[hand], 3)
     squares = np.zeros((moving, moving))
     squares[:6, :6] = np.diag(sigmas**2)
-    squares[6:, 6:] = _ANGLES[angles] ** 2 * angle_shares(skeleton)
+    squares[6:, 6:] = _ANGLES[angles] ** 2 * body.shares
     cov = np.zeros((size + moving, size + moving))
     # A constant acceleration for the whole time.
     cov[:moving, :moving] = 0.25 * elapsed_s**4 * squares
@@ -138,56 +136,39 @@ def _accelerated(skeleton: Skeleton, hand: int, angles: int, elapsed_s: float) -
     return cov
 
 
-def levels(skeleton: Skeleton, elapsed_s: float) -> tuple[tuple[Array, float], ...]:
+def levels(body: Body, elapsed_s: float) -> tuple[tuple[Array, float], ...]:
     """What accelerations of the hand and of its fingers add to a covariance (d, d) in a time.
 
     With the log probability of each; at rest first.
     """
     return tuple(
-        (_accelerated(skeleton, hand, angles, elapsed_s), _SHARP * (hand + angles))
+        (_accelerated(body, hand, angles, elapsed_s), _SHARP * (hand + angles))
         for hand in range(len(_HAND))
         for angles in range(len(_ANGLES))
     )
 
 
-def angle_shares(skeleton: Skeleton) -> Array:
-    """Covariance (angles, angles) of accelerations, one that is sharp having about 1."""
-    flexion = np.tile([0.0, 1.0, 1.0, 0.8], skeleton.fingers)
-    finger = np.repeat(np.eye(skeleton.fingers), 4, axis=0)
-    columns = np.concatenate(
-        [
-            np.diag(np.where(flexion > 0.0, _OWN, _SPLAY)),
-            _FINGER * flexion[:, None] * finger,
-            (_ALL * flexion * np.where(skeleton.thumb, 0.5, 1.0))[:, None],
-        ],
-        axis=1,
-    )
-    return np.asarray(columns @ columns.T)
-
-
-def updated(
-    skeleton: Skeleton, state: State, seen: Mask, places: Array, variances: Array
-) -> Update:
+def updated(body: Body, state: State, seen: Mask, places: Array, variances: Array) -> Update:
     """k states with dots that are `seen` (k, n) at places (k, n, 2) of variances (k, n), px.
 
     Also with what hands do: usual angles, and joints' ends. The log likelihood is that of the dots'
     places, per px^2 each, times how usual the posture is.
     """
     # What is usual is linear: it is entered once, before dots are linearised again and again.
-    state, usual = _usual(skeleton, state)
-    (count, dots), size = seen.shape, skeleton.size
-    first, total = 2 * dots, 2 * dots + skeleton.angles
+    state, usual = _usual(body, state)
+    (count, dots), size = seen.shape, body.size
+    first, total = 2 * dots, 2 * dots + body.angles
     rows = np.zeros((count, total, size))
     spread = np.ones((count, total))
     spread[:, :first] = np.repeat(np.where(seen, variances, 1.0), 2, axis=1)
     offsets = np.zeros((count, total))
     shift, now = np.zeros_like(state.means), _folded(state)
     for _ in range(_ROUNDS):
-        pixels, slopes = skeleton.project(*now[:4])
+        pixels, slopes = body.project(*now[:4])
         slopes *= seen[:, :, None, None]
         rows[:, :first] = slopes.reshape(count, first, size)
         offsets[:, :first] = ((places - pixels) * seen[..., None]).reshape(count, first)
-        _limit(skeleton, now, rows, offsets, spread)
+        _limit(body, now, rows, offsets, spread)
         residuals = offsets + np.einsum("kms,ks->km", rows, shift[:, :size])
         cross = state.covs[:, :, :size] @ rows.swapaxes(1, 2)
         cov = rows @ cross[:, :size]
@@ -203,12 +184,12 @@ def updated(
     return Update(now._replace(covs=0.5 * (covs + covs.swapaxes(1, 2))), nats)
 
 
-def _usual(skeleton: Skeleton, state: State) -> tuple[State, Array]:
+def _usual(body: Body, state: State) -> tuple[State, Array]:
     """k states with the angles that are usual, and how usual theirs are (k,), nats."""
-    rows, spread = skeleton.rows, skeleton.variances / _USUAL_SHARE
-    cross = state.covs[:, :, : skeleton.size] @ rows.T  # (k, d, r)
-    cov = rows @ cross[:, : skeleton.size] + np.diag(spread)
-    residuals = skeleton.targets - state.means[:, : skeleton.size] @ rows.T
+    rows, spread = body.rows, body.variances / _USUAL_SHARE
+    cross = state.covs[:, :, : body.size] @ rows.T  # (k, d, r)
+    cov = rows @ cross[:, : body.size] + np.diag(spread)
+    residuals = body.targets - state.means[:, : body.size] @ rows.T
     gain = cross @ np.linalg.inv(cov)
     weighed = np.linalg.solve(cov, residuals[..., None])
     squared = np.einsum("kr,kr->k", residuals, weighed[..., 0])
@@ -217,12 +198,12 @@ def _usual(skeleton: Skeleton, state: State) -> tuple[State, Array]:
     return state._replace(means=means, covs=state.covs - gain @ cross.swapaxes(1, 2)), nats
 
 
-def _limit(skeleton: Skeleton, now: State, rows: Array, offsets: Array, spread: Array) -> None:
+def _limit(body: Body, now: State, rows: Array, offsets: Array, spread: Array) -> None:
     """Enter the rows of joints that are beyond their ends; those of the others say nothing."""
-    angles = now.means[:, 6 : skeleton.moving]
-    inside = np.clip(angles, skeleton.least, skeleton.most)
-    beyond, own = inside != angles, np.arange(skeleton.angles)
-    first = rows.shape[1] - skeleton.angles
+    angles = now.means[:, 6 : body.moving]
+    inside = np.clip(angles, body.least, body.most)
+    beyond, own = inside != angles, np.arange(body.angles)
+    first = rows.shape[1] - body.angles
     rows[:, first + own, 6 + own] = beyond
     offsets[:, first:] = inside - angles
     spread[:, first:] = np.where(beyond, _LIMIT_SIGMA**2, 1.0)

@@ -25,9 +25,11 @@ class Search(NamedTuple):
     # Accounts that began with different postures are searched apart, each posture as widely as all
     # are otherwise, until it is so much (nats) less likely than the best; 0: all together.
     apart_nats: float = 0.0
+    # Whether dots hang on nothing that is known (body/cloud.py), not on a hand.
+    cloud: bool = False
 
 
-LIVE = Search()
+LIVE, CLOUD = Search(), Search(cloud=True)
 # The right posture may be 25 nats less likely than others for 10 pictures, and be the likeliest by
 # hundreds after 20. (Live, with true names retraced, that of 15 dots of `grab`, seeds 0 and 6; most
 # postures are given up by then, so that 40 nats take half as long again as none.)

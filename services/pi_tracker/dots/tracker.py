@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
+from services.pi_tracker.dots.body.cloud import Cloud
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import Chains, chains_of
 from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.evidence import Begun
@@ -31,7 +34,6 @@ from services.pi_tracker.dots.hypothesis import (
     rescored,
 )
 from services.pi_tracker.dots.search import LIVE, Search
-from services.pi_tracker.dots.skeleton import Skeleton
 from services.pi_tracker.dots.start.anew import LastKnown
 from services.pi_tracker.dots.start.posture import postures
 from services.pi_tracker.dots.start.start import Start, from_seeds, from_shape
@@ -80,13 +82,16 @@ class DotTracker:
             )
         # Of the dots that there are, once tracking has started.
         self._chains: Chains = chains_of(self.landmarks)
-        self._skeleton: Skeleton
+        self._body: Body
         self._hypotheses: list[Hypothesis] = []
         self._false_patches = 0.0
         self._time_s = 0.0
         # (n,) px^2: how large each dot is when all of it shows.
         self._whole: Array = np.zeros(0)
         self._known = LastKnown()
+        # How likely the last picture was to the likeliest account, and all but the first; how far
+        # that is from showing a hand; nats.
+        self.gained = self.nats = self.misfit = 0.0
         # The hand in the picture with which tracking started, None before.
         self.begun: Begun | None = None
         # What a person should know of the start; empty if all is well.
@@ -103,9 +108,10 @@ class DotTracker:
         around = self._around(elapsed_s)
         parents, search = self._hypotheses, self._search
         found = searched(parents, arrays, around, elapsed_s, search)
-        self._hypotheses = rescored(
-            self._known.against(found, parents[0], arrays, around, elapsed_s, search)
-        )
+        found = self._known.against(found, parents[0], arrays, around, elapsed_s, search)
+        self.gained = max(one.score for one in found)
+        self.nats += self.gained
+        self._hypotheses = rescored(found)
         best = self._hypotheses[0]
         self._whole = _grown(self._whole, best.patch, arrays.areas)
         self._known.note(best, arrays.areas, self._whole)
@@ -117,6 +123,11 @@ class DotTracker:
     def names(self) -> tuple[str, ...]:
         """The landmarks that have a dot, in the order of a way's patches."""
         return self._chains.landmarks
+
+    @property
+    def is_cloud(self) -> bool:
+        """Whether dots hang on no hand."""
+        return self._search.cloud
 
     def way(self) -> list[Way]:
         """What the account that is the likeliest by now said of each picture since the start.
@@ -145,7 +156,6 @@ class DotTracker:
 
     def _begin(self, found: Start, patches: Sequence[Patch], time_s: float) -> None:
         self._chains, self.notes, self._time_s = found.chains, found.notes, time_s
-        self._skeleton = Skeleton(found.chains.landmarks, self._size_px)
         areas = np.array([p.area_px for p in patches]) if patches else np.array([100.0])
         typical = float(np.median(areas))
         own = [typical if p < 0 else patches[p].area_px for p in found.patch]
@@ -155,9 +165,10 @@ class DotTracker:
         false = np.delete(places, [p for p in found.patch if p >= 0], axis=0)
         way = Way(None, found.patch) if self._remembers else None
         sigmas = np.maximum(found.sigmas, _WANDER * np.sqrt(typical))
-        scores, states = zip(*postures(self._skeleton, found.places, sigmas), strict=True)
+        self._body, begun = self._first(found, sigmas)
+        scores, states = zip(*begun, strict=True)
         self.begun = Begun(
-            self._skeleton, motion.together(list(states)), np.array(scores), self._size_px
+            self._body, motion.together(list(states)), np.array(scores), self._size_px
         )
         self._hypotheses = [
             Hypothesis(
@@ -166,10 +177,19 @@ class DotTracker:
             for branch, (score, state) in enumerate(zip(scores, states, strict=True))
         ]
 
+    def _first(self, found: Start, sigmas: Array) -> tuple[Body, list[tuple[float, motion.State]]]:
+        """What the dots hang on, its states in the first picture and their scores."""
+        if self._search.cloud:
+            cloud = Cloud(found.places, self._size_px)
+            return cloud, [(0.0, cloud.begun(sigmas))]
+        hand = Skeleton(found.chains.landmarks, self._size_px)
+        self.misfit, begun = postures(hand, found.places, sigmas)
+        return hand, begun
+
     def _around(self, elapsed_s: float) -> Surroundings:
         width, height = self._size_px
         density = (self._false_patches + FEWEST_FALSE) / (width * height)
-        return Surroundings(self._skeleton, motion.levels(self._skeleton, elapsed_s), density)
+        return Surroundings(self._body, motion.levels(self._body, elapsed_s), density)
 
     def _dots(self, patches: Sequence[Patch]) -> dict[str, Dot]:
         best = self._hypotheses[0]
@@ -195,8 +215,8 @@ class DotTracker:
     def _expected(self, best: Hypothesis) -> tuple[Array, Array]:
         """Where the hand has its dots (n, 2), and their sigmas (n,), px."""
         state = best.state
-        pixels, slopes = self._skeleton.project(*state[:4])
-        size = self._skeleton.size
+        pixels, slopes = self._body.project(*state[:4])
+        size = self._body.size
         covs = slopes[0] @ state.covs[0, :size, :size] @ slopes[0].swapaxes(1, 2)
         return pixels[0], np.sqrt(0.5 * np.trace(covs, axis1=1, axis2=2))
 

@@ -29,16 +29,19 @@ def searched_again(
     pictures: Sequence[SeenPatches],
     told: Sequence[Told],
     advance: Callable[[], None],
+    *,
+    by_shape: bool = True,
 ) -> list[dict[int, Told]]:
     """Accounts that begin with names of `told`, or by shape, by the numbers of their pictures.
 
-    begin makes a tracker that remembers, of seeds; names are those of the dots of told.
+    begin makes a tracker that remembers, of seeds; names are those of the dots of told. by_shape:
+    whether these are a hand's, whose shape says which is which.
     """
     chains = chains_of(names)
     accounts: list[dict[int, Told]] = []
     for first in range(0, len(pictures), _BLOCK):
         block = range(first, min(first + _BLOCK, len(pictures)))
-        for number, own in _begun(chains, pictures, told, block):
+        for number, own in _begun(chains, pictures, told, block, by_shape):
             patches = pictures[number].patches
             seeds = {n: _place(patches[p]) for n, p in zip(names, own, strict=True)}
             ahead = range(number, min(number + _REACH, len(pictures)))
@@ -53,13 +56,19 @@ def searched_again(
 
 
 def _begun(
-    chains: Chains, pictures: Sequence[SeenPatches], told: Sequence[Told], block: range
+    chains: Chains,
+    pictures: Sequence[SeenPatches],
+    told: Sequence[Told],
+    block: range,
+    by_shape: bool,
 ) -> list[tuple[int, Told]]:
     """Pictures of a block to begin with, and the patches that dots are taken to have there."""
     begun = []
     number = _clearest(pictures, {k: told[k] for k in block})
     if number is not None:
         begun.append((number, told[number]))
+    if not by_shape:
+        return begun
     # Names that are lost for good are found again by shape.
     count = len(chains.landmarks)
     every = {k: tuple(range(count)) for k in block if len(pictures[k].patches) == count}

@@ -15,16 +15,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
+from services.pi_tracker.dots.either import is_cloud
 from services.pi_tracker.dots.evidence import Judge
 from services.pi_tracker.dots.hindsight import resumed
 from services.pi_tracker.dots.hindsight.again import searched_again
 from services.pi_tracker.dots.hindsight.weaving import Account, woven
 from services.pi_tracker.dots.hypothesis import SHARED
-from services.pi_tracker.dots.search import AGAIN, SEVERAL, Search
+from services.pi_tracker.dots.search import AGAIN, CLOUD, SEVERAL, Search
 from services.pi_tracker.dots.tracker import MERGED_QUALITY, DotTracker, arrays_of, seen_alone
 
-# How often each picture is looked at: from the start in each way, from the middle, and resumed.
-LOOKS = len(SEVERAL) + 1 + resumed.LOOKS
+# How often each picture is looked at: from the start in each way, and as what hangs on no hand;
+# from the middle, and resumed.
+LOOKS = len(SEVERAL) + 2 + resumed.LOOKS
 
 Begin = Callable[[Search], DotTracker]
 
@@ -37,12 +39,8 @@ def look_back(
     begin makes a tracker that remembers, of the given search; advance is called LOOKS times for
     each picture.
     """
-    trackers = [begin(search) for search in SEVERAL]
-    for tracker in trackers:
-        for picture in pictures:
-            tracker.step(picture.patches, picture.time_s)
-            advance()
-    begun, names = trackers[0].begun, trackers[0].names
+    trackers = _followed(begin, pictures, advance)
+    begun, names, cloud = trackers[0].begun, trackers[0].names, trackers[0].is_cloud
     if begun is None:
         return [{} for _ in pictures]
     accounts: list[Account] = [
@@ -56,18 +54,40 @@ def look_back(
         [one.time_s for one in seen],
         list(accounts[0].values()),
     )
-    for _ in range((LOOKS - len(SEVERAL)) * (len(pictures) - count)):
+    for _ in range((1 + resumed.LOOKS) * (len(pictures) - count)):
         advance()
     told = woven(judge, accounts, count)
+    again = AGAIN._replace(cloud=cloud)
     accounts += searched_again(
-        lambda seeds: DotTracker(names, begun.size_px, seeds, AGAIN, remembers=True),
+        lambda seeds: DotTracker(names, begun.size_px, seeds, again, remembers=True),
         names,
         seen,
         told,
         advance,
+        by_shape=not cloud,
     )
     told = resumed.resumed(judge, woven(judge, accounts, count), advance)
     return _dots(names, told, [one.patches for one in pictures])
+
+
+def _followed(
+    begin: Begin, pictures: Sequence[SeenPatches], advance: Callable[[], None]
+) -> list[DotTracker]:
+    """Trackers that have searched all pictures, each in another way; of no hand if it is none."""
+    hand, cloud = begin(SEVERAL[0]), begin(CLOUD)
+    since = 0
+    for tracker in (hand, cloud):
+        for picture in pictures:
+            tracker.step(picture.patches, picture.time_s)
+            since += tracker is hand and hand.begun is not None
+            advance()
+    no_hand = is_cloud(hand, cloud, since)
+    others = [begin(one._replace(cloud=no_hand)) for one in SEVERAL[1:]]
+    for tracker in others:
+        for picture in pictures:
+            tracker.step(picture.patches, picture.time_s)
+            advance()
+    return [cloud if no_hand else hand, *others]
 
 
 def _dots(

@@ -80,7 +80,7 @@ def _searched(
 
 def _gone_on(judge: Judge, trace: Trace, number: int, told: list[Told]) -> list[Told]:
     """Dots' patches of picture `number` and those that follow, searched on from a trace of it."""
-    skeleton, own = judge.skeleton, told[number]
+    body, own = judge.body, told[number]
     scores = trace.scores - trace.nats
     hypotheses = [
         Hypothesis(
@@ -98,8 +98,8 @@ def _gone_on(judge: Judge, trace: Trace, number: int, told: list[Told]) -> list[
     ]
     for k in range(number + 1, min(number + _MOST, len(told))):
         elapsed_s = motion.between(judge.times_s[k - 1], judge.times_s[k])
-        levels = motion.levels(skeleton, elapsed_s)
-        around = Surroundings(skeleton, levels, judge.false_density)
+        levels = motion.levels(body, elapsed_s)
+        around = Surroundings(body, levels, judge.false_density)
         hypotheses = searched_on(hypotheses, judge.pictures[k], around, elapsed_s, _WIDE)
         late = _last(hypotheses[0].way, AGREED)
         if k - number >= _LEAST and late == told[k - AGREED + 1 : k + 1]:

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.body import Body
 from services.pi_tracker.dots.extend import extend, searched
 from services.pi_tracker.dots.hypothesis import Hypothesis, Patches, Surroundings, pruned
 from services.pi_tracker.dots.search import Search
-from services.pi_tracker.dots.skeleton import Skeleton
 
 Array = npt.NDArray[np.float64]
 
@@ -117,18 +117,18 @@ class LastKnown:
             patch=parent.patch,
             way=parent.way,
         )
-        ways = tuple((_moved(around.skeleton, share), _ELSEWHERE) for share in _SHARES)
-        anywhere = Surroundings(around.skeleton, ways, around.false_density)
+        ways = tuple((_moved(around.body, share), _ELSEWHERE) for share in _SHARES)
+        anywhere = Surroundings(around.body, ways, around.false_density)
         return pruned(extend([begun], patches, anywhere, _MEANWHILE_S, _SEARCH), _SEARCH)
 
 
-def _moved(skeleton: Skeleton, share: float) -> Array:
+def _moved(body: Body, share: float) -> Array:
     """What a covariance (d, d) grows by while a hand is out of sight, at a share of the usual."""
-    moving, size = skeleton.moving, skeleton.size
+    moving, size = body.moving, body.size
     cov = np.zeros((size + moving, size + moving))
     cov[:3, :3] = _PLACE_M**2 * np.eye(3)
     cov[3:6, 3:6] = _TURN_RAD**2 * np.eye(3)
-    cov[6:moving, 6:moving] = _BENT_RAD**2 * motion.angle_shares(skeleton)
+    cov[6:moving, 6:moving] = _BENT_RAD**2 * body.shares
     cov *= share**2
-    cov[size:, size:] = motion.any_speed(skeleton)
+    cov[size:, size:] = motion.any_speed(body)
     return cov

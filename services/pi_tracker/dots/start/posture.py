@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rhot.geometry.transforms import rotation_from_quaternion
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.motion import State, start
-from services.pi_tracker.dots.skeleton import Skeleton, turned
 
 Array = npt.NDArray[np.float64]
 
@@ -44,8 +45,11 @@ class _Fits(NamedTuple):
 
 def postures(
     skeleton: Skeleton, places: Array, sigmas: Array, seed: int = 0
-) -> list[tuple[float, State]]:
-    """States and their scores (nats, the best 0) of dots at places (n, 2) with sigmas (n,), px."""
+) -> tuple[float, list[tuple[float, State]]]:
+    """States and their scores (nats, the best 0) of dots at places (n, 2) with sigmas (n,), px.
+
+    Before them, how far the best is from showing them and from a usual hand, nats.
+    """
     random = np.random.default_rng(seed)
     turns = random.normal(size=(2 * _DIRECTIONS, 4))
     rotations = np.array([rotation_from_quaternion(q / np.linalg.norm(q)) for q in turns])
@@ -58,7 +62,7 @@ def postures(
     kept = _distinct(skeleton, fits, scores)
     facing = skeleton.facing(*fits)
     best, covs = float(scores[kept[0]]), np.asarray(np.linalg.inv(told), np.float64)
-    return [
+    return float(costs.min()), [
         (
             float(scores[k]) - best,
             start(

@@ -62,12 +62,12 @@ def test_backwards_the_same_names_are_right() -> None:
     judge = _judge(right, pictures)
     back = judge.backwards(list(judge.retraced(right))[-1])
     traces = list(back.retraced(right))
-    pixels, _ = judge.skeleton.project(*traces[-1].states[:4])
+    pixels, _ = judge.body.project(*traces[-1].states[:4])
     assert np.abs(pixels[0] - pictures[0].places).max() < 3.0
     tips = (0, 1, 2, 7, 4, 5, 6, 3)
     exchanged = list(back.retraced([RIGHT] * 6 + [tips] * 6))
     assert exchanged[-1].nats < traces[-1].nats - 10.0
     # Where the hand goes backwards, too.
-    ahead = list(judge.retraced(right))[6].states.means[0, judge.skeleton.size :][:2]
-    behind = traces[6].states.means[0, judge.skeleton.size :][:2]
+    ahead = list(judge.retraced(right))[6].states.means[0, judge.body.size :][:2]
+    behind = traces[6].states.means[0, judge.body.size :][:2]
     assert np.all(ahead * behind < 0.0)

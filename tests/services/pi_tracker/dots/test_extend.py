@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from rhot.hand import DIGITS
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Patch
 from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
-from services.pi_tracker.dots.skeleton import Skeleton, turned
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
 from services.simulator.recorded_motion.recording import RecordedJoints

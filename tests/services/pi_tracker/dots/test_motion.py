@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from services.pi_tracker.dots import motion
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import finger_landmarks
-from services.pi_tracker.dots.skeleton import Skeleton, turned
 from services.pi_tracker.dots.start.posture import postures
 
 NAMES = (*finger_landmarks("thumb"), *finger_landmarks("index"))
@@ -27,7 +28,7 @@ def _seen(bend: float) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def begun() -> list[tuple[float, motion.State]]:
-    return postures(SKELETON, _seen(-0.3), np.full(8, 1.0))
+    return postures(SKELETON, _seen(-0.3), np.full(8, 1.0))[1]
 
 
 def test_the_first_picture_allows_several_postures_that_all_show_it(

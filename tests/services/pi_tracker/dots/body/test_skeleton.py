@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.hand import CHAIN_JOINTS, HANDS, JOINTS, default_hand, forward
+from services.pi_tracker.dots.body.rotations import turned
+from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import finger_landmarks
-from services.pi_tracker.dots.skeleton import Skeleton, turned
 
 NAMES = ("wrist", *finger_landmarks("ring"), "middle_metacarpal", *finger_landmarks("thumb"))
 SIZE = (1280, 720)

@@ -23,12 +23,13 @@ import numpy.typing as npt
 
 from rhot.geometry.transforms import rotation_from_quaternion
 from rhot.hand import CHAIN_JOINTS, JOINTS, default_hand, forward
+from services.pi_tracker.dots.body.rotations import about_minus_x, about_y, cross, mirrored
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 # A camera's focal length by its picture's longer side, if nobody knows: that of phones and webcams.
-_FOCAL = 0.75
+FOCAL = 0.75
 # No joint is nearer to a camera than this, m.
 _NEAREST_M = 0.05
 # Usual angles and their spread, rad: abduction and three flexions of the thumb, of a finger; wide,
@@ -48,6 +49,9 @@ _LENGTH_SIGMA, _ROOT_SIGMA, _LOOSE_SIGMA = 0.12, 0.007, 0.015
 # clips of 8 dots like the tuning half of benchmarks/dots_pictures.py, before dots that turn away
 # were expected as early: .8 and .35 up 82 % right, .5 and .5 88 %.)
 _UP, _UP_SIGMA, _ASIDE_SIGMA, _BEFORE_END = 0.5, 0.5, 0.5, 0.5
+# Shares of a flexion's acceleration: its own, its finger's (the thumb's is half) and of all
+# fingers; and of an abduction.
+_OWN, _FINGER, _ALL, _SPLAY = 0.55, 0.5, 0.7, 0.35
 
 
 class _Chains(NamedTuple):
@@ -81,7 +85,7 @@ class Skeleton:
         self._group = np.unique(np.minimum(rows, 1), return_inverse=True)[1]
         groups = len(np.unique(self._group))
         self.size = self._ups + 2 * groups
-        self.focal_px = _FOCAL * max(size_px)
+        self.focal_px = FOCAL * max(size_px)
         self.middle_px = 0.5 * (np.array(size_px) - 1.0)
         model = default_hand("right")
         rest, _ = forward(model, np.eye(3), np.zeros(3), np.zeros((5, 4)))
@@ -96,7 +100,7 @@ class Skeleton:
         kind = np.minimum(rows, 1)
         self.usual, self.spread = np.array(_USUAL)[kind].ravel(), np.array(_SPREAD)[kind].ravel()
         self.least, self.most = np.array(_LEAST)[kind].ravel(), np.array(_MOST)[kind].ravel()
-        self.thumb = np.repeat(rows == 0, 4)  # (angles,)
+        self.shares = _shares(rows)
         self.person = _people(rows, len(loose), groups)
         # What is usual as linear rows (r, size) with targets and variances: angles, couplings.
         last = 6 + 4 * np.flatnonzero(rows > 0) + 3
@@ -128,18 +132,18 @@ class Skeleton:
     ) -> tuple[Array, Array]:
         """Places (k, n, 3) of the dots in the camera's frame, m, and derivatives (.., size)."""
         points, slopes = self._in_hand(postures, facing)
-        frames = _mirrored(rotations, sides)
+        frames = mirrored(rotations, sides)
         points, slopes = points @ frames.swapaxes(1, 2), frames[:, None] @ slopes
         slopes[..., :3] = np.eye(3)
         # A turn w shifts a point p by w x p.
         for axis in range(3):
-            slopes[..., 3 + axis] = _cross(np.eye(3)[axis], points)
+            slopes[..., 3 + axis] = cross(np.eye(3)[axis], points)
         return points + postures[:, None, :3], slopes
 
     def facing(self, postures: Array, rotations: Array, sides: Array) -> Array:
         """Where the camera is about each finger's bones (k, fingers), rad: 0 at their back."""
         chains = self._chains(postures)
-        frames = _mirrored(rotations, sides)[:, None]
+        frames = mirrored(rotations, sides)[:, None]
         # Towards the camera, in the axes of the hand.
         middles = chains.joints.mean(axis=2)
         sight = -(middles @ frames[:, 0].swapaxes(1, 2) + postures[:, None, :3])
@@ -152,7 +156,7 @@ class Skeleton:
 
         Dots that are on no finger have 1.
         """
-        chains, frames = self._chains(postures), _mirrored(rotations, sides)
+        chains, frames = self._chains(postures), mirrored(rotations, sides)
         cosine, sine = np.cos(facing)[:, :, None, None], np.sin(facing)[:, :, None, None]
         skin = (cosine * chains.skins[..., 1] + sine * chains.skins[..., 0]).reshape(
             len(postures), -1, 3
@@ -172,15 +176,15 @@ class Skeleton:
         joints = np.zeros((count, fingers, 4, 3))
         skins = np.zeros((count, fingers, 4, 3, 3))
         cosines, sines = np.cos(angles), np.sin(angles)
-        turn = self._turns @ _about_y(cosines[..., 0], sines[..., 0])
+        turn = self._turns @ about_y(cosines[..., 0], sines[..., 0])
         joints[:, :, 0] = at = self._bases + shifts[:, :fingers]
         axes = [(np.broadcast_to(self._turns[:, :, 1], at.shape), at)]
         bones = []
         for k in range(3):
             axes.append((-turn[..., 0], at))
             half = 0.5 * angles[..., k + 1]
-            skins[:, :, k] = turn @ _about_minus_x(np.cos(half), np.sin(half))
-            turn = turn @ _about_minus_x(cosines[..., k + 1], sines[..., k + 1])
+            skins[:, :, k] = turn @ about_minus_x(np.cos(half), np.sin(half))
+            turn = turn @ about_minus_x(cosines[..., k + 1], sines[..., k + 1])
             lengths = self._lengths[:, k] * np.exp(logs[..., k])
             bones.append(-lengths[..., None] * turn[..., 2])
             joints[:, :, k + 1] = at = at + bones[-1]
@@ -211,11 +215,11 @@ class Skeleton:
                 slopes[:, each, j, :, self.moving + 3 * each + k] = bones[k].swapaxes(0, 1)
             for k in range(j + 1):
                 axis, start = axes[k]
-                turning = _cross(axis, dots[:, :, j] - start).swapaxes(0, 1)
+                turning = cross(axis, dots[:, :, j] - start).swapaxes(0, 1)
                 slopes[:, each, j, :, 6 + 4 * each + k] = turning
             if j < 3:
                 # Skin over a joint goes half way with the bone beyond it.
-                turning = 0.5 * _cross(axes[j + 1][0], offsets[:, :, j]).swapaxes(0, 1)
+                turning = 0.5 * cross(axes[j + 1][0], offsets[:, :, j]).swapaxes(0, 1)
                 slopes[:, each, j, :, 6 + 4 * each + j + 1] = turning
             for k in range(3):
                 slopes[:, each, j, k, own + 3 * each + k] = 1.0
@@ -244,42 +248,16 @@ def _people(rows: npt.NDArray[np.int64], loose: int, groups: int) -> Array:
     )
 
 
-def turned(vectors: Array) -> Array:
-    """Rotations (k, 3, 3) by vectors (k, 3), rad."""
-    angles = np.linalg.norm(vectors, axis=1) + 1e-12
-    x, y, z = (vectors / angles[:, None]).T
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    wide = angles[:, None, None]
-    return np.asarray(np.eye(3) + np.sin(wide) * skew + (1.0 - np.cos(wide)) * skew @ skew)
-
-
-def _mirrored(rotations: Array, sides: Array) -> Array:
-    """Camera from hand (k, 3, 3), a left hand being a right one mirrored."""
-    frames = rotations.copy()
-    frames[:, :, 0] *= sides[:, None]
-    return frames
-
-
-def _cross(first: Array, second: Array) -> Array:
-    """Cross products (..., 3); numpy's own takes five times as long for a few."""
-    product = np.empty(np.broadcast_shapes(first.shape, second.shape))
-    for k, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
-        product[..., k] = first[..., a] * second[..., b] - first[..., b] * second[..., a]
-    return product
-
-
-def _about_y(cosines: Array, sines: Array) -> Array:
-    turn = np.zeros((*cosines.shape, 3, 3))
-    turn[..., 0, 0] = turn[..., 2, 2] = cosines
-    turn[..., 1, 1] = 1.0
-    turn[..., 0, 2], turn[..., 2, 0] = sines, -sines
-    return turn
-
-
-def _about_minus_x(cosines: Array, sines: Array) -> Array:
-    turn = np.zeros((*cosines.shape, 3, 3))
-    turn[..., 0, 0] = 1.0
-    turn[..., 1, 1] = turn[..., 2, 2] = cosines
-    turn[..., 1, 2], turn[..., 2, 1] = sines, -sines
-    return turn
+def _shares(rows: npt.NDArray[np.int64]) -> Array:
+    """Covariance (angles, angles) of accelerations, one that is sharp having about 1."""
+    flexion = np.tile([0.0, 1.0, 1.0, 0.8], len(rows))
+    finger = np.repeat(np.eye(len(rows)), 4, axis=0)
+    columns = np.concatenate(
+        [
+            np.diag(np.where(flexion > 0.0, _OWN, _SPLAY)),
+            _FINGER * flexion[:, None] * finger,
+            (_ALL * flexion * np.where(np.repeat(rows == 0, 4), 0.5, 1.0))[:, None],
+        ],
+        axis=1,
+    )
+    return np.asarray(columns @ columns.T)

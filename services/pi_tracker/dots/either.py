@@ -1,0 +1,77 @@
+"""Dots that hang on a hand, or on nothing that is known: both are followed, the likelier is told.
+
+A hand's posture says where dots that are hidden come out again. Where it is no hand that is filmed,
+or one whose dots are named otherwise than they are, it cannot be where its dots are, and names them
+wrongly for good: then each goes where it went (body/cloud.py). Both tell the likelihood of the same
+patches, so they are compared as they are. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.search import CLOUD, LIVE
+from services.pi_tracker.dots.tracker import DotTracker
+
+# A picture speaks against a hand by what a cloud is likelier, nats of each dot, less this. (36
+# clips of the tuning half of benchmarks/dots_pictures.py: at most .6 on average, .5 of a hand that
+# is lost; plates, chains and grids of eight dots: 1.5 to 8, but for chains a finger fits.)
+_AHEAD = 1.0
+# No first picture of a hand is further from one than this, nats. (On the same: at most 11, of 8
+# dots 7; of plates 34 to 155.)
+_MISFIT = 20.0
+# So much (nats of each dot) must speak against a hand until it is believed to be none, or for it if
+# its first picture was not one's; and no more than this is remembered.
+_SURE, _DOUBT = 30.0, 10.0
+
+
+class EitherTracker:
+    """DotTracker's dots, live, of whichever body the pictures speak for."""
+
+    def __init__(
+        self,
+        landmarks: Sequence[str],
+        size_px: tuple[int, int],
+        seeds: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        self._hand = DotTracker(landmarks, size_px, seeds, LIVE)
+        self._cloud = DotTracker(landmarks, size_px, seeds, CLOUD)
+        # What speaks for a cloud, nats of each dot.
+        self._ahead: float | None = None
+
+    def step(self, patches: Sequence[Patch], time_s: float) -> dict[str, Dot]:
+        """The dots of the next picture, by landmark; empty until tracking has started."""
+        hand, cloud = self._hand.step(patches, time_s), self._cloud.step(patches, time_s)
+        if self._ahead is not None:
+            gained = (self._cloud.gained - self._hand.gained) / len(self._hand.names) - _AHEAD
+            self._ahead = min(max(self._ahead + gained, -_SURE), _SURE)
+        elif self._hand.begun is not None:
+            self._ahead = _DOUBT if self._hand.misfit > _MISFIT else -_SURE
+        return cloud if self._is_cloud else hand
+
+    @property
+    def dot_area_px2(self) -> float:
+        """How large a dot is that shows as a whole, 0 while it is unknown."""
+        return self._told.dot_area_px2
+
+    @property
+    def notes(self) -> list[str]:
+        """What a person should know of the start; empty if all is well."""
+        return self._hand.notes
+
+    @property
+    def _is_cloud(self) -> bool:
+        return self._ahead is not None and self._ahead > 0.0
+
+    @property
+    def _told(self) -> DotTracker:
+        return self._cloud if self._is_cloud else self._hand
+
+
+def is_cloud(hand: DotTracker, cloud: DotTracker, pictures: int) -> bool:
+    """Whether dots hang on no hand, after so many pictures since tracking started."""
+    if not hand.names or pictures < 1:
+        return False
+    apart = cloud.nats - hand.nats + max(hand.misfit - _MISFIT, 0.0)
+    return apart > _AHEAD * len(hand.names) * pictures
