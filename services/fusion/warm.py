@@ -48,7 +48,7 @@ def warm_up(
     hand, nobody = next(iter(hands)), np.empty(0, dtype=np.int64)
     directions = turned_vectors(np.empty((0, 3)), np.empty((0, 4)))
     paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
-    paint.note(Directions(hand, 0, nobody, directions, directions, np.empty((0, 2))))
+    paint.note(Directions(hand, 0, nobody, directions, directions, np.empty((0, 2)), 0.0))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     heights_by_landmark(nobody, np.empty(0), np.empty((0, 2)), np.eye(3))
     fit_shift(Heights(nobody, nobody, *(np.empty(0) for _ in range(6))), 0.0, 1.0)

@@ -23,6 +23,8 @@ SIGMA_UNKNOWN = (0.29, 0.16)
 # cosine of -.8, along .06-.15; less than .02 and nothing from the side.
 SIGMA_SIDE = (0.02, 0.012)
 SIGMA_END, _END_POWER = (0.1, 0.035), (4, 2)
+# A shape that is unlike the model's counts so much more along the viewing ray than across it.
+_SHAPE_ALONG = 2.0
 # Light falls on the side that cameras see: tips are located so much before their axis, in radii
 # (tuning captures: .01 to .06; without, depths are 3 % worse).
 _LIT = 0.025
@@ -50,6 +52,7 @@ class KnownPaint(NamedTuple):
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
     direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
+    shape_sds: Array  # (L,) how unlike the model's it may be, in radii
     stamps_ns: Ints  # (L,) of the pose that told it
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
 
@@ -60,14 +63,19 @@ def note_directions(
     rows: Ints,
     directions: Array,
     hinges: Array,
-    sigmas_rad: Array,
+    sigmas: tuple[Array, float],
     stamp_ns: int,
 ) -> None:
-    """Remember how fingers of landmarks (n,) point (n, 3) and bend (n, 3), as sure as (n, 2)."""
+    """Remember how fingers of landmarks (n,) point (n, 3) and bend (n, 3).
+
+    sigmas: how sure that is (n, 2) rad, and the shape of their paint, in radii.
+    """
+    sigmas_rad, shape_sd = sigmas
     for n in range(rows.size):
         paint.directions[rows[n]] = directions[n]
         paint.hinges[rows[n]] = hinges[n]
         paint.direction_sigmas[rows[n]] = sigmas_rad[n]
+        paint.shape_sds[rows[n]] = shape_sd
         paint.stamps_ns[rows[n]] = stamp_ns
 
 
@@ -91,13 +99,15 @@ def correct_paint(
         is_told = abs(instant_ns - paint.stamps_ns[row]) <= _POSE_AGE_NS
         is_told &= paint.direction_sigmas[row, 0] <= _MOST_UNSURE_RAD
         if paint.radii_m[row] == 0.0:
-            normal, sigma_rad = -ray, SIGMA_FACING_RAD
+            normal, sigma_rad, shape = -ray, SIGMA_FACING_RAD, 0.0
             if is_told:
                 normal, sigma_rad = paint.directions[row], paint.direction_sigmas[row, 0]
+                shape = paint.shape_sds[row]
             # Deeper than the skin, by as much as the limb is thinner.
             sag_m = paint.sags_m[row]
             positions[row] += sag_m * normal
-            sigmas = paint.radius_sds[row] * sag_m, sigma_rad * sag_m
+            along = math.hypot(paint.radius_sds[row], _SHAPE_ALONG * shape)
+            sigmas = along * sag_m, math.hypot(sigma_rad, shape) * sag_m
             _add_about(normal, sigmas, covariances[row])
             continue
         along, across = SIGMA_UNKNOWN  # in radii
@@ -115,6 +125,8 @@ def correct_paint(
                 positions[row] += _LIT * paint.radii_m[row] * ray - shift
                 covariances[row] += shift_covariance
                 along, across = _tip_sigmas(ray @ paint.directions[row])
+                shape = paint.shape_sds[row]
+                along, across = math.hypot(along, _SHAPE_ALONG * shape), math.hypot(across, shape)
         radius_m = paint.radii_m[row]
         _add_about(ray, (along * radius_m, across * radius_m), covariances[row])
 

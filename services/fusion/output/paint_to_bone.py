@@ -44,6 +44,14 @@ from services.fusion.output.visible_paint import dab_sag_m, shift_table
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
 # (How long the paint is does not matter: paint_centroid.py.)
 _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
+# A hand that a model of other bones fits badly, so that its pose is unsure of the wrist's
+# orientation, has other fingers and other paint than the model too: by so many radii for each
+# radian of one axis beyond the first of these (of hands like the tables' .06 to .08; of recorded
+# hands .13 to .2), and not more than the last. Chosen on the other renderer's tuning half: at lag 2
+# median NEES 1.0, 1.2, 3.8 and 2.9 without, .3, .3, 1.1 and 1.1 with it, 99, 97, 60 and 67 % and
+# 99, 99, 90 and 92 % within three sigmas; of recorded hands that the simulator drew 1.3 and .8, .6
+# and .4; of its other hands .2 to .5 and .1 to .5. At half as much per radian .5, .4, 1.7 and 1.3.
+_ALIKE_RAD, _SHAPE_PER_RAD, _MOST_SHAPE = 0.06, {"tables": 1.5}, 0.3
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
 # Abduction alone turns a finger sideways. Against the root mean square over a digit's angles, which
@@ -84,6 +92,7 @@ class Directions(NamedTuple):
     directions: Array  # (n, 3)
     hinges: Array  # (n, 3) the axis about which a finger bends
     sigmas_rad: Array  # (n, 2) of the directions, about the hinge and sideways
+    shape_sd: float  # of the hand's paint against the model's, in radii
 
 
 class PaintToBone:
@@ -119,6 +128,9 @@ class PaintToBone:
         # In its joint's frame (L, 3): the way a painted tip points, the outward normal of a dab's
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
+        self._shape_per_rad = {
+            hand: _SHAPE_PER_RAD.get(model.origin, 0.0) for hand, model in hands.items()
+        }
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
         self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
@@ -135,6 +147,7 @@ class PaintToBone:
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),
+            shape_sds=np.zeros(len(landmarks)),
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
             viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
@@ -164,12 +177,19 @@ class PaintToBone:
         directions = turned_vectors(self._outwards[of], turns)
         hinges = turned_vectors(self._hinges[: len(of)], turns)
         spreads = np.array(sigmas_rad).reshape(-1, 2)
-        return Directions(pose.hand, pose.stamp_ns, of, directions, hinges, spreads)
+        shape_sd = self._shape_sd(pose.hand, pose.wrist_sigma_rad)
+        return Directions(pose.hand, pose.stamp_ns, of, directions, hinges, spreads, shape_sd)
+
+    def _shape_sd(self, hand: HandName, wrist_rad: float | None) -> float:
+        """In radii, of a hand whose wrist is so unsure; 0 if the pose does not say."""
+        unlike_rad = max((wrist_rad or 0.0) / math.sqrt(3.0) - _ALIKE_RAD, 0.0)
+        return min(self._shape_per_rad.get(hand, 0.0) * unlike_rad, _MOST_SHAPE)
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
+        sigmas = told.sigmas_rad, told.shape_sd
         note_directions(
-            self.known, told.rows, told.directions, told.hinges, told.sigmas_rad, told.stamp_ns
+            self.known, told.rows, told.directions, told.hinges, sigmas, told.stamp_ns
         )
 
 
