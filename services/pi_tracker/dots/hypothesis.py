@@ -27,7 +27,7 @@ Mask = npt.NDArray[np.bool_]
 # where its skin faces away; it does at the first of these cosines, and shows well at the second.
 # (On the clips of skeleton.py: -.1 and .4 88 % right, 92 % so; of those that face away .2 found 88,
 # .4 87 %.)
-_FOUND, _FOUND_AGAIN, _FACES_AWAY, _TURNED = 0.97, 0.6, 0.2, (-0.4, 0.3)
+_FOUND, _FOUND_AGAIN, _FACES_AWAY, _TURNED = 0.97, 0.6, 0.1, (-0.4, 0.3)
 # Of each picture so many patches that are no dots, at least.
 FEWEST_FALSE = 0.1
 # Where a dot lies behind or beside another's it shares that one's patch, with this probability.
@@ -44,9 +44,8 @@ _WANDER, SHARED = 0.16, 0.35
 # detect/marker_finder.py; areas vary by less than the second without anything being hidden.
 HIDDEN, AREA_NOISE = 0.34, 0.25
 # A dot's area varies by so much (sigma of its logarithm) below and above what it was of late, and
-# no patch is judged by more than so many nats on it. (18 clips of 8 dots, the tuning half of
-# benchmarks/dots_pictures.py, live: 2 nats below 96.3 % right, 1 97.0, .5 96.3.)
-_AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (1.0, 4.0)
+# no patch is judged by more than so many nats on it.
+_AREA_SIGMA, _AREA_NATS = (0.45, 0.2), (2.0, 4.0)
 # No account is kept that is so much (nats) less likely than the best.
 _WORSE_NATS = 14.0
 # Weight of a new area.
