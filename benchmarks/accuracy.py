@@ -15,80 +15,27 @@ detector's measured noise.
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
-from accuracy_pictures import RENDERED_SEEDS, Pictures, Score
+from accuracy_pictures import RENDERED_SEEDS, Pictures
+from accuracy_points import OTHERS, depth_bound_mm, synthetic_figures
 
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import Fusion, HandTable
-from rhot.geometry.transforms import Array
-from rhot.hand import BASIC_LANDMARKS
 from rhot.messages import MarkerFrame
-from services.fusion.geometry.projection import extrinsics
-from services.fusion.geometry.triangulation import triangulate
 from services.fusion.step import FusionStep
-from testing.synthetic_points import (
-    Motion,
-    MovingHand,
-    RestingHand,
-    SyntheticRig,
-    frames,
-    point_hands,
-)
+from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
-SEEDS = (1, 2, 3)
-SECONDS = 15.0
 # Frames left out of the timing.
 WARM_FRAMES = 100
 # Landmarks and colours beyond the six of a synthetic hand.
 KNUCKLES = {"index_proximal": "yellow", "middle_proximal": "orange"}
-# Methods beside the asynchronous filter, without 1-Euro: what the pairing itself costs.
-OTHERS = {
-    "nearest": Fusion(method="triangulate", pairing="nearest", filter="none"),
-    "linear": Fusion(method="triangulate", pairing="linear", filter="none"),
-    "hermite": Fusion(method="triangulate", pairing="hermite", filter="none"),
-    "disparity": Fusion(method="disparity", pairing="hermite", filter="none"),
-    "kalman_lag2_clocks_as_announced": Fusion(lag_frames=2, tune_clocks=False),
-}
-
-
-def synthetic(
-    fusion: Fusion,
-    motion_of: Callable[[int], Motion] = lambda seed: MovingHand(seed=seed),
-    **setup: Any,
-) -> dict[str, float]:
-    """Figures of one method over all seeds; motion_of makes the motion of a seed."""
-    found = Score()
-    for seed in SEEDS:
-        rig = SyntheticRig(seed=seed, **setup)
-        motion = motion_of(seed)
-        step = FusionStep(rig.config(fusion), rig.rig(), point_hands())
-        messages = [points for frame in frames(rig, motion, SECONDS) for points in step.step(frame)]
-        found.add(messages + step.flush(), functools.partial(truth, motion))
-    return found.figures()
-
-
-def truth(motion: Motion, at_s: float) -> dict[str, Array]:
-    """Every landmark's place (3,) at an instant."""
-    return dict(zip(BASIC_LANDMARKS, motion(np.array([at_s]))[0], strict=True))
-
-
-def depth_bound_mm(distance_m: float, sigma_px: float) -> float:
-    """Cramer-Rao bound of the depth from one frame of each camera: the triangulation's sigma."""
-    cameras = tuple(SyntheticRig().rig().values())
-    poses = extrinsics(cameras)
-    p_cameras = np.einsum("nij,j->ni", poses.R, [0.0375, 0.0, distance_m]) + poses.t  # (2, 3)
-    rays = p_cameras[:, :2] / p_cameras[:, 2:]
-    sigmas = np.full(2, sigma_px / cameras[0].focal_px[0])
-    return 1e3 * float(np.sqrt(triangulate(rays, sigmas, poses, 3.0).covariance_m2[2, 2]))
 
 
 def cost(cameras: int = 2, fps: float = 30.0, markers: int = 6) -> dict[str, float]:
@@ -101,7 +48,8 @@ def cost(cameras: int = 2, fps: float = 30.0, markers: int = 6) -> dict[str, flo
         config, hand={"right": HandTable(markers=config.hand["right"].markers | more)}
     )
     step = FusionStep(config, setup.rig(), point_hands())
-    without_output, with_output = [], []
+    without_output: list[float] = []
+    with_output: list[float] = []
     for number, frame in enumerate(given):
         begin_s = time.perf_counter()
         messages = step.step(frame)
@@ -203,36 +151,6 @@ def rendered_figures(config: RigConfig, seconds: float, seeds: tuple[int, ...]) 
         f"lag{lag}": piano.score(Fusion(lag_frames=lag)).figures() for lag in (0, 1, 2)
     }
     return figures
-
-
-def synthetic_figures() -> dict[str, Any]:
-    """The same from synthetic observations."""
-    still = {str(z_m): synthetic(Fusion(), functools.partial(_resting, z_m)) for z_m in (0.5, 1.0)}
-    moving = {str(lag): synthetic(Fusion(lag_frames=lag)) for lag in (0, 1, 2)}
-    others = {name: synthetic(fusion) for name, fusion in OTHERS.items()}
-    noisy = {str(lag): synthetic(Fusion(lag_frames=lag), sigma_px=0.2) for lag in (0, 1, 2)}
-    return {
-        "still_depth_rms_mm": {distance: figures["z"] for distance, figures in still.items()},
-        "still_over_crb": {
-            distance: round(figures["z"] / depth_bound_mm(float(distance), 0.06), 3)
-            for distance, figures in still.items()
-        },
-        "still_nees": {distance: figures["nees"] for distance, figures in still.items()},
-        "moving_rms_mm": {lag: figures["rms"] for lag, figures in moving.items()},
-        "moving_nees": {lag: figures["nees"] for lag, figures in moving.items()},
-        "moving_other_methods_rms_mm": {name: figures["rms"] for name, figures in others.items()},
-        "moving_noise_0.2px_rms_mm": {lag: figures["rms"] for lag, figures in noisy.items()},
-        "moving_clocks_off_10ms_rms_mm": {
-            str(lag): synthetic(Fusion(lag_frames=lag), clock_error_s=0.005, clock_sigma_s=0.01)[
-                "rms"
-            ]
-            for lag in (0, 2)
-        },
-    }
-
-
-def _resting(distance_m: float, seed: int) -> RestingHand:
-    return RestingHand(distance_m=distance_m, seed=seed)
 
 
 def main() -> int:

@@ -16,25 +16,22 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from rhot.geometry.transforms import Array, rotation_from_quaternion, rotation_from_vector
-from rhot.hand import BASIC_LANDMARKS, TIPS, HandModel, forward, landmark_point
+from rhot.geometry.transforms import Array, rotation_from_quaternion
+from rhot.hand import BASIC_LANDMARKS, TIPS, HandModel, landmark_point
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.step import FusionStep
-from services.simulator.hands.gestures import MOTIONS
 from services.solver.step import SolverStep
+from testing.gesture_points import FIRST_TUNING_SEED, SWAYING, Joints, hand_at, motion_of
 from testing.synthetic_points import COLORS, START_NS, SyntheticRig, frames, point_hands
 
 SECONDS, BEGIN_S, EVERY_S = 16.0, 2.0, 2.5
 EDGES_S = (0.1, 0.2, 0.3, 0.5, 1.0)
-SWAYING = "swaying "
 GESTURES = {
     "reported": ("random", "piano", "fist", SWAYING + "random"),
     "tuning": (
@@ -43,15 +40,7 @@ GESTURES = {
     ),
 }
 # The first of the seeds of a half.
-_FIRST_SEED = {"reported": 1, "tuning": 11}
-_HELD_UP = rotation_from_vector(np.array([1.2, 0.3, 0.1]))
-# Where the wrist is; of one that sways, such that no tip leaves a picture.
-_PLACE_M, _SWAYING_PLACE_M = np.array([0.03, 0.03, 0.55]), np.array([0.03, -0.09, 0.65])
-# How the swaying hand turns and shifts: rad and m, rad/s.
-_TURN_RAD, _TURN_RAD_S = 0.5, np.array([3.1, 2.3, 2.7])
-_SHIFT_M, _SHIFT_RAD_S = 0.12, np.array([2.9, 3.7, 2.1])
-
-Joints = tuple[Array, Array]  # positions (26, 3), rotations (26, 3, 3)
+_FIRST_SEED = {"reported": 1, "tuning": FIRST_TUNING_SEED}
 
 
 class Gap(NamedTuple):
@@ -73,27 +62,6 @@ class Sample(NamedTuple):
     plain: list[float]
 
 
-def hand_at(name: str, model: HandModel, seed: int) -> Callable[[float], Joints]:
-    """Joints of a gesture at a time (s)."""
-    sways = name.startswith(SWAYING)
-    gesture = MOTIONS[name.removeprefix(SWAYING)](model, seed)
-    place_m = _SWAYING_PLACE_M if sways else _PLACE_M
-    # Gestures that know no seed are at another instant of theirs when a gap begins.
-    later_s = 0.37 * seed if seed >= _FIRST_SEED["tuning"] else 0.0
-    phase = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (2, 3))
-
-    @cache
-    def at(t_s: float) -> Joints:
-        angles, turn, shift, *_ = gesture(t_s + later_s)
-        if sways:
-            turn = _TURN_RAD * np.sin(_TURN_RAD_S * t_s + phase[0])
-            shift = _SHIFT_M * np.sin(_SHIFT_RAD_S * t_s + phase[1])
-        rotation = _HELD_UP @ rotation_from_vector(np.asarray(turn))
-        return forward(model, rotation, place_m + shift, angles)
-
-    return at
-
-
 def landmarks_of(model: HandModel, joints: Joints) -> Array:
     """The painted landmarks (6, 3), wrist first."""
     return np.array([landmark_point(model, name, *joints) for name in BASIC_LANDMARKS])
@@ -105,22 +73,10 @@ def samples(name: str, seed: int, gap: Gap) -> list[Sample]:
     hands["right"] = model = msgspec.structs.replace(hands["right"], origin="measured")
     at = hand_at(name, model, seed)
 
-    def motion(times_s: Array) -> Array:
-        times = np.broadcast_to(times_s.reshape(len(times_s), -1), (len(times_s), 6)).tolist()
-        return np.array(
-            [
-                [
-                    landmark_point(model, mark, *at(t))
-                    for mark, t in zip(BASIC_LANDMARKS, row, strict=True)
-                ]
-                for row in times
-            ]
-        )
-
     rig = SyntheticRig(loss=0.0, clock_error_s=0.0, seed=seed)
     fusion, solver = FusionStep(rig.config(), rig.rig(), hands), SolverStep(rig.config(), hands)
     found = []
-    for frame in frames(rig, motion, SECONDS):
+    for frame in frames(rig, motion_of(model, at), SECONDS):
         for points in fusion.step(_as_seen(frame, gap)):
             pose = solver.step(points)
             solver.challenge("right")

@@ -62,7 +62,7 @@ def point_case(
     if wander is not None:
         given = _wandering(given, wander, setup)
     if gaps is not None:
-        given = _with_gaps(given, gaps, setup)
+        given = with_gaps(given, gaps, setup)
     shown = [{marker.color for marker in frame.markers} for frame in given]
     sign = {camera: -1.0 if n % 2 else 1.0 for n, camera in enumerate(setup.names)}
     return Case(
@@ -80,7 +80,7 @@ def point_case(
     )
 
 
-def _with_gaps(given: list[MarkerFrame], gaps: Gaps, setup: SyntheticRig) -> list[MarkerFrame]:
+def with_gaps(given: list[MarkerFrame], gaps: Gaps, setup: SyntheticRig) -> list[MarkerFrame]:
     rng = np.random.default_rng([gaps.seed, 6])
     kept = []
     for frame in given:

@@ -87,7 +87,8 @@ class KalmanMethod:
         self._located.take(time_s, told)
         if alone:
             self._located.tell_alone(time_s, self._centres_rig, told)
-        _keep_useful(told.found, told.positions_m, told.covariances_m2, told.measured)
+        alone_with = self._located.alone_with
+        _keep_useful(told.found, told.positions_m, told.covariances_m2, told.measured, alone_with)
         return told
 
     def settle(self) -> None:
@@ -107,11 +108,13 @@ def _looks_at(looks: FrameLooks, rows: slice) -> FrameLooks:
 
 
 @njit(cache=True, error_model="numpy")
-def _keep_useful(found: Bools, places: Array, covs: Array, measured: Bools) -> None:
+def _keep_useful(
+    found: Bools, places: Array, covs: Array, measured: Bools, alone_with: Ints
+) -> None:
     """Those found (L,), in place, that are finite and certain enough to be told: (L, 3), (L, 3, 3).
 
-    What one camera sees (not measured, (L,)) may be unsure along its ray: bones tell the solver the
-    rest.
+    What one camera sees alone (LastLocated.alone_with (L,), not measured) may be unsure along its
+    ray: bones tell the solver the rest.
     """
     for row in range(found.size):
         if not (np.isfinite(places[row]).all() and np.isfinite(covs[row]).all()):
@@ -121,5 +124,6 @@ def _keep_useful(found: Bools, places: Array, covs: Array, measured: Bools) -> N
         if 0.0 < covs[row, 0, 0] + covs[row, 1, 1] + covs[row, 2, 2] <= SHOW_SIGMA_M**2:
             continue
         variances = np.linalg.eigvalsh(covs[row])  # (3,) ascending
-        largest = variances[2] if measured[row] else variances[1]
+        alone = not measured[row] and alone_with[row] >= 0
+        largest = variances[1] if alone else variances[2]
         found[row] &= variances[2] > 0.0 and largest <= SHOW_SIGMA_M**2

@@ -13,8 +13,8 @@ from services.fusion.kalman.frame_update import (
     RESTART_WINDOW_S,
     UNUSUAL,
     FrameLooks,
-    Sights,
     no_fates,
+    no_sights,
 )
 from services.fusion.kalman.held import Held, in_a_row, take_looks, tell_all
 from services.fusion.kalman.history import empty_history
@@ -69,10 +69,7 @@ class HandFilter:
         self._max_distance_m = max_distance_m
         self._counts = counts
         self._history = empty_history(landmarks, len(MODELS.own))
-        shape = (landmarks, len(cameras.t))
-        self._sights = Sights(
-            np.full(shape, -np.inf), np.full(shape, -np.inf), np.full(landmarks, -np.inf), hold_s
-        )
+        self._sights = no_sights(landmarks, len(cameras.t), hold_s)
         self._fates = no_fates(landmarks)
         self._row = in_a_row(
             Held(self._history, self._sights, self._fates, cameras, MODELS, float(GATE))
@@ -200,7 +197,7 @@ class HandFilter:
         """Fill told with what is known at an instant; lost landmarks end (frame_update.drop_lost).
 
         recent_s (C,): so old a camera's look may be to count as of that instant. Returns whether
-        one camera sees any landmark alone.
+        there is any landmark that no two cameras see.
         """
         lost, alone = tell_all(time_s, recent_s, *told, *self._row)
         self._counts.dropped += lost

@@ -23,7 +23,7 @@ def tell(
     recent_s: Array,
     told: Estimates,
 ) -> tuple[int, int]:
-    """Fill told; how many landmarks were lost meanwhile, and how many one camera sees alone.
+    """Fill told; how many landmarks were lost meanwhile, and how many no two cameras see.
 
     filters: the models, and the gate; recent_s (C,): so old a camera's look may be to count as of
     that instant.
@@ -42,5 +42,5 @@ def tell(
             looked += time_s - sights.observed_s[k, c] <= recent_s[c]
         told.measured[k] = used >= 2
         told.detected[k] = looked >= 2
-        alone += told.found[k] and used == 1
+        alone += told.found[k] and used < 2
     return lost, alone

@@ -54,6 +54,9 @@ class LastLocated:
         span_s: from one instant to the next, usually.
         """
         self._hand, self._span_s = hand, span_s
+        # The camera that saw each alone last, -1: two saw it since. A frame that is lost is no
+        # reason to tell what nobody sees as the filter has it, metres off along a ray.
+        self.alone_with = np.full(hand.size, -1)
         self._shapes = no_shapes(hand.size)
         # How the hands deformed lately.
         self._memory = empty_memory(hand.size, eye_rig)
@@ -78,16 +81,19 @@ class LastLocated:
             spans = time_s, self._span_s
             learnt = self._shapes, self._memory, self._motion
             _note(learnt, self._hand, located, places, spans)
+            self.alone_with[located] = -1
 
     def tell_alone(self, time_s: float, centres_rig: Array, estimates: Estimates) -> None:
-        """Estimates of all landmarks that one camera sees alone, in place.
+        """Estimates of all landmarks that one camera sees alone, or did last, in place.
 
         centres_rig (C, 3): of the cameras.
         """
         self.settle()
-        alone = estimates.found & ~estimates.measured & estimates.seen_by.any(axis=1)
+        seen = estimates.found & ~estimates.measured & estimates.seen_by.any(axis=1)
+        self.alone_with[seen] = estimates.seen_by[seen].argmax(axis=1)
+        alone = estimates.found & ~estimates.measured & (self.alone_with >= 0)
         located = estimates.found & estimates.measured
-        centres = centres_rig[estimates.seen_by.argmax(axis=1)]  # (L, 3) of one that sees each
+        centres = centres_rig[self.alone_with]  # (L, 3) of the camera that sees each alone
         means, covs = estimates.positions_m, estimates.covariances_m2
         memory = self._memory, self._span_s
         places = means.copy(), covs.copy()

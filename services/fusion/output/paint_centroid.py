@@ -96,29 +96,38 @@ def expected_shift(
 ) -> bool:
     """What cameras locate minus the landmark p_rig (3,): its mean (3,) and covariance (3, 3).
 
-    By four directions, turned to either side about the hinge and sideways (the cubature rule of
-    Arasaratnam & Haykin, IEEE Trans. Automatic Control 54(6), 2009). Where a finger points at the
-    cameras the mean is another than the shift of the mean direction. False if the cameras cannot
+    By its direction and four others, turned to either side about the hinge and sideways: divided
+    differences of second order (DD2 of Norgaard, Poulsen & Ravn, Automatica 36(11), 2000). Seen
+    from the side, a finger has its shift at an extreme, and a turn to either side does the same:
+    differences of first order, and cubature rules, call that certain. False if the cameras cannot
     locate it.
     """
     H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
     if not _sights(p_rig, cameras, H, A_inverse):
         return False
     sights = H, A_inverse
-    across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((4, 3))
+    across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((3, 3))
     _cross(finger.hinge, finger.direction, across[0])
     across[1] = finger.hinge
-    shift[:] = 0.0
-    for n in range(4):
-        angle = math.sqrt(2.0) * finger.sigmas_rad[n // 2] * (1.0 if n % 2 else -1.0)
-        for i in range(3):
-            turned[i] = math.cos(angle) * finger.direction[i] + math.sin(angle) * across[n // 2, i]
-        _least_squares(table, p_rig, turned, cameras, sights, work, shifts[n])
-        shift += 0.25 * shifts[n]
+    straight, one, other = shifts[0], shifts[1], shifts[2]
+    _least_squares(table, p_rig, finger.direction, cameras, sights, work, straight)
+    for i in range(3):
+        shift[i] = straight[i] / 3.0
     covariance[:] = 0.0
-    for n in range(4):
-        shifts[n] -= shift
-        _add_square(shifts[n], 0.25, covariance)
+    for axis in range(2):
+        angle = math.sqrt(3.0) * finger.sigmas_rad[axis]
+        for side, out in ((-1.0, one), (1.0, other)):
+            for i in range(3):
+                turned[i] = (
+                    math.cos(angle) * finger.direction[i] + side * math.sin(angle) * across[axis, i]
+                )
+            _least_squares(table, p_rig, turned, cameras, sights, work, out)
+        for i in range(3):
+            first, second = other[i] - one[i], other[i] + one[i] - 2.0 * straight[i]
+            shift[i] += (one[i] + other[i]) / 6.0
+            one[i], other[i] = first, second
+        _add_square(one, 1.0 / 12.0, covariance)
+        _add_square(other, 1.0 / 18.0, covariance)
     # The shift of a longer or shorter stretch of paint is the same to .1 mm, that of a thicker
     # finger larger in proportion.
     _add_square(shift, finger.radius_sd**2, covariance)

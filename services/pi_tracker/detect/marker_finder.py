@@ -19,6 +19,7 @@ from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.identify.marker_identity import Association, MarkerIdentity
+from services.pi_tracker.identify.pieces import joined
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
@@ -100,12 +101,19 @@ class MarkerFinder:
         return markers
 
     def _search(self, image: Picture, stamp_ns: int) -> list[list[Blob]]:
-        """Plausible blobs of each colour, remainders of occluded markers among them."""
+        """Plausible blobs of each colour, remainders of occluded markers among them.
+
+        Pieces of a marker that was seen a moment ago are one.
+        """
         blobs = self._search_all_colors(image)
         for color, own in enumerate(blobs):
-            predicted = None if own else self._identity.predicted(color, stamp_ns)
-            if predicted is not None:
+            predicted = None if len(own) == 1 else self._identity.predicted(color, stamp_ns)
+            if predicted is None:
+                continue
+            if not own:
                 own += self._occluded_remainders(image, color, predicted)
+            if len(own) > 1:
+                own[:] = joined(own, self._identity.area_px2(color))
         return blobs
 
     def _search_all_colors(self, image: Picture) -> list[list[Blob]]:

@@ -17,7 +17,7 @@ import pytest
 from rhot.files.rig_tables import Fusion
 from services.fusion.step import FusionStep
 from testing.families.motions import flapping, stop_and_go, tapping
-from testing.families.points import Gaps, point_case
+from testing.families.points import Gaps, point_case, with_gaps
 from testing.families.recordings import leap_motion
 from testing.point_errors import PointErrors, point_errors
 from testing.synthetic_points import Motion, MovingHand, SyntheticRig, frames
@@ -106,8 +106,37 @@ def test_a_finger_that_taps_stays_near_when_a_camera_misses_it():
     step = FusionStep(case.config, case.cameras, case.hands)
     told = [points for frame in case.frames for points in step.step(frame)]
     found = point_errors(told, motion).within(1.0)
-    assert step.method.counts.started > 20
+    assert step.method.counts.started > 12
     assert largest_error_mm(found) < 85.0
+
+
+def test_landmarks_that_their_hand_tells_do_not_begin_again(fuse):
+    """Test: a hand moves smoothly; a fifth of all markers are missing, some for .2 s in a camera.
+
+    One that was known to 4 mm began again with two looks as the other camera came back, 204 mm off;
+    of these, 29 mm. Expected: each begins once; the largest error with two frames of lag, as
+    measured and a half.
+    """
+    motion, rig = MovingHand(finger_share=0.0), SyntheticRig()
+    given = with_gaps(frames(rig, motion, 12.0), Gaps(share=0.2, seed=3), rig)
+    step, messages = fuse(rig, given, Fusion(lag_frames=2))
+    assert step.method.counts.started == 6
+    assert largest_error_mm(point_errors(messages, motion).within(1.0)) < 5.0
+
+
+def test_what_nobody_sees_for_a_frame_is_not_told_metres_off():
+    """Test: a camera misses a hand for a second; meanwhile the other one loses frames.
+
+    Points at the instant of a lost frame were told as the filter had them: of other motions 7 m
+    off, their sigmas metres, of this one 286 mm. Expected: the largest error, as measured and a
+    half.
+    """
+    motion = MovingHand(speed_m_s=0.3)
+    gaps = Gaps(blind=((1, tuple(range(6)), 1.5, 1.0),), every_s=2.0)
+    case = point_case("lost frames", motion, SyntheticRig(loss=0.1, seed=2), gaps)
+    step = FusionStep(case.config, case.cameras, case.hands)
+    told = [points for frame in case.frames for points in step.step(frame)]
+    assert largest_error_mm(point_errors(told, motion).within(1.0)) < 130.0
 
 
 def test_a_marker_that_is_suddenly_elsewhere_is_found_within_three_frames(bench_of):

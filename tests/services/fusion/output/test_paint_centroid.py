@@ -124,3 +124,25 @@ def test_the_mean_shift_of_a_finger_that_points_at_the_cameras_is_not_that_of_it
     drawn = np.array(shifts)
     assert abs(unsure[2] - drawn[:, 2].mean()) < 0.5 * abs(sure[2] - drawn[:, 2].mean())
     assert 0.3 < covariance[0, 0] / drawn[:, 0].var() < 3.0
+
+
+@pytest.mark.parametrize("sigma_deg", [16.0, 25.0])
+def test_how_unsure_a_tip_is_by_a_very_unsure_direction(sigma_deg: float):
+    """A finger that nearly points at the cameras: its depth's spread is that of directions drawn.
+
+    Differences of first order call it 1.37 and .69 times that.
+    """
+    rig = extrinsics(tuple(SyntheticRig().rig().values()))
+    table, point = shift_table(RADIUS_M, PAINT_M, TAPER), np.array([0.0375, 0.0, 0.6])
+    about, sideways = np.radians(sigma_deg), 0.6 * np.radians(sigma_deg)
+    direction = np.array([0.0, 0.3, -0.95]) / np.hypot(0.3, 0.95)
+    across = np.cross([1.0, 0.0, 0.0], direction)
+    _, covariance = finger_shift(table, point, direction, rig, (about, sideways))
+    random, shifts = np.random.default_rng(3), []
+    for a, b in random.normal(0.0, (about, sideways), (600, 2)):
+        angle = np.hypot(a, b)
+        away = (a * across + b * np.array([1.0, 0.0, 0.0])) / angle
+        turned = np.cos(angle) * direction + np.sin(angle) * away
+        shifts.append(finger_shift(table, point, turned, rig)[0])
+    spread = np.std(np.array(shifts)[:, 2])
+    assert 0.8 < np.sqrt(covariance[2, 2]) / spread < 1.25
