@@ -24,10 +24,11 @@ Array = npt.NDArray[np.float64]
 
 # A hand is lost where dots are missed and as many patches of a dot's size are nobody's: so many of
 # them, counted in pictures in a row; it is looked for again after so many pictures. It is known
-# where this share of its dots was seen, each alone, in so many pictures. (Twelve clips of the kind
-# of the tuning half of benchmarks/dots_pictures.py, 15 dots: with a pause of 2 pictures 93.7 % are
-# right, with 10 93.0.)
-_LOST, _PAUSE, _MOST, _KNOWN = 6, 2, 0.8, 5
+# where this share of its dots was seen, each alone, in so many pictures, and at the start. (Clips of
+# 15 dots of the tuning half of benchmarks/dots_pictures.py: one that waves, lost for good after
+# five pictures, 12 % right, unless it is known from the start, 52. Later, with 6, 2 and 5 instead
+# of 3, 0 and 3, it was 42 and two that grab 79 and 90, and are 55, 78 and 92 so.)
+_LOST, _PAUSE, _MOST, _KNOWN = 3, 0, 0.8, 3
 # Where no more than this share of them was seen a hand may be anything when it comes out again.
 _FEW = 0.6
 # No dot is smaller than this share of a whole one.
@@ -51,7 +52,8 @@ class LastKnown:
 
     def __init__(self) -> None:
         self._known: Hypothesis | None = None
-        self._seen, self._few, self._lost = 0, _KNOWN, 0
+        # What tracking starts with is known.
+        self._seen, self._few, self._lost = _KNOWN, _KNOWN, 0
         # Accounts that begin with it, their scores beside the best of the others, which is 0.
         self._rivals: list[Hypothesis] = []
         self._ahead: list[float] = []
