@@ -14,16 +14,19 @@ from services.pi_tracker.dots.dot import Dot, Patch
 from services.pi_tracker.dots.search import CLOUD, LIVE
 from services.pi_tracker.dots.tracker import DotTracker
 
-# A picture speaks against a hand by what a cloud is likelier, nats of each dot, less this. (36
-# clips of the tuning half of benchmarks/dots_pictures.py: at most .6 on average, .5 of a hand that
-# is lost; plates, chains and grids of eight dots: 1.5 to 8, but for chains a finger fits.)
-_AHEAD = 1.0
-# No first picture of a hand is further from one than this, nats. (On the same: at most 11, of 8
-# dots 7; of plates 34 to 155.)
-_MISFIT = 20.0
-# So much (nats of each dot) must speak against a hand until it is believed to be none, or for it if
-# its first picture was not one's; and no more than this is remembered.
-_SURE, _DOUBT = 30.0, 10.0
+# A picture speaks against a hand by what a cloud is likelier, nats of each dot, less the first of
+# these, and against a cloud by what a hand is, and the second. (36 clips of the tuning half of
+# benchmarks/dots_pictures.py: at most .6 on average; plates, chains and grids of eight dots: 1.5 to
+# 8, but for chains that a finger fits.)
+_AHEAD, _BEHIND = 3.0, 0.5
+# So much must speak against what is believed; no more is remembered. (On the same clips at most 9
+# speak against a hand at once; 64 if 1 instead of 3 is the first above.)
+_SURE = 30.0
+# No first picture of a hand is further from one than this, nats, and what is further is told as a
+# cloud until so much speaks for a hand. (On the same: at most 11; of plates 34 to 155.)
+_MISFIT, _DOUBT = 20.0, 10.0
+# Of all pictures of a recording, and of one whose first picture is no hand's.
+_ON_AVERAGE = (1.5, 0.5)
 
 
 class EitherTracker:
@@ -44,8 +47,12 @@ class EitherTracker:
         """The dots of the next picture, by landmark; empty until tracking has started."""
         hand, cloud = self._hand.step(patches, time_s), self._cloud.step(patches, time_s)
         if self._ahead is not None:
-            gained = (self._cloud.gained - self._hand.gained) / len(self._hand.names) - _AHEAD
+            gained = (self._cloud.gained - self._hand.gained) / len(self._hand.names)
+            gained -= _BEHIND if self._is_cloud else _AHEAD
+            was_cloud = self._is_cloud
             self._ahead = min(max(self._ahead + gained, -_SURE), _SURE)
+            if was_cloud != self._is_cloud:
+                self._ahead = _SURE if self._is_cloud else -_SURE
         elif self._hand.begun is not None:
             self._ahead = _DOUBT if self._hand.misfit > _MISFIT else -_SURE
         return cloud if self._is_cloud else hand
@@ -54,6 +61,11 @@ class EitherTracker:
     def dot_area_px2(self) -> float:
         """How large a dot is that shows as a whole, 0 while it is unknown."""
         return self._told.dot_area_px2
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The landmarks that have a dot."""
+        return self._hand.names
 
     @property
     def notes(self) -> list[str]:
@@ -73,5 +85,5 @@ def is_cloud(hand: DotTracker, cloud: DotTracker, pictures: int) -> bool:
     """Whether dots hang on no hand, after so many pictures since tracking started."""
     if not hand.names or pictures < 1:
         return False
-    apart = cloud.nats - hand.nats + max(hand.misfit - _MISFIT, 0.0)
-    return apart > _AHEAD * len(hand.names) * pictures
+    gained = (cloud.nats - hand.nats) / (len(hand.names) * pictures)
+    return gained > _ON_AVERAGE[hand.misfit > _MISFIT]

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
@@ -19,6 +21,7 @@ from services.pi_tracker.dots.either import EitherTracker
 from services.pi_tracker.dots.hindsight.looking_back import look_back
 from services.pi_tracker.dots.parts import parts_of
 from services.pi_tracker.dots.search import Search
+from services.pi_tracker.dots.slivers import SliverFinder
 from services.pi_tracker.dots.tracker import DotTracker
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.image.blob import Blob
@@ -30,6 +33,8 @@ from services.pi_tracker.measure.fastest import centroids
 # The centre of a part of a blob is known to this share of its diameter, and so much less of its
 # quality is left.
 _PART_SIGMA, _PART_QUALITY = 0.15, 0.5
+# Where as many blobs as this share of the dots are found, they are one dot each as a rule.
+_NEARLY_ALL = 0.75
 
 
 class DotFinder:
@@ -55,6 +60,8 @@ class DotFinder:
         self._seen: list[SeenPatches] | None = [] if remembers else None
         self._color, self._settings = color, settings
         self._noise = Noise()
+        # Where the dots of the last picture were, those that were not seen, too.
+        self._expected: list[tuple[float, float]] = []
         self.use(table)
         self.tracker = EitherTracker(landmarks, size_px, seeds)
 
@@ -62,6 +69,7 @@ class DotFinder:
         """Search with another table from the next frame on; dots keep their names."""
         self._class = table.names.index(self._color)
         self._detector = BlobDetector(table, self._settings)
+        self._slivers = SliverFinder(table, self._class, self._settings)
 
     def find(self, frame: Frame) -> dict[str, Dot]:
         """The dots of one picture by landmark; empty until tracking has started."""
@@ -72,10 +80,13 @@ class DotFinder:
             for blob in self._detector.detect(image, search_region.whole(image.size))
             if blob.color == self._class and is_paint_shaped(blob, self._settings.max_area_px)
         ]
+        blobs += self._slivers.beside(blobs, image, self._expected, self.tracker.dot_area_px2)
         patches, time_s = self._patches(image, blobs), frame.stamp_ns * 1e-9
         if self._seen is not None:
             self._seen.append(SeenPatches(time_s, patches))
-        return self.tracker.step(patches, time_s)
+        dots = self.tracker.step(patches, time_s)
+        self._expected = [(dot.x_px, dot.y_px) for dot in dots.values()]
+        return dots
 
     @property
     def seen(self) -> list[SeenPatches]:
@@ -92,13 +103,24 @@ class DotFinder:
     def _begun(self, search: Search) -> DotTracker:
         return DotTracker(*self._given, search, remembers=True)
 
+    def _dot_area(self, blobs: list[Blob]) -> float:
+        """How large a dot is that shows as a whole, 0 while it is unknown.
+
+        All that are large at once are no dots that touch: blurred ones before were small.
+        """
+        known = self.tracker.dot_area_px2
+        if not known or len(blobs) < _NEARLY_ALL * len(self.tracker.names):
+            return known
+        return max(known, float(np.median([blob.area_px for blob in blobs])))
+
     def _patches(self, image: Picture, blobs: list[Blob]) -> list[Patch]:
         found: list[Patch] = []
         if not blobs:
             return found
         measured = centroids(image, blobs, self._noise)
+        area_px2 = self._dot_area(blobs)
         for number, (blob, one) in enumerate(zip(blobs, measured, strict=True)):
-            parts = parts_of(blob, self.tracker.dot_area_px2)
+            parts = parts_of(blob, area_px2)
             if len(parts) == 1:
                 found.append(Patch(one.x_px, one.y_px, blob.area_px, one.sigma_px, one.quality))
                 continue

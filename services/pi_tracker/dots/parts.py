@@ -22,8 +22,9 @@ _LONG = 2.2
 # It is cut into as few parts as leave each this round: a disc's variance along any axis is its area
 # / (4 pi), that of a disc and a half side by side twice that. (Cut by area alone, two dots nearer
 # to the camera than the others were three: `grab`, seeds 2, 10, 14 and 17 of benchmarks/dots.py:
-# 74, 95, 97 and 87 % right live, 99.6 % or more so.)
-_ROUND = 1.5
+# 74, 95, 97 and 87 % right live, 99.6 % or more so.) No part is smaller than this share of a dot:
+# of few cells none is round, and a dot that shows more than others was four.
+_ROUND, _LEAST_PART = 1.5, 0.5
 _MAX_PARTS, _ROUNDS = 4, 8
 
 
@@ -38,7 +39,8 @@ def parts_of(blob: Blob, dot_area_px2: float) -> list[tuple[float, float, float]
     # A disc of area A has variance A / (4 pi) along any axis; a cell is 4 px^2.
     if values[1] < _LONG * dot_area_px2 / 4.0 / (4.0 * np.pi):
         return whole
-    for count in range(2, _MAX_PARTS + 1):
+    most = min(_MAX_PARTS, int(blob.area_px / (_LEAST_PART * dot_area_px2)))
+    for count in range(2, most + 1):
         centres, own = _cut(cells, np.asarray(vectors[:, 1], np.float64), count)
         if all(_is_round(cells[own == k]) for k in range(count)):
             break

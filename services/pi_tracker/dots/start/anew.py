@@ -23,11 +23,12 @@ from services.pi_tracker.dots.search import Search
 Array = npt.NDArray[np.float64]
 
 # A hand is lost where dots are missed and as many patches of a dot's size are nobody's: so many of
-# them, counted in pictures in a row; it is looked for again after so many pictures. It is known
-# where this share of its dots was seen, each alone, in so many pictures. (Twelve clips of the kind
-# of the tuning half of benchmarks/dots_pictures.py, 15 dots: with a pause of 2 pictures 93.7 % are
-# right, with 10 93.0.)
-_LOST, _PAUSE, _MOST, _KNOWN = 6, 2, 0.8, 5
+# them, counted in pictures in a row. It is known where this share of its dots was seen, each alone,
+# in so many pictures, and at the start. (Clips of 15 dots, the tuning half of
+# benchmarks/dots_pictures.py: one that waves, lost for good after five pictures, 12 % right, known
+# from the start 52. Later, with 6 and 5 instead of 3 and 3, and two pictures of rest after each
+# search, it was 42 and two that grab 79 and 90, and are 55, 78 and 92 so.)
+_LOST, _MOST, _KNOWN = 3, 0.8, 3
 # Where no more than this share of them was seen a hand may be anything when it comes out again.
 _FEW = 0.6
 # No dot is smaller than this share of a whole one.
@@ -51,11 +52,11 @@ class LastKnown:
 
     def __init__(self) -> None:
         self._known: Hypothesis | None = None
-        self._seen, self._few, self._lost = 0, _KNOWN, 0
+        # What tracking starts with is known.
+        self._seen, self._few, self._lost = _KNOWN, _KNOWN, 0
         # Accounts that begin with it, their scores beside the best of the others, which is 0.
         self._rivals: list[Hypothesis] = []
         self._ahead: list[float] = []
-        self._pause = 0
 
     def note(self, best: Hypothesis, areas: Array, whole: Array) -> None:
         """The likeliest account of a picture; areas (m,) of its patches, whole (n,) of dots."""
@@ -71,7 +72,6 @@ class LastKnown:
         if len(large) >= _MOST * len(told) and self._few in range(1, _KNOWN):
             # It comes out again.
             self._lost = max(self._lost, _LOST)
-        self._pause = max(self._pause - 1, 0)
 
     def against(
         self,
@@ -88,7 +88,7 @@ class LastKnown:
         """
         if self._rivals:
             rivals = searched(self._rivals, patches, around, elapsed_s, search)
-        elif self._known is not None and self._lost >= _LOST and not self._pause:
+        elif self._known is not None and self._lost >= _LOST:
             rivals = self._begun(self._known, parent, patches, around)
         else:
             return found
@@ -101,7 +101,7 @@ class LastKnown:
             return rivals
         self._rivals = [replace(one, score=one.score - best) for one in rivals]
         if len(self._ahead) >= _TRIED:
-            self._rivals, self._pause, self._ahead = [], _PAUSE, []
+            self._rivals, self._ahead = [], []
         return found
 
     def _begun(

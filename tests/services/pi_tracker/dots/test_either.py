@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 
+from services.pi_tracker.dots import either
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
 from services.pi_tracker.dots.either import EitherTracker
 from services.pi_tracker.dots.hindsight.looking_back import look_back
-from services.pi_tracker.dots.search import Search
+from services.pi_tracker.dots.search import CLOUD, LIVE, Search
 from services.pi_tracker.dots.tracker import DotTracker
 from testing.dot_pictures import NAMES, SIZE
 
@@ -83,3 +86,72 @@ def test_hindsight_follows_what_is_no_hand() -> None:
     for (places, _), dots in zip(pictures, looked, strict=True):
         assert not _wrong(dots, places)
         assert len(dots) >= 7
+
+
+class _Told:
+    """A tracker that says what it is told to: of a hand, or of a cloud."""
+
+    names = NAMES
+    nats = 0.0
+    # What the next picture gains a cloud over a hand, nats of all dots; how far the first is from
+    # a hand's.
+    ahead, misfit = 0.0, 0.0
+
+    def __init__(self, *given: object) -> None:
+        self.is_cloud = given[-1] == CLOUD
+        self.begun: object | None = None
+        self.gained = 0.0
+
+    def step(self, patches: list[Patch], time_s: float) -> dict[str, str]:
+        self.begun = self
+        self.gained = self.ahead if self.is_cloud else 0.0
+        return {"told": "cloud" if self.is_cloud else "hand"}
+
+
+def _told(monkeypatch: pytest.MonkeyPatch, misfit: float, *stretches: tuple[float, int]) -> str:
+    """h or c of each picture: a first, and stretches of nats that a cloud gains by each dot."""
+    monkeypatch.setattr(either, "DotTracker", _Told)
+    monkeypatch.setattr(_Told, "misfit", misfit)
+    tracker, told = EitherTracker(NAMES, SIZE), ""
+    for nats, count in [(0.0, 1), *stretches]:
+        monkeypatch.setattr(_Told, "ahead", nats * len(NAMES))
+        for _ in range(count):
+            told += dict(tracker.step([], 0.0))["told"][0]
+    return told
+
+
+def test_a_hand_is_told_until_much_speaks_against_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: 3 nats of each dot are what hands cost at worst; 30 beyond that are enough."""
+    assert _told(monkeypatch, 10.0, (2.9, 100)) == "h" * 101
+    told = _told(monkeypatch, 10.0, (6.0, 20))
+    assert told == "h" * 11 + "c" * 10
+    # A few bad pictures are made up for by those that follow.
+    assert _told(monkeypatch, 10.0, (6.0, 9), (0.0, 9), (6.0, 9)) == "h" * 28
+
+
+def test_what_is_believed_to_be_no_hand_is_one_only_after_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Expected: by a half nat of each picture, when both are as likely, from 30 on."""
+    told = _told(monkeypatch, 10.0, (6.0, 11), (0.0, 65))
+    assert told == "h" * 11 + "c" * 60 + "h" * 6
+
+
+def test_a_first_picture_that_is_no_hands_is_a_clouds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: told as one, but for the first picture; a hand after less than one later."""
+    told = _told(monkeypatch, 34.0, (1.0, 50))
+    assert told == "c" * 51
+    assert _told(monkeypatch, 34.0, (0.0, 25)) == "c" * 20 + "h" * 6
+    assert _told(monkeypatch, 11.0, (0.0, 25)) == "h" * 26
+
+
+@pytest.mark.parametrize(
+    ("misfit", "nats", "cloud"),
+    [(10.0, 1.4, False), (10.0, 1.6, True), (34.0, 0.4, False), (34.0, 0.6, True)],
+)
+def test_a_whole_recording_is_no_hands_by_what_its_pictures_say_on_average(
+    misfit: float, nats: float, cloud: bool
+) -> None:
+    hand, other = _Told(LIVE), _Told(CLOUD)
+    hand.misfit, other.nats = misfit, nats * len(NAMES) * 60
+    assert either.is_cloud(cast("DotTracker", hand), cast("DotTracker", other), 60) == cloud

@@ -5,11 +5,15 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.cli.offline.looking_back import looked_back
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.dots.finder import DotFinder
+from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.step import TrackerStep
 from testing.dot_pictures import COLORS, DOTS, NAMES, REST, SIZE, dot_picture, dot_places
 
@@ -78,3 +82,45 @@ def test_a_recording_whose_shared_colour_is_not_asked_for_stays_as_it_is() -> No
     assert [len(frame.markers) for frame in live] == [1, 1, 1]
     told = looked_back(live, {"side": step}, 1, Path(tempfile.gettempdir()), False)
     assert list(told) == live
+
+
+def _discs(seq: int, radii: list[float]) -> Frame:
+    """The dots at rest as sharp red discs of these radii, px; of 0, a bar one cell wide."""
+    image: Image = np.full((SIZE[1], SIZE[0], 3), (110, 140, 200), np.uint8)
+    rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
+    for (x, y), radius in zip(REST, radii, strict=True):
+        width, height = (radius, radius) if radius else (1.0, 6.0)
+        inside = ((columns + 0.5 - x) / width) ** 2 + ((rows + 0.5 - y) / height) ** 2 < 1.0
+        image[inside] = (35, 25, 190)
+    return Frame("side", seq, seq * 33_333_333, 0.0, SIZE, image, "bgr")
+
+
+def _finder() -> DotFinder:
+    table = compile_colors(COLORS, ["red"])
+    seeds = {n: (x, y) for n, (x, y) in zip(NAMES, REST.tolist(), strict=True)}
+    return DotFinder(table, "red", Tracker(), NAMES, SIZE, seeds, remembers=True)
+
+
+def test_a_dot_that_turns_until_it_is_one_cell_wide_is_still_told() -> None:
+    finder = _finder()
+    for number in range(4):
+        finder.find(_discs(number, [8.0] * 8))
+    for number in range(4, 8):
+        dots = finder.find(_discs(number, [8.0] * 6 + [0.0, 8.0]))
+        assert [dot.state for dot in dots.values()] == ["seen"] * 8
+        sliver = dots[NAMES[6]]
+        assert (sliver.x_px, sliver.y_px) == pytest.approx(REST[6], abs=2.0)
+
+
+def test_dots_that_were_blurred_at_the_start_are_one_each_when_they_are_sharp() -> None:
+    """Expected: blurred ones leave a middle of a quarter of their area, and are not cut later."""
+    finder = _finder()
+    for number in range(4):
+        finder.find(_discs(number, [4.0] * 8))
+    for number in range(4, 8):
+        dots = finder.find(_discs(number, [8.0] * 8))
+        patches = finder.seen[-1].patches
+        assert len(patches) == 8
+        assert all(patch.whole < 0 for patch in patches)
+        for dot, place in zip(dots.values(), REST, strict=True):
+            assert (dot.x_px, dot.y_px) == pytest.approx(place, abs=1.0)

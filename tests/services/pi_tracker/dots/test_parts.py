@@ -49,3 +49,14 @@ def test_three_in_a_row_are_three() -> None:
 
 def test_one_dot_nearer_to_the_camera_stays_whole() -> None:
     assert len(parts_of(_blob((40, 30)), 0.6 * AREA)) == 1
+
+
+def test_a_few_cells_of_one_dot_are_no_crowd() -> None:
+    """Expected: of few cells no part is round, but none is less than half a dot."""
+    mask = np.zeros((20, 20), np.uint8)
+    mask[5:8, 4:10] = 1  # 18 cells, 72 px^2
+    (blob,) = blobs_of_contours(external_contours(mask), mask, 0, (0, 0), 1)
+    for area in (30.0, 40.0, 50.0):
+        parts = parts_of(blob, area)
+        assert len(parts) <= 72.0 / (0.5 * area)
+    assert len(parts_of(blob, 60.0)) == 1

@@ -118,6 +118,28 @@ def test_a_hand_that_comes_back_elsewhere_is_found_as_it_was_known() -> None:
     assert _errors(dots, back).max() < 1.0
 
 
+def test_a_hand_that_is_lost_right_after_the_start_is_found_as_it_began() -> None:
+    """Expected: what tracking starts with is known, also if it is seen in two pictures only."""
+    tracker = _tracker()
+    tracker.step(patches_at(REST), 1 / 30)
+    for frame in range(2, 12):
+        tracker.step([], frame / 30)
+    back = REST + np.array([150.0, 90.0])
+    for frame in range(12, 24):
+        dots = tracker.step(patches_at(back), frame / 30)
+    assert {dot.state for dot in dots.values()} == {"seen"}
+    assert _errors(dots, back).max() < 1.0
+
+
+def test_how_large_a_dot_is_as_a_whole_is_told_by_those_that_face_the_camera() -> None:
+    """Expected: 300 px^2 of the index finger's, whatever the thumb's show that face aside."""
+    thumb = [Patch(x, y, 80.0) for x, y in REST[:4].tolist()]
+    tracker = DotTracker(NAMES, SIZE, {n: (x, y) for n, (x, y) in zip(NAMES, REST, strict=True)})
+    for frame in range(10):
+        tracker.step(thumb + patches_at(REST[4:]), frame / 30)
+    assert tracker.dot_area_px2 > 280.0
+
+
 def test_dots_that_are_half_hidden_do_not_make_a_whole_one_large() -> None:
     tracker = _tracker()
     for frame in range(1, 20):
