@@ -188,9 +188,7 @@ class PaintToBone:
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
         sigmas = told.sigmas_rad, told.shape_sd
-        note_directions(
-            self.known, told.rows, told.directions, told.hinges, sigmas, told.stamp_ns
-        )
+        note_directions(self.known, told.rows, told.directions, told.hinges, sigmas, told.stamp_ns)
 
 
 @njit(cache=True)

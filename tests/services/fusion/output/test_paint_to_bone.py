@@ -129,17 +129,35 @@ def test_without_a_pose_tips_stay_and_sigma_says_so(paint):
 def test_a_dab_is_as_unsure_as_the_skin_under_it(paint):
     """Beside it by the wrist's orientation, deep by its limb's thickness."""
     found = []
-    for sigma_rad in (0.05, 0.2):
+    for sigma_rad in (0.05, 0.1):
         told = msgspec.structs.replace(
             pose(10**18, (1.0, 0.0, 0.0, 0.0)), wrist_sigma_rad=sigma_rad
         )
         paint.note(paint.directions(told))
         found.append(np.sqrt(corrected(paint, 10**18)[1][0].diagonal() - 1e-8))
-    for sigma_rad, (x, y, z) in zip((0.05, 0.2), found, strict=True):
+    for sigma_rad, (x, y, z) in zip((0.05, 0.1), found, strict=True):
         # The normal of the wrist's skin is -y.
         assert x == pytest.approx(SAG_M * sigma_rad / np.sqrt(3.0), rel=1e-3)
         assert z == pytest.approx(x, rel=1e-3)
         assert y == pytest.approx(0.08 * SAG_M, rel=1e-3)
+
+
+def test_a_hand_that_is_unlike_its_model_has_other_fingers(paint):
+    """A pose that is unsure of the wrist fits badly: paint is of another shape, within limits."""
+    sigmas_mm = []
+    for sigma_rad in (0.1, 0.3, 3.0, 30.0):
+        told = msgspec.structs.replace(
+            pose(10**18, (1.0, 0.0, 0.0, 0.0)), wrist_sigma_rad=sigma_rad
+        )
+        directions = paint.directions(told)
+        # The way it points is as sure as before: its shape alone counts.
+        paint.note(directions._replace(sigmas_rad=np.full_like(directions.sigmas_rad, 0.05)))
+        sigmas_mm.append(1e3 * np.sqrt(np.trace(corrected(paint, 10**18)[1][1])))
+    alike, unlike, most, beyond = sigmas_mm
+    # .3 rad are .173 of one axis, .113 beyond hands alike: .17 radii across, twice that along.
+    grown_mm = np.sqrt(unlike**2 - alike**2)
+    assert grown_mm == pytest.approx(6.8 * 1.5 * 0.1132 * np.sqrt(6.0), rel=0.02)
+    assert unlike < most == beyond
 
 
 def test_what_tapers_is_corrected_as_that(paint):
