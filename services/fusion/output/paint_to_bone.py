@@ -106,8 +106,7 @@ class PaintToBone:
     ) -> None:
         paints = [hands[landmark.hand].paint[landmark.name] for landmark in landmarks]
         radii_m = np.array([paint.radius_m for paint in paints])  # (L,)
-        # Diameters of dabs (L,), 0 for painted tips.
-        dabs_m = np.array([paint.extent_m if paint.radius_m == 0.0 else 0.0 for paint in paints])
+        dabs_m = np.where(radii_m == 0.0, [paint.extent_m for paint in paints], 0.0)  # across
         # Which landmarks are painted all round (L,), as tips are.
         self.round: Bools = radii_m > 0.0
         # Which landmarks are paint of some size (L,), not points.
@@ -128,9 +127,7 @@ class PaintToBone:
         # In its joint's frame (L, 3): the way a painted tip points, the outward normal of a dab's
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
-        self._shape_per_rad = {
-            hand: _SHAPE_PER_RAD.get(model.origin, 0.0) for hand, model in hands.items()
-        }
+        self._origins = {hand: model.origin for hand, model in hands.items()}
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
         self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
@@ -183,7 +180,8 @@ class PaintToBone:
     def _shape_sd(self, hand: HandName, wrist_rad: float | None) -> float:
         """In radii, of a hand whose wrist is so unsure; 0 if the pose does not say."""
         unlike_rad = max((wrist_rad or 0.0) / math.sqrt(3.0) - _ALIKE_RAD, 0.0)
-        return min(self._shape_per_rad.get(hand, 0.0) * unlike_rad, _MOST_SHAPE)
+        per_rad = _SHAPE_PER_RAD.get(self._origins.get(hand, ""), 0.0)
+        return min(per_rad * unlike_rad, _MOST_SHAPE)
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
