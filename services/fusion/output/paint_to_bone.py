@@ -50,7 +50,8 @@ _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
 # hands .13 to .2), and not more than the last. Chosen on the other renderer's tuning half: at lag 2
 # median NEES 1.0, 1.2, 3.8 and 2.9 without, .3, .3, 1.1 and 1.1 with it, 99, 97, 60 and 67 % and
 # 99, 99, 90 and 92 % within three sigmas; of recorded hands that the simulator drew 1.3 and .8, .6
-# and .4; of its other hands .2 to .5 and .1 to .5. At half as much per radian .5, .4, 1.7 and 1.3.
+# and .4; of its other hands .2 to .5 and .1 to .5. From .07 rad on, at most .15 radii, 1.5 times
+# that along the ray and nothing for dabs, medians were .5, .4, 1.7 and 1.3.
 _ALIKE_RAD, _SHAPE_PER_RAD, _MOST_SHAPE = 0.06, {"tables": 1.5}, 0.3
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
