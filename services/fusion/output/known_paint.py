@@ -23,7 +23,8 @@ SIGMA_UNKNOWN = (0.29, 0.16)
 # cosine of -.8, along .06-.15; less than .02 and nothing from the side.
 SIGMA_SIDE = (0.02, 0.012)
 SIGMA_END, _END_POWER = (0.1, 0.035), (4, 2)
-# A shape that is unlike the model's counts so much more along the viewing ray than across it.
+# A shape that is unlike the model's counts so much more along the viewing ray than across it, as
+# what is left does (SIGMA_UNKNOWN: 1.8 times).
 _SHAPE_ALONG = 2.0
 # Light falls on the side that cameras see: tips are located so much before their axis, in radii
 # (tuning captures: .01 to .06; without, depths are 3 % worse).

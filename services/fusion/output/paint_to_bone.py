@@ -46,12 +46,14 @@ from services.fusion.output.visible_paint import dab_sag_m, shift_table
 _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
 # A hand that a model of other bones fits badly, so that its pose is unsure of the wrist's
 # orientation, has other fingers and other paint than the model too: by so many radii for each
-# radian of one axis beyond the first of these (of hands like the tables' .06 to .08; of recorded
-# hands .13 to .2), and not more than the last. Chosen on the other renderer's tuning half: at lag 2
-# median NEES 1.0, 1.2, 3.8 and 2.9 without, .3, .3, 1.1 and 1.1 with it, 99, 97, 60 and 67 % and
-# 99, 99, 90 and 92 % within three sigmas; of recorded hands that the simulator drew 1.3 and .8, .6
-# and .4; of its other hands .2 to .5 and .1 to .5. From .07 rad on, at most .15 radii, 1.5 times
-# that along the ray and nothing for dabs, medians were .5, .4, 1.7 and 1.3.
+# radian of one axis beyond the first of these (.05 to .1 of hands that the simulator drew, .13 to
+# .2 of recorded ones), and not more than the last, so that what this makes of a pose cannot grow by
+# itself. Chosen on the other renderer's tuning half: at lag 2 median NEES 1.0, 1.2, 3.8 and 2.9
+# without, .2, .3, .8 and 1.0 with it, 99, 97, 60 and 67 % and 99, 100, 100 and 93 % within three
+# sigmas. From .07 rad on, at most .15 radii, 1.5 times that along the ray and nothing for dabs,
+# medians were .5, .4, 1.7 and 1.3. On our own tuning half, of recorded hands 1.3 and .8 without, .5
+# and .3 with it; of others .2 to .5 and .1 to .5. A wrist is unsure for other reasons, too: such a
+# hand is told too unsurely.
 _ALIKE_RAD, _SHAPE_PER_RAD, _MOST_SHAPE = 0.06, {"tables": 1.5}, 0.3
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
@@ -125,10 +127,10 @@ class PaintToBone:
             ]
             for hand in hands
         }
+        self._origins = {hand: model.origin for hand, model in hands.items()}
         # In its joint's frame (L, 3): the way a painted tip points, the outward normal of a dab's
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
-        self._origins = {hand: model.origin for hand, model in hands.items()}
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
         self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))

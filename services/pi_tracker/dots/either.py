@@ -25,7 +25,8 @@ _SURE = 30.0
 # No first picture of a hand is further from one than this, nats, and what is further is told as a
 # cloud until so much speaks for a hand. (On the same: at most 11; of plates 34 to 155.)
 _MISFIT, _DOUBT = 20.0, 10.0
-# Of all pictures of a recording, and of one whose first picture is no hand's.
+# Of all pictures of a recording on average, by the same figures: above what any hand costs; and of
+# one whose first picture is no hand's, which needs little more.
 _ON_AVERAGE = (1.5, 0.5)
 
 
@@ -52,6 +53,7 @@ class EitherTracker:
             was_cloud = self._is_cloud
             self._ahead = min(max(self._ahead + gained, -_SURE), _SURE)
             if was_cloud != self._is_cloud:
+                # What was decided is believed as firmly as what was before.
                 self._ahead = _SURE if self._is_cloud else -_SURE
         elif self._hand.begun is not None:
             self._ahead = _DOUBT if self._hand.misfit > _MISFIT else -_SURE
