@@ -70,6 +70,12 @@ def variances(
     return found
 
 
+@njit(cache=True)
+def told_misfit(errors: Errors) -> float:
+    """Squared residuals of the landmarks over what is usual of such models; -1: not known."""
+    return errors.misfit[0] if errors.landmark_m2[0] > 0.0 else -1.0
+
+
 @njit(cache=True, fastmath=FUSED)
 def _carry_along(
     chains: HandChains, observations: Observations, estimate: HandEstimate, errors: Errors

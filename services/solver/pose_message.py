@@ -59,6 +59,7 @@ def hand_pose(
         ],
         wrist_sigma_m=rows[WRIST_ROW][0],
         wrist_sigma_rad=rows[WRIST_ROW][1],
+        model_misfit=rows[WRIST_ROW][2] if rows[WRIST_ROW][2] >= 0.0 else None,
     )
 
 

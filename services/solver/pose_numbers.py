@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.solver.error_effect import Errors, variances
+from services.solver.error_effect import Errors, told_misfit, variances
 from services.solver.finger.solve_fingers import (
     Bools,
     FingerSolution,
@@ -30,7 +30,7 @@ from services.solver.whole_hand.landmarks import Observations, Observed, Places
 _DECIMALS = 6
 _UNITS = 10.0**_DECIMALS
 # Where the numbers of a pose are: joints (x, y, z, w, x, y, z), digits (four angles, distance left,
-# iterations, outcome, sigma), the wrist (sigmas of position and rotation).
+# iterations, outcome, sigma), the wrist (sigmas of position and rotation, the model's misfit).
 JOINT_ROWS, DIGIT_ROWS, WRIST_ROW = slice(0, 26), slice(26, 31), 31
 _ROWS, _COLUMNS = 32, 8
 _DIGIT_0 = DIGIT_ROWS.start
@@ -103,16 +103,20 @@ def _dls_numbers_unpacked(
     observations = Observations(joint, digit, depth, offset_m, points_m, whitening)
     errors = Errors(effect, sigmas, paint_columns, misfit, landmark_m2, keep)
     spread = variances(chains, observations, estimate, errors)
-    return pose_numbers(chains, wrist, fingers, spread)
+    return pose_numbers(chains, wrist, fingers, spread, told_misfit(errors))
 
 
 @njit(cache=True)
 def pose_numbers(
-    chains: HandChains, wrist: tuple[Array, Array], fingers: FingerSolution, variances: Array
+    chains: HandChains,
+    wrist: tuple[Array, Array],
+    fingers: FingerSolution,
+    variances: Array,
+    misfit: float,
 ) -> Array:
     """Joints of a wrist (rotation (3, 3), position (3,)) and solved digits, in rows; (32, 8).
 
-    variances (26,) of rotation, position and angles.
+    variances (26,) of rotation, position and angles; misfit: of told_misfit.
     """
     numbers = np.zeros((_ROWS, _COLUMNS))
     angles = rounded_within_limits(fingers.angles_rad, chains.limits_rad)
@@ -134,6 +138,7 @@ def pose_numbers(
         digit[7] = rounded(min(sigmas[2 + row], _UNKNOWN_RAD))
     numbers[WRIST_ROW, 0] = rounded(min(sigmas[0], _UNKNOWN_M))
     numbers[WRIST_ROW, 1] = rounded(min(sigmas[1], _UNKNOWN_RAD))
+    numbers[WRIST_ROW, 2] = rounded(misfit)
     return numbers
 
 

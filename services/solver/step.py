@@ -18,7 +18,7 @@ from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose, JointSource
-from services.solver.error_effect import Errors, variances
+from services.solver.error_effect import Errors, told_misfit, variances
 from services.solver.finger.solve_fingers import DLS, solve_fingers, tips_in_wrist
 from services.solver.model_check import check_model
 from services.solver.model_error import ModelError
@@ -109,7 +109,7 @@ class _Hand:
         tips = tips_in_wrist(wrist, points)
         fingers = solve_fingers(settings, tracker.chains, estimate.angles_rad, tips)
         spread = variances(tracker.chains, fitted, estimate, errors)
-        return pose_numbers(tracker.chains, wrist, fingers, spread)
+        return pose_numbers(tracker.chains, wrist, fingers, spread, told_misfit(errors))
 
     def _sources(self, observed: Observed) -> list[JointSource]:
         """Where each joint comes from; the same few sets of landmarks come again and again."""

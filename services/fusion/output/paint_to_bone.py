@@ -44,17 +44,15 @@ from services.fusion.output.visible_paint import dab_sag_m, shift_table
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
 # (How long the paint is does not matter: paint_centroid.py.)
 _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
-# A hand that a model of other bones fits badly, so that its pose is unsure of the wrist's
-# orientation, has other fingers and other paint than the model too: by so many radii for each
-# radian of one axis beyond the first of these (.05 to .1 of hands that the simulator drew, .13 to
-# .2 of recorded ones), and not more than the last, so that what this makes of a pose cannot grow by
-# itself. Chosen on the other renderer's tuning half: at lag 2 median NEES 1.0, 1.2, 3.8 and 2.9
-# without, .2, .3, .8 and 1.0 with it, 99, 97, 60 and 67 % and 99, 100, 100 and 93 % within three
-# sigmas. From .07 rad on, at most .15 radii, 1.5 times that along the ray and nothing for dabs,
-# medians were .5, .4, 1.7 and 1.3. On our own tuning half, of recorded hands 1.3 and .8 without, .5
-# and .3 with it; of others .2 to .5 and .1 to .5. A wrist is unsure for other reasons, too: such a
-# hand is told too unsurely.
-_ALIKE_RAD, _SHAPE_PER_RAD, _MOST_SHAPE = 0.06, {"tables": 1.5}, 0.3
+# A hand that the tables' model fits badly has other fingers and other paint than the model, too:
+# none of that from the first of these misfits (HandPose.model_misfit) down, so many radii from the
+# second up, and no more, so that what this makes of a pose cannot grow by itself. Hands that the
+# simulator drew have .1 to .9, recorded ones 1.1 to 3.6. Chosen on the other renderer's tuning half
+# and on our own: at lag 2 mean NEES of the former 1.5, 1.4, 4.5 and 4.3 without, .7, .6, 1.5 and
+# 1.7 with it (98, 97, 59 and 66 % within three sigmas, 100, 99, 100 and 90); of recorded hands in
+# our own pictures 2.3 and 1.0, .7 and .5; of others as without. With (.6, 1.0) and .15 radii it was
+# .6, .6, 1.4 and 1.3, and of a small adult .32 instead of .40.
+_MISFITS, _UNLIKE_SHAPE = (0.7, 1.2), 0.14
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
 # Abduction alone turns a finger sideways. Against the root mean square over a digit's angles, which
@@ -177,14 +175,16 @@ class PaintToBone:
         directions = turned_vectors(self._outwards[of], turns)
         hinges = turned_vectors(self._hinges[: len(of)], turns)
         spreads = np.array(sigmas_rad).reshape(-1, 2)
-        shape_sd = self._shape_sd(pose.hand, pose.wrist_sigma_rad)
+        shape_sd = self._shape_sd(pose.hand, pose.model_misfit)
         return Directions(pose.hand, pose.stamp_ns, of, directions, hinges, spreads, shape_sd)
 
-    def _shape_sd(self, hand: HandName, wrist_rad: float | None) -> float:
-        """In radii, of a hand whose wrist is so unsure; 0 if the pose does not say."""
-        unlike_rad = max((wrist_rad or 0.0) / math.sqrt(3.0) - _ALIKE_RAD, 0.0)
-        per_rad = _SHAPE_PER_RAD.get(self._origins.get(hand, ""), 0.0)
-        return min(per_rad * unlike_rad, _MOST_SHAPE)
+    def _shape_sd(self, hand: HandName, misfit: float | None) -> float:
+        """In radii, of a hand that fits its model so badly; 0 if the pose does not say."""
+        if misfit is None or self._origins.get(hand) != "tables":
+            return 0.0
+        alike, unlike = _MISFITS
+        share = (misfit - alike) / (unlike - alike)
+        return _UNLIKE_SHAPE * min(max(share, 0.0), 1.0)
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""

@@ -90,6 +90,25 @@ def test_an_exact_hand_has_small_sigmas(world: Callable, angles_of: Callable) ->
     assert np.all((mean > 0.15) & (mean < 2.0))
 
 
+def test_a_pose_tells_how_badly_its_hand_fits_the_model(world: Callable) -> None:
+    """Nothing of one that was measured, whose bones are no question."""
+    table = default_hand()
+    random = np.random.default_rng(5)
+    other = with_bone_factors(table, random.choice([0.75, 1.3], (5, 4)))
+    measured = msgspec.structs.replace(table, origin="measured")
+    found = []
+    for told, true in ((table, table), (table, other), (measured, other)):
+        ours, step = type(world("right"))(true), SolverStep(RigConfig(), {"right": told})
+        for frame, instant in enumerate(ours.motion(5, 120, "random")):
+            pose = step.step(ours.message(ours.points(instant), frame))
+        assert pose is not None
+        found.append(pose.model_misfit)
+    alike, unlike, untold = found
+    assert alike < 0.9
+    assert unlike > 1.2
+    assert untold is None
+
+
 @pytest.mark.parametrize("error", ["size", "bone", "root", "paint"])
 def test_a_constant_error_of_the_model_moves_the_pose_as_is_told(
     world: Callable, error: str

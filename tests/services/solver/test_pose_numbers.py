@@ -43,7 +43,7 @@ def test_rows_are_joints_digits_and_the_wrist() -> None:
     wrist = np.eye(3), np.array([0.1, 0.2, 0.5])
     variances = np.full(26, 1e-4)
     numbers = pose_numbers(
-        hand_chains(model), wrist, FingerSolution(angles, ends, status), variances
+        hand_chains(model), wrist, FingerSolution(angles, ends, status), variances, 1.25
     )
     positions, _ = forward(model, *wrist, angles)
     np.testing.assert_allclose(numbers[JOINT_ROWS, :3], positions, atol=1e-6)
@@ -51,14 +51,14 @@ def test_rows_are_joints_digits_and_the_wrist() -> None:
     np.testing.assert_allclose(numbers[DIGIT_ROWS, :4], angles, atol=1e-6)
     assert numbers[DIGIT_ROWS, 4:7].tolist() == [[0.001235, 3.0, s] for s in status]
     np.testing.assert_allclose(numbers[DIGIT_ROWS, 7], 0.01)
-    np.testing.assert_allclose(numbers[WRIST_ROW, :2], 0.017321)
+    np.testing.assert_allclose(numbers[WRIST_ROW, :3], [0.017321, 0.017321, 1.25])
 
 
 def test_nothing_known_is_half_a_turn_and_a_metre() -> None:
     model = default_hand("right")
     fingers = FingerSolution(np.zeros((5, 4)), np.zeros((5, 3)), np.full(5, NOT_SEEN))
     wrist = np.eye(3), np.zeros(3)
-    numbers = pose_numbers(hand_chains(model), wrist, fingers, np.full(26, 1e6))
+    numbers = pose_numbers(hand_chains(model), wrist, fingers, np.full(26, 1e6), -1.0)
     assert numbers[WRIST_ROW, :2].tolist() == [1.0, round(math.pi, 6)]
     assert numbers[DIGIT_ROWS, 7].tolist() == [round(math.pi, 6)] * 5
 

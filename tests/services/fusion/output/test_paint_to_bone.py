@@ -142,22 +142,30 @@ def test_a_dab_is_as_unsure_as_the_skin_under_it(paint):
         assert y == pytest.approx(0.08 * SAG_M, rel=1e-3)
 
 
+def shape_sigma_mm(paint, model_misfit) -> float:
+    """Of a tip, all axes, that a pose of such a misfit tells of; its direction is well known."""
+    told = msgspec.structs.replace(
+        pose(10**18, (1.0, 0.0, 0.0, 0.0), sigma_rad=0.05), model_misfit=model_misfit
+    )
+    paint.note(paint.directions(told))
+    return float(1e3 * np.sqrt(np.trace(corrected(paint, 10**18)[1][1])))
+
+
 def test_a_hand_that_is_unlike_its_model_has_other_fingers(paint):
-    """A pose that is unsure of the wrist fits badly: paint is of another shape, within limits."""
-    sigmas_mm = []
-    for sigma_rad in (0.1, 0.3, 3.0, 30.0):
-        told = msgspec.structs.replace(
-            pose(10**18, (1.0, 0.0, 0.0, 0.0)), wrist_sigma_rad=sigma_rad
-        )
-        directions = paint.directions(told)
-        # The way it points is as sure as before: its shape alone counts.
-        paint.note(directions._replace(sigmas_rad=np.full_like(directions.sigmas_rad, 0.05)))
-        sigmas_mm.append(1e3 * np.sqrt(np.trace(corrected(paint, 10**18)[1][1])))
-    alike, unlike, most, beyond = sigmas_mm
-    # .3 rad are .173 of one axis, .113 beyond hands alike: .17 radii across, twice that along.
+    """Paint of a hand that fits badly is of another shape, within limits."""
+    untold, alike, between, unlike, beyond = (
+        shape_sigma_mm(paint, misfit) for misfit in (None, 0.6, 0.95, 1.2, 1e9)
+    )
+    assert untold == alike < between < unlike == beyond
+    # .14 radii across, twice that along.
     grown_mm = np.sqrt(unlike**2 - alike**2)
-    assert grown_mm == pytest.approx(6.8 * 1.5 * 0.1132 * np.sqrt(6.0), rel=0.02)
-    assert unlike < most == beyond
+    assert grown_mm == pytest.approx(6.8 * 0.14 * np.sqrt(6.0), rel=0.02)
+
+
+def test_a_hand_that_was_measured_is_of_its_own_shape():
+    measured = msgspec.structs.replace(default_hand("right"), origin="measured")
+    paint = PaintToBone(LANDMARKS, {"right": measured}, tuple(SyntheticRig().rig().values()))
+    assert shape_sigma_mm(paint, 1e9) == shape_sigma_mm(paint, None)
 
 
 def test_what_tapers_is_corrected_as_that(paint):
