@@ -1,4 +1,4 @@
-"""The tracker's centres measured by its compiled form and in Python: how fast, how far apart.
+"""The tracker by its compiled forms and in Python: how fast, and how far centres are apart.
 
 `python benchmarks/tracker_compiled.py [--frames N] [--json FILE]`
 
@@ -6,7 +6,7 @@ Both track the same simulated pictures (six colours, 640 x 480) in one process, 
 each with a tracker of its own. Times are the processor's, medians of five rounds' medians; ratios
 are Python's over the compiled form's, the median of the rounds with the least and the most of them:
     refine  the centres of a picture's markers, from blobs on
-    step    the whole step: picture in memory -> message encoded
+    step    the whole step: picture in memory -> message encoded; the search, too, by each form
 `markers` is how many were compared, `apart_px` how far the two centres of a marker are apart at
 most, `apart_95_px` in 95 % of the markers: messages are rounded to a thousandth of a pixel, these
 are not. Where the tracker has no compiled form, it says so and ends.
@@ -60,6 +60,13 @@ class Timed:
         return found
 
 
+def search_in_python(step: TrackerStep) -> None:
+    """Leave the compiled search out of a tracker."""
+    finder = step._finder
+    assert isinstance(finder, marker_finder.MarkerFinder)
+    finder._detector._compiled = finder._unfiltered_detector._compiled = None
+
+
 def in_turns(frames: list[Frame], forms: dict[str, Measure]) -> dict[str, list[int]]:
     """Durations of the centres and of the step of each form, ns, frame by frame."""
     config = load_rig(ROOT / "config" / "sim.toml")
@@ -67,6 +74,9 @@ def in_turns(frames: list[Frame], forms: dict[str, Measure]) -> dict[str, list[i
     steps = {
         name: TrackerStep(CAMERA, colors, Tracker(), (640, 480), config.colors) for name in forms
     }
+    for name in forms:
+        if name == "python":
+            search_in_python(steps[name])
     encoder, times = msgspec.json.Encoder(), defaultdict(list)
     for begin in range(0, len(frames), TURN):
         for name, measure in forms.items():

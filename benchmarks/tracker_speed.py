@@ -29,7 +29,8 @@ from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.image.yuv_planes import Rect, picture
+from services.pi_tracker.image.planes import Rect
+from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.step import TrackerStep
 
 # After a change of turns the first pictures take up to three times as long, ours more than the

@@ -9,7 +9,7 @@ import numpy as np
 
 from services.pi_tracker.image.blob import Blob, make_blob
 from services.pi_tracker.image.frame import Image
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 # Places of five tips in an arc and a wrist, px from the middle of the hand.
 _HAND_PX = ((-60, -20), (-30, -60), (0, -70), (30, -60), (55, -40), (0, 60))

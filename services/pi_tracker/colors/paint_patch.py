@@ -21,7 +21,7 @@ from services.pi_tracker.colors.region_growing import (
     touches_border,
 )
 from services.pi_tracker.image.chroma import Cells, Mask
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rhot.errors import CalibrationError
 from services.pi_tracker.image.chroma import Cells
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 # A patch smaller than three cells (12 px) is not searched by the tracker either, by default; its
 # colours would be the rim's.

@@ -14,7 +14,7 @@ import numpy as np
 from services.pi_tracker.colors.pointer import MIN_CELLS
 from services.pi_tracker.image.chroma import Cells, Mask
 from services.pi_tracker.image.hue import Array
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 # Chroma of grey walls in real video is 2 +- 2 grey levels (99 %: 5); a pastel ball in poor light
 # has 12.

@@ -10,8 +10,6 @@
 
 #include "mixture.h"
 
-/* Cells a side of a picture, at most: so no product of sizes overflows. */
-#define MOST_CELLS 16384
 /* x, y, area, sigma and quality of a blob. */
 #define VALUES 5
 
@@ -23,7 +21,7 @@ const char *const rhot_digest = RHOT_DIGEST;
 /* Who calls has the same structures: their sizes are compared. */
 const int32_t rhot_sizes[2] = {sizeof(picture), sizeof(constants)};
 
-enum { BAD_PICTURE = -1, BAD_BLOB = -2, BAD_MASKS = -3, BAD_SCRATCH = -4 };
+enum { BAD_BLOB = -2, BAD_MASKS = -3, BAD_SCRATCH = -4 };
 
 typedef struct {
     double area, x, y;                     /* of the pixels' weights: sum, times x, times y */
@@ -140,16 +138,6 @@ static shape tile_of(const blob *b, const picture *p) {
     return s;
 }
 
-static int is_picture(const picture *p) {
-    int64_t w = (int64_t)p->right - p->left, h = (int64_t)p->bottom - p->top;
-    if (!p->y || !p->u || !p->v || p->width > MOST_CELLS || p->height > MOST_CELLS) return 0;
-    if (p->left < 0 || p->top < 0 || w < 1 || h < 1) return 0;
-    if (p->right > p->width || p->bottom > p->height) return 0;
-    return p->row_y >= 2 * w && p->row_chroma >= w &&
-           p->bytes_y >= (2 * h - 1) * p->row_y + 2 * w &&
-           p->bytes_chroma >= (h - 1) * p->row_chroma + w;
-}
-
 /* Whether a blob lies in the picture and its tile in the window. */
 static int is_blob(const blob *b, const picture *p) {
     if (b->left < 0 || b->top < 0 || b->right > p->width || b->bottom > p->height) return 0;
@@ -157,6 +145,18 @@ static int is_blob(const blob *b, const picture *p) {
     shape s = tile_of(b, p);
     return s.left >= p->left && s.top >= p->top && s.left + s.w <= p->right &&
            s.top + s.h <= p->bottom;
+}
+
+/* Asks for the pixels of a tile. */
+static void fetch_tile(const shape *s, const picture *p) {
+    for (int32_t y = s->top - p->top; y < s->top - p->top + s->h; y++) {
+        ptrdiff_t left = s->left - p->left, chroma = (ptrdiff_t)y * p->row_chroma + left;
+        const uint8_t *pixels = p->y + (ptrdiff_t)2 * y * p->row_y + 2 * left;
+        fetch(pixels, (ptrdiff_t)2 * s->w);
+        fetch(pixels + p->row_y, (ptrdiff_t)2 * s->w);
+        fetch(p->u + chroma, s->w);
+        fetch(p->v + chroma, s->w);
+    }
 }
 
 /* Floats of scratch for a blob of w x h cells; less than 0 if there is no such blob. */
@@ -189,6 +189,10 @@ int32_t rhot_centroids(const picture *p, const constants *k, const double noise[
     for (int32_t n = 0; n < count && !wrong; n++) {
         const blob *b = &blobs[n];
         shape s = tile_of(b, p);
+        if (n + 1 < count) {
+            shape next = tile_of(b + 1, p);
+            fetch_tile(&next, p);
+        }
         tile t;
         for (size_t i = 0; i < PLANES; i++) t.plane[i] = scratch + i * s.size;
         for (size_t i = 0; i < CLEARED * s.size; i++) scratch[i] = 0.0f;

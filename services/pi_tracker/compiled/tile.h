@@ -6,8 +6,7 @@
 #ifndef RHOT_TILE_H
 #define RHOT_TILE_H
 
-#include <stddef.h>
-#include <stdint.h>
+#include "picture.h"
 
 /* Cells around a blob that are looked at, and how far windows of five cells reach. */
 #define MARGIN 2
@@ -19,17 +18,6 @@
 #else
 #define INDEPENDENT _Pragma("GCC ivdep")
 #endif
-
-typedef struct {
-    /* Planes of a window of the picture. A row of u and of v has half as many bytes as one of y. */
-    const uint8_t *y, *u, *v;
-    /* 256 values each, which levels stand for; null where they stand for themselves. */
-    const uint8_t *luma_levels, *chroma_levels;
-    int64_t bytes_y, bytes_chroma; /* of y; of u and of v each */
-    int32_t row_y, row_chroma;     /* bytes from one row to the next */
-    /* The window in the picture and the picture's size, in cells; right and bottom excluded. */
-    int32_t left, top, right, bottom, width, height;
-} picture;
 
 /* Tuned in measure/centroid.py, centroid_sigma.py and paint_fraction.py, which say on what. */
 typedef struct {

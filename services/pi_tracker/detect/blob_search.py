@@ -12,11 +12,14 @@ import cv2
 import numpy as np
 
 from rhot.files.rig_tables import Tracker
+from services.pi_tracker.compiled.library import loaded
 from services.pi_tracker.detect.color_table import ColorTable
+from services.pi_tracker.detect.compiled_patches import CompiledPatches, Patches
 from services.pi_tracker.detect.morphology import opening
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours, make_blob
 from services.pi_tracker.image.frame import Image
-from services.pi_tracker.image.yuv_planes import Picture, Rect
+from services.pi_tracker.image.planes import Rect
+from services.pi_tracker.image.yuv_planes import Picture
 
 # Contours examined in one rectangle, largest first. Six markers, their reflections and a dozen
 # distractors stay far below; a room full of colour must not cost more than a frame: 28 ms at most,
@@ -53,6 +56,16 @@ class BlobDetector:
         # sees them side by side.
         self._margin = 1 + self._gaussian + max(self._dilate - self._erode, 0)
         self._min_cells = max(1, round(settings.min_area_px / 4.0))
+        self._compiled: CompiledPatches | None = None
+        if loaded is not None and not self._gaussian and self._erode == self._dilate:
+            self._compiled = CompiledPatches(
+                loaded,
+                table.layers,
+                margin=self._margin,
+                rounds=self._erode,
+                min_cells=self._min_cells,
+                most=_MAX_CONTOURS,
+            )
 
     def detect(self, picture: Picture, rect: Rect, keep_thin: bool = False) -> list[Blob]:
         """All blobs of at least min_area_px in a rectangle, in no order.
@@ -63,11 +76,19 @@ class BlobDetector:
         large = whole_cells >= _COARSE_MIN_CELLS
         if large and self._row_step > 1 and self._sparse:
             rect = self._coarse_search(picture, rect)
-        patch = self._table.classify_cropped(*picture.cells(rect), self._margin)
+        planes = picture.planes
+        found = None if self._compiled is None or planes is None else self._compiled(planes, rect)
+        if found is None:
+            found = self._detect_in_python(picture, rect, keep_thin)
         if large:
-            self._sparse = patch.mask.size <= _SPARSE_SHARE * whole_cells
+            self._sparse = found.cells <= _SPARSE_SHARE * whole_cells
+        return found.blobs
+
+    def _detect_in_python(self, picture: Picture, rect: Rect, keep_thin: bool) -> Patches:
+        """The blobs of a rectangle, whatever it holds."""
+        patch = self._table.classify_cropped(*picture.cells(rect), self._margin)
         if not patch.mask.size:
-            return []
+            return Patches(0, [])
         mask = self._filtered(patch.mask)
         contours = _largest(cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0])
         left, top = rect[0] + patch.left, rect[1] + patch.top
@@ -88,7 +109,7 @@ class BlobDetector:
                 # One colour only, as a rule.
                 blob_rect = (left + x, top + y, left + x + w, top + y + h)
                 found.append(make_blob(k - 1, blob_rect, mask[y : y + h, x : x + w], cells))
-        return found
+        return Patches(patch.mask.size, found)
 
     def _coarse_search(self, picture: Picture, rect: Rect) -> Rect:
         """The part of a rectangle in which there may be blobs, from every so many rows."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 # A hand at rest still trembles and turns, and from one frame to the next a motion seldom more than
 # doubles. (What escapes is found in the same frame by searching the whole image.)

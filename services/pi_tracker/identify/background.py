@@ -17,7 +17,8 @@ import numpy as np
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
-from services.pi_tracker.image.yuv_planes import Picture, Rect
+from services.pi_tracker.image.planes import Rect
+from services.pi_tracker.image.yuv_planes import Picture
 
 # Sightings in a row before a cell counts as static: a tenth of a second at 30 fps, too long for a
 # moving finger. And how many are remembered, so that an object is known as soon as the hand in

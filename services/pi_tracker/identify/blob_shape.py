@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from services.pi_tracker.image.blob import Blob
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 # Paint patches seen from any side, blurred by fast motion, stay within this ratio of sides and fill
 # this share of their box.
@@ -15,10 +15,12 @@ _RIM_SHARE = 0.6
 
 def is_paint_shaped(blob: Blob, max_area_px: float) -> bool:
     """Whether a blob's area, aspect and fill are those of a patch of paint."""
-    width, height = blob.rect[2] - blob.rect[0], blob.rect[3] - blob.rect[1]
+    x0, y0, x1, y1 = blob.rect
+    width, height = x1 - x0, y1 - y0
     return (
         blob.area_px <= max_area_px
-        and max(width, height) <= _MAX_ASPECT * min(width, height)
+        and width <= _MAX_ASPECT * height
+        and height <= _MAX_ASPECT * width
         and blob.cells >= _MIN_FILL * width * height
     )
 

@@ -74,20 +74,33 @@ class MarkerIdentity:
 
     def associate(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Association | None]:
         """Each colour's marker, None where there is none."""
-        blobs = [self._preselected(color, own, stamp_ns) for color, own in enumerate(blobs)]
-        candidates = [self._candidates(color, blobs, stamp_ns) for color in range(len(blobs))]
-        associated: list[Association | None]
-        if all(self._is_unambiguous(color, own) for color, own in enumerate(candidates)):
-            associated = [Association(own[0].blob, 1.0, 1.0) for own in candidates]
-        else:
-            best = most_consistent_set(candidates)
-            associated = [
-                None if member is None else _accepted(candidates[color], *member)
-                for color, member in enumerate(best)
-            ]
+        associated = self._obvious(blobs, stamp_ns) or self._compared(blobs, stamp_ns)
         self._note_touching(associated)
         self._coast_unseen(associated, stamp_ns)
         return associated
+
+    def _obvious(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Association | None]:
+        """Each colour's only blob, where every colour has one that is like its track; else none."""
+        found: list[Association | None] = []
+        for track, own in zip(self._tracks, blobs, strict=True):
+            if len(own) != 1 or track is None:
+                return []
+            (blob,) = own
+            like = track.likeness(blob, stamp_ns, self._margin_px) >= _ACCEPT_LIKENESS
+            if not like and not track.is_at(blob, stamp_ns):
+                return []
+            found.append(Association(blob, 1.0, 1.0))
+        return found
+
+    def _compared(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Association | None]:
+        """Each colour's marker, by its track and the other colours' blobs."""
+        blobs = [self._preselected(color, own, stamp_ns) for color, own in enumerate(blobs)]
+        candidates = [self._candidates(color, blobs, stamp_ns) for color in range(len(blobs))]
+        best = most_consistent_set(candidates)
+        return [
+            None if member is None else _accepted(candidates[color], *member)
+            for color, member in enumerate(best)
+        ]
 
     def update(self, color: int, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> float:
         """Take in a marker's measurement; returns which fraction of it is occluded, 0..1."""
@@ -128,11 +141,6 @@ class MarkerIdentity:
         )
         return sorted(own, key=rank, reverse=True)[:_MAX_CANDIDATES]
 
-    def _is_unambiguous(self, color: int, own: list[Candidate]) -> bool:
-        return (
-            len(own) == 1 and own[0].prior >= _ACCEPT_LIKENESS and self._tracks[color] is not None
-        )
-
     def _note_touching(self, associated: list[Association | None]) -> None:
         self._touched = [False] * len(associated)
         seen = [(color, one.blob.rect) for color, one in enumerate(associated) if one is not None]
@@ -142,12 +150,14 @@ class MarkerIdentity:
 
     def _coast_unseen(self, associated: list[Association | None], stamp_ns: int) -> None:
         """Move the tracks that are not seen by the median motion of those that are."""
+        if None not in associated:
+            return
         motions = [
             (one.blob.x_px - track.x_px, one.blob.y_px - track.y_px)
             for one, track in zip(associated, self._tracks, strict=True)
             if one is not None and track is not None and track.stamp_ns < stamp_ns
         ]
-        if not motions or len(motions) == len(associated):
+        if not motions:
             return
         dx_px, dy_px = (median(steps) for steps in zip(*motions, strict=True))
         for one, track in zip(associated, self._tracks, strict=True):

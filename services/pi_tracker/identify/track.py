@@ -5,6 +5,7 @@ Pure. Stamps may stand still or run backwards: velocity is then zero, and likene
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from services.pi_tracker.image.blob import Blob
@@ -24,7 +25,7 @@ _MAX_PREDICTION_S = 0.1
 _GATE_PX, _GATE_PX_S, _RECENT_NS = 20.0, 40.0, 300_000_000
 
 
-@dataclass
+@dataclass(slots=True)
 class Track:
     """Position and velocity of one colour's marker at stamp_ns.
 
@@ -83,8 +84,9 @@ class Track:
         dx, dy = blob.x_px - x, blob.y_px - y
         unseen_s = min(max((stamp_ns - self.seen_ns) * 1e-9, 0.0), 1.0)
         reach_px = margin_px + _MAX_SPEED_PX_S * unseen_s
-        size_ratio = min(blob.area_px, self.area_px) / max(blob.area_px, self.area_px, 1.0)
-        return float(size_ratio**0.5 / (1.0 + (dx * dx + dy * dy) / (reach_px * reach_px)))
+        a, b = blob.area_px, self.area_px
+        size_ratio = a / max(b, 1.0) if a < b else b / max(a, 1.0)
+        return math.sqrt(size_ratio) / (1.0 + (dx * dx + dy * dy) / (reach_px * reach_px))
 
     def is_recent(self, stamp_ns: int) -> bool:
         """Whether it was seen less than _RECENT_NS ago."""

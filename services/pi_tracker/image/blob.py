@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 
 from services.pi_tracker.image.frame import Image
-from services.pi_tracker.image.yuv_planes import Rect
+from services.pi_tracker.image.planes import Rect
 
 
 class Blob(NamedTuple):

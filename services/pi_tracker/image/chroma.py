@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.hue import LUMA_GAIN, Array, hue_of_chroma
-from services.pi_tracker.image.yuv_planes import Picture, Rect, picture
+from services.pi_tracker.image.planes import Rect
+from services.pi_tracker.image.yuv_planes import Picture, picture
 
 Mask = npt.NDArray[np.bool_]
 

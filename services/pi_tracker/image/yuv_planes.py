@@ -12,16 +12,15 @@ An image that does not have the shape its frame claims raises SourceError.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from dataclasses import replace
+from typing import Protocol
 
 import cv2
 import numpy as np
 
 from rhot.errors import SourceError
 from services.pi_tracker.image.frame import Frame, Image
-
-# (x0, y0, x1, y1) in cells, the end excluded.
-Rect = tuple[int, int, int, int]
+from services.pi_tracker.image.planes import LIMITED_CHROMA, LIMITED_LUMA, Planes, Rect
 
 # BT.601, Y in 16..235, chroma about 128, from B, G, R in 0..255; the inverse of OpenCV's
 # COLOR_YUV2BGR_I420.
@@ -31,25 +30,15 @@ _V_FROM_BGR = (-0.071427, -0.367788, 0.439216)
 _LUMA = np.array([[*_Y_FROM_BGR, 16.0]])
 _CHROMA = np.array([[*_U_FROM_BGR, 128.0], [*_V_FROM_BGR, 128.0]])
 
-# Full range to limited range: 256 levels to 219 of luma about 16, and to 224 of chroma about 128.
-_LEVELS = np.arange(256.0)
-LIMITED_LUMA = np.round(16.0 + _LEVELS * (219.0 / 255.0)).astype(np.uint8)
-LIMITED_CHROMA = np.round(128.0 + (_LEVELS - 128.0) * (224.0 / 255.0)).astype(np.uint8)
-
-
-class Window(NamedTuple):
-    """A part of a picture: uint8, the last axis contiguous."""
-
-    rect: Rect  # cells that it has
-    luma: Image  # (2h, 2w) of every pixel
-    chroma: Image  # (2, h, w) u, v of every cell
-    full_range: bool  # both are yet to be scaled, by LIMITED_LUMA and LIMITED_CHROMA
-
 
 class Picture(Protocol):
     """A frame as luma and chroma."""
 
     size: tuple[int, int]  # cells (width, height)
+
+    @property
+    def planes(self) -> Planes | None:
+        """All of it, where nothing has to be converted."""
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         """Luma (h, w) and chroma u, v (h, w, 2) of every cell of a rectangle.
@@ -63,9 +52,6 @@ class Picture(Protocol):
         luma (2h, 2w) of every pixel, chroma u, v (2, h, w) of every cell.
         """
 
-    def window(self, rect: Rect) -> Window:
-        """The planes of a rectangle or of more, without a copy where there are planes."""
-
 
 class _PlanarPicture:
     """I420."""
@@ -76,6 +62,9 @@ class _PlanarPicture:
         self._y = image[:height]
         self._chroma = image[height:].reshape(2, half_h, half_w)
         self._u, self._v = self._chroma
+        self.planes = Planes(
+            (0, 0, half_w, half_h), self.size, self._y, self._chroma, full_range=False
+        )
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
         x0, y0, x1, y1 = rect
@@ -90,29 +79,23 @@ class _PlanarPicture:
         luma[:] = self._y[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
         chroma[:] = self._chroma[:, y0:y1, x0:x1]
 
-    def window(self, rect: Rect) -> Window:
-        del rect
-        return Window((0, 0, *self.size), self._y, self._chroma, full_range=False)
-
 
 class _FullRangePicture:
     """I420 with luma in 0..255, scaled to limited range where it is asked for."""
 
-    def __init__(self, planes: _PlanarPicture) -> None:
-        self.size = planes.size
-        self._planes = planes
+    def __init__(self, limited: _PlanarPicture) -> None:
+        self.size = limited.size
+        self._as_limited = limited
+        self.planes = replace(limited.planes, full_range=True)
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
-        luma, chroma = self._planes.cells(rect, step)
+        luma, chroma = self._as_limited.cells(rect, step)
         return cv2.LUT(luma, LIMITED_LUMA), cv2.LUT(chroma, LIMITED_CHROMA)
 
     def copy_to(self, rect: Rect, luma: Image, chroma: Image) -> None:
-        self._planes.copy_to(rect, luma, chroma)
+        self._as_limited.copy_to(rect, luma, chroma)
         luma[:] = LIMITED_LUMA[luma]
         chroma[:] = LIMITED_CHROMA[chroma]
-
-    def window(self, rect: Rect) -> Window:
-        return self._planes.window(rect)._replace(full_range=True)
 
 
 class _BgrPicture:
@@ -120,6 +103,7 @@ class _BgrPicture:
 
     def __init__(self, image: Image, width: int, height: int) -> None:
         self.size = (width // 2, height // 2)
+        self.planes = None
         self._image = image
 
     def cells(self, rect: Rect, step: int = 1) -> tuple[Image, Image]:
@@ -130,12 +114,6 @@ class _BgrPicture:
         bgr = _pixels(self._image, rect)
         luma[:] = cv2.transform(bgr, _LUMA)
         chroma[:] = cv2.split(cv2.transform(_cell_means(bgr), _CHROMA))
-
-    def window(self, rect: Rect) -> Window:
-        h, w = rect[3] - rect[1], rect[2] - rect[0]
-        luma, chroma = np.empty((2 * h, 2 * w), np.uint8), np.empty((2, h, w), np.uint8)
-        self.copy_to(rect, luma, chroma)
-        return Window(rect, luma, chroma, full_range=False)
 
 
 def picture(frame: Frame) -> Picture:
@@ -154,6 +132,14 @@ def picture(frame: Frame) -> Picture:
         raise SourceError(f"camera {frame.camera!r}: I420 needs even sizes, got {width}x{height}")
     planes = _PlanarPicture(np.ascontiguousarray(image), width, height)
     return _FullRangePicture(planes) if frame.full_range else planes
+
+
+def planes_of(image: Picture, rect: Rect) -> Planes:
+    """A copy of a rectangle of a picture as planes."""
+    h, w = rect[3] - rect[1], rect[2] - rect[0]
+    luma, chroma = np.empty((2 * h, 2 * w), np.uint8), np.empty((2, h, w), np.uint8)
+    image.copy_to(rect, luma, chroma)
+    return Planes(rect, image.size, luma, chroma, full_range=False)
 
 
 def bgr_image(frame: Frame) -> Image:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import struct
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,8 @@ from services.pi_tracker.compiled.library import loaded
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
-from services.pi_tracker.image.yuv_planes import (
-    LIMITED_CHROMA,
-    LIMITED_LUMA,
-    Picture,
-    Rect,
-    Window,
-)
+from services.pi_tracker.image.planes import Planes, Rect
+from services.pi_tracker.image.yuv_planes import Picture, planes_of
 from services.pi_tracker.measure import centroid, centroid_sigma, paint_fraction
 from services.pi_tracker.measure.blob_tiles import MARGIN
 from services.pi_tracker.measure.centroid import Centroid
@@ -32,18 +27,6 @@ _VALUES = 5  # of a centroid
 _MOST_KEPT = 1 << 20
 # What the function returns (compiled/centroid.c).
 _WRONG = {-1: "no such picture", -2: "no such blob", -3: "masks too small", -4: "scratch too small"}
-_LEVELS = (LIMITED_LUMA.ctypes.data, LIMITED_CHROMA.ctypes.data)
-
-
-class _Picture(ctypes.Structure):
-    """picture of compiled/tile.h."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("y", "u", "v", "luma_levels", "chroma_levels")),
-        *((name, ctypes.c_int64) for name in ("bytes_y", "bytes_chroma")),
-        *((name, ctypes.c_int32) for name in ("row_y", "row_chroma")),
-        *((name, ctypes.c_int32) for name in ("left", "top", "right", "bottom", "width", "height")),
-    )
 
 
 def _constants() -> ctypes.Structure:
@@ -85,6 +68,13 @@ def _constants() -> ctypes.Structure:
     return made
 
 
+class _Scratch(NamedTuple):
+    """Memory, and where it lies: to ask an array for its address costs a microsecond."""
+
+    floats: Image
+    address: int
+
+
 class CompiledCentroids:
     """A library's centroids; called like centroid.centroids."""
 
@@ -100,7 +90,7 @@ class CompiledCentroids:
         self._constants = _constants()
         self._constants_at = ctypes.addressof(self._constants)
         # Memory between calls. Whoever calls takes one out: threads never share it.
-        self._kept: list[Image] = []
+        self._kept: list[_Scratch] = []
 
     def __call__(self, picture: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
         """Measure blobs; one result each, in their order.
@@ -109,20 +99,16 @@ class CompiledCentroids:
         """
         if not blobs:
             return []
-        size = picture.size
+        planes = picture.planes
+        if planes is not None:
+            return self._in_planes(planes, blobs, noise)
         # What is not in planes is converted, for each blob as much as it needs.
-        window = picture.window(_tile(blobs[0].rect, size))
-        if window.rect == (0, 0, *size):
-            return self._in_window(window, size, blobs, noise)
-        windows = [picture.window(_tile(blob.rect, size)) for blob in blobs]
+        parts = [planes_of(picture, _tile(blob.rect, picture.size)) for blob in blobs]
         return [
-            self._in_window(part, size, [blob], noise)[0]
-            for part, blob in zip(windows, blobs, strict=True)
+            self._in_planes(part, [blob], noise)[0] for part, blob in zip(parts, blobs, strict=True)
         ]
 
-    def _in_window(
-        self, window: Window, size: tuple[int, int], blobs: Sequence[Blob], noise: Noise
-    ) -> list[Centroid]:
+    def _in_planes(self, planes: Planes, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
         count = len(blobs)
         rects = [number for blob in blobs for number in (*blob.rect, blob.cells)]
         masks = b"".join([blob.mask.tobytes() for blob in blobs])
@@ -131,23 +117,23 @@ class CompiledCentroids:
         scratch = self._scratch(self._scratch_size(w, h))
         out = (ctypes.c_double * (_VALUES * count))()
         wrong = self._measure(
-            ctypes.byref(_planes(window, size)),
+            ctypes.byref(planes.in_c),
             self._constants_at,
             (ctypes.c_double * 2)(noise.luma, noise.chroma),
             count,
             struct.pack(f"{5 * count}i", *rects),
             masks,
             len(masks),
-            scratch.ctypes.data,
-            scratch.size,
+            scratch.address,
+            scratch.floats.size,
             out,
         )
-        if scratch.size <= _MOST_KEPT:
+        if scratch.floats.size <= _MOST_KEPT:
             self._kept.append(scratch)
         if wrong:
             raise ValueError(
                 f"{_WRONG.get(wrong, wrong)}: blobs at {[blob.rect for blob in blobs]} of a "
-                f"picture of {size} cells, planes of {window.rect}"
+                f"picture of {planes.size} cells, planes of {planes.rect}"
             )
         values = iter(out[:])
         return [
@@ -155,30 +141,13 @@ class CompiledCentroids:
             for blob, five in zip(blobs, zip(*[values] * _VALUES, strict=True), strict=True)
         ]
 
-    def _scratch(self, floats: int) -> Image:
+    def _scratch(self, count: int) -> _Scratch:
         """Memory for so many floats."""
         kept = self._kept.pop() if self._kept else None
-        if kept is not None and kept.size >= floats:
+        if kept is not None and kept.floats.size >= count:
             return kept
-        return np.empty(max(floats, 0), np.float32)
-
-
-def _planes(window: Window, size: tuple[int, int]) -> _Picture:
-    """The window for C; valid as long as its arrays are."""
-    luma, chroma = window.luma, window.chroma
-    u = chroma.ctypes.data
-    return _Picture(
-        luma.ctypes.data,
-        u,
-        u + chroma.strides[0],
-        *(_LEVELS if window.full_range else (None, None)),
-        luma.nbytes,
-        chroma.nbytes // 2,
-        luma.strides[0],
-        chroma.strides[1],
-        *window.rect,
-        *size,
-    )
+        floats = np.empty(max(count, 0), np.float32)
+        return _Scratch(floats, floats.ctypes.data)
 
 
 def _tile(rect: Rect, size: tuple[int, int]) -> Rect:

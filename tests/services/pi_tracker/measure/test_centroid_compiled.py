@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,6 +15,7 @@ from services.pi_tracker.detect.search_region import whole
 from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
+from services.pi_tracker.image.planes import PictureInC
 from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure import centroid_compiled, fastest
 from services.pi_tracker.measure.centroid import centroids
@@ -143,7 +145,8 @@ def test_a_mask_smaller_than_its_rectangle_is_refused(measure):
 
 def test_planes_smaller_than_the_picture_are_refused(measure):
     image = picture_of(np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8))
-    image.size = (WIDTH, 2 * HEIGHT)
+    taller = (WIDTH, 2 * HEIGHT)
+    image.planes = dataclasses.replace(image.planes, rect=(0, 0, *taller), size=taller)
     blob = make_blob(0, (2, 2, 8, 8), np.ones((6, 6), np.uint8), 36)
     with pytest.raises(ValueError, match="no such picture"):
         measure(image, [blob], Noise())
@@ -152,7 +155,7 @@ def test_planes_smaller_than_the_picture_are_refused(measure):
 def test_both_sides_have_the_same_structures(compiled):
     sizes = (ctypes.c_int32 * 2).in_dll(compiled, "rhot_sizes")
     constants = centroid_compiled._constants()
-    assert list(sizes) == [ctypes.sizeof(centroid_compiled._Picture), ctypes.sizeof(constants)]
+    assert list(sizes) == [ctypes.sizeof(PictureInC), ctypes.sizeof(constants)]
 
 
 def test_threads_do_not_share_memory(studio, tip, detector, noise, measure):
