@@ -43,9 +43,9 @@ class Errors(NamedTuple):
     sigmas: Array  # (b,) standard deviations; all 0: the model is exact
     paint_columns: Integers  # (m,) first columns of the paint of a message's landmarks
     misfit: Array  # (1,) squared residuals of landmarks over what is usual, changed in place
-    # (2,) what is usual, per degree of freedom (0: not known); and what of a landmark's variance,
-    # as the fit is told, is the model's.
-    landmark_m2: Array
+    # What is usual, per degree of freedom (0: not known); and what of a landmark's variance, as the
+    # fit is told, is the model's.
+    landmark_m2: tuple[float, float]
     # How much of an old error's effect on the angles is left; 0: of its effect on anything.
     keep: float
 

@@ -126,7 +126,7 @@ class ModelError:
             self._sigmas,
             columns,
             self._misfit,
-            np.array([self._spread.residual_m**2, self.landmark_m2 + misfit_m2]),
+            (self._spread.residual_m**2, self.landmark_m2 + misfit_m2),
             keep,
         )
 

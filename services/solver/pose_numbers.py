@@ -53,7 +53,9 @@ def dls_numbers(
     observed, which sit at places. errors: as `variances` takes them. options: iterations and
     tolerance (m).
     """
-    numbers: Array = _dls_numbers_unpacked(
+    numbers = np.empty((_ROWS, _COLUMNS))
+    _dls_numbers_unpacked(
+        numbers,
         chains_row,
         *places,
         observed.points_m,
@@ -69,6 +71,7 @@ def dls_numbers(
 
 @njit(cache=True)
 def _dls_numbers_unpacked(
+    numbers: Array,
     chains_row: Array,
     joint: Integers,
     digit: Integers,
@@ -90,12 +93,14 @@ def _dls_numbers_unpacked(
     sigmas: Array,
     paint_columns: Integers,
     misfit: Array,
-    landmark_m2: Array,
+    landmark_m2: tuple[float, float],
     keep: float,
     max_iterations: int,
     tolerance_m: float,
-) -> Array:
-    """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long."""
+) -> None:
+    """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long, and
+    for what it returns.
+    """
     chains, wrist = chains_of(chains_row), (rotation, position_m)
     tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
@@ -103,7 +108,7 @@ def _dls_numbers_unpacked(
     observations = Observations(joint, digit, depth, offset_m, points_m, whitening)
     errors = Errors(effect, sigmas, paint_columns, misfit, landmark_m2, keep)
     spread = variances(chains, observations, estimate, errors)
-    return pose_numbers(chains, wrist, fingers, spread, told_misfit(errors))
+    numbers[:] = pose_numbers(chains, wrist, fingers, spread, told_misfit(errors))
 
 
 @njit(cache=True)

@@ -80,7 +80,7 @@ def filter_node(
     gram = np.empty((3 * before.shape[0], 3 * before.shape[0]))
     turn_gram(history.state[last, likeliest], before, gram)
     shared = SharedNoise(gram, history.way[last])
-    Q, by_itself = np.empty((3, 3)), np.empty((2, 3, 3))
+    Q, by_itself = np.empty((3, 3)), np.empty((models.own.shape[0], 2, 3, 3))
     for m in range(models.own.shape[0]):
         parent = likeliest if _goes_on_from(history, last, m, likeliest) else m
         history.parent[node, m] = parent
@@ -100,16 +100,16 @@ def filter_node(
             predict_state(history.state[last, parent], F, x)
             predict_cov(history.cov[last, parent], F, jerk, Q, P)
         add_walk(models, m, dt_s, before, P)
-        own_noise(models, m, dt_s, by_itself)
+        own_noise(models, m, dt_s, by_itself[m])
         for k in range(own.shape[0]):
             if before[k] and own[k] > 0.0:
-                add_own(P, k, own[k], by_itself[1])
+                add_own(P, k, own[k], by_itself[m, 1])
     _begin(history, node, before)
     log_likelihoods = np.zeros(models.own.shape[0])
     for m in range(models.own.shape[0]):
         history.strikes[node, m] = history.strikes[last, history.parent[node, m]]
-        own_noise(models, m, dt_s, by_itself)
-        log_likelihoods[m] = _update(history, node, m, cameras, gate, (by_itself, models.own[m]))
+        noise = by_itself[m], models.own[m]
+        log_likelihoods[m] = _update(history, node, m, cameras, gate, noise)
     _weigh(history, last, node, log_likelihoods)
     likeliest = int(np.argmax(history.probability[node]))
     alive, after = history.alive[node], history.way[node]

@@ -172,15 +172,19 @@ def jerk_cov(models: MotionModels, m: int, shared: SharedNoise, alive: Bools) ->
     jerk = np.empty((axes, axes))
     for i in range(axes):
         row, by_turn, by_way = jerk[i], shared.turn[i], shared.way[i]
-        if not alive[i // 3]:
-            row[:] = 0.0
-            continue
         for j in range(axes):
             row[j] = turn * by_turn[j] + along * by_way[j]
-        for n in range(count):
-            if alive[n]:
-                row[3 * n + i % 3] += shift
-        row[i] += own
+    # By landmarks: which one an axis is of, and whether that is alive, took longer than all sums.
+    for n in range(count):
+        if not alive[n]:
+            jerk[3 * n : 3 * n + 3] = 0.0
+            continue
+        for k in range(count):
+            if alive[k]:
+                for i in range(3):
+                    jerk[3 * n + i, 3 * k + i] += shift
+        for i in range(3 * n, 3 * n + 3):
+            jerk[i, i] += own
     return jerk
 
 

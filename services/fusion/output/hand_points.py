@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName
-from rhot.messages import HandPoint, PointSource
+from rhot.messages import HandPoint
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
@@ -54,6 +54,9 @@ class PointMessages:
         hand_of = [self._hands.index(landmark.hand) for landmark in landmarks]
         self._hand_of = np.array(hand_of, dtype=np.int64), np.array(list(reach_m.values()))
         self._hand_names = [landmark.hand for landmark in landmarks]
+        # For _point_numbers to fill.
+        self._numbers = np.empty((len(landmarks), 12))
+        self._kept = np.empty(len(landmarks), dtype=np.bool_)
         # Names of the cameras that see a landmark, by whether each does: few different lists.
         self._seen_by: dict[tuple[bool, ...], list[str]] = {}
 
@@ -71,8 +74,10 @@ class PointMessages:
         add_systematic; places (L, 3) gets the positions, NaN of what was not found.
         """
         systematic, hidden = errors
-        # Arrays by themselves: each in a tuple would cost .1 us more.
-        numbers, kept, incoherent = _point_numbers(
+        # Arrays by themselves: each in a tuple would cost .1 us more, and one returned .5.
+        incoherent = _point_numbers(
+            self._numbers,
+            self._kept,
             instant_ns,
             hidden,
             places,
@@ -83,40 +88,53 @@ class PointMessages:
             *self._extrinsics,
         )
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
-        seen_by, measured = estimates.seen_by.tolist(), estimates.measured.tolist()
-        rows = numbers.tolist()
-        for row in np.flatnonzero(kept).tolist():
-            point = self._point(row, rows[row], tuple(seen_by[row]), measured[row])
-            points[self._hand_names[row]].append(point)
+        told = zip(
+            self._kept.tolist(),
+            self._names,
+            self._hand_names,
+            self._numbers.tolist(),
+            estimates.seen_by.tolist(),
+            estimates.measured.tolist(),
+            strict=True,
+        )
+        for kept, name, hand, (x, y, z, sx, sy, sz, xx, xy, xz, yy, yz, zz), seen, measured in told:
+            if kept:
+                point = HandPoint(
+                    name=name,
+                    position_m=(x, y, z),
+                    sigma_m=(sx, sy, sz),
+                    cameras=self._named(tuple(seen)),
+                    source="measured" if measured else "predicted",
+                    covariance_m2=(xx, xy, xz, yy, yz, zz),
+                )
+                points[hand].append(point)
         return points, incoherent
 
-    def _point(
-        self, row: int, numbers: list[float], seen_by: tuple[bool, ...], measured: bool
-    ) -> HandPoint:
-        x, y, z, sx, sy, sz, *covariance = numbers
-        source: PointSource = "measured" if measured else "predicted"
+    def _named(self, seen_by: tuple[bool, ...]) -> list[str]:
+        """The cameras that see a landmark; of which each does."""
         cameras = self._seen_by.get(seen_by)
         if cameras is None:
             cameras = [name for name, sees in zip(self._cameras, seen_by, strict=True) if sees]
             self._seen_by[seen_by] = cameras
-        return HandPoint(
-            name=self._names[row],
-            position_m=(x, y, z),
-            sigma_m=(sx, sy, sz),
-            cameras=cameras,
-            source=source,
-            covariance_m2=tuple(covariance),  # type: ignore[arg-type]
-        )
+        return cameras
 
 
 @njit(cache=True)
 def _point_numbers(
-    instant_ns: int, hidden: Array, places: Array, hand_of: Ints, reach_m: Array, *row: Any
-) -> tuple[Array, Bools, int]:
-    """Numbers of points (L, 12), rounded, which of them to tell (L,), and how many are incoherent.
+    numbers: Array,
+    kept: Bools,
+    instant_ns: int,
+    hidden: Array,
+    places: Array,
+    hand_of: Ints,
+    reach_m: Array,
+    *row: Any,
+) -> int:
+    """To numbers (L, 12) those of points, rounded; to kept (L,) which of them to tell.
 
-    hand_of (L,), reach_m: whose a landmark is, and each hand's reach. row: Estimates, KnownPaint,
-    Systematic and Extrinsics, one after the other. The others as in PointMessages.of.
+    Returns how many are incoherent. hand_of (L,), reach_m: whose a landmark is, and each hand's
+    reach. row: Estimates, KnownPaint, Systematic and Extrinsics, one after the other. The others as
+    in PointMessages.of.
     """
     estimates, paint = Estimates(*row[:_ESTIMATES]), KnownPaint(*row[_ESTIMATES:_PAINT])
     systematic, cameras = Systematic(*row[_PAINT:_SYSTEMATIC]), Extrinsics(*row[_SYSTEMATIC:])
@@ -128,15 +146,15 @@ def _point_numbers(
         places[k] = positions[k]
     add_systematic(systematic, hidden, positions, seen_by, cameras, covariances)
     usable = _usable(positions, covariances, found)
-    kept = np.zeros_like(usable)
+    kept[:] = False
     for hand in range(reach_m.size):
         rows = np.flatnonzero(hand_of == hand)
         detected = estimates.detected[rows]
         kept[rows] = coherent(
             positions[rows], covariances[rows], usable[rows], detected, reach_m[hand]
         )
-    incoherent = int(np.count_nonzero(usable) - np.count_nonzero(kept))
-    return _rounded(positions, covariances), kept, incoherent
+    _round(positions, covariances, numbers)
+    return int(np.count_nonzero(usable) - np.count_nonzero(kept))
 
 
 @njit(cache=True)
@@ -150,9 +168,8 @@ def _usable(positions: Array, covariances: Array, found: Bools) -> Bools:
 
 
 @njit(cache=True)
-def _rounded(positions: Array, covariances: Array) -> Array:
-    """Position, sigmas and upper triangle of the covariance of points, rounded; (L, 12)."""
-    numbers = np.empty((positions.shape[0], 12))
+def _round(positions: Array, covariances: Array, numbers: Array) -> None:
+    """Position, sigmas and upper triangle of the covariance of points, rounded, to (L, 12)."""
     for row in range(positions.shape[0]):
         for i in range(3):
             sigma = np.sqrt(max(covariances[row, i, i], 0.0))
@@ -161,4 +178,3 @@ def _rounded(positions: Array, covariances: Array) -> Array:
         for n in range(6):
             value = covariances[row, _ROWS[n], _COLUMNS[n]]
             numbers[row, 6 + n] = np.rint(value * _PER_M2) / _PER_M2
-    return numbers

@@ -55,7 +55,8 @@ class HiddenPaint:
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
-        return _compare(
+        found = np.empty(len(view.landmarks))
+        _compare(
             self._areas,
             self._seen_s,
             self.sigmas,
@@ -66,7 +67,9 @@ class HiddenPaint:
             time_s,
             view.landmarks,
             view.areas,
+            found,
         )
+        return found
 
 
 @njit(cache=True)
@@ -81,9 +84,11 @@ def _compare(
     time_s: float,
     landmarks: Ints,
     areas: Array,
-) -> Array:
-    """Update known areas, times and sigmas (L, C) by a look; the sigmas of its landmarks (n,)."""
-    out = np.zeros(landmarks.size)
+    out: Array,
+) -> None:
+    """Update known areas, times and sigmas (L, C) by a look; to out the sigmas of its landmarks
+    (n,).
+    """
     for n in range(landmarks.size):
         row = landmarks[n]
         keep = math.exp(-max(time_s - seen_s[row, camera], 0.0) / _MEMORY_S)
@@ -107,4 +112,3 @@ def _compare(
                     worst = max(worst, _SHIFT * hidden * math.sqrt(whole))
         sigmas[row, camera] = max(worst, keep * sigmas[row, camera])
         out[n] = sigmas[row, camera]
-    return out

@@ -60,8 +60,11 @@ class PoseFeedback(Generic[T]):
     def take(self, instant_ns: int) -> list[T]:
         """The poses that count from now on, as points of this instant are due; oldest first."""
         self._newest_ns = instant_ns
-        count = sum(pose.stamp_ns + POSE_DELAY_NS <= instant_ns for pose in self._waiting)
-        due, self._waiting = self._waiting[:count], self._waiting[count:]
+        waiting, count = self._waiting, 0
+        while count < len(waiting) and waiting[count].stamp_ns + POSE_DELAY_NS <= instant_ns:
+            count += 1
+        due = waiting[:count]
+        del waiting[:count]
         return due
 
     def reset(self) -> None:

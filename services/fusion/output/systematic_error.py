@@ -57,34 +57,40 @@ class SystematicError:
     def __init__(self, extended: Bools, cameras: tuple[Camera, ...]) -> None:
         """extended (L,): the landmark is paint of some size, not a point."""
         # Normalised units per px in the middle of each camera's image.
-        self._unit = np.array([1.0 / float(np.mean(camera.focal_px)) for camera in cameras])
-        self.known = Systematic(np.zeros(len(extended)), OWN_PX * self._unit, extended)
+        unit = np.array([1.0 / float(np.mean(camera.focal_px)) for camera in cameras])
+        self._floors: list[float] = (WHITE_PX * unit).tolist()
+        self.known = Systematic(np.zeros(len(extended)), OWN_PX * unit, extended)
 
     def white_sigmas(self, view: View, hidden: Array) -> Array:
         """What changes of a view's rays from frame to frame, one standard deviation (n,).
 
         That is a part of its sigmas, which are remembered, and what hidden paint adds (n,).
         """
-        floor = WHITE_PX * float(self._unit[view.camera])
-        known = self.known
-        return _white_sigmas(
-            known.running, known.extended, view.landmarks, view.sigmas, hidden, floor
+        floor = self._floors[view.camera]
+        known, white = self.known, np.empty(len(view.landmarks))
+        _white_sigmas(
+            known.running, known.extended, view.landmarks, view.sigmas, hidden, floor, white
         )
+        return white
 
 
 @njit(cache=True)
 def _white_sigmas(
-    running: Array, extended: Bools, landmarks: Ints, sigmas: Array, hidden: Array, floor: float
-) -> Array:
-    """SystematicError.white_sigmas; floor: WHITE_PX in the rays' units."""
-    white = np.empty(landmarks.shape[0])
+    running: Array,
+    extended: Bools,
+    landmarks: Ints,
+    sigmas: Array,
+    hidden: Array,
+    floor: float,
+    white: Array,
+) -> None:
+    """SystematicError.white_sigmas to white (n,); floor: WHITE_PX in the rays' units."""
     for n in range(landmarks.shape[0]):
         row, sigma = landmarks[n], sigmas[n]
         running[row] = sigma if running[row] == 0.0 else (1.0 - _NEW) * running[row] + _NEW * sigma
         if extended[row]:
             sigma = min(sigma, math.hypot(floor, WHITE_SHARE * sigma))
         white[n] = math.hypot(sigma, hidden[n])
-    return white
 
 
 @njit(cache=True)

@@ -47,8 +47,13 @@ def follow(
 
     The rows: of in_a_row. last, told: what was believed and what was told.
     """
-    # Tuples unpacked: numba takes four times as long over an array in a tuple.
-    found = _follow_unpacked(
+    # Arrays to be filled, and tuples unpacked: numba takes four times as long over an array in a
+    # tuple, and three times over one that it returns.
+    found = np.empty((3, 3)), np.empty(3), np.empty((5, 4)), np.empty((UNKNOWNS, UNKNOWNS))
+    whitened = np.empty_like(observed.covariances_m2)
+    cost, iterations, learned_m2, quiet = _follow_unpacked(
+        *found,
+        whitened,
         chains_row,
         posture_row,
         places.joint,
@@ -66,11 +71,16 @@ def follow(
         told.angles_rad,
         seconds,
     )
-    return Followed(HandEstimate(*found[:6]), *found[6:])
+    return Followed(HandEstimate(*found, cost, iterations), whitened, learned_m2, quiet)
 
 
 @njit(cache=True)
 def _follow_unpacked(
+    found_rotation: Array,
+    found_position_m: Array,
+    found_angles: Array,
+    found_covariance: Array,
+    whitened: Array,
     chains_row: Array,
     posture_row: Array,
     joint: Integers,
@@ -87,20 +97,17 @@ def _follow_unpacked(
     told_rotation: Array,
     told_angles: Array,
     seconds: float,
-) -> tuple[Array, Array, Array, Array, float, int, Array, float, bool]:
-    """`follow` with plain arrays for its tuples, and for what it returns."""
-    whitened = whitening(covariances_m2, misfit_m2)
+) -> tuple[float, int, float, bool]:
+    """`follow` with plain arrays for its tuples, the first five for what it returns."""
+    whitened[:] = whitening(covariances_m2, misfit_m2)
     observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
     last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)
     own = update(chains_of(chains_row), posture_of(posture_row), observations, last, seconds)
+    found_rotation[:], found_position_m[:] = own.rotation, own.position_m
+    found_angles[:], found_covariance[:] = own.angles_rad, own.covariance
     return (
-        own.rotation,
-        own.position_m,
-        own.angles_rad,
-        own.covariance,
         own.cost,
         own.iterations,
-        whitened,
         learned_misfit(misfit_m2, whitened, own.cost, seconds),
         is_quiet(told_rotation, told_angles, own, seconds),
     )

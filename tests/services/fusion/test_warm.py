@@ -30,7 +30,7 @@ LIVE = (
     hand_points._point_numbers,
     paint_to_bone.turned_vectors,
     known_paint.note_directions,
-    observations._observed,
+    observations._observe,
     ray_interpolation.add_frame,
     epipolar_error._newest_errors,
     moved_camera._displaced,
