@@ -43,7 +43,7 @@ _ELSEWHERE = -10.0
 _MEANWHILE_S = 0.5
 # Patches that were nobody's go on as such, and cost less than dots that may be anywhere. So many
 # pictures are to tell; what makes so many of them likelier by this (nats) is believed.
-_TRIED, _JUDGED, _BETTER = 8, 3, 10.0
+_TRIED, _JUDGED, _BETTER, _WORSE = 8, 3, 10.0, 10.0
 _SEARCH = Search(beam=192, updated=12)
 
 
@@ -54,6 +54,8 @@ class LastKnown:
         self._known: Hypothesis | None = None
         # What tracking starts with is known.
         self._seen, self._few, self._lost = _KNOWN, _KNOWN, 0
+        # Of a dot, px^2, at least.
+        self._least = 0.0
         # Accounts that begin with it, their scores beside the best of the others, which is 0.
         self._rivals: list[Hypothesis] = []
         self._ahead: list[float] = []
@@ -62,16 +64,14 @@ class LastKnown:
         """The likeliest account of a picture; areas (m,) of its patches, whole (n,) of dots."""
         told = list(best.patch)
         alone = sum(patch >= 0 and told.count(patch) == 1 for patch in told)
-        self._seen = self._seen + 1 if alone >= _MOST * len(told) else 0
+        self._least = _SPECK * float(np.median(whole))
+        large = np.flatnonzero(areas >= self._least)
+        lost = min(told.count(-1), len(set(large.tolist()) - set(told)))
+        self._lost = self._lost + lost if lost else 0
+        self._seen = self._seen + 1 if alone >= _MOST * len(told) and not lost else 0
         if self._seen >= _KNOWN:
             self._known = best
         self._few = 0 if alone < _FEW * len(told) else self._few + 1
-        large = np.flatnonzero(areas >= _SPECK * float(np.median(whole)))
-        lost = min(told.count(-1), len(set(large.tolist()) - set(told)))
-        self._lost = self._lost + lost if lost else 0
-        if len(large) >= _MOST * len(told) and self._few in range(1, _KNOWN):
-            # It comes out again.
-            self._lost = max(self._lost, _LOST)
 
     def against(
         self,
@@ -88,21 +88,27 @@ class LastKnown:
         """
         if self._rivals:
             rivals = searched(self._rivals, patches, around, elapsed_s, search)
-        elif self._known is not None and self._lost >= _LOST:
+        elif self._known is not None and (self._lost >= _LOST or self._comes_out(patches)):
             rivals = self._begun(self._known, parent, patches, around)
         else:
             return found
         best = max(one.score for one in found)
         ahead = max(one.score for one in rivals) - best
         self._ahead.append(ahead)
-        gained = ahead - self._ahead[-1 - _JUDGED] if len(self._ahead) > _JUDGED else 0.0
+        gained = ahead - min(self._ahead[-1 - _JUDGED :])
         if ahead > 0.0 or gained > _BETTER:
             self._rivals, self._lost, self._ahead = [], 0, []
             return rivals
         self._rivals = [replace(one, score=one.score - best) for one in rivals]
-        if len(self._ahead) >= _TRIED:
+        if len(self._ahead) >= _TRIED or ahead < max(self._ahead) - _WORSE:
             self._rivals, self._ahead = [], []
         return found
+
+    def _comes_out(self, patches: Patches) -> bool:
+        """Whether a hand of which little was seen shows nearly all of it."""
+        assert self._known is not None
+        large = np.count_nonzero(patches.areas >= self._least)
+        return bool(self._few < _KNOWN and large >= _FEW * len(self._known.patch))
 
     def _begun(
         self, known: Hypothesis, parent: Hypothesis, patches: Patches, around: Surroundings
@@ -117,9 +123,21 @@ class LastKnown:
             patch=parent.patch,
             way=parent.way,
         )
+        starts = [begun]
+        if self._comes_out(patches):
+            starts.append(replace(begun, state=_amid(around.body, begun.state, patches.places)))
         ways = tuple((_moved(around.body, share), _ELSEWHERE) for share in _SHARES)
         anywhere = Surroundings(around.body, ways, around.false_density)
-        return pruned(extend([begun], patches, anywhere, _MEANWHILE_S, _SEARCH), _SEARCH)
+        return pruned(extend(starts, patches, anywhere, _MEANWHILE_S, _SEARCH), _SEARCH)
+
+
+def _amid(body: Body, state: motion.State, places: Array) -> motion.State:
+    """The same posture where its dots are, on average, where patches (m, 2) are, px."""
+    pixels, slopes = body.project(*state[:4])
+    away = places.mean(axis=0) - pixels[0].mean(axis=0)
+    means = state.means.copy()
+    means[0, :2] += np.linalg.solve(slopes[0, :, :, :2].mean(axis=0), away)
+    return state._replace(means=means)
 
 
 def _moved(body: Body, share: float) -> Array:
