@@ -172,19 +172,18 @@ def test_levels_of_full_range_have_the_classes_of_those_they_stand_for(table):
     assert set(np.unique(classes)) == {0, 1, 2, 3}
 
 
-@pytest.mark.parametrize(
-    "rect",
-    [
-        (-1, 0, 3, 3),
-        (0, -1, 3, 3),
-        (0, 0, WIDTH + 1, 3),
-        (0, 0, 3, HEIGHT + 1),
-        (3, 3, 3, 5),
-        (5, 5, 3, 3),
-        (-(2**31), 0, 2**31 - 1, 1),
-    ],
-)
-def test_a_rectangle_outside_the_picture_is_refused(table, compiled, rect):
+@pytest.mark.parametrize("beyond", [(-1, 0, 0, 0), (0, -1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)])
+def test_a_rectangle_beyond_the_picture_is_refused(table, compiled, beyond):
+    refused(table, compiled, tuple(np.add((0, 0, WIDTH, HEIGHT), beyond).tolist()))
+
+
+def test_a_rectangle_of_no_cells_or_any_numbers_is_refused(table, compiled):
+    for rect in ((3, 3, 3, 5), (5, 5, 3, 3), (-(2**31), 0, 2**31 - 1, 1)):
+        refused(table, compiled, rect)
+
+
+def refused(table, compiled, rect):
+    """The compiled form says that there is no such rectangle."""
     levels = np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8)
     image = picture(Frame("left", 0, 0, 0.0, (2 * WIDTH, 2 * HEIGHT), levels, "i420"))
     _, form = both(compiled, table)
