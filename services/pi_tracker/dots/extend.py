@@ -167,13 +167,15 @@ def _searched(beam: _Beam, tables: _Tables, search: Search) -> _Beam:
     left = np.ones(dots, bool)
     while left.any():
         gains = _gains(beam, tables, left)
-        likely = _likely(beam.score + _most(gains), search.beam)
-        beam, gains = beam.take(likely), gains[likely]
+        # What the others gain at best.
+        rest = np.maximum(gains.max(axis=2, initial=0.0), 0.0)
+        bounds = beam.score + rest.sum(axis=1)
+        likely = _likely(bounds, search.beam)
+        beam, gains, rest, bounds = beam.take(likely), gains[likely], rest[likely], bounds[likely]
         spread = np.einsum("iaia->i", beam.covs[0])
         dot = int(np.where(left, spread, np.inf).argmin())
-        row = int(np.cumsum(left)[dot]) - 1
-        own = _options(beam, tables, gains[:, row], dot)
-        totals = beam.score[:, None] + own + _most_beside(gains, row)
+        own = _options(beam, tables, gains[:, np.cumsum(left)[dot] - 1], dot)
+        totals = own + (bounds - rest[:, np.cumsum(left)[dot] - 1])[:, None]
         chosen = _likely(totals.ravel(), 2 * search.beam)
         which, patch = np.divmod(chosen, own.shape[1])
         left[dot] = False
@@ -184,26 +186,6 @@ def _searched(beam: _Beam, tables: _Tables, search: Search) -> _Beam:
     which = np.concatenate([beam.view[:, None], level[:, None], beam.patch], axis=1)
     _, first = np.unique(which, axis=0, return_index=True)
     return beam.take(np.sort(first)[: search.updated])
-
-
-def _most(gains: Array) -> Array:
-    """What dots that are left gain at most (k,), of their gains by patches that are free (k, l, m).
-
-    No dot has two patches and no patch is two dots': where twelve are hidden and three patches are
-    left, wide accounts would have each of the three twelve times, and the right one is given up.
-    """
-    most = np.maximum(gains, 0.0)
-    by_dots, by_patches = most.max(axis=2, initial=0.0), most.max(axis=1, initial=0.0)
-    return np.minimum(by_dots.sum(axis=1), by_patches.sum(axis=1))
-
-
-def _most_beside(gains: Array, row: int) -> Array:
-    """The same of all dots but one if that has no patch (k, 1 + m: the first), or each."""
-    most = np.maximum(np.delete(gains, row, axis=1), 0.0)
-    by_dots = most.max(axis=2, initial=0.0).sum(axis=1)
-    by_patches = most.max(axis=1, initial=0.0)
-    left = by_patches.sum(axis=1)[:, None] - np.pad(by_patches, ((0, 0), (1, 0)))
-    return np.minimum(by_dots[:, None], left)
 
 
 def _likely(scores: Array, count: int) -> Indices:

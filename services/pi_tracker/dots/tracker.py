@@ -119,7 +119,7 @@ class DotTracker:
         self._hypotheses = rescored(found)
         best = self._hypotheses[0]
         self._whole = _grown(self._whole, best.patch, arrays.areas)
-        self._known.note(best, self.gained, arrays.areas, self._whole)
+        self._known.note(best, arrays.areas, self._whole)
         false = len(patches) - len({p for p in best.patch if p >= 0})
         self._false_patches += _FALSE_WEIGHT * (false - self._false_patches)
         return self._dots(patches)

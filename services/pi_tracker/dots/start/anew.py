@@ -29,14 +29,8 @@ Array = npt.NDArray[np.float64]
 # from the start 52. Later, with 6 and 5 instead of 3 and 3, and two pictures of rest after each
 # search, it was 42 and two that grab 79 and 90, and are 55, 78 and 92 so.)
 _LOST, _MOST, _KNOWN = 3, 0.8, 3
-# Where fewer than this share of them were seen a hand may be anything when it comes out again: it
-# is looked for at once, in pictures that show so many patches. (Three clips of 15 dots that grab:
-# once .8 are there, and only after they had names, 77 to 91 % right; so 92 to 99 %.)
+# Where no more than this share of them was seen a hand may be anything when it comes out again.
 _FEW = 0.6
-# So is a picture that is less likely than its patches are as a rule by this (nats), a hand's whose
-# dots all have a name, but a wrong one; what is usual counts a new picture so much. (Three clips of
-# 8 dots that grab: 92.0, 99.9 and 97.8 % right without, 93.2, 99.8 and 98.5 % so.)
-_UNLIKELY, _USUAL_WEIGHT = 12.0, 0.05
 # No dot is smaller than this share of a whole one.
 _SPECK = 0.3
 # A hand comes back within so much (sigma) of where it was, turned and bent by so much, m and
@@ -48,9 +42,8 @@ _ELSEWHERE = -10.0
 # It has come to rest meanwhile, s.
 _MEANWHILE_S = 0.5
 # Patches that were nobody's go on as such, and cost less than dots that may be anywhere. So many
-# pictures are to tell; what makes the last so many, or one, likelier by this (nats) is believed,
-# and what has fallen behind by the last is given up for another try.
-_TRIED, _JUDGED, _BETTER, _WORSE = 8, 3, 10.0, 10.0
+# pictures are to tell; what makes so many of them likelier by this (nats) is believed.
+_TRIED, _JUDGED, _BETTER = 8, 3, 10.0
 _SEARCH = Search(beam=192, updated=12)
 
 
@@ -61,34 +54,24 @@ class LastKnown:
         self._known: Hypothesis | None = None
         # What tracking starts with is known.
         self._seen, self._few, self._lost = _KNOWN, _KNOWN, 0
-        # How likely a picture is as a rule, nats of each patch.
-        self._usual: float | None = None
-        # Of a dot, px^2, at least.
-        self._least = 0.0
         # Accounts that begin with it, their scores beside the best of the others, which is 0.
         self._rivals: list[Hypothesis] = []
         self._ahead: list[float] = []
 
-    def note(self, best: Hypothesis, gained: float, areas: Array, whole: Array) -> None:
-        """The likeliest account of a picture, and how likely that was to it, nats.
-
-        areas (m,) of its patches, whole (n,) of dots.
-        """
+    def note(self, best: Hypothesis, areas: Array, whole: Array) -> None:
+        """The likeliest account of a picture; areas (m,) of its patches, whole (n,) of dots."""
         told = list(best.patch)
         alone = sum(patch >= 0 and told.count(patch) == 1 for patch in told)
-        self._least = _SPECK * float(np.median(whole))
-        large = np.flatnonzero(areas >= self._least)
-        lost = min(told.count(-1), len(set(large.tolist()) - set(told)))
-        # Of a hand that is not as an account has it, pictures are unlikely.
-        each = gained / max(len(areas), 1)
-        usual = each if self._usual is None else self._usual
-        lost = max(lost, int(gained < usual * len(areas) - _UNLIKELY))
-        self._usual = usual + _USUAL_WEIGHT * (each - usual)
-        self._lost = self._lost + lost if lost else 0
-        self._seen = self._seen + 1 if alone >= _MOST * len(told) and not lost else 0
+        self._seen = self._seen + 1 if alone >= _MOST * len(told) else 0
         if self._seen >= _KNOWN:
             self._known = best
         self._few = 0 if alone < _FEW * len(told) else self._few + 1
+        large = np.flatnonzero(areas >= _SPECK * float(np.median(whole)))
+        lost = min(told.count(-1), len(set(large.tolist()) - set(told)))
+        self._lost = self._lost + lost if lost else 0
+        if len(large) >= _MOST * len(told) and self._few in range(1, _KNOWN):
+            # It comes out again.
+            self._lost = max(self._lost, _LOST)
 
     def against(
         self,
@@ -105,60 +88,38 @@ class LastKnown:
         """
         if self._rivals:
             rivals = searched(self._rivals, patches, around, elapsed_s, search)
+        elif self._known is not None and self._lost >= _LOST:
+            rivals = self._begun(self._known, parent, patches, around)
         else:
-            comes_out = self._comes_out(patches, len(parent.patch))
-            if self._known is None or not (comes_out or self._lost >= _LOST):
-                return found
-            rivals = _begun(self._known, parent, patches, around, amid=comes_out)
+            return found
         best = max(one.score for one in found)
         ahead = max(one.score for one in rivals) - best
         self._ahead.append(ahead)
-        gained = ahead - min(self._ahead[-1 - _JUDGED :])
+        gained = ahead - self._ahead[-1 - _JUDGED] if len(self._ahead) > _JUDGED else 0.0
         if ahead > 0.0 or gained > _BETTER:
             self._rivals, self._lost, self._ahead = [], 0, []
             return rivals
         self._rivals = [replace(one, score=one.score - best) for one in rivals]
-        if len(self._ahead) >= _TRIED or ahead < max(self._ahead) - _WORSE:
+        if len(self._ahead) >= _TRIED:
             self._rivals, self._ahead = [], []
         return found
 
-    def _comes_out(self, patches: Patches, dots: int) -> bool:
-        """Whether a hand of which little was seen shows most of its dots."""
-        large = np.count_nonzero(patches.areas >= self._least)
-        return bool(self._few < _KNOWN and large >= _FEW * dots)
-
-
-def _begun(
-    known: Hypothesis, parent: Hypothesis, patches: Patches, around: Surroundings, *, amid: bool
-) -> list[Hypothesis]:
-    """A hand as it was known, in the next picture; `parent` says what was before.
-
-    amid: also where its dots are, on average, where the patches are.
-    """
-    begun = replace(
-        known,
-        score=parent.score,
-        unseen=parent.unseen,
-        # What was nobody's may well be its dots.
-        false=np.zeros((0, 2)),
-        patch=parent.patch,
-        way=parent.way,
-    )
-    starts = [begun]
-    if amid:
-        starts.append(replace(begun, state=_amid(around.body, begun.state, patches.places)))
-    ways = tuple((_moved(around.body, share), _ELSEWHERE) for share in _SHARES)
-    anywhere = Surroundings(around.body, ways, around.false_density)
-    return pruned(extend(starts, patches, anywhere, _MEANWHILE_S, _SEARCH), _SEARCH)
-
-
-def _amid(body: Body, state: motion.State, places: Array) -> motion.State:
-    """The same posture where its dots are, on average, where patches (m, 2) are, px."""
-    pixels, slopes = body.project(*state[:4])
-    away = places.mean(axis=0) - pixels[0].mean(axis=0)
-    means = state.means.copy()
-    means[0, :2] += np.linalg.solve(slopes[0, :, :, :2].mean(axis=0), away)
-    return state._replace(means=means)
+    def _begun(
+        self, known: Hypothesis, parent: Hypothesis, patches: Patches, around: Surroundings
+    ) -> list[Hypothesis]:
+        """A hand as it was known, in the next picture; `parent` says what was before."""
+        begun = replace(
+            known,
+            score=parent.score,
+            unseen=parent.unseen,
+            # What was nobody's may well be its dots.
+            false=np.zeros((0, 2)),
+            patch=parent.patch,
+            way=parent.way,
+        )
+        ways = tuple((_moved(around.body, share), _ELSEWHERE) for share in _SHARES)
+        anywhere = Surroundings(around.body, ways, around.false_density)
+        return pruned(extend([begun], patches, anywhere, _MEANWHILE_S, _SEARCH), _SEARCH)
 
 
 def _moved(body: Body, share: float) -> Array:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rhot.hand import DIGITS
 from services.pi_tracker.dots.body.rotations import turned
 from services.pi_tracker.dots.body.skeleton import Skeleton
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Patch
-from services.pi_tracker.dots.extend import _most, _most_beside
 from services.pi_tracker.dots.search import LIVE, SEVERAL, Search
 from services.pi_tracker.dots.tracker import DotTracker
 from services.simulator.recorded_motion.load import load_recording
@@ -101,19 +99,3 @@ def _postures(frames: list[DotFrame], search: Search) -> int:
     for number, frame in enumerate(frames):
         tracker.step(patches_of(frame, tracker.dot_area_px2), number / 30.0)
     return len({one.branch for one in tracker._hypotheses})
-
-
-def test_bounds_hold_what_dots_may_gain_and_count_no_patch_twice() -> None:
-    random = np.random.default_rng(3)
-    for dots, patches in ((12, 3), (3, 12), (5, 5), (4, 0)):
-        gains = random.normal(1.0, 2.0, (4, dots, patches))
-        most, beside = _most(gains), _most_beside(gains, 1)
-        for k, of in enumerate(np.maximum(gains, 0.0)):
-            assert of[linear_sum_assignment(of, maximize=True)].sum() <= most[k] + 1e-9
-            assert most[k] <= of.max(axis=0, initial=0.0).sum() + 1e-9
-            others = np.delete(of, 1, axis=0)
-            for taken in range(-1, patches):
-                free = others if taken < 0 else np.delete(others, taken, axis=1)
-                best = free[linear_sum_assignment(free, maximize=True)].sum()
-                assert best <= beside[k, 1 + taken] + 1e-9
-                assert beside[k, 1 + taken] <= others.max(axis=1, initial=0.0).sum() + 1e-9

