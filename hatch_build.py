@@ -137,7 +137,7 @@ def told(machine: str, wrong: str) -> str:
         return f"rhot: the tracker's C is compiled for {machine}"
     return (
         f"rhot: the tracker's C is not compiled: {wrong}; on {machine} it measures in Python, "
-        "the same in twice the time (for the compiled form: sudo apt install gcc, install again)"
+        "the same in three times the time (for the compiled form: apt install gcc, install again)"
     )
 
 

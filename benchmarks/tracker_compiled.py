@@ -74,9 +74,8 @@ def in_turns(frames: list[Frame], forms: dict[str, Measure]) -> dict[str, list[i
     steps = {
         name: TrackerStep(CAMERA, colors, Tracker(), (640, 480), config.colors) for name in forms
     }
-    for name in forms:
-        if name == "python":
-            search_in_python(steps[name])
+    if "python" in steps:
+        search_in_python(steps["python"])
     encoder, times = msgspec.json.Encoder(), defaultdict(list)
     for begin in range(0, len(frames), TURN):
         for name, measure in forms.items():

@@ -5,7 +5,7 @@
 
 #include "picture.h"
 
-/* Cells that are looked at a time. */
+/* Cells that are looked up at a time. */
 #define BLOCK 32
 
 typedef struct {
@@ -38,9 +38,9 @@ static inline int is_luma_of(uint32_t entry, const rows *r, int32_t x) {
     return luma >= (entry >> 8 & 255) && luma <= (entry >> 16 & 255);
 }
 
-/* The class of each cell of a row, 0 for none, into classes; luma is looked at only where chroma has
-   a class, which is rare. Layers never claim the same cell: they share chromas, not lumas. soon: a
-   row that is looked at soon, or NULL. Returns whether any cell has a class. */
+/* The class of each cell of a row, 0 for none, into classes; luma is looked at only where chroma
+   has a class, which is rare. Layers never claim the same cell: they share chromas, not lumas.
+   soon: a row that is looked at soon, or NULL. Returns whether any cell has a class. */
 static int classify(uint8_t *classes, const rows *r, const rows *soon, int32_t w, const colors *c) {
     uint8_t by_chroma[BLOCK], any = 0;
     for (int32_t x0 = 0; x0 < w; x0 += BLOCK) {

@@ -58,8 +58,8 @@ static box classes_of(uint8_t *classes, const picture *p, const box *r, const co
     return found;
 }
 
-/* The part of a rectangle's classes, w cells wide, moved to the front of their memory; mask gets 255
-   where there is a class. */
+/* The part of a rectangle's classes, w cells wide, moved to the front of their memory; mask gets
+   255 where there is a class. */
 static void crop(uint8_t *classes, int32_t w, const box *part, uint8_t *mask) {
     int32_t wide = part->x1 - part->x0;
     uint8_t *to = classes;
@@ -160,9 +160,9 @@ static int32_t patches_of(uint8_t *mask, const uint8_t *classes, int32_t w, int3
 
 /* Patches of a rectangle of a picture into out; returns how many, or FOR_PYTHON.
 
-   part: where in the rectangle there are colours, with o->margin around; all 0 where there are none.
-   memory: seven bytes for each cell of the rectangle (of a multiple of 8), aligned as numbers are. It begins
-   with the opened mask of that part, row by row, 255 where a patch is. */
+   part: where in the rectangle there are colours, with o->margin around; all 0 where none are.
+   memory: seven bytes for each cell of the rectangle (of a multiple of 8), aligned as numbers are.
+   It begins with the opened mask of that part, row by row, 255 where a patch is. */
 int32_t rhot_patches(const picture *p, const box *r, const colors *c, const options *o,
                      uint8_t *memory, int64_t bytes, box *part, patch *out) {
     if (!is_picture(p)) return BAD_PICTURE;
