@@ -11,7 +11,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.output.paint_centroid import Finger, expected_shift
+from services.fusion.output.paint_centroid import Finger, cross, expected_shift
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
@@ -33,6 +33,8 @@ _LIT = 0.025
 SIGMA_FACING_RAD = 0.5
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
 _POSE_AGE_NS = 150_000_000
+# What turned faster from one pose to the next jumped to another posture, and does not turn on.
+_MOST_TURN_RAD_S = 20.0
 # A direction that is less sure than that says less than none: some of those that it may be would
 # hide the paint. Closing hands a tenth larger than told, 95 % and maximum at no lag: 4.6 and 13 mm
 # with 1.0, 3.3 and 8.1 with .6, 3.5 and 8.7 with .45; a recorded wave 10.4, 10.4 and 10.1. Of the
@@ -54,6 +56,7 @@ class KnownPaint(NamedTuple):
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
     direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
     shape_sds: Array  # (L,) how unlike the model's it may be, in radii
+    turns_rad_s: Array  # (L, 3) how a direction turned from the pose before that one
     stamps_ns: Ints  # (L,) of the pose that told it
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
 
@@ -73,11 +76,55 @@ def note_directions(
     """
     sigmas_rad, shape_sd = sigmas
     for n in range(rows.size):
-        paint.directions[rows[n]] = directions[n]
-        paint.hinges[rows[n]] = hinges[n]
-        paint.direction_sigmas[rows[n]] = sigmas_rad[n]
-        paint.shape_sds[rows[n]] = shape_sd
-        paint.stamps_ns[rows[n]] = stamp_ns
+        row = rows[n]
+        passed_s = 1e-9 * (stamp_ns - paint.stamps_ns[row])
+        paint.turns_rad_s[row] = 0.0
+        if 0.0 < passed_s <= 1e-9 * _POSE_AGE_NS:
+            _note_turn(paint.directions[row], directions[n], passed_s, paint.turns_rad_s[row])
+        paint.directions[row] = directions[n]
+        paint.hinges[row] = hinges[n]
+        paint.direction_sigmas[row] = sigmas_rad[n]
+        paint.shape_sds[row] = shape_sd
+        paint.stamps_ns[row] = stamp_ns
+
+
+@njit(cache=True)
+def _note_turn(before: Array, now: Array, passed_s: float, turn_rad_s: Array) -> None:
+    """How a direction (3,) turned on average, to (3,); 0 if it jumped."""
+    cross(before, now, turn_rad_s)
+    sine = math.sqrt(turn_rad_s[0] ** 2 + turn_rad_s[1] ** 2 + turn_rad_s[2] ** 2)
+    known = sine <= _MOST_TURN_RAD_S * passed_s
+    for i in range(3):
+        turn_rad_s[i] = turn_rad_s[i] / passed_s if known else 0.0
+
+
+@njit(cache=True)
+def _aim(paint: KnownPaint, row: int, instant_ns: int, aim: Array) -> None:
+    """Where a landmark's direction and hinge point at an instant, to aim (2, 3).
+
+    They turn on as they turned between the last two poses: a pose is a frame or two old when points
+    rest on it.
+    """
+    direction, hinge = aim
+    age_s = 1e-9 * (instant_ns - paint.stamps_ns[row])
+    cross(paint.turns_rad_s[row], paint.directions[row], direction)
+    for i in range(3):
+        direction[i] = paint.directions[row, i] + age_s * direction[i]
+    _make_unit(direction)
+    along = 0.0
+    for i in range(3):
+        along += paint.hinges[row, i] * direction[i]
+    for i in range(3):
+        hinge[i] = paint.hinges[row, i] - along * direction[i]
+    _make_unit(hinge)
+
+
+@njit(cache=True)
+def _make_unit(v: Array) -> None:
+    """Make a vector (3,) one of unit length, in place; zeros stay."""
+    length = max(math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2), 1e-9)
+    for i in range(3):
+        v[i] /= length
 
 
 @njit(cache=True)
@@ -93,16 +140,18 @@ def correct_paint(
 
     seen_by (L, C) tells which cameras located them.
     """
-    shift, shift_covariance = np.empty(3), np.empty((3, 3))
+    shift, shift_covariance, aim = np.empty(3), np.empty((3, 3)), np.empty((2, 3))
     for row in range(positions.shape[0]):
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
         is_told = abs(instant_ns - paint.stamps_ns[row]) <= _POSE_AGE_NS
         is_told &= paint.direction_sigmas[row, 0] <= _MOST_UNSURE_RAD
+        if is_told:
+            _aim(paint, row, instant_ns, aim)
         if paint.radii_m[row] == 0.0:
             normal, sigma_rad, shape = -ray, SIGMA_FACING_RAD, 0.0
             if is_told:
-                normal, sigma_rad = paint.directions[row], paint.direction_sigmas[row, 0]
+                normal, sigma_rad = aim[0], paint.direction_sigmas[row, 0]
                 shape = paint.shape_sds[row]
             # Deeper than the skin, by as much as the limb is thinner.
             sag_m = paint.sags_m[row]
@@ -114,18 +163,14 @@ def correct_paint(
         along, across = SIGMA_UNKNOWN  # in radii
         if is_told:
             # A tip, whose middle has no depth under it.
-            finger = Finger(
-                paint.directions[row],
-                paint.hinges[row],
-                paint.direction_sigmas[row],
-                paint.radius_sds[row],
-            )
+            sigmas_rad, radius_sd = paint.direction_sigmas[row], paint.radius_sds[row]
+            finger = Finger(aim[0], aim[1], sigmas_rad, radius_sd)
             chosen = _locating(cameras, seen_by[row])
             place, table = positions[row], paint.tables[row]
             if expected_shift(table, place, finger, chosen, shift, shift_covariance):
                 positions[row] += _LIT * paint.radii_m[row] * ray - shift
                 covariances[row] += shift_covariance
-                along, across = _tip_sigmas(ray @ paint.directions[row])
+                along, across = _tip_sigmas(ray @ aim[0])
                 shape = paint.shape_sds[row]
                 along, across = math.hypot(along, _SHAPE_ALONG * shape), math.hypot(across, shape)
         radius_m = paint.radii_m[row]

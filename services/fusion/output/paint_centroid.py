@@ -107,7 +107,7 @@ def expected_shift(
         return False
     sights = H, A_inverse
     across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((3, 3))
-    _cross(finger.hinge, finger.direction, across[0])
+    cross(finger.hinge, finger.direction, across[0])
     across[1] = finger.hinge
     straight, one, other = shifts[0], shifts[1], shifts[2]
     _least_squares(table, p_rig, finger.direction, cameras, sights, work, straight)
@@ -135,7 +135,7 @@ def expected_shift(
 
 
 @njit(cache=True)
-def _cross(a: Array, b: Array, out: Array) -> None:
+def cross(a: Array, b: Array, out: Array) -> None:
     """Fill out (3,) with a x b: numpy's own takes longer than all of a shift."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]

@@ -146,6 +146,7 @@ class PaintToBone:
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),
             shape_sds=np.zeros(len(landmarks)),
+            turns_rad_s=np.zeros((len(landmarks), 3)),
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
             viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
