@@ -10,7 +10,7 @@ import numpy.typing as npt
 from services.pi_tracker.dots.chains import finger_landmarks
 from services.pi_tracker.dots.dot import Patch
 from services.pi_tracker.dots.hypothesis import Patches
-from services.pi_tracker.dots.parts import parts_of
+from services.pi_tracker.dots.patches.parts import parts_of
 from testing.synthetic_dots import DotFrame
 
 # Thumb and index finger in a picture of SIZE; (8, 2) px.

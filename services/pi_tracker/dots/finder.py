@@ -19,9 +19,10 @@ from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.dots.dot import Dot, Patch, SeenPatches
 from services.pi_tracker.dots.either import EitherTracker
 from services.pi_tracker.dots.hindsight.looking_back import look_back
-from services.pi_tracker.dots.parts import parts_of
+from services.pi_tracker.dots.patches.faint import FaintFinder
+from services.pi_tracker.dots.patches.parts import parts_of
+from services.pi_tracker.dots.patches.slivers import SliverFinder
 from services.pi_tracker.dots.search import Search
-from services.pi_tracker.dots.slivers import SliverFinder
 from services.pi_tracker.dots.tracker import DotTracker
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
 from services.pi_tracker.image.blob import Blob
@@ -65,6 +66,7 @@ class DotFinder:
         self._noise = Noise()
         # Where the dots of the last picture were, those that were not seen, too.
         self._expected: list[tuple[float, float]] = []
+        self._faint = FaintFinder()
         self.use(table)
         self.tracker = EitherTracker(landmarks, size_px, seeds)
 
@@ -85,10 +87,13 @@ class DotFinder:
         ]
         blobs += self._slivers.beside(blobs, image, self._expected, self.tracker.dot_area_px2)
         patches, time_s = self._patches(image, blobs), frame.stamp_ns * 1e-9
+        area_px2 = self.tracker.dot_area_px2
+        patches += self._faint.find(image, blobs, area_px2, self._noise.chroma)
         if self._seen is not None:
             self._seen.append(SeenPatches(time_s, patches))
         dots = self.tracker.step(patches, time_s)
         self._expected = [(dot.x_px, dot.y_px) for dot in dots.values()]
+        self._faint.note(image, blobs, dots)
         return dots
 
     @property

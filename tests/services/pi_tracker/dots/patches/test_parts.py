@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.pi_tracker.dots.parts import parts_of
+from services.pi_tracker.dots.patches.parts import parts_of
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours
 
 RADIUS = 5  # cells

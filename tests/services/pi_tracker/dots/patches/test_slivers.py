@@ -9,7 +9,7 @@ from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.dots.slivers import SliverFinder
+from services.pi_tracker.dots.patches.slivers import SliverFinder
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame, Image
 from services.pi_tracker.image.yuv_planes import Picture, picture
