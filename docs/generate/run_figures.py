@@ -61,7 +61,7 @@ RUNS = {
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
     "dots": _script("dots", "", "--clips 1", 4),
     "dots_pictures": _script(
-        "dots_pictures", "", "--dots 8 --clips 1 --motion pinch --hindsight", 15
+        "dots_pictures", "", "--dots 8 --clips 1 --motion pinch --hindsight", 45
     ),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
