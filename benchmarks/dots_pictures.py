@@ -150,7 +150,7 @@ def main() -> int:
     parser.add_argument("--dots", type=int, choices=(8, 15), help="only so many")
     parser.add_argument("--clips", type=int, default=3, help="of each motion")
     parser.add_argument(
-        "--hindsight", type=int, nargs="*", default=[8, 15], help="dots that are looked back at, too"
+        "--hindsight", type=int, nargs="*", default=[8, 15], help="dots looked back at, too"
     )
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()

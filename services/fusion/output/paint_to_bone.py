@@ -136,12 +136,11 @@ class PaintToBone:
             shift_table(paint.radius_m, paint.extent_m, _taper(hands[landmark.hand], landmark.name))
             for landmark, paint in zip(landmarks, paints, strict=True)
         ]
-        sds = [_RADIUS_SD.get(hands[landmark.hand].origin, 0.0) for landmark in landmarks]
         self.known = KnownPaint(
             radii_m=radii_m,
             sags_m=sags_m,
             tables=np.array(tables).reshape(len(paints), -1),
-            radius_sds=np.array(sds),
+            radius_sds=np.array([_RADIUS_SD.get(hands[one.hand].origin, 0.0) for one in landmarks]),
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),

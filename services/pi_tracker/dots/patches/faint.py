@@ -33,14 +33,14 @@ _GREY = 128.0
 _LEAST_SINE = 0.3
 # A cell is a faint dot's from this share of paint on, and from so many sigmas of noise; and no rest
 # is larger or smaller: skin in the brightest light has 1.5. (Tuning half of
-# benchmarks/dots_pictures.py, 15 dots: with .22 as many dots have a patch, with .14 a fist has two
-# false ones in three pictures. Without a bound of the rest, red things behind a dark hand are dots
-# in half of its pictures.)
+# benchmarks/dots_pictures.py, 15 dots: with .14, and half as small ones, a fist had false ones in
+# two of three pictures, and none so. Without a bound of the rest, red things behind dark hands were
+# dots in a quarter to half of their pictures.)
 _SHARE, _SIGMAS, _RESTS = 0.18, 4.0, (-0.4, 1.8)
 # All paint of a faint dot is so much of one that shows as a whole, and no further than so many
 # diameters, and what dots lately moved by, from where one is missing; a missing one has no blob
-# within this part of a diameter. Cells of a blob's edge are faint, too, so far from it.
-_AREAS, _REACH, _OWN, _EDGE_CELLS = (0.25, 2.0), 2.0, 0.7, 1
+# within this part of a diameter.
+_AREAS, _REACH, _OWN = (0.25, 2.0), 2.0, 0.7
 # A centre is known to this share of a diameter, and is worth so much.
 _SIGMA, _QUALITY = 0.15, 0.5
 # Paint and skin are looked at in one picture of so many, so far around a blob, and a new look has

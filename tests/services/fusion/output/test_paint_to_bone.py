@@ -212,34 +212,6 @@ def test_a_pose_corrects_tips_while_it_is_fresh(paint):
     assert is_untouched(corrected(paint, 10**18)[0])
 
 
-def tilted(angle_rad: float, stamp_ns: int) -> HandPose:
-    """A hand that is tilted by an angle; its directions are well known."""
-    turn = rotation_from_vector([angle_rad, 0.0, 0.0])
-    return pose(stamp_ns, tuple(quaternion_from_rotation(turn).tolist()), sigma_rad=0.02)
-
-
-@pytest.mark.parametrize("step_rad", [0.0, 0.1, -0.3])
-def test_what_turns_is_aimed_where_it_is_by_now(paint, step_rad):
-    """Fingers and skin turn on by as much as they did between the last two poses."""
-    frame_ns = 33_000_000
-    for k in range(2):
-        paint.note(paint.directions(tilted(0.5 + k * step_rad, 10**18 + k * frame_ns)))
-    stale, _ = corrected(paint, 10**18 + frame_ns)
-    aimed, _ = corrected(paint, 10**18 + 2 * frame_ns)
-    paint.reset()
-    paint.note(paint.directions(tilted(0.5 + 2 * step_rad, 10**18)))
-    true, _ = corrected(paint, 10**18)
-    errors = np.linalg.norm(aimed - true, axis=1)
-    assert (errors <= 0.2 * np.linalg.norm(stale - true, axis=1) + 1e-9).all()
-
-
-def test_what_jumped_to_another_posture_does_not_turn_on(paint):
-    for k in range(2):
-        paint.note(paint.directions(tilted(0.1 + 0.9 * k, 10**18 + k * 33_000_000)))
-    now, later = (corrected(paint, 10**18 + k * 33_000_000)[0] for k in (1, 2))
-    np.testing.assert_array_equal(now, later)
-
-
 def test_the_end_of_a_finger_that_points_at_the_cameras_is_known_least(paint):
     sigmas_mm = []
     for angle in (0.0, 0.5, 1.5):
