@@ -90,7 +90,7 @@ def note_directions(
 
 @njit(cache=True)
 def _note_turn(before: Array, now: Array, passed_s: float, turn_rad_s: Array) -> None:
-    """How a direction (3,) turned on average, to (3,); 0 if it jumped."""
+    """How a direction (3,) turned in passed_s on average, rad/s to (3,); 0 if it jumped."""
     cross(before, now, turn_rad_s)
     sine = math.sqrt(turn_rad_s[0] ** 2 + turn_rad_s[1] ** 2 + turn_rad_s[2] ** 2)
     known = sine <= _MOST_TURN_RAD_S * passed_s

@@ -65,7 +65,7 @@ class DotFinder:
         self._color, self._settings = color, settings
         self._noise = Noise()
         # Where the dots of the last picture were, those that were not seen, too.
-        self._expected: list[tuple[float, float]] = []
+        self._places: dict[str, tuple[float, float]] = {}
         self._faint = FaintFinder()
         self.use(table)
         self.tracker = EitherTracker(landmarks, size_px, seeds)
@@ -85,15 +85,19 @@ class DotFinder:
             for blob in self._detector.detect(image, search_region.whole(image.size))
             if blob.color == self._class and is_paint_shaped(blob, self._settings.max_area_px)
         ]
-        blobs += self._slivers.beside(blobs, image, self._expected, self.tracker.dot_area_px2)
+        before, area_px2 = self._places, self.tracker.dot_area_px2
+        dots_px = list(before.values())
+        blobs += self._slivers.beside(blobs, image, dots_px, area_px2)
         patches, time_s = self._patches(image, blobs), frame.stamp_ns * 1e-9
-        area_px2 = self.tracker.dot_area_px2
-        patches += self._faint.find(image, blobs, area_px2, self._noise.chroma)
+        patches += self._faint.find(image, blobs, dots_px, area_px2, self._noise.chroma)
         if self._seen is not None:
             self._seen.append(SeenPatches(time_s, patches))
         dots = self.tracker.step(patches, time_s)
-        self._expected = [(dot.x_px, dot.y_px) for dot in dots.values()]
-        self._faint.note(image, blobs, dots)
+        self._places = {name: (dot.x_px, dot.y_px) for name, dot in dots.items()}
+        moved_px = [
+            math.dist(before[name], at) for name, at in self._places.items() if name in before
+        ]
+        self._faint.note(image, blobs, moved_px)
         return dots
 
     @property

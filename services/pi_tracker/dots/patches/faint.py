@@ -12,14 +12,14 @@ two equations for two shares. Other things are told from a dot by a rest that no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.detect import search_region
-from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.dot import Patch
 from services.pi_tracker.identify.blob_shape import touch
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.planes import Rect
@@ -56,41 +56,40 @@ class FaintFinder:
         # Chroma (2,) about grey of paint and of the skin around it; zeros: not known yet.
         self._paint, self._skin = np.zeros(2), np.zeros(2)
         self._pictures = 0
-        # Where the dots of the last picture were, and how far they moved to there.
-        self._dots: dict[str, Point] = {}
+        # How far dots moved from one picture to the next, lately.
         self._moved_px = 0.0
 
-    def note(self, image: Picture, blobs: Sequence[Blob], dots: Mapping[str, Dot]) -> None:
-        """Learn from a picture: from its blobs, and from where its dots are."""
-        places = {name: (dot.x_px, dot.y_px) for name, dot in dots.items()}
-        moved = [
-            math.dist(place, self._dots[name])
-            for name, place in places.items()
-            if name in self._dots
-        ]
-        self._dots, self._moved_px = places, float(np.median(moved)) if moved else 0.0
+    def note(self, image: Picture, blobs: Sequence[Blob], moved_px: Sequence[float]) -> None:
+        """Learn from a picture: from its blobs, and by how much its dots have moved to it."""
+        self._moved_px = float(np.median(moved_px)) if moved_px else 0.0
         if blobs and self._pictures % _LEARN_ONE_OF == 0:
             self._learn(image, blobs)
         self._pictures += 1
 
     def find(
-        self, image: Picture, blobs: Sequence[Blob], area_px2: float, noise: float
+        self,
+        image: Picture,
+        blobs: Sequence[Blob],
+        dots_px: Sequence[Point],
+        area_px2: float,
+        noise: float,
     ) -> list[Patch]:
         """Patches that are none of the blobs of a picture, where dots are missing among these.
 
-        None where there are as many blobs as dots, and before paint and skin are known. area_px2:
-        of a dot that shows as a whole; noise: of chroma, as image.noise.Noise has it.
+        None where there are as many blobs as dots, and before paint and skin are known. dots_px:
+        where dots were in the last picture; area_px2: of one that shows as a whole; noise: of
+        chroma, as image.noise.Noise has it.
         """
         across = float(self._paint[0] * self._skin[1] - self._paint[1] * self._skin[0])
         lengths = float(np.linalg.norm(self._paint) * np.linalg.norm(self._skin))
         if area_px2 <= 0.0 or not abs(across) > _LEAST_SINE * lengths:
             return []
-        if len(blobs) >= len(self._dots):
+        if len(blobs) >= len(dots_px):
             return []
         diameter = math.sqrt(4.0 / math.pi * area_px2)
         missing = [
             place
-            for place in self._dots.values()
+            for place in dots_px
             if all(math.dist(place, (b.x_px, b.y_px)) > _OWN * diameter for b in blobs)
         ]
         if not missing:

@@ -11,7 +11,7 @@ from rhot.files.rig_tables import Tracker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.dots.dot import Dot, Patch
+from services.pi_tracker.dots.dot import Patch
 from services.pi_tracker.dots.patches.faint import FaintFinder
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Frame, Image
@@ -54,20 +54,16 @@ def blobs_of(image: Picture) -> list[Blob]:
     return BlobDetector(TABLE, Tracker()).detect(image, search_region.whole(image.size))
 
 
-def dot(x: float, y: float) -> Dot:
-    return Dot(x, y, 0.3, 1.0, "seen", AREA_PX2, 0)
-
-
 def begun(skin: tuple[int, int, int] = SKIN) -> FaintFinder:
     """Has seen both dots at rest."""
     finder, image = FaintFinder(), drawn((*STILL, 0.0), (*MOVING, 0.0), skin=skin)
     assert len(blobs_of(image)) == 2
-    finder.note(image, blobs_of(image), {"still": dot(*STILL), "moving": dot(*MOVING)})
+    finder.note(image, blobs_of(image), [0.0, 0.0])
     return finder
 
 
 def found(finder: FaintFinder, image: Picture) -> list[Patch]:
-    return finder.find(image, blobs_of(image), AREA_PX2, NOISE)
+    return finder.find(image, blobs_of(image), (STILL, MOVING), AREA_PX2, NOISE)
 
 
 @pytest.mark.parametrize("moves_px", [24.0, 30.0])
