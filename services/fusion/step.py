@@ -84,7 +84,7 @@ class FusionStep:
         )
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         centres = np.array([camera.centre_rig for camera in self._cameras])
-        self._hidden = HiddenPaint(centres, self._paint.round)
+        self._hidden = HiddenPaint(centres, self._paint.round, self._paint.known)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
         self.clocks = ClockOffsetEstimator(

@@ -32,7 +32,7 @@ _LIT = 0.025
 # Of the skin under a dab whose direction nobody tells: what a camera sees faces it, more or less.
 SIGMA_FACING_RAD = 0.5
 # A finger turns by up to 10 rad/s: an older direction is worth no more than none.
-_POSE_AGE_NS = 150_000_000
+POSE_AGE_NS = 150_000_000
 # What turned faster from one pose to the next jumped to another posture, and does not turn on.
 _MOST_TURN_RAD_S = 20.0
 # A direction that is less sure than that says less than none: some of those that it may be would
@@ -42,7 +42,7 @@ _MOST_TURN_RAD_S = 20.0
 # flapping 2.80, 2.57, 2.50, 2.49.
 _MOST_UNSURE_RAD = 0.6
 # A stamp that is older than any.
-LONG_AGO_NS = -_POSE_AGE_NS - 1
+LONG_AGO_NS = -POSE_AGE_NS - 1
 
 
 class KnownPaint(NamedTuple):
@@ -50,7 +50,8 @@ class KnownPaint(NamedTuple):
 
     radii_m: Array  # (L,) of painted tips, 0 for dabs
     sags_m: Array  # (L,) how deep a dab's middle lies under the landmark
-    tables: Array  # (L, 61) shifts of tips (paint_centroid.py)
+    tables: Array  # (L, 61) shifts of tips (visible_paint.py)
+    areas_m2: Array  # (L, 61) of tips, as they show (visible_paint.py)
     radius_sds: Array  # (L,) how unsure the radius of a finger or limb is, as a share
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
@@ -79,7 +80,7 @@ def note_directions(
         row = rows[n]
         passed_s = 1e-9 * (stamp_ns - paint.stamps_ns[row])
         paint.turns_rad_s[row] = 0.0
-        if 0.0 < passed_s <= 1e-9 * _POSE_AGE_NS:
+        if 0.0 < passed_s <= 1e-9 * POSE_AGE_NS:
             _note_turn(paint.directions[row], directions[n], passed_s, paint.turns_rad_s[row])
         paint.directions[row] = directions[n]
         paint.hinges[row] = hinges[n]
@@ -107,16 +108,22 @@ def _aim(paint: KnownPaint, row: int, instant_ns: int, aim: Array) -> None:
     """
     direction, hinge = aim
     age_s = 1e-9 * (instant_ns - paint.stamps_ns[row])
-    cross(paint.turns_rad_s[row], paint.directions[row], direction)
-    for i in range(3):
-        direction[i] = paint.directions[row, i] + age_s * direction[i]
-    _make_unit(direction)
+    turn_on(paint.directions[row], paint.turns_rad_s[row], age_s, direction)
     along = 0.0
     for i in range(3):
         along += paint.hinges[row, i] * direction[i]
     for i in range(3):
         hinge[i] = paint.hinges[row, i] - along * direction[i]
     _make_unit(hinge)
+
+
+@njit(cache=True)
+def turn_on(direction: Array, turn_rad_s: Array, seconds: float, out: Array) -> None:
+    """Where a direction (3,) points that turned on for so long; to out (3,)."""
+    cross(turn_rad_s, direction, out)
+    for i in range(3):
+        out[i] = direction[i] + seconds * out[i]
+    _make_unit(out)
 
 
 @njit(cache=True)
@@ -144,7 +151,7 @@ def correct_paint(
     for row in range(positions.shape[0]):
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
-        is_told = abs(instant_ns - paint.stamps_ns[row]) <= _POSE_AGE_NS
+        is_told = abs(instant_ns - paint.stamps_ns[row]) <= POSE_AGE_NS
         is_told &= paint.direction_sigmas[row, 0] <= _MOST_UNSURE_RAD
         if is_told:
             _aim(paint, row, instant_ns, aim)

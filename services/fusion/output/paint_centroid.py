@@ -23,7 +23,7 @@ from services.fusion.geometry.projection import Extrinsics, project
 def centroid_shift(table: Array, cosine: float) -> float:
     """Metres from the landmark to the visible centroid, towards the finger's end.
 
-    table: of visible_paint.shift_table; cosine: of the angle between finger and viewing ray.
+    table: shifts_m of visible_paint.PaintTables; cosine: of the angle between finger and ray.
     """
     place = math.acos(min(1.0, max(-1.0, cosine))) / math.pi * (table.shape[0] - 1)
     k = min(int(place), table.shape[0] - 2)

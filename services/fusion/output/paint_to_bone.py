@@ -38,7 +38,7 @@ from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
-from services.fusion.output.visible_paint import dab_sag_m, shift_table
+from services.fusion.output.visible_paint import dab_sag_m, paint_tables
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
@@ -72,7 +72,7 @@ _HINGE = (1.0, 0.0, 0.0)
 
 
 def _taper(hand: HandModel, landmark: str) -> float:
-    """How a painted tip looks to widen away from its end, as visible_paint.shift_table takes it.
+    """How a painted tip looks to widen away from its end, as visible_paint.paint_tables takes it.
 
     Its last bone ends in two balls, the far one its radius before the end of the finger.
     """
@@ -133,13 +133,16 @@ class PaintToBone:
         self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
         tables = [
-            shift_table(paint.radius_m, paint.extent_m, _taper(hands[landmark.hand], landmark.name))
+            paint_tables(
+                paint.radius_m, paint.extent_m, _taper(hands[landmark.hand], landmark.name)
+            )
             for landmark, paint in zip(landmarks, paints, strict=True)
         ]
         self.known = KnownPaint(
             radii_m=radii_m,
             sags_m=sags_m,
-            tables=np.array(tables).reshape(len(paints), -1),
+            tables=np.array([one.shifts_m for one in tables]).reshape(len(paints), -1),
+            areas_m2=np.array([one.areas_m2 for one in tables]).reshape(len(paints), -1),
             radius_sds=np.array([_RADIUS_SD.get(hands[one.hand].origin, 0.0) for one in landmarks]),
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),

@@ -39,6 +39,9 @@ OWN_PX = 0.028
 # Systematic, shared by all cameras, as a share of sigma_px: with more than this, resting hands'
 # errors across the ray (.15-.18 mm RMS at .5 m, .19-.23 at 1.0 m) are smaller than sigma says.
 SHARED_SHARE = 0.14
+# What hides paint from all cameras is so much each camera's own. (Tuning halves of held_out.py and
+# other_renderer.py: the same to 1 % with .4.)
+OWN_SHARE = 0.2
 # Share of a new frame's sigma in the running one.
 _NEW = 0.1
 
@@ -106,8 +109,9 @@ def add_systematic(
 
     Own errors: the covariance of the least-squares point of the cameras' rays. Shared ones: across
     the first camera's optical axis. seen_by (L, C) tells which cameras located a point; one that
-    fewer than two did counts as seen by all; one without extent has none. hidden (L, C): how far
-    each ray may be off since paint is hidden from it (hidden_paint.py).
+    fewer than two did counts as seen by all; one without extent has none. hidden (2, L, C): how far
+    each ray may be off since paint is hidden from it, and all of them as it is from all
+    (hidden_paint.py).
     """
     R, t = cameras
     A = np.empty((3, 3))  # H^T H / own^2, summed
@@ -119,19 +123,21 @@ def add_systematic(
             continue
         p_rig = positions[row]
         by_all = np.count_nonzero(seen_by[row]) < 2
-        is_first = True
+        first, shared = -1, 0.0
         A[:] = 0.0
         for c in range(R.shape[0]):
             if not (seen_by[row, c] or by_all) or not project(p_rig, R[c], t[c], ray, H):
                 continue
-            own = math.hypot(known.own[c], hidden[row, c])
+            own = math.hypot(known.own[c], hidden[0, row, c])
+            own = math.hypot(own, OWN_SHARE * hidden[1, row, c])
             for i in range(3):
                 for j in range(3):
                     A[i, j] += (H[0, i] * H[0, j] + H[1, i] * H[1, j]) / own**2
-            if is_first:
-                shared = SHARED_SHARE * known.running[row]
-                _add_shared_error(p_rig, shared, R[c], t[c], covs[row])
-                is_first = False
+            first = c if first < 0 else first
+            shared = max(shared, hidden[1, row, c])
+        if first >= 0:
+            shared = math.hypot(SHARED_SHARE * known.running[row], shared)
+            _add_shared_error(p_rig, shared, R[first], t[first], covs[row])
         if invert_symmetric(A, A_inverse):
             covs[row] += A_inverse
 

@@ -1,4 +1,4 @@
-"""Where the middle of what is visible of paint lies: of a finger tip by ray-casting, of a dab.
+"""What is visible of paint: its middle and its area, of a finger tip by ray-casting; a dab's depth.
 
 The tip is a tapered capsule (radius of the paint at its end) that ends in a half ball, painted over
 extent_m from its end; the landmark is the middle of the painted stretch of the axis. Seen from
@@ -14,6 +14,7 @@ to 1.4 mm too deep, those that pointed away .2 mm towards their end.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -28,10 +29,12 @@ _FINENESS = 40
 
 
 @njit(cache=True)
-def _centroid_shift(
+def _visible(
     radius_m: float, extent_m: float, taper: float, sine: float, cosine: float
-) -> float:
-    """Metres from the landmark to the visible centroid, by parallel rays over a grid.
+) -> tuple[float, float]:
+    """From the landmark to the visible centroid, m, and the visible area, m^2, across the rays.
+
+    By parallel rays over a grid.
 
     The finger points along (sine, 0, cosine), rays along (0, 0, 1); u is a ray's x, w its y.
     """
@@ -53,7 +56,8 @@ def _centroid_shift(
             if math.isfinite(z) and u * sine + z * cosine >= radius_m - extent_m:
                 area += 1.0
                 moment += i * step
-    return moment / area if area > 0.0 else 0.0
+    # Of one half: w and -w are alike.
+    return moment / area if area > 0.0 else 0.0, 2.0 * area * step * step
 
 
 @njit(cache=True)
@@ -89,23 +93,32 @@ def _first_hit(
     return z
 
 
+class PaintTables(NamedTuple):
+    """What shows of a painted tip, of angles from 0 (the finger points away) to pi."""
+
+    shifts_m: Array  # (61,) what paint_centroid.centroid_shift looks up
+    areas_m2: Array  # (61,) across the viewing ray
+
+
 @njit(cache=True)
-def _fill_table(radius_m: float, extent_m: float, taper: float, table: Array) -> None:
-    for k in range(table.shape[0]):
-        angle = math.pi * k / (table.shape[0] - 1)
-        table[k] = _centroid_shift(radius_m, extent_m, taper, math.sin(angle), math.cos(angle))
+def _fill_tables(
+    radius_m: float, extent_m: float, taper: float, shifts: Array, areas: Array
+) -> None:
+    for k in range(shifts.shape[0]):
+        angle = math.pi * k / (shifts.shape[0] - 1)
+        shifts[k], areas[k] = _visible(radius_m, extent_m, taper, math.sin(angle), math.cos(angle))
 
 
-def shift_table(radius_m: float, extent_m: float, taper: float = 0.0) -> Array:
-    """What paint_centroid.centroid_shift looks up: of angles from 0 (the finger points away) to pi.
+def paint_tables(radius_m: float, extent_m: float, taper: float = 0.0) -> PaintTables:
+    """What shows of a tip that is painted over extent_m; zeros for flat dabs.
 
     taper: by how much the radius of the balls that the finger is made of grows away from its end,
-    as a share of the way; less than 1. (61,) m, zero for flat dabs.
+    as a share of the way; less than 1.
     """
-    table = np.zeros(_ANGLES)
+    tables = PaintTables(np.zeros(_ANGLES), np.zeros(_ANGLES))
     if radius_m > 0.0 and extent_m > 0.0:
-        _fill_table(radius_m, extent_m, taper, table)
-    return table
+        _fill_tables(radius_m, extent_m, taper, *tables)
+    return tables
 
 
 def dab_sag_m(radius_m: float, limb_m: float) -> float:

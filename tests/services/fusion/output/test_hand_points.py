@@ -22,7 +22,7 @@ LANDMARKS = (
     Landmark("right", "wrist"),
     Landmark("right", "index_tip"),
 )
-NOTHING = Systematic(np.zeros(4), np.full(2, 1e-4), np.zeros(4, dtype=bool)), np.zeros((4, 2))
+NOTHING = Systematic(np.zeros(4), np.full(2, 1e-4), np.zeros(4, dtype=bool)), np.zeros((2, 4, 2))
 
 # Of points without extent.
 PAINT = PaintToBone(LANDMARKS, dict.fromkeys(HANDS, point_hands()["right"]), CAMERAS).known

@@ -8,7 +8,7 @@ import pytest
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics, extrinsics
 from services.fusion.output.paint_centroid import Finger, centroid_shift, expected_shift
-from services.fusion.output.visible_paint import shift_table
+from services.fusion.output.visible_paint import paint_tables
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M, PAINT_M = 0.0068, 0.014
@@ -53,16 +53,19 @@ def visible_middle(sine: float, cosine: float) -> float:
 
 
 def test_shift_is_along_the_finger_and_vanishes_end_on():
-    table = shift_table(RADIUS_M, PAINT_M)
+    table = paint_tables(RADIUS_M, PAINT_M).shifts_m
     assert centroid_shift(table, -1.0) == pytest.approx(0.0, abs=1e-5)
     # Seen from the side, the round end has less paint than the straight stretch behind it.
     assert -1e-3 < centroid_shift(table, 0.0) < -0.3e-3
     assert -2e-3 < centroid_shift(table, -0.6) < -1e-3
-    assert not shift_table(0.0, 0.01).any()
+    assert not paint_tables(0.0, 0.01).shifts_m.any()
 
 
 def test_a_taper_moves_the_middle_as_its_skin_does():
-    table, plain = shift_table(RADIUS_M, PAINT_M, TAPER), shift_table(RADIUS_M, PAINT_M)
+    table, plain = (
+        paint_tables(RADIUS_M, PAINT_M, TAPER).shifts_m,
+        paint_tables(RADIUS_M, PAINT_M).shifts_m,
+    )
     for angle in (60.0, 90.0, 120.0, 150.0, 170.0):
         sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
         found = centroid_shift(table, cosine)
@@ -76,7 +79,7 @@ def test_a_taper_moves_the_middle_as_its_skin_does():
 
 def test_known_direction_explains_where_the_centroid_is_located(random_fingers, split):
     cameras = extrinsics(tuple(SyntheticRig(distortion=(0.0,) * 5).rig().values()))
-    table, left = shift_table(RADIUS_M, PAINT_M), []
+    table, left = paint_tables(RADIUS_M, PAINT_M).shifts_m, []
     for point, direction, located in random_fingers(150, hidden=0.7):
         shift, covariance = finger_shift(table, located, direction, cameras)
         np.testing.assert_allclose(covariance, 0.0, atol=1e-20)
@@ -89,7 +92,7 @@ def test_known_direction_explains_where_the_centroid_is_located(random_fingers, 
 
 
 def test_any_number_of_cameras_agrees_on_the_shift():
-    table, direction = shift_table(RADIUS_M, PAINT_M), np.array([0.3, -0.6, -0.74])
+    table, direction = paint_tables(RADIUS_M, PAINT_M).shifts_m, np.array([0.3, -0.6, -0.74])
     direction /= np.linalg.norm(direction)
     shifts = []
     for cameras in (2, 4):
@@ -101,7 +104,7 @@ def test_any_number_of_cameras_agrees_on_the_shift():
 def test_an_unsure_bend_makes_a_tip_unsure_in_its_plane():
     """A finger along y that bends about x: unsure there it is unsure in y and z, sideways in x."""
     rig = extrinsics(tuple(SyntheticRig().rig().values()))
-    table, point = shift_table(RADIUS_M, PAINT_M), np.array([0.0, 0.0, 0.5])
+    table, point = paint_tables(RADIUS_M, PAINT_M).shifts_m, np.array([0.0, 0.0, 0.5])
     direction = np.array([0.0, -0.8, -0.6])
     _, bent = finger_shift(table, point, direction, rig, (0.2, 0.0))
     _, turned = finger_shift(table, point, direction, rig, (0.0, 0.2))
@@ -113,7 +116,7 @@ def test_an_unsure_bend_makes_a_tip_unsure_in_its_plane():
 def test_the_mean_shift_of_a_finger_that_points_at_the_cameras_is_not_that_of_its_direction():
     """Its depth depends most on the direction there: mostly it points a little elsewhere."""
     rig = extrinsics(tuple(SyntheticRig().rig().values()))
-    table, point = shift_table(RADIUS_M, PAINT_M, TAPER), np.array([0.0375, 0.0, 0.5])
+    table, point = paint_tables(RADIUS_M, PAINT_M, TAPER).shifts_m, np.array([0.0375, 0.0, 0.5])
     sure, _ = finger_shift(table, point, np.array([0.0, 0.0, -1.0]), rig)
     unsure, covariance = finger_shift(table, point, np.array([0.0, 0.0, -1.0]), rig, (0.15, 0.15))
     random, shifts = np.random.default_rng(3), []
@@ -133,7 +136,7 @@ def test_how_unsure_a_tip_is_by_a_very_unsure_direction(sigma_deg: float):
     Differences of first order call it 1.37 and .69 times that.
     """
     rig = extrinsics(tuple(SyntheticRig().rig().values()))
-    table, point = shift_table(RADIUS_M, PAINT_M, TAPER), np.array([0.0375, 0.0, 0.6])
+    table, point = paint_tables(RADIUS_M, PAINT_M, TAPER).shifts_m, np.array([0.0375, 0.0, 0.6])
     about, sideways = np.radians(sigma_deg), 0.6 * np.radians(sigma_deg)
     direction = np.array([0.0, 0.3, -0.95]) / np.hypot(0.3, 0.95)
     across = np.cross([1.0, 0.0, 0.0], direction)

@@ -11,6 +11,7 @@ from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.output.systematic_error import (
     OWN_PX,
+    OWN_SHARE,
     SHARED_SHARE,
     WHITE_PX,
     WHITE_SHARE,
@@ -24,7 +25,7 @@ FOCAL_PX = CAMERAS[0].focal_px[0]
 DISTANCE_M = 0.6
 POINTS = np.tile([0.0375, 0.0, DISTANCE_M], (2, 1))
 BOTH = np.ones((2, 2), dtype=bool)
-WHOLE = np.zeros((2, 2))
+WHOLE = np.zeros((2, 2, 2))
 
 
 @pytest.fixture
@@ -93,9 +94,20 @@ def test_points_behind_the_cameras_add_nothing_and_nan_nowhere(errors):
 
 def test_a_ray_that_paint_is_hidden_from_is_off_by_so_much(errors):
     hidden = WHOLE.copy()
-    hidden[0, 1] = 2.0 / FOCAL_PX
+    hidden[0, 0, 1] = 2.0 / FOCAL_PX
     more = covariances(errors, POINTS, BOTH, hidden) - covariances(errors, POINTS, BOTH, WHOLE)
     assert np.sqrt(more[0, 2, 2]) == pytest.approx(
         2.0 * DISTANCE_M**2 / (FOCAL_PX * 0.075), rel=0.02
     )
+    assert not more[1].any()
+
+
+def test_paint_that_is_hidden_from_all_is_off_sideways_and_a_little_in_depth(errors):
+    hidden = WHOLE.copy()
+    hidden[1, 0] = 2.0 / FOCAL_PX
+    more = covariances(errors, POINTS, BOTH, hidden) - covariances(errors, POINTS, BOTH, WHOLE)
+    sideways_m, depth_m = np.sqrt(more[0, 0, 0]), np.sqrt(more[0, 2, 2])
+    assert sideways_m == pytest.approx(2.0 * DISTANCE_M / FOCAL_PX, rel=0.05)
+    own_px = OWN_SHARE * 2.0 * np.sqrt(2.0)
+    assert depth_m == pytest.approx(own_px * DISTANCE_M**2 / (FOCAL_PX * 0.075), rel=0.05)
     assert not more[1].any()
