@@ -87,7 +87,7 @@ def _gone_on(judge: Judge, trace: Trace, number: int, told: list[Told]) -> list[
             score=float(scores[row]),
             state=trace.states.take([row]),
             branch=row,
-            areas=judge.areas,
+            areas=trace.areas,
             unseen=trace.unseen,
             patch=own,
             before=own,

@@ -39,6 +39,23 @@ def test_exchanged_and_missing_names_are_less_likely() -> None:
     assert _evidence([RIGHT] * 6 + [lost] * 6, pictures) < right - 10.0
 
 
+def test_sizes_are_learned_from_each_account_and_not_from_a_rough_one() -> None:
+    """A large dot and a small one that a rough account exchanges from the second picture on."""
+    exchanged = (0, 1, 2, 7, 4, 5, 6, 3)
+    large = np.array([1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 1.0])
+    pictures = [one._replace(areas=one.areas * large) for one in _pictures()]
+    right, rough = [RIGHT] * 12, [RIGHT] + [exchanged] * 11
+    by_rough = list(_judge(rough, pictures).retraced(right))[-1]
+    assert by_rough.nats == list(_judge(right, pictures).retraced(right))[-1].nats
+    np.testing.assert_allclose(by_rough.areas, pictures[0].areas)
+    # What is half hidden for a while is no smaller for good.
+    half = [
+        one._replace(areas=one.areas / 2.0) if k == 6 else one for k, one in enumerate(pictures)
+    ]
+    after = list(_judge(right, half).retraced(right))[-1]
+    assert np.all(after.areas > 0.85 * pictures[0].areas)
+
+
 def test_a_dot_that_is_hidden_is_told_so() -> None:
     pictures = _pictures()
     for k in (5, 6, 7):

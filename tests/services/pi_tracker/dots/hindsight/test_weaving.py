@@ -52,3 +52,19 @@ def test_names_of_the_first_picture_stand() -> None:
 def test_an_account_may_go_on_to_the_end() -> None:
     lost = _account([RIGHT] * 32 + [TIPS] * 32)
     assert _woven(lost, _account([RIGHT] * (COUNT - 5), 5)) == [RIGHT] * COUNT
+
+
+def test_accounts_that_nearly_agree_go_on_from_the_much_likelier_past() -> None:
+    """One loses most dots early, the other late; between, they differ in one dot."""
+    lost: Told = (0, 1, -1, -1, -1, -1, -1, -1)
+    other: Told = (0, 1, 2, 3, 4, 5, 6, -1)
+    early = _account([RIGHT] * 2 + [lost] * 20 + [RIGHT] * 42)
+    late = _account([RIGHT] * 22 + [other] * 20 + [lost] * 22)
+    # From the second's past to the first, though they are never alike for long.
+    told = _woven(late, early)
+    assert told[:22] == [RIGHT] * 22
+    assert told[42:] == [RIGHT] * 22
+    # Names that are exchanged are not nearly alike: then neither is mended.
+    other = (0, 1, 2, 3, 4, 5, 7, 6)
+    exchanged = _account([RIGHT] * 22 + [other] * 20 + [lost] * 22)
+    assert _woven(exchanged, early) in (list(exchanged.values()), list(early.values()))
