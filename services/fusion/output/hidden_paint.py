@@ -127,29 +127,25 @@ def _compare(
     """
     own, shared = sigmas
     # How much less of each shows than its pose lets expect, as a logarithm; NaN where none tells.
-    less, aim = np.full(landmarks.size, np.nan), np.empty(3)
+    less = np.full(landmarks.size, np.nan)
     for n in range(landmarks.size):
         row = landmarks[n]
         passed_s = max(time_s - seen_s[row, camera], 0.0)
         keep = math.exp(-passed_s / _MEMORY_S)
         known[row, camera], seen_s[row, camera] = areas[n], time_s
-        shared[row, camera] *= keep
-        away = places[row] - centres[camera]
-        away_m = math.sqrt(away @ away)
         age_ns = instant_ns - stamps_ns[row]
-        # Nothing without a place, which is NaN, or without a distance.
-        if away_m > 0.0 and areas[n] > 0.0 and areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
-            turn_on(directions[row], turns_rad_s[row], 1e-9 * age_ns, aim)
-            angle = math.acos(min(max((away @ aim) / away_m, -1.0), 1.0))
-            sigma_rad = math.hypot(direction_sigmas[row, 0], direction_sigmas[row, 1])
-            levels[row, camera], less[n] = less_than_expected(
-                expected_areas(areas_m2[row], angle, sigma_rad),
-                areas[n] * away_m**2,
-                levels[row, camera],
-                passed_s,
+        if areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
+            levels[row, camera], less[n] = _against_pose(
+                places[row] - centres[camera],
+                areas_m2[row],
+                (directions[row], turns_rad_s[row], 1e-9 * age_ns),
+                math.hypot(direction_sigmas[row, 0], direction_sigmas[row, 1]),
+                areas[n],
+                (levels[row, camera], passed_s),
             )
         worst = _unlike(known, seen_s, places, centres, per_rad, camera, row, time_s)
         own[row, camera] = max(worst, keep * own[row, camera])
+        shared[row, camera] *= keep
         out[n] = own[row, camera]
     usual = usually_less(less)
     for n in range(landmarks.size):
@@ -157,6 +153,32 @@ def _compare(
         hidden = hidden_share(less[n] - usual, shape_sds[row])
         off = _SHIFT_BY_POSE * hidden * math.sqrt(areas[n] / (1.0 - hidden))
         shared[row, camera] = max(off, shared[row, camera])
+
+
+@njit(cache=True)
+def _against_pose(
+    ray: Array,
+    table: Array,
+    told: tuple[Array, Array, float],
+    sigma_rad: float,
+    area: float,
+    before: tuple[float, float],
+) -> tuple[float, float]:
+    """A tip's level after one more look, and how much less of it shows, as a logarithm.
+
+    ray (3,): from the camera to it, m; told: direction (3,), how it turns (3,) rad/s, how long ago,
+    s; area: in the rays' units; before: the level, how long ago, s. As it was, and NaN, without a
+    place, which is NaN, or without a distance.
+    """
+    away_m = math.sqrt(ray @ ray)
+    if not (away_m > 0.0 and area > 0.0):
+        return before[0], math.nan
+    aim = np.empty(3)
+    turn_on(told[0], told[1], told[2], aim)
+    cosine = float(ray @ aim) / away_m
+    angle = math.acos(min(max(cosine, -1.0), 1.0))
+    expected = expected_areas(table, angle, sigma_rad)
+    return less_than_expected(expected, area * away_m**2, before[0], before[1])
 
 
 @njit(cache=True)

@@ -38,7 +38,7 @@ from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
-from services.fusion.output.visible_paint import dab_sag_m, paint_tables
+from services.fusion.output.visible_paint import PaintTables, dab_sag_m, paint_tables
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
@@ -82,6 +82,12 @@ def _taper(hand: HandModel, landmark: str) -> float:
             length_m = max(digit.lengths_m[2] - far_m, 1e-3)
             return _TAPER_SEEN * min(max((near_m - far_m) / length_m, 0.0), _MOST_TAPER)
     return 0.0
+
+
+def _tables(hand: HandModel, landmark: str) -> PaintTables:
+    """What shows of a landmark's paint."""
+    paint = hand.paint[landmark]
+    return paint_tables(paint.radius_m, paint.extent_m, _taper(hand, landmark))
 
 
 class Directions(NamedTuple):
@@ -132,12 +138,7 @@ class PaintToBone:
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
         self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
-        tables = [
-            paint_tables(
-                paint.radius_m, paint.extent_m, _taper(hands[landmark.hand], landmark.name)
-            )
-            for landmark, paint in zip(landmarks, paints, strict=True)
-        ]
+        tables = [_tables(hands[one.hand], one.name) for one in landmarks]
         self.known = KnownPaint(
             radii_m=radii_m,
             sags_m=sags_m,
