@@ -5,8 +5,8 @@ A tip's area follows from its distance and from the angle between finger and vie
 whole paint compares with the model's (longer paint, a darker colour, a thicker finger) is learned
 while tracking, as a level of its logarithm that rises fast and falls slowly: what is hidden is
 hidden for a short while. Blur and dim light make all tips smaller at once. Rendered tips that show
-whole keep that to 3 to 10 % (tuning halves, one standard deviation; recorded hands that are not the
-tables' to 20 %).
+whole keep that to 3 to 12 % (tuning half, one standard deviation; recorded hands that are not the
+tables' to 11 to 26 %).
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 
-# The level's times upwards and downwards. (Tuning captures are told the same within 2 % with 3 and
-# with 30 s downwards.)
+# The level's times upwards and downwards. (NEES of tuning captures is the same within 3 % with 3
+# and with 30 s downwards.)
 _RISE_S, _FALL_S = 0.5, 10.0
 # Logarithm of the ratio of areas that says nothing, and how much more for paint whose shape is
 # unlike the model's by a radius. (Chosen on the tuning halves of held_out.py and other_renderer.py
-# by the likelihood of errors: with .03 to .12 it is the same to .02 nats a point.)
+# by the likelihood of errors: with .08 it is .015 nats a point less without lag on the latter, and
+# the same otherwise.)
 _USUAL, _UNLIKE = 0.05, 1.0
 
 

@@ -37,8 +37,8 @@ _ALIKE, _TIP_PER_RAD, _DAB_PER_RAD = 0.03, 0.6, 2.0
 # these captures were .093 of it off RMS where the logarithm was .25-.5, .232 above, .017 below .05.
 _SHIFT = 0.42
 # The same of what a tip's direction lets expect. (Tuning half of our own pictures: with .5 NEES is
-# 4 % less. The filter is not told, which made the other renderer's hand that grabs worse without
-# lag: 4.96 -> 5.31 mm RMS, 27 -> 44 at most.)
+# about 4 % less. The filter is not told: that made the other renderer's hand that grabs worse
+# without lag, 4.96 -> 5.31 mm RMS, 27 -> 44 at most.)
 _SHIFT_BY_POSE = 0.3
 # Another camera's look is compared with for so long, and a hidden marker counts on for so long.
 _RECENT_S, _MEMORY_S = 0.1, 0.1
