@@ -45,7 +45,8 @@ _RECENT_S, _MEMORY_S = 0.1, 0.1
 
 
 class HiddenPaint:
-    """How far every camera's sight of every landmark may be off, by the areas that all of them see.
+    """How far every camera's sight of every landmark may be off: by the areas that all of them see,
+    and by what poses let expect of tips.
 
     Landmarks without extent have no area.
     """

@@ -50,7 +50,7 @@ class KnownPaint(NamedTuple):
 
     radii_m: Array  # (L,) of painted tips, 0 for dabs
     sags_m: Array  # (L,) how deep a dab's middle lies under the landmark
-    tables: Array  # (L, 61) shifts of tips (visible_paint.py)
+    shifts_m: Array  # (L, 61) of tips (visible_paint.py)
     areas_m2: Array  # (L, 61) of tips, as they show (visible_paint.py)
     radius_sds: Array  # (L,) how unsure the radius of a finger or limb is, as a share
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
@@ -173,7 +173,7 @@ def correct_paint(
             sigmas_rad, radius_sd = paint.direction_sigmas[row], paint.radius_sds[row]
             finger = Finger(aim[0], aim[1], sigmas_rad, radius_sd)
             chosen = _locating(cameras, seen_by[row])
-            place, table = positions[row], paint.tables[row]
+            place, table = positions[row], paint.shifts_m[row]
             if expected_shift(table, place, finger, chosen, shift, shift_covariance):
                 positions[row] += _LIT * paint.radii_m[row] * ray - shift
                 covariances[row] += shift_covariance

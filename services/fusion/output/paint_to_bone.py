@@ -142,7 +142,7 @@ class PaintToBone:
         self.known = KnownPaint(
             radii_m=radii_m,
             sags_m=sags_m,
-            tables=np.array([one.shifts_m for one in tables]).reshape(len(paints), -1),
+            shifts_m=np.array([one.shifts_m for one in tables]).reshape(len(paints), -1),
             areas_m2=np.array([one.areas_m2 for one in tables]).reshape(len(paints), -1),
             radius_sds=np.array([_RADIUS_SD.get(hands[one.hand].origin, 0.0) for one in landmarks]),
             directions=np.zeros((len(landmarks), 3)),

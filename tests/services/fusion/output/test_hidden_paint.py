@@ -37,7 +37,7 @@ def known_paint() -> KnownPaint:
     return KnownPaint(
         radii_m=np.array([0.0068, 0.0]),
         sags_m=np.zeros(2),
-        tables=np.array([TABLES.shifts_m, nothing]),
+        shifts_m=np.array([TABLES.shifts_m, nothing]),
         areas_m2=np.array([TABLES.areas_m2, nothing]),
         radius_sds=np.zeros(2),
         directions=np.zeros((2, 3)),
