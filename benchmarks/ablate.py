@@ -30,7 +30,7 @@ from held_out_score import Figures, make_fusion, misses, scores
 from rhot.files.rig_tables import Fusion
 from services.fusion import step as fusion_step
 from services.fusion.kalman import hand_filter
-from services.fusion.kalman.motion_models import MotionModels
+from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import SystematicError
 from services.pi_tracker.identify import group_consistency

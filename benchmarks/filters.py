@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from services.fusion.kalman.motion_models import transition, unit_process_noise
+from services.fusion.kalman.motion.motion_models import transition, unit_process_noise
 from services.fusion.paired.one_euro import OneEuroFilter
 from testing.synthetic_points import MovingHand
 
@@ -82,7 +82,7 @@ def double_exponential(
 def kalman(path: Array, rate_hz: float, density: float) -> Array:
     """Fusion's motion model with one jerk density; positions are measured.
 
-    services/fusion/kalman/motion_models.py. The gain is the same for all axes.
+    services/fusion/kalman/motion/motion_models.py. The gain is the same for all axes.
     """
     F, unit_Q = motion_model(rate_hz)
     state = np.zeros((3, 3))  # position, velocity, acceleration; each of the three axes

@@ -33,7 +33,7 @@ from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
 from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import hand_reach_m
-from services.fusion.output.hand_points import PointMessages
+from services.fusion.output.hand_points import Corrections, PointMessages
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.paint_to_bone import Directions, PaintToBone
 from services.fusion.output.pose_feedback import PoseFeedback
@@ -76,15 +76,10 @@ class FusionStep:
         self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._poses: PoseFeedback[Directions] = PoseFeedback()
-        self._messages = PointMessages(
-            self._landmarks,
-            {hand: hand_reach_m(hands[hand]) for hand in self._rows},
-            [camera.name for camera in self._cameras],
-            extrinsics(self._cameras),
-        )
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         centres = np.array([camera.centre_rig for camera in self._cameras])
         self._hidden = HiddenPaint(centres, self._paint.round, self._paint.known)
+        self._messages = self._point_messages(hands)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
         self.clocks = ClockOffsetEstimator(
@@ -113,6 +108,19 @@ class FusionStep:
         if settings.method == "kalman":
             return KalmanMethod(hands, self._cameras, periods_s, settings)
         return PairedMethod(len(self._landmarks), self._cameras, periods_s, settings)
+
+    def _point_messages(self, hands: Mapping[HandName, HandModel]) -> PointMessages:
+        """Points as messages, corrected by what is known of paint and errors."""
+        known = Corrections(
+            self._paint.known,
+            self._systematic.known,
+            self._hidden.seen,
+            extrinsics(self._cameras),
+        )
+        reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
+        return PointMessages(
+            self._landmarks, reach_m, [camera.name for camera in self._cameras], known
+        )
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -191,6 +199,7 @@ class FusionStep:
 
     def flush(self) -> list[HandPoints]:
         """The points still waiting for later frames, at the end of a recording."""
+        self.settle()
         waiting_ns = self._schedule.take_waiting()
         waiting = [points for instant_ns in waiting_ns for points in self._points_at(instant_ns)]
         self.settle()
@@ -222,13 +231,7 @@ class FusionStep:
         for told in self._poses.take(instant_ns):
             self._paint.note(told)
         estimates = self.method.estimate((instant_ns - self._epoch_ns) * 1e-9)
-        points_of, incoherent = self._messages.of(
-            estimates,
-            instant_ns,
-            self._paint.known,
-            (self._systematic.known, self._hidden.sigmas),
-            self._hidden.places,
-        )
+        points_of, incoherent = self._messages.of(estimates, instant_ns)
         self.method.counts.incoherent += incoherent
         stamp_ns = min(max(instant_ns, 0), 2**63 - 1)
         messages = [

@@ -1,8 +1,8 @@
 """The Kalman method: all landmarks of a hand in one filter, so that each tells of the others.
 
 Every camera's observation counts at its own instant, unpaired, and views may come from 2..N cameras
-in any order. See services.fusion.method.Method for what it offers, motion_models.py for the motion
-that landmarks share, own_motion.py for what each does by itself.
+in any order. See services.fusion.method.Method for what it offers, motion/ for the motion
+that landmarks share and for what each does by itself.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts, Estimates, no_estimates
 from services.fusion.one_camera.last_located import LastLocated
+from services.fusion.packed import pack
 
 # A point this uncertain is of no use to anybody (the width of a hand).
 SHOW_SIGMA_M = 0.05
@@ -50,7 +51,7 @@ class KalmanMethod:
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
         self._told = no_estimates(len(self._hand), len(cameras))
-        self._told_of = [self._told.of(rows) for rows in self._rows]
+        self._told_of = [pack(self._told.of(rows)) for rows in self._rows]
         self.reset()
 
     def reset(self) -> None:
@@ -80,7 +81,7 @@ class KalmanMethod:
 
     def estimate(self, time_s: float) -> Estimates:
         """All landmarks at an instant."""
-        self.settle()
+        self._located.settle()
         told, alone = self._told, False
         for hand, mine in zip(self._hands, self._told_of, strict=True):
             alone |= hand.tell(time_s, self._recent_s, mine)
@@ -92,7 +93,9 @@ class KalmanMethod:
         return told
 
     def settle(self) -> None:
-        """Learn from the last estimates."""
+        """Learn from the last estimates, and from the last frame what they did not wait for."""
+        for hand in self._hands:
+            hand.settle()
         self._located.settle()
 
 

@@ -14,9 +14,15 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.filtering import filter_from, insert_frame, oldest_with
+from services.fusion.kalman.filtering import (
+    complete_newest,
+    filter_from,
+    filter_inserted,
+    insert_frame,
+    oldest_with,
+)
 from services.fusion.kalman.history import HandHistory, start_history
-from services.fusion.kalman.motion_models import MotionModels
+from services.fusion.kalman.motion.motion_models import MotionModels
 
 # What one camera alone has seen for longer is forgotten: by then its distance says nothing.
 ONE_CAMERA_S = 2.0
@@ -97,8 +103,11 @@ def take_in(
     looks: FrameLooks,
     fates: Fates,
 ) -> int:
-    """Filter a frame, and later ones anew; filters: the models, and the gate."""
-    models, gate = filters
+    """Filter a frame, and later ones anew; filters: the models, and the gate.
+
+    Of the newest one, models that say nothing yet may be left to complete_newest.
+    """
+    complete_newest(history, cameras, filters)
     time_s = looks.times_s.mean()
     _no_fate(fates)
     fates.counts[0] = drop_lost(history, sights, cameras, filters, time_s)
@@ -124,7 +133,7 @@ def take_in(
             sights.returned_s[k] = time_s
         back_s = time_s - sights.returned_s[k]
         fates.back[k] = back_s < min(RESTART_WINDOW_S, time_s - sights.begun_s[k])
-    filter_from(history, index, cameras, models, gate)
+    filter_inserted(history, index, cameras, filters)
     for n in range(looks.landmarks.size):
         k, at_s = looks.landmarks[n], looks.times_s[n]
         fates.alive[k], fates.used[k] = history.alive[node, k], history.used[node, k]
@@ -190,7 +199,7 @@ def drop_lost(
             history.ends[newest, k] = True
             lost += 1
     if lost and history.size[0] > 1:
-        filter_from(history, history.size[0] - 1, cameras, filters[0], filters[1])
+        filter_from(history, history.size[0] - 1, cameras, filters)
     elif lost:
         for k in range(history.alive.shape[1]):
             history.alive[newest, k] &= not history.ends[newest, k]

@@ -7,7 +7,7 @@ import numpy as np
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.filtering import filter_from, oldest_with
+from services.fusion.kalman.filtering import oldest_with
 from services.fusion.kalman.frame_update import (
     LATE,
     RESTART_WINDOW_S,
@@ -16,11 +16,12 @@ from services.fusion.kalman.frame_update import (
     no_fates,
     no_sights,
 )
-from services.fusion.kalman.held import Held, in_a_row, take_looks, tell_all
+from services.fusion.kalman.held import Held, complete, filter_again, take_looks, tell_all
 from services.fusion.kalman.history import empty_history
-from services.fusion.kalman.motion_models import MotionModels
+from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
-from services.fusion.method import Counts, Estimates
+from services.fusion.method import Counts
+from services.fusion.packed import Packed, pack
 
 # From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
 # motion was bounded (own_motion.MOST). Geometric mean of RMS, 95 % and maximum at lag 0, over those
@@ -71,13 +72,11 @@ class HandFilter:
         self._history = empty_history(landmarks, len(MODELS.own))
         self._sights = no_sights(landmarks, len(cameras.t), hold_s)
         self._fates = no_fates(landmarks)
-        self._row = in_a_row(
-            Held(self._history, self._sights, self._fates, cameras, MODELS, float(GATE))
-        )
+        self._held = pack(Held(self._history, self._sights, self._fates, cameras, MODELS, GATE))
 
     def observe(self, looks: FrameLooks) -> None:
         """Take in a frame's looks."""
-        outcome = take_looks(*looks, *self._row)
+        outcome = take_looks(self._held, *looks)
         lost, used, alive = self._fates.counts.tolist()
         self._counts.dropped += lost
         if outcome == LATE:
@@ -87,6 +86,11 @@ class HandFilter:
         self._counts.gated += alive - used
         if outcome == UNUSUAL:
             self._begin_where_due(looks)
+
+    def settle(self) -> None:
+        """Do what of the last frame points do not wait for; observe() does it where nobody has."""
+        if self._history.incomplete[0]:
+            complete(self._held)
 
     def _begin_where_due(self, looks: FrameLooks) -> None:
         """Landmarks of a frame that begin, or begin again, as their fates say."""
@@ -98,9 +102,6 @@ class HandFilter:
             self._begin(landmark, time_s, START_WINDOW_S)
         for landmark in looks.landmarks[(alive & ~used)[looks.landmarks]].tolist():
             self._begin_again(landmark, time_s)
-
-    def _filter_from(self, index: int) -> None:
-        filter_from(self._history, index, self._cameras, MODELS, GATE)
 
     def _looks(self, landmark: int, indices: Ints) -> Looks:
         history = self._history
@@ -136,10 +137,10 @@ class HandFilter:
         before = history.begins[since, landmark], history.ends[since, landmark]
         history.begins[since, landmark] = since == node
         history.ends[since, landmark] = False
-        self._filter_from(index)
+        filter_again(self._held, index)
         if not self._has_depth(landmark, indices):
             history.begins[since, landmark], history.ends[since, landmark] = before
-            self._filter_from(index)
+            filter_again(self._held, index)
             self._counts.refused += 1
             return False
         for k in indices.tolist():
@@ -193,12 +194,13 @@ class HandFilter:
         if np.count_nonzero(~history.used[nodes, landmark]) >= CONTRADICTIONS:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
-    def tell(self, time_s: float, recent_s: Array, told: Estimates) -> bool:
-        """Fill told with what is known at an instant; lost landmarks end (frame_update.drop_lost).
+    def tell(self, time_s: float, recent_s: Array, told: Packed) -> bool:
+        """Fill told, Estimates, with what is known at an instant.
 
+        Lost landmarks end (frame_update.drop_lost).
         recent_s (C,): so old a camera's look may be to count as of that instant. Returns whether
         there is any landmark that no two cameras see.
         """
-        lost, alone = tell_all(time_s, recent_s, *told, *self._row)
+        lost, alone = tell_all(self._held, told, time_s, recent_s)
         self._counts.dropped += lost
         return bool(alone)

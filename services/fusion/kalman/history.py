@@ -22,13 +22,14 @@ NODES = 32
 
 
 class HandHistory(NamedTuple):
-    """Up to NODES frames of N landmarks, M motion models; D = 9 N + 1 (motion_models.py).
+    """Up to NODES frames of N landmarks, M motion models; D = 9 N + 1 (motion/motion_models.py).
 
     `order` lists the nodes (rows of storage) by time. The first is what all others build on.
     """
 
     size: Ints  # (1,) how many nodes there are; 0: nothing observed yet
     order: Ints  # (NODES,)
+    incomplete: Bools  # (1,) the newest node is not filtered by all models yet
     time_s: Array  # (NODES,) mean of the frame's observations
     camera: Ints  # (NODES,)
     clock_variance: Array  # (NODES,) of the camera's clock, s^2
@@ -45,9 +46,10 @@ class HandHistory(NamedTuple):
     used_by: Bools  # (NODES, M, N) its observation updated this model
     strikes: Ints  # (NODES, M, N) how many of its latest looks in a row this model did not use
     probability: Array  # (NODES, M) of each model
+    log_likelihood: Array  # (NODES, M) of the frame's looks
     behind: Ints  # (NODES, M) how many frames it has been improbable
-    way: Array  # (NODES, 3 N, 3 N) mean of v v^T over recent velocities (motion_models.py)
-    own: Array  # (NODES, M, N) density of each landmark's own jerk in the step here (own_motion.py)
+    way: Array  # (NODES, 3 N, 3 N) mean of v v^T over recent velocities (motion/motion_models.py)
+    own: Array  # (NODES, M, N) density of each landmark's own jerk in the step here (own_motion)
     carried: Array  # (NODES, M, N) what of it was so before the frame's looks
     parent: Ints  # (NODES, M) the model whose estimate at the node before it was predicted from
     state: Array  # (NODES, M, D) filtered
@@ -68,6 +70,7 @@ def empty_history(landmarks: int, models: int) -> HandHistory:
     return HandHistory(
         size=np.zeros(1, dtype=np.int64),
         order=np.arange(NODES),
+        incomplete=np.zeros(1, dtype=np.bool_),
         time_s=np.zeros(NODES),
         camera=np.full(NODES, -1),
         clock_variance=np.zeros(NODES),
@@ -84,6 +87,7 @@ def empty_history(landmarks: int, models: int) -> HandHistory:
         used_by=np.zeros((*by_model, landmarks), dtype=np.bool_),
         strikes=np.zeros((*by_model, landmarks), dtype=np.int64),
         probability=np.full(by_model, 1.0 / models),
+        log_likelihood=np.zeros(by_model),
         behind=np.zeros(by_model, dtype=np.int64),
         way=np.zeros((NODES, 3 * landmarks, 3 * landmarks)),
         own=np.zeros((*by_model, landmarks)),
@@ -106,6 +110,7 @@ def start_history(history: HandHistory, time_s: float) -> None:
     node = history.order[0]
     models = history.probability.shape[1]
     history.size[0] = 1
+    history.incomplete[0] = False
     history.time_s[node] = time_s
     history.camera[node] = -1
     clear_events(history, node)

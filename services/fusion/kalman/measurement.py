@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import project_at
-from services.fusion.kalman.motion_models import FAST_SUMS
+from services.fusion.kalman.motion.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
 # A look that moves its landmark by more than this is linearised anew where that leaves it; from

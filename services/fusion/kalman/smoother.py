@@ -13,10 +13,10 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools
-from services.fusion.kalman.filtering import innovation_of
 from services.fusion.kalman.history import HandHistory, nodes_until
 from services.fusion.kalman.measurement import adjoint_update
-from services.fusion.kalman.motion_models import (
+from services.fusion.kalman.model_step import innovation_of
+from services.fusion.kalman.motion.motion_models import (
     FAST_SUMS,
     RESTING,
     MotionModels,
@@ -29,13 +29,13 @@ from services.fusion.kalman.motion_models import (
     turn_gram,
     unit_process_noise,
 )
-from services.fusion.kalman.own_motion import (
+from services.fusion.kalman.motion.own_motion import (
     add_own_to_places,
     carried_on,
     own_noise,
     transitions,
 )
-from services.fusion.kalman.rigid_motion import body_transform
+from services.fusion.kalman.motion.rigid_motion import body_transform
 
 # Models less probable than this have no say in what is put out.
 _LEAST = 1e-3

@@ -16,8 +16,8 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.geometry.triangulation import TriangulationStatus, triangulate
-from services.fusion.kalman.filtering import START_SIGMAS
 from services.fusion.kalman.measurement import Innovation, Look, predict_ray
+from services.fusion.kalman.model_step import START_SIGMAS
 
 # Rounds of linearisation: the second is within a millimetre, the third within rounding.
 _ROUNDS = 3

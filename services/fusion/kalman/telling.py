@@ -8,7 +8,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.frame_update import Sights, drop_lost
 from services.fusion.kalman.history import HandHistory
-from services.fusion.kalman.motion_models import MotionModels
+from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.smoother import smooth_hand
 from services.fusion.method import Estimates
 

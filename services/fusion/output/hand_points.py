@@ -7,7 +7,7 @@ a call touches is cold by the next frame: many small ones cost more than what th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,20 +20,37 @@ from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
 from services.fusion.output.hand_plausibility import coherent
+from services.fusion.output.hidden_paint import PaintSeen
 from services.fusion.output.known_paint import KnownPaint, correct_paint
 from services.fusion.output.systematic_error import Systematic, add_systematic
+from services.fusion.packed import Packed, pack
 
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
 _PER_M = 1e6
 # Covariances to as many digits as sigmas' squares need.
 _PER_M2 = 1e13
-# Where the parts of a row end that _point_numbers is given.
-_ESTIMATES = len(Estimates._fields)
-_PAINT = _ESTIMATES + len(KnownPaint._fields)
-_SYSTEMATIC = _PAINT + len(Systematic._fields)
 # The upper triangle, as HandPoint.covariance_m2 has it.
 _ROWS, _COLUMNS = np.triu_indices(3)
+
+
+class Corrections(NamedTuple):
+    """What turns located paint into points, by what is known of it at the time."""
+
+    paint: KnownPaint
+    systematic: Systematic
+    seen: PaintSeen
+    cameras: Extrinsics
+
+
+class _Points(NamedTuple):
+    """All that points are made of beside estimates, and what becomes of them."""
+
+    corrections: Corrections
+    hand_of: Ints  # (L,) whose a landmark is
+    reach_m: Array  # (H,) each hand's
+    numbers: Array  # (L, 12) of points, rounded
+    kept: Bools  # (L,) which of them are told
 
 
 class PointMessages:
@@ -44,55 +61,42 @@ class PointMessages:
         landmarks: tuple[Landmark, ...],
         reach_m: Mapping[HandName, float],
         cameras: Sequence[str],
-        extrinsics: Extrinsics,
+        corrections: Corrections,
     ) -> None:
-        """reach_m: of every hand, in the order of the messages (hand_plausibility.py)."""
+        """reach_m: of every hand, in the order of the messages (hand_plausibility.py).
+
+        corrections: what their owners keep up to date; places that are seen are written here.
+        """
         self._names = [landmark.name for landmark in landmarks]
         self._hands = list(reach_m)
         self._cameras = cameras
-        self._extrinsics = extrinsics
         hand_of = [self._hands.index(landmark.hand) for landmark in landmarks]
-        self._hand_of = np.array(hand_of, dtype=np.int64), np.array(list(reach_m.values()))
         self._hand_names = [landmark.hand for landmark in landmarks]
-        # For _point_numbers to fill.
-        self._numbers = np.empty((len(landmarks), 12))
-        self._kept = np.empty(len(landmarks), dtype=np.bool_)
+        self._points = _Points(
+            corrections,
+            np.array(hand_of, dtype=np.int64),
+            np.array(list(reach_m.values())),
+            np.empty((len(landmarks), 12)),
+            np.empty(len(landmarks), dtype=np.bool_),
+        )
+        self._packed = pack(self._points)
         # Names of the cameras that see a landmark, by whether each does: few different lists.
         self._seen_by: dict[tuple[bool, ...], list[str]] = {}
 
     def of(
-        self,
-        estimates: Estimates,
-        instant_ns: int,
-        paint: KnownPaint,
-        errors: tuple[Systematic, Array],
-        places: Array,
+        self, estimates: Estimates, instant_ns: int
     ) -> tuple[dict[HandName, list[HandPoint]], int]:
         """The points of every hand, and how many were left out as they do not belong to theirs.
 
-        estimates: of paint's centres; errors: what is to be added to their covariances, as in
-        add_systematic; places (L, 3) gets the positions, NaN of what was not found.
+        estimates: of paint's centres.
         """
-        systematic, hidden = errors
-        # Arrays by themselves: each in a tuple would cost .1 us more, and one returned .5.
-        incoherent = _point_numbers(
-            self._numbers,
-            self._kept,
-            instant_ns,
-            hidden,
-            places,
-            *self._hand_of,
-            *estimates,
-            *paint,
-            *systematic,
-            *self._extrinsics,
-        )
+        incoherent = _point_numbers(self._packed, instant_ns, *estimates)
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
         told = zip(
-            self._kept.tolist(),
+            self._points.kept.tolist(),
             self._names,
             self._hand_names,
-            self._numbers.tolist(),
+            self._points.numbers.tolist(),
             estimates.seen_by.tolist(),
             estimates.measured.tolist(),
             strict=True,
@@ -120,40 +124,30 @@ class PointMessages:
 
 
 @njit(cache=True)
-def _point_numbers(
-    numbers: Array,
-    kept: Bools,
-    instant_ns: int,
-    hidden: Array,
-    places: Array,
-    hand_of: Ints,
-    reach_m: Array,
-    *row: Any,
-) -> int:
-    """To numbers (L, 12) those of points, rounded; to kept (L,) which of them to tell.
+def _point_numbers(packed: Packed, instant_ns: int, *row: Any) -> int:
+    """Fill the numbers of points, and which of them to tell; how many are incoherent.
 
-    Returns how many are incoherent. hand_of (L,), reach_m: whose a landmark is, and each hand's
-    reach. row: Estimates, KnownPaint, Systematic and Extrinsics, one after the other. The others as
-    in PointMessages.of.
+    packed: _Points; row: Estimates.
     """
-    estimates, paint = Estimates(*row[:_ESTIMATES]), KnownPaint(*row[_ESTIMATES:_PAINT])
-    systematic, cameras = Systematic(*row[_PAINT:_SYSTEMATIC]), Extrinsics(*row[_SYSTEMATIC:])
+    points, estimates = packed.parts, Estimates(*row)
+    paint, systematic, seen, cameras = points.corrections
     positions, covariances = estimates.positions_m.copy(), estimates.covariances_m2.copy()
     found, seen_by = estimates.found, estimates.seen_by
     correct_paint(paint, instant_ns, positions, covariances, seen_by, cameras)
-    places[:] = np.nan
+    seen.places[:] = np.nan
     for k in np.flatnonzero(found):
-        places[k] = positions[k]
-    add_systematic(systematic, hidden, positions, seen_by, cameras, covariances)
+        seen.places[k] = positions[k]
+    add_systematic(systematic, seen.sigmas, positions, seen_by, cameras, covariances)
     usable = _usable(positions, covariances, found)
+    kept = points.kept
     kept[:] = False
-    for hand in range(reach_m.size):
-        rows = np.flatnonzero(hand_of == hand)
+    for hand in range(points.reach_m.size):
+        rows = np.flatnonzero(points.hand_of == hand)
         detected = estimates.detected[rows]
         kept[rows] = coherent(
-            positions[rows], covariances[rows], usable[rows], detected, reach_m[hand]
+            positions[rows], covariances[rows], usable[rows], detected, points.reach_m[hand]
         )
-    _round(positions, covariances, numbers)
+    _round(positions, covariances, points.numbers)
     return int(np.count_nonzero(usable) - np.count_nonzero(kept))
 
 

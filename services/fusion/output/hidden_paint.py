@@ -14,6 +14,7 @@ A painted finger tip looks up to so much smaller from another side; a dab on cur
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -28,6 +29,7 @@ from services.fusion.output.expected_area import (
     usually_less,
 )
 from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint, turn_on
+from services.fusion.packed import Packed, pack
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
 # cameras' rays, of tips and of dabs. Whole ones seen by two cameras .09 to .15 rad apart: within
@@ -44,6 +46,28 @@ _SHIFT_BY_POSE = 0.3
 _RECENT_S, _MEMORY_S = 0.1, 0.1
 
 
+class PaintSeen(NamedTuple):
+    """What C cameras saw last of the paint of L landmarks."""
+
+    areas: Array  # (L, C) of each look, in the rays' units
+    seen_s: Array  # (L, C) when
+    levels: Array  # (L, C) logarithm of area over expected area of paint that shows whole
+    # One standard deviation of each ray: its own, as others see more, and one that all share, as
+    # all see less than the pose lets expect.
+    sigmas: Array  # (2, L, C)
+    # Where each landmark is, which whoever puts it there writes; NaN where that is unknown.
+    places: Array  # (L, 3)
+
+
+class _Seen(NamedTuple):
+    """All that a look is compared with."""
+
+    seen: PaintSeen
+    centres_rig: Array  # (C, 3) of the cameras
+    per_rad: Array  # (L,) how fast areas differ with the angle between rays
+    paint: KnownPaint
+
+
 class HiddenPaint:
     """How far every camera's sight of every landmark may be off: by the areas that all of them see,
     and by what poses let expect of tips.
@@ -56,39 +80,29 @@ class HiddenPaint:
 
         paint: what its owner keeps up to date with poses.
         """
-        self._centres, self._paint = centres_rig, paint
-        self._per_rad = np.where(round_paint, _TIP_PER_RAD, _DAB_PER_RAD)
+        per_rad = np.where(round_paint, _TIP_PER_RAD, _DAB_PER_RAD)
+        shape = (len(per_rad), len(centres_rig))
+        self.seen = PaintSeen(
+            areas=np.empty(shape),
+            seen_s=np.empty(shape),
+            levels=np.empty(shape),
+            sigmas=np.empty((2, *shape)),
+            places=np.empty((shape[0], 3)),
+        )
+        self._packed = pack(_Seen(self.seen, centres_rig, per_rad, paint))
         self.reset()
 
     def reset(self) -> None:
         """Time starts anew."""
-        shape = (len(self._per_rad), len(self._centres))
-        self._areas, self._seen_s = np.zeros(shape), np.full(shape, -np.inf)
-        # The logarithm of area over expected area of paint that shows whole.
-        self._levels = np.full(shape, np.nan)
-        # One standard deviation of each ray (2, L, C): its own, as others see more, and one that
-        # all share, as all see less than the pose lets expect; where each landmark is (L, 3), which
-        # whoever puts it there writes, NaN where that is unknown.
-        self.sigmas = np.zeros((2, *shape))
-        self.places = np.full((shape[0], 3), np.nan)
+        seen = self.seen
+        seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
+        seen.sigmas[:], seen.places[:] = 0.0, np.nan
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
-        found, paint = np.empty(len(view.landmarks)), self._paint
+        found = np.empty(len(view.landmarks))
         _compare(
-            self._areas,
-            self._seen_s,
-            self._levels,
-            self.sigmas,
-            self.places,
-            self._centres,
-            self._per_rad,
-            paint.areas_m2,
-            paint.directions,
-            paint.turns_rad_s,
-            paint.direction_sigmas,
-            paint.shape_sds,
-            paint.stamps_ns,
+            self._packed,
             view.camera,
             view.instant_ns,
             time_s,
@@ -101,19 +115,7 @@ class HiddenPaint:
 
 @njit(cache=True)
 def _compare(
-    known: Array,
-    seen_s: Array,
-    levels: Array,
-    sigmas: Array,
-    places: Array,
-    centres: Array,
-    per_rad: Array,
-    areas_m2: Array,
-    directions: Array,
-    turns_rad_s: Array,
-    direction_sigmas: Array,
-    shape_sds: Array,
-    stamps_ns: Ints,
+    packed: Packed,
     camera: int,
     instant_ns: int,
     time_s: float,
@@ -121,37 +123,35 @@ def _compare(
     areas: Array,
     out: Array,
 ) -> None:
-    """Update known areas, times and levels (L, C) and sigmas (2, L, C) by a look; to out the sigmas
-    of its landmarks (n,).
-
-    areas_m2 to stamps_ns: of KnownPaint.
-    """
-    own, shared = sigmas
+    """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,)."""
+    seen, centres, per_rad, paint = packed.parts
+    own, shared = seen.sigmas
     # How much less of each shows than its pose lets expect, as a logarithm; NaN where none tells.
     less = np.full(landmarks.size, np.nan)
     for n in range(landmarks.size):
         row = landmarks[n]
-        passed_s = max(time_s - seen_s[row, camera], 0.0)
+        passed_s = max(time_s - seen.seen_s[row, camera], 0.0)
         keep = math.exp(-passed_s / _MEMORY_S)
-        known[row, camera], seen_s[row, camera] = areas[n], time_s
-        age_ns = instant_ns - stamps_ns[row]
-        if areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
-            levels[row, camera], less[n] = _against_pose(
-                places[row] - centres[camera],
-                areas_m2[row],
-                (directions[row], turns_rad_s[row], 1e-9 * age_ns),
-                math.hypot(direction_sigmas[row, 0], direction_sigmas[row, 1]),
+        seen.areas[row, camera], seen.seen_s[row, camera] = areas[n], time_s
+        age_ns = instant_ns - paint.stamps_ns[row]
+        if paint.areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
+            sigmas_rad = paint.direction_sigmas[row]
+            seen.levels[row, camera], less[n] = _against_pose(
+                seen.places[row] - centres[camera],
+                paint.areas_m2[row],
+                (paint.directions[row], paint.turns_rad_s[row], 1e-9 * age_ns),
+                math.hypot(sigmas_rad[0], sigmas_rad[1]),
                 areas[n],
-                (levels[row, camera], passed_s),
+                (seen.levels[row, camera], passed_s),
             )
-        worst = _unlike(known, seen_s, places, centres, per_rad, camera, row, time_s)
+        worst = _unlike(seen, centres, per_rad[row], camera, row, time_s)
         own[row, camera] = max(worst, keep * own[row, camera])
         shared[row, camera] *= keep
         out[n] = own[row, camera]
     usual = usually_less(less)
     for n in range(landmarks.size):
         row = landmarks[n]
-        hidden = hidden_share(less[n] - usual, shape_sds[row])
+        hidden = hidden_share(less[n] - usual, paint.shape_sds[row])
         off = _SHIFT_BY_POSE * hidden * math.sqrt(areas[n] / (1.0 - hidden))
         shared[row, camera] = max(off, shared[row, camera])
 
@@ -184,30 +184,23 @@ def _against_pose(
 
 @njit(cache=True)
 def _unlike(
-    known: Array,
-    seen_s: Array,
-    places: Array,
-    centres: Array,
-    per_rad: Array,
-    camera: int,
-    row: int,
-    time_s: float,
+    seen: PaintSeen, centres: Array, per_rad: float, camera: int, row: int, time_s: float
 ) -> float:
     """How far a camera's look at a landmark may be off, as others see more; 0 if none does."""
-    area, worst = known[row, camera], 0.0
-    own = places[row] - centres[camera]
+    area, worst, place = seen.areas[row, camera], 0.0, seen.places[row]
+    own = place - centres[camera]
     own_m = math.sqrt(own @ own)
     for other in range(centres.shape[0]):
-        fresh = 0.0 <= time_s - seen_s[row, other] <= _RECENT_S
+        fresh = 0.0 <= time_s - seen.seen_s[row, other] <= _RECENT_S
         if other == camera or not fresh or area <= 0.0:
             continue
-        away = places[row] - centres[other]
+        away = place - centres[other]
         away_m = math.sqrt(away @ away)
         # Nothing without a place, which is NaN, or without a distance.
         if own_m * away_m > 0.0:
             cosine = min(max((own @ away) / (own_m * away_m), -1.0), 1.0)
-            whole = known[row, other] * (away_m / own_m) ** 2
-            less = math.log(whole / area) - _ALIKE - per_rad[row] * math.acos(cosine)
+            whole = seen.areas[row, other] * (away_m / own_m) ** 2
+            less = math.log(whole / area) - _ALIKE - per_rad * math.acos(cosine)
             if less > 0.0:
                 worst = max(worst, _SHIFT * (1.0 - math.exp(-less)) * math.sqrt(whole))
     return worst

@@ -12,6 +12,7 @@ from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.output.paint_centroid import Finger, cross, expected_shift
+from services.fusion.packed import Packed
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
@@ -64,18 +65,19 @@ class KnownPaint(NamedTuple):
 
 @njit(cache=True)
 def note_directions(
-    paint: KnownPaint,
+    packed: Packed,
     rows: Ints,
     directions: Array,
     hinges: Array,
-    sigmas: tuple[Array, float],
+    sigmas_rad: Array,
+    shape_sd: float,
     stamp_ns: int,
 ) -> None:
-    """Remember how fingers of landmarks (n,) point (n, 3) and bend (n, 3).
+    """Remember in KnownPaint how fingers of landmarks (n,) point (n, 3) and bend (n, 3).
 
-    sigmas: how sure that is (n, 2) rad, and the shape of their paint, in radii.
+    sigmas_rad (n, 2), shape_sd: how sure that is, and the shape of their paint, in radii.
     """
-    sigmas_rad, shape_sd = sigmas
+    paint: KnownPaint = packed.parts
     for n in range(rows.size):
         row = rows[n]
         passed_s = 1e-9 * (stamp_ns - paint.stamps_ns[row])

@@ -31,49 +31,55 @@ def centroid_shift(table: Array, cosine: float) -> float:
 
 
 @njit(cache=True)
-def _sights(p_rig: Array, cameras: Extrinsics, H: Array, A_inverse: Array) -> bool:
-    """What does not depend on a finger's direction: H (C, 2, 3) of the rays by a point p_rig (3,).
+def _sights(p_rig: Array, cameras: Extrinsics, rays: Array, weights: Array) -> bool:
+    """What does not depend on a finger's direction: how cameras locate a point p_rig (3,).
 
-    And the inverse of H^T H (3, 3), summed over the cameras. False if they cannot locate it.
+    To rays (C, 3) their unit vectors towards it, to weights (C, 3, 3) how a shift seen by each
+    moves the point of least squares. False if they cannot locate it.
     """
-    A, ray = np.zeros((3, 3)), np.empty(2)
-    for c in range(H.shape[0]):
-        if not project(p_rig, cameras.R[c], cameras.t[c], ray, H[c]):
+    A, A_inverse, ray, H = np.zeros((3, 3)), np.empty((3, 3)), np.empty(2), np.empty((2, 3))
+    for c in range(rays.shape[0]):
+        R, t, away = cameras.R[c], cameras.t[c], rays[c]
+        if not project(p_rig, R, t, ray, H):
             return False
-        for k in range(2):
+        for i in range(3):
+            # From the camera's centre, -R^T t.
+            away[i] = p_rig[i] + R[0, i] * t[0] + R[1, i] * t[1] + R[2, i] * t[2]
+            for j in range(3):
+                weights[c, i, j] = H[0, i] * H[0, j] + H[1, i] * H[1, j]
+                A[i, j] += weights[c, i, j]
+        length = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+        for i in range(3):
+            away[i] /= length
+    if not invert_symmetric(A, A_inverse):
+        return False
+    column = np.empty(3)
+    for c in range(rays.shape[0]):
+        for j in range(3):
             for i in range(3):
-                for j in range(3):
-                    A[i, j] += H[c, k, i] * H[c, k, j]
-    return invert_symmetric(A, A_inverse)
+                column[i] = weights[c, i, j]
+            multiply(A_inverse, column, weights[c, :, j])
+    return True
 
 
 @njit(cache=True)
-def _least_squares(
-    table: Array,
-    p_rig: Array,
-    direction: Array,
-    cameras: Extrinsics,
-    sights: tuple[Array, Array],
-    work: Array,
-    shift: Array,
-) -> None:
-    """Where the cameras locate the visible centroid, minus the landmark p_rig (3,); to shift (3,).
+def _located(table: Array, direction: Array, rays: Array, weights: Array, shift: Array) -> None:
+    """Where the cameras locate the visible centroid, minus the landmark; to shift (3,).
 
-    direction (3,) is the finger's, towards its end, of unit length. Least squares over the cameras'
-    rays, from what _sights found; work (2, 3) is written over.
+    direction (3,) is the finger's, towards its end, of unit length; the others as of _sights.
     """
-    H, A_inverse = sights
-    b, seen_shift = work[0], work[1]
-    b[:] = 0.0  # H^T (shift of the ray), summed
-    for c in range(H.shape[0]):
-        _seen_shift(table, p_rig, direction, cameras.R[c], cameras.t[c], seen_shift)
-        for k in range(2):
-            ray_shift = (
-                H[c, k, 0] * seen_shift[0] + H[c, k, 1] * seen_shift[1] + H[c, k, 2] * seen_shift[2]
-            )
-            for i in range(3):
-                b[i] += H[c, k, i] * ray_shift
-    multiply(A_inverse, b, shift)
+    shift[:] = 0.0
+    for c in range(rays.shape[0]):
+        x, y, z = rays[c]
+        cosine = x * direction[0] + y * direction[1] + z * direction[2]
+        sine = math.sqrt(max(1.0 - cosine * cosine, 1e-12))
+        # Across the viewing ray, towards the finger's end.
+        far = centroid_shift(table, cosine) / sine
+        x = far * (direction[0] - cosine * x)
+        y = far * (direction[1] - cosine * y)
+        z = far * (direction[2] - cosine * z)
+        for i in range(3):
+            shift[i] += weights[c, i, 0] * x + weights[c, i, 1] * y + weights[c, i, 2] * z
 
 
 class Finger(NamedTuple):
@@ -102,26 +108,25 @@ def expected_shift(
     differences of first order, and cubature rules, call that certain. False if the cameras cannot
     locate it.
     """
-    H, A_inverse, work = np.empty((cameras.R.shape[0], 2, 3)), np.empty((3, 3)), np.empty((2, 3))
-    if not _sights(p_rig, cameras, H, A_inverse):
+    count = cameras.R.shape[0]
+    rays, weights = np.empty((count, 3)), np.empty((count, 3, 3))
+    if not _sights(p_rig, cameras, rays, weights):
         return False
-    sights = H, A_inverse
     across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((3, 3))
     cross(finger.hinge, finger.direction, across[0])
     across[1] = finger.hinge
     straight, one, other = shifts[0], shifts[1], shifts[2]
-    _least_squares(table, p_rig, finger.direction, cameras, sights, work, straight)
+    _located(table, finger.direction, rays, weights, straight)
     for i in range(3):
         shift[i] = straight[i] / 3.0
     covariance[:] = 0.0
     for axis in range(2):
         angle = math.sqrt(3.0) * finger.sigmas_rad[axis]
-        for side, out in ((-1.0, one), (1.0, other)):
+        cosine, sine = math.cos(angle), math.sin(angle)
+        for side, out in ((-sine, one), (sine, other)):
             for i in range(3):
-                turned[i] = (
-                    math.cos(angle) * finger.direction[i] + side * math.sin(angle) * across[axis, i]
-                )
-            _least_squares(table, p_rig, turned, cameras, sights, work, out)
+                turned[i] = cosine * finger.direction[i] + side * across[axis, i]
+            _located(table, turned, rays, weights, out)
         for i in range(3):
             first, second = other[i] - one[i], other[i] + one[i] - 2.0 * straight[i]
             shift[i] += (one[i] + other[i]) / 6.0
@@ -148,23 +153,3 @@ def _add_square(v: Array, weight: float, cov: Array) -> None:
     for i in range(3):
         for j in range(3):
             cov[i, j] += weight * v[i] * v[j]
-
-
-@njit(cache=True)
-def _seen_shift(
-    table: Array, p_rig: Array, direction: Array, R: Array, t: Array, out: Array
-) -> None:
-    """One camera's centroid_shift as a vector across its viewing ray, in the rig frame; to out."""
-    length = 0.0
-    cosine = 0.0
-    for i in range(3):
-        # The viewing ray in the rig frame: p - centre, centre = -R^T t.
-        out[i] = p_rig[i] + R[0, i] * t[0] + R[1, i] * t[1] + R[2, i] * t[2]
-        length += out[i] ** 2
-        cosine += out[i] * direction[i]
-    length = math.sqrt(length)
-    cosine /= length
-    sine = math.sqrt(max(1.0 - cosine * cosine, 1e-12))
-    shift = centroid_shift(table, cosine)
-    for i in range(3):
-        out[i] = (direction[i] - cosine * out[i] / length) / sine * shift

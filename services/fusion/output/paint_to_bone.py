@@ -39,6 +39,7 @@ from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
 from services.fusion.output.visible_paint import PaintTables, dab_sag_m, paint_tables
+from services.fusion.packed import pack
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
@@ -154,6 +155,8 @@ class PaintToBone:
             viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
 
+        self._packed = pack(self.known)
+
     def reset(self) -> None:
         """Time starts anew: no direction is known."""
         self.known.stamps_ns[:] = LONG_AGO_NS
@@ -192,8 +195,15 @@ class PaintToBone:
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
-        sigmas = told.sigmas_rad, told.shape_sd
-        note_directions(self.known, told.rows, told.directions, told.hinges, sigmas, told.stamp_ns)
+        note_directions(
+            self._packed,
+            told.rows,
+            told.directions,
+            told.hinges,
+            told.sigmas_rad,
+            told.shape_sd,
+            told.stamp_ns,
+        )
 
 
 @njit(cache=True)

@@ -15,19 +15,21 @@ from services.fusion.monitors import (
     shift_regression,
 )
 from services.fusion.one_camera import carried_shape, last_located
-from services.fusion.output import hand_points, known_paint, paint_to_bone
+from services.fusion.output import hand_points, hidden_paint, known_paint, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 
 LIVE = (
     held.take_looks,
-    filtering.filter_from,
+    held.complete,
+    held.filter_again,
     filtering.oldest_with,
     held.tell_all,
     estimator._keep_useful,
     carried_shape.carry_shape,
     last_located._note,
     hand_points._point_numbers,
+    hidden_paint._compare,
     paint_to_bone.turned_vectors,
     known_paint.note_directions,
     observations._observe,

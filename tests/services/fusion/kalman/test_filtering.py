@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.kalman.filtering import BEHIND_FRAMES
+from services.fusion.kalman.held import filter_again
+from testing.synthetic_points import MovingHand
 
 
 def test_late_frames_give_the_same_estimate(one_hand):
@@ -39,9 +41,56 @@ def test_a_model_left_behind_goes_on_from_the_likeliest(one_hand):
     """
     hand = one_hand()
     hand.run(range(4 + 2 * BEHIND_FRAMES))
+    hand.filter.settle()
     history = hand.filter._history
     newest = history.order[history.size[0] - 1]
     rested = [int(history.parent[node, 0]) for node in history.order[: history.size[0]]]
     assert set(rested) > {0}
     apart = history.state[newest, 0, :18] - history.state[newest, 2, :18]
     assert np.abs(apart).max() < 0.1
+
+
+def test_models_that_follow_later_end_as_if_filtered_at_once(one_hand):
+    """Test: 40 frames, of which most wait for their leading models only.
+
+    Expected: once the others have followed, each node is what filtering it anew makes of it.
+    """
+    hand, waited = one_hand(), 0
+    for k in range(40):
+        hand.see(hand.frame(k))
+        history = hand.filter._history
+        waited += history.incomplete[0]
+        hand.filter.settle()
+        assert not history.incomplete[0]
+        newest = history.order[history.size[0] - 1]
+        names = ("state", "cov", "probability", "behind", "own", "strikes", "way", "used", "parent")
+        followed = {name: getattr(history, name)[newest].copy() for name in names}
+        filter_again(hand.filter._held, history.size[0] - 1)
+        for name, found in followed.items():
+            np.testing.assert_array_equal(found, getattr(history, name)[newest], err_msg=name)
+    assert waited > 25
+
+
+def test_who_settles_and_when_changes_no_estimate(one_hand):
+    settled, left = one_hand(), one_hand()
+    for k in range(30):
+        settled.see(settled.frame(k))
+        left.see(left.frame(k))
+        told = [hand.told(k / 60.0) for hand in (settled, left)]
+        np.testing.assert_array_equal(told[0].positions_m, told[1].positions_m)
+        np.testing.assert_array_equal(told[0].covariances_m2, told[1].covariances_m2)
+        settled.filter.settle()
+
+
+def test_a_frame_that_leading_models_do_not_expect_waits_for_all(one_hand):
+    """Test: a hand at rest that suddenly is 3 mm aside.
+
+    Expected: its first frame there is filtered by all models before anything is told.
+    """
+    still = MovingHand(seed=1)(np.zeros((1, 6)))[0]
+    hand = one_hand(path=lambda times: np.broadcast_to(still, (len(times), 6, 3)).copy())
+    hand.run(range(30))
+    assert hand.filter._history.incomplete[0]
+    still += [0.003, 0.0, 0.0]
+    hand.see(hand.frame(30))
+    assert not hand.filter._history.incomplete[0]

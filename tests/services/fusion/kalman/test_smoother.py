@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.kalman.hand_filter import MODELS
-from services.fusion.kalman.motion_models import (
+from services.fusion.kalman.motion.motion_models import (
     SharedNoise,
     add_walk,
     jerk_cov,
     turn_gram,
     unit_process_noise,
 )
-from services.fusion.kalman.own_motion import add_own, own_noise, transitions
+from services.fusion.kalman.motion.own_motion import add_own, own_noise, transitions
 from testing.families.motions import flapping
 
 

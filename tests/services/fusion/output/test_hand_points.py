@@ -10,7 +10,8 @@ from rhot.hand import HANDS
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
-from services.fusion.output.hand_points import PointMessages
+from services.fusion.output.hand_points import Corrections, PointMessages
+from services.fusion.output.hidden_paint import HiddenPaint, PaintSeen
 from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import Systematic
 from testing.synthetic_points import SyntheticRig, point_hands
@@ -22,16 +23,22 @@ LANDMARKS = (
     Landmark("right", "wrist"),
     Landmark("right", "index_tip"),
 )
-NOTHING = Systematic(np.zeros(4), np.full(2, 1e-4), np.zeros(4, dtype=bool)), np.zeros((2, 4, 2))
-
+NOTHING = Systematic(np.zeros(4), np.full(2, 1e-4), np.zeros(4, dtype=bool))
 # Of points without extent.
 PAINT = PaintToBone(LANDMARKS, dict.fromkeys(HANDS, point_hands()["right"]), CAMERAS).known
 
 
 @pytest.fixture
-def messages() -> PointMessages:
+def seen() -> PaintSeen:
+    centres = np.array([camera.centre_rig for camera in CAMERAS])
+    return HiddenPaint(centres, np.zeros(4, dtype=bool), PAINT).seen
+
+
+@pytest.fixture
+def messages(seen: PaintSeen) -> PointMessages:
     reach_m = {"left": 0.19, "right": 0.19}
-    return PointMessages(LANDMARKS, reach_m, ["near", "far"], extrinsics(CAMERAS))
+    known = Corrections(PAINT, NOTHING, seen, extrinsics(CAMERAS))
+    return PointMessages(LANDMARKS, reach_m, ["near", "far"], known)
 
 
 def estimates(positions: Array) -> Estimates:
@@ -50,9 +57,10 @@ def positions() -> Array:
     return np.array([[0.0123456789, 0.0, 0.5], [0.1, 0.0, 0.5], [0.0] * 3, [-0.1, 0.0, 0.6]])
 
 
-def test_points_are_told_by_hand(messages: PointMessages, positions: Array) -> None:
-    told, places = estimates(positions), np.zeros((4, 3))
-    points, incoherent = messages.of(told, 0, PAINT, NOTHING, places)
+def test_points_are_told_by_hand(
+    messages: PointMessages, seen: PaintSeen, positions: Array
+) -> None:
+    points, incoherent = messages.of(estimates(positions), 0)
     assert [[point.name for point in of] for of in points.values()] == [
         ["wrist", "index_tip"],
         ["index_tip"],
@@ -66,8 +74,8 @@ def test_points_are_told_by_hand(messages: PointMessages, positions: Array) -> N
     assert (tip.cameras, tip.source) == (["near"], "predicted")
     assert points["right"][0].cameras == ["far"]
     assert incoherent == 0
-    np.testing.assert_array_equal(places[[0, 1, 3]], positions[[0, 1, 3]])
-    assert np.isnan(places[2]).all()
+    np.testing.assert_array_equal(seen.places[[0, 1, 3]], positions[[0, 1, 3]])
+    assert np.isnan(seen.places[2]).all()
 
 
 def test_what_is_no_number_or_of_another_hand_is_not_told(
@@ -76,7 +84,7 @@ def test_what_is_no_number_or_of_another_hand_is_not_told(
     positions[1, 2] = np.inf
     told = estimates(positions)
     told.detected[:] = [True, True, True, True]
-    points, incoherent = messages.of(told, 0, PAINT, NOTHING, np.zeros((4, 3)))
+    points, incoherent = messages.of(told, 0)
     assert [point.name for point in points["left"]] == ["wrist"]
     # One of the two that two cameras detect is enough; of more than two that would be none.
     assert len(points["right"]) == 1

@@ -14,6 +14,7 @@ from services.fusion.intake.observations import View
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
 from services.fusion.output.visible_paint import paint_tables
+from services.fusion.packed import pack
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene
@@ -53,14 +54,14 @@ def known_paint() -> KnownPaint:
 def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float, shape_sd: float = 0.0):
     """A pose tells where the tip points, at 0 s."""
     rows, hinges = np.array([0]), np.array([[1.0, 0.0, 0.0]])
-    sigmas = np.array([[sigma_rad, 0.0]]), shape_sd
-    note_directions(paint, rows, np.array([direction]), hinges, sigmas, 0)
+    sigmas = np.array([[sigma_rad, 0.0]])
+    note_directions(pack(paint), rows, np.array([direction]), hinges, sigmas, shape_sd, 0)
 
 
 @pytest.fixture
 def paint() -> HiddenPaint:
     paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
-    paint.places[:] = PLACES
+    paint.seen.places[:] = PLACES
     return paint
 
 
@@ -90,8 +91,8 @@ def test_alike_is_whole_and_less_is_hidden(paint):
     third = paint.observe(look(1, 0.33, 1.0), 0.03)[0] * 527.0
     assert 2.5 < third < 5.0
     # It is the smaller one that is off; what no pose told is not expected.
-    assert not paint.sigmas[0, :, 0].any()
-    assert not paint.sigmas[1].any()
+    assert not paint.seen.sigmas[0, :, 0].any()
+    assert not paint.seen.sigmas[1].any()
 
 
 def test_it_is_forgotten_after_a_while(paint):
@@ -109,7 +110,7 @@ def test_a_nearer_camera_sees_more():
     """Twice as near is four times the area, and nothing is hidden of either."""
     centres = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.25]])
     paint = HiddenPaint(centres, np.array([True, False]), known_paint())
-    paint.places[:] = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
+    paint.seen.places[:] = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
     paint.observe(look(1, 4.0, 4.0), 0.0)
     assert not paint.observe(look(0, 1.0, 1.0), 0.01).any()
     assert paint.observe(look(0, 0.5, 1.0), 0.02)[0] > 0.0
@@ -118,44 +119,44 @@ def test_a_nearer_camera_sees_more():
 def test_what_is_hidden_from_all_cameras_shows_by_its_pose():
     known = known_paint()
     paint = HiddenPaint(CENTRES, np.array([True, False]), known)
-    paint.places[:] = PLACES
+    paint.seen.places[:] = PLACES
     told(known, (0.0, -1.0, 0.0), 0.1)
     for frame in range(30):
         paint.observe(look(frame % 2, SIDE, 1.0), frame / 60)
-    assert not paint.sigmas[1].any()
+    assert not paint.seen.sigmas[1].any()
     # A third of it behind another finger, for both cameras: .3 of a third of its width.
     for camera in (0, 1):
         paint.observe(look(camera, 0.67 * SIDE, 1.0), 0.7 + camera / 60)
     width_px = 527.0 * np.sqrt(SIDE * AREA)
-    sigmas_px = paint.sigmas[1, 0] * 527.0
+    sigmas_px = paint.seen.sigmas[1, 0] * 527.0
     assert np.all((0.05 * width_px < sigmas_px) & (sigmas_px < 0.12 * width_px))
     # The filter is not told, nor is it a difference between cameras; a dab has no such area.
-    assert not paint.sigmas[0].any()
-    assert not paint.sigmas[1, 1].any()
+    assert not paint.seen.sigmas[0].any()
+    assert not paint.seen.sigmas[1, 1].any()
     # It is forgotten as the tip shows again.
     for frame in range(60):
         paint.observe(look(frame % 2, SIDE, 1.0), 0.75 + frame / 60)
-    assert np.all(paint.sigmas[1, 0] * 527.0 < 1e-3 * width_px)
+    assert np.all(paint.seen.sigmas[1, 0] * 527.0 < 1e-3 * width_px)
 
 
 def test_a_tip_that_turns_away_or_is_darker_for_good_is_not_hidden():
     known = known_paint()
     paint = HiddenPaint(CENTRES, np.array([True, False]), known)
-    paint.places[:] = PLACES
+    paint.seen.places[:] = PLACES
     told(known, (0.0, -1.0, 0.0), 0.1)
     paint.observe(look(0, SIDE, 1.0), 0.0)
     # It points at the camera and shows its end alone.
     ahead = -PLACES[0] / np.linalg.norm(PLACES[0])
     told(known, tuple(ahead), 0.1)
     paint.observe(look(0, SIDE * float(TABLES.areas_m2[-1] / TABLES.areas_m2[30]), 1.0), 0.03)
-    assert not paint.sigmas[1].any()
+    assert not paint.seen.sigmas[1].any()
     # As dark as that from the side, it counts as hidden, and as usual after half a minute.
     told(known, (0.0, -1.0, 0.0), 0.1)
     paint.observe(look(0, 0.6 * SIDE, 1.0), 0.06)
-    assert paint.sigmas[1, 0, 0] > 0.0
+    assert paint.seen.sigmas[1, 0, 0] > 0.0
     for frame in range(900):
         paint.observe(look(0, 0.6 * SIDE, 1.0), 0.09 + frame / 30)
-    assert paint.sigmas[1, 0, 0] < 1e-6
+    assert paint.seen.sigmas[1, 0, 0] < 1e-6
 
 
 def test_what_makes_all_tips_smaller_hides_none():
@@ -165,45 +166,45 @@ def test_what_makes_all_tips_smaller_hides_none():
         **{name: np.repeat(value[:1], 3, axis=0) for name, value in known._asdict().items()}
     )
     paint = HiddenPaint(CENTRES, np.full(3, True), known)
-    paint.places[:] = PLACES[0]
+    paint.seen.places[:] = PLACES[0]
     rows, down, hinges = (
         np.arange(3),
         np.tile((0.0, -1.0, 0.0), (3, 1)),
         np.tile((1.0, 0, 0), (3, 1)),
     )
-    note_directions(known, rows, down, hinges, (np.full((3, 2), 0.05), 0.0), 0)
+    note_directions(pack(known), rows, down, hinges, np.full((3, 2), 0.05), 0.0, 0)
 
     def seen(*areas: float) -> View:
         return look(0, 1.0, 1.0)._replace(landmarks=rows, areas=SIDE * AREA * np.array(areas))
 
     paint.observe(seen(1.0, 1.0, 1.0), 0.0)
     paint.observe(seen(0.67, 0.7, 0.65), 0.03)
-    assert not paint.sigmas[1].any()
+    assert not paint.seen.sigmas[1].any()
     paint.observe(seen(1.0, 0.67, 1.0), 0.06)
-    assert (paint.sigmas[1, :, 0] > 0.0).tolist() == [False, True, False]
+    assert (paint.seen.sigmas[1, :, 0] > 0.0).tolist() == [False, True, False]
 
 
 def test_an_unsure_pose_or_shape_explains_a_small_area():
     for sigma_rad, shape_sd, hidden in ((0.1, 0.0, True), (1.2, 0.0, False), (0.1, 0.3, False)):
         known = known_paint()
         paint = HiddenPaint(CENTRES, np.array([True, False]), known)
-        paint.places[:] = PLACES
+        paint.seen.places[:] = PLACES
         told(known, (0.0, -1.0, 0.0), sigma_rad, shape_sd)
         paint.observe(look(0, SIDE, 1.0), 0.0)
         paint.observe(look(0, 0.75 * SIDE, 1.0), 0.03)
-        assert (paint.sigmas[1, 0, 0] > 0.0) == hidden
+        assert (paint.seen.sigmas[1, 0, 0] > 0.0) == hidden
 
 
 def test_nothing_is_known_without_a_place():
     paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
     for places in (np.full((2, 3), np.nan), np.zeros((2, 3)), np.tile(CENTRES[1], (2, 1))):
-        paint.places[:] = places
+        paint.seen.places[:] = places
         paint.observe(look(0, 1.0, 1.0), 0.0)
         assert not paint.observe(look(1, 0.2, 0.2), 0.01).any()
-    paint.places[:] = PLACES
+    paint.seen.places[:] = PLACES
     assert not paint.observe(look(1, 0.0, 0.0), 0.02).any()
     paint.reset()
-    assert not paint.sigmas.any()
+    assert not paint.seen.sigmas.any()
 
 
 def test_sigmas_cover_fingers_that_pass_before_each_other(repository: Path):

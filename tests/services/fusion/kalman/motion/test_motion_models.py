@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from services.fusion.kalman.hand_filter import MODELS
-from services.fusion.kalman.motion_models import (
+from services.fusion.kalman.motion.motion_models import (
     SharedNoise,
     add_walk,
     adjoint_predict,

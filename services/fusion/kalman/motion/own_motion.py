@@ -16,7 +16,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.kalman.measurement import Innovation, Look
-from services.fusion.kalman.motion_models import MotionModels, transition, unit_process_noise
+from services.fusion.kalman.motion.motion_models import MotionModels, transition, unit_process_noise
 
 # Squared Mahalanobis distance (2 degrees of freedom) of a look beyond which own motion is looked
 # for: 5 % of all by chance.

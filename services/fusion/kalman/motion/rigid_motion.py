@@ -11,7 +11,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Bools
 from services.fusion.geometry.normal_equations import invert_symmetric
-from services.fusion.kalman.motion_models import centred
+from services.fusion.kalman.motion.motion_models import centred
 
 
 @njit(cache=True, error_model="numpy")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from services.fusion.kalman.hand_filter import MODELS
-from services.fusion.kalman.own_motion import (
+from services.fusion.kalman.motion.own_motion import (
     CALM_S,
     LEAST,
     LIVELY,

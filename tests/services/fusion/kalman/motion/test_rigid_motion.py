@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.fusion.kalman.rigid_motion import body_transform
+from services.fusion.kalman.motion.rigid_motion import body_transform
 
 
 def test_velocities_of_a_body_stay_what_they_are():
