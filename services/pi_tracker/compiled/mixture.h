@@ -40,14 +40,28 @@ static void weigh(tile *t, const shape *s, const constants *k, int kind, const f
     double sums[4] = {0.0, 0.0, 0.0, 0.0};
     for (int32_t y = 0; y < s->h; y++) {
         size_t at = row_at(s, y);
-        for (int c = 0; c < 4; c++) {
-            const float *light = c < 3 ? t->plane[LIGHT + c] + at : NULL, *w = weights + at;
-            float *to = known[c] + at, sum = 0.0f;
-            INDEPENDENT
-            for (int32_t x = 0; x < s->w; x++) to[x] = light ? light[x] * w[x] : w[x];
-            for (int32_t x = 0; x < s->w; x++) sum += to[x];
-            sums[c] += sum;
+        const float *luma = t->plane[LIGHT] + at, *u = t->plane[LIGHT + 1] + at;
+        const float *v = t->plane[LIGHT + 2] + at, *w = weights + at;
+        float *ly = known[0] + at, *lu = known[1] + at, *lv = known[2] + at, *lw = known[3] + at;
+        INDEPENDENT
+        for (int32_t x = 0; x < s->w; x++) {
+            ly[x] = luma[x] * w[x];
+            lu[x] = u[x] * w[x];
+            lv[x] = v[x] * w[x];
+            lw[x] = w[x];
         }
+        /* Each in its order, but not one after the other. */
+        float sum_y = 0.0f, sum_u = 0.0f, sum_v = 0.0f, sum_w = 0.0f;
+        for (int32_t x = 0; x < s->w; x++) {
+            sum_y += ly[x];
+            sum_u += lu[x];
+            sum_v += lv[x];
+            sum_w += lw[x];
+        }
+        sums[0] += sum_y;
+        sums[1] += sum_u;
+        sums[2] += sum_v;
+        sums[3] += sum_w;
     }
     for (int c = 0; c < 4; c++) {
         float mean = c < 3 ? (float)(sums[c] / at_least(sums[3], 1e-6)) : 1.0f;

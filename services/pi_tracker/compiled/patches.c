@@ -27,6 +27,9 @@ typedef struct {
     int32_t most;      /* patches that there is room for */
 } options;
 
+/* Eight cells; their memory is aligned so. */
+typedef uint64_t __attribute__((may_alias)) eight;
+
 /* Rows ahead of which chroma is asked for, and luma where there is colour. */
 #define AHEAD 8
 #define SOON 3
@@ -73,21 +76,26 @@ static void crop(uint8_t *classes, int32_t w, const box *part, uint8_t *mask) {
 }
 
 /* Rounds of erosion by 2 x 2 cells, then of dilation that puts back what is left where it was, in
-   place, as `opening` of detect/morphology.py: rows of w cells run into each other. */
-static void open_mask(uint8_t *mask, ptrdiff_t size, ptrdiff_t w, int32_t rounds) {
+   place, as `opening` of detect/morphology.py: rows of w cells run into each other. spare: memory
+   like the mask's, so that no cell waits for another's. */
+static void open_mask(uint8_t *mask, uint8_t *spare, ptrdiff_t size, ptrdiff_t w, int32_t rounds) {
     ptrdiff_t left = size;
     for (int32_t n = 0; n < rounds && left > 0; n++) {
         left -= w + 1;
+        INDEPENDENT
         for (ptrdiff_t i = 0; i < left; i++)
             mask[i] = mask[i] & mask[i + 1] & mask[i + w] & mask[i + w + 1];
     }
     for (ptrdiff_t i = left > 0 ? left : 0; i < size; i++) mask[i] = 0;
     for (int32_t n = 0; n < rounds && left > 0; n++) {
         left += w + 1;
-        for (ptrdiff_t i = left - 1; i > w; i--)
-            mask[i] = mask[i] | mask[i - 1] | mask[i - w] | mask[i - w - 1];
-        mask[w] |= mask[w - 1] | mask[0];
-        for (ptrdiff_t i = w - 1; i > 0; i--) mask[i] |= mask[i - 1];
+        spare[0] = mask[0];
+        for (ptrdiff_t i = 1; i < w; i++) spare[i] = mask[i] | mask[i - 1];
+        spare[w] = mask[w] | mask[w - 1] | mask[0];
+        INDEPENDENT
+        for (ptrdiff_t i = w + 1; i < left; i++)
+            spare[i] = mask[i] | mask[i - 1] | mask[i - w] | mask[i - w - 1];
+        for (ptrdiff_t i = 0; i < left; i++) mask[i] = spare[i];
     }
 }
 
@@ -140,12 +148,18 @@ static int is_nested(const box *a, const box *b) {
            (b->x0 < a->x0 && b->y0 < a->y0 && b->x1 > a->x1 && b->y1 > a->y1);
 }
 
+/* The first cell of a mask from i on, size if none is. Most cells are none: eight at a time. */
+static int32_t next_cell(const uint8_t *mask, int32_t i, int32_t size) {
+    while (i < size && !mask[i])
+        i += i % 8 == 0 && i + 8 <= size && !*(const eight *)(mask + i) ? 8 : 1;
+    return i;
+}
+
 /* The patches of a mask (w, h) that is used up, into out; returns how many, or FOR_PYTHON. */
 static int32_t patches_of(uint8_t *mask, const uint8_t *classes, int32_t w, int32_t h,
                           const options *o, int32_t *stack, patch *out) {
     int32_t count = 0, seen = 0, size = w * h;
-    for (int32_t i = 0; i < size; i++) {
-        if (!mask[i]) continue;
+    for (int32_t i = next_cell(mask, 0, size); i < size; i = next_cell(mask, i + 1, size)) {
         if (++seen > o->most) return FOR_PYTHON;
         patch found;
         found.at = take_out(mask, w, h, i, stack);
@@ -183,7 +197,7 @@ int32_t rhot_patches(const picture *p, const box *r, const colors *c, const opti
     part->y1 = h - found.y1 > o->margin ? found.y1 + o->margin : h;
     int32_t wide = part->x1 - part->x0, high = part->y1 - part->y0;
     crop(classes, w, part, mask);
-    open_mask(mask, (ptrdiff_t)wide * high, wide, o->rounds);
+    open_mask(mask, spare, (ptrdiff_t)wide * high, wide, o->rounds);
     for (ptrdiff_t i = 0; i < (ptrdiff_t)wide * high; i++) spare[i] = mask[i];
     return patches_of(spare, classes, wide, high, o, stack, out);
 }

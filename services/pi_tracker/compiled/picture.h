@@ -12,6 +12,13 @@
 /* Bytes of a cache's line, as a rule. */
 #define LINE 64
 
+/* Several numbers at a time: no value of such a loop depends on another's. */
+#if defined(__clang__)
+#define INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define INDEPENDENT _Pragma("GCC ivdep")
+#endif
+
 /* What a function returns that was given no picture. */
 enum { BAD_PICTURE = -1 };
 

@@ -12,13 +12,6 @@
 #define MARGIN 2
 #define PAD 2
 
-/* Several floats at a time: no value of such a loop depends on another's. */
-#if defined(__clang__)
-#define INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
-#else
-#define INDEPENDENT _Pragma("GCC ivdep")
-#endif
-
 /* Tuned in measure/centroid.py, centroid_sigma.py and paint_fraction.py, which say on what. */
 typedef struct {
     double misfit_px, misfit_per_px, sharp_band_px, darkest, full_contrast;

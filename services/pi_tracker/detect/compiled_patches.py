@@ -80,7 +80,7 @@ class CompiledPatches:
             self._memory_at = self._memory.ctypes.data
         colors = self._colors.get(planes.full_range) or self._colors_of(planes.full_range)
         count = self._find(
-            ctypes.byref(planes.in_c),
+            planes.in_c,
             (_INT * 4)(*rect),
             ctypes.byref(colors),
             self._options,

@@ -220,8 +220,11 @@ def _marker(name: str, centroid: Centroid, certainty: float, occluded: float) ->
 
     That moves the centre; where to is unknown, so sigma grows.
     """
-    whole_px2 = centroid.area_px / (1.0 - min(occluded, _MAX_OCCLUDED))
-    occlusion_sigma_px = _OCCLUSION_SIGMA * occluded * math.sqrt(whole_px2)
+    sigma_px, quality = centroid.sigma_px, centroid.quality * certainty
+    if occluded > 0.0:
+        whole_px2 = centroid.area_px / (1.0 - min(occluded, _MAX_OCCLUDED))
+        sigma_px = math.hypot(sigma_px, _OCCLUSION_SIGMA * occluded * math.sqrt(whole_px2))
+        quality *= 1.0 - occluded
     return Marker(
         color=name,
         # A hundredth of the best sigma is as fine as the position deserves.
@@ -229,6 +232,6 @@ def _marker(name: str, centroid: Centroid, certainty: float, occluded: float) ->
         x_px=round(1e3 * centroid.x_px) / 1e3,
         y_px=round(1e3 * centroid.y_px) / 1e3,
         area_px=round(10.0 * centroid.area_px) / 10.0,
-        sigma_px=round(1e4 * math.hypot(centroid.sigma_px, occlusion_sigma_px)) / 1e4,
-        quality=round(1e3 * centroid.quality * certainty * (1.0 - occluded)) / 1e3,
+        sigma_px=round(1e4 * sigma_px) / 1e4,
+        quality=round(1e3 * quality) / 1e3,
     )

@@ -47,7 +47,12 @@ class Track:
 
     def predicted(self, stamp_ns: int) -> tuple[float, float]:
         """Its position at a time, px."""
-        ahead_s = min(max((stamp_ns - self.stamp_ns) * 1e-9, 0.0), _MAX_PREDICTION_S)
+        ahead_s = (stamp_ns - self.stamp_ns) * 1e-9
+        # By comparisons: min and max take twice as long, of every marker in every picture.
+        if ahead_s <= 0.0:
+            return self.x_px, self.y_px
+        if ahead_s > _MAX_PREDICTION_S:
+            ahead_s = _MAX_PREDICTION_S
         return self.x_px + self.vx_px_s * ahead_s, self.y_px + self.vy_px_s * ahead_s
 
     def update(
@@ -82,10 +87,15 @@ class Track:
         """How well a blob agrees with this track in place and size, 0..1."""
         x, y = self.predicted(stamp_ns)
         dx, dy = blob.x_px - x, blob.y_px - y
-        unseen_s = min(max((stamp_ns - self.seen_ns) * 1e-9, 0.0), 1.0)
+        unseen_ns = stamp_ns - self.seen_ns
+        unseen_s = (
+            0.0 if unseen_ns <= 0 else 1.0 if unseen_ns >= 1_000_000_000 else unseen_ns * 1e-9
+        )
         reach_px = margin_px + _MAX_SPEED_PX_S * unseen_s
         a, b = blob.area_px, self.area_px
-        size_ratio = a / max(b, 1.0) if a < b else b / max(a, 1.0)
+        if a > b:
+            a, b = b, a
+        size_ratio = a / b if b > 1.0 else a
         return math.sqrt(size_ratio) / (1.0 + (dx * dx + dy * dy) / (reach_px * reach_px))
 
     def is_recent(self, stamp_ns: int) -> bool:

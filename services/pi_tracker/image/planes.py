@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+import struct
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,15 +20,9 @@ LIMITED_CHROMA = np.round(128.0 + (_LEVELS - 128.0) * (224.0 / 255.0)).astype(np
 _LIMITED_IN_C = (LIMITED_LUMA.ctypes.data, LIMITED_CHROMA.ctypes.data)
 
 
-class PictureInC(ctypes.Structure):
-    """picture of compiled/picture.h."""
-
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("y", "u", "v", "luma_levels", "chroma_levels")),
-        *((name, ctypes.c_int64) for name in ("bytes_y", "bytes_chroma")),
-        *((name, ctypes.c_int32) for name in ("row_y", "row_chroma")),
-        *((name, ctypes.c_int32) for name in ("left", "top", "right", "bottom", "width", "height")),
-    )
+# picture of compiled/picture.h: addresses of y, u, v and of both tables of levels; bytes of y and
+# of u; bytes of a row of both; the window's left, top, right, bottom; the picture's width, height.
+PICTURE_IN_C = struct.Struct("5P2q8i")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +36,15 @@ class Planes:
     full_range: bool  # both are yet to be scaled, by LIMITED_LUMA and LIMITED_CHROMA
 
     @cached_property
-    def in_c(self) -> PictureInC:
+    def in_c(self) -> bytes:
         """For compiled code; valid as long as these planes are."""
         luma, chroma = self.luma, self.chroma
         u = chroma.ctypes.data
-        return PictureInC(
+        return PICTURE_IN_C.pack(
             luma.ctypes.data,
             u,
             u + chroma.strides[0],
-            *(_LIMITED_IN_C if self.full_range else (None, None)),
+            *(_LIMITED_IN_C if self.full_range else (0, 0)),
             luma.nbytes,
             chroma.nbytes // 2,
             luma.strides[0],

@@ -117,7 +117,7 @@ class CompiledCentroids:
         scratch = self._scratch(self._scratch_size(w, h))
         out = (ctypes.c_double * (_VALUES * count))()
         wrong = self._measure(
-            ctypes.byref(planes.in_c),
+            planes.in_c,
             self._constants_at,
             (ctypes.c_double * 2)(noise.luma, noise.chroma),
             count,

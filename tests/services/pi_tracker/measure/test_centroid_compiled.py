@@ -15,7 +15,7 @@ from services.pi_tracker.detect.search_region import whole
 from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
-from services.pi_tracker.image.planes import PictureInC
+from services.pi_tracker.image.planes import PICTURE_IN_C
 from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure import centroid_compiled, fastest
 from services.pi_tracker.measure.centroid import centroids
@@ -155,7 +155,7 @@ def test_planes_smaller_than_the_picture_are_refused(measure):
 def test_both_sides_have_the_same_structures(compiled):
     sizes = (ctypes.c_int32 * 2).in_dll(compiled, "rhot_sizes")
     constants = centroid_compiled._constants()
-    assert list(sizes) == [ctypes.sizeof(PictureInC), ctypes.sizeof(constants)]
+    assert list(sizes) == [PICTURE_IN_C.size, ctypes.sizeof(constants)]
 
 
 def test_threads_do_not_share_memory(studio, tip, detector, noise, measure):
