@@ -350,7 +350,7 @@ prune_versions() {
 
 remove_version() {
     local packages digest
-    # The folder of its kernels carries a digest of the package's place (rhot/process/numba_cache.py).
+    # The folder of its kernels carries a digest of the package's place (rhot/kernels/numba_cache.py).
     for packages in "$1"/lib/python3*/site-packages/services; do
         digest=$(printf %s "$packages" | sha256sum | cut -c1-8)
         rm -rf -- "$CACHE/rhot-kernels-$digest-"*

@@ -22,7 +22,7 @@ from testing.source_tree import (
 
 # The floors of rhot/, from the lowest: each uses only what is named, and what lies below it.
 FLOORS_OF_RHOT = (
-    {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/plain_text"},
+    {"rhot/errors", "rhot/clock", "rhot/geometry", "rhot/kernels", "rhot/plain_text"},
     {"rhot/hand_tables", "rhot/hand", "rhot/hand_exercises", "rhot/hand_skin"},
     {"rhot/messages", "rhot/hand_mesh"},
     {"rhot/topic_kinds"},

@@ -1,6 +1,6 @@
 """Compiles (or loads from numba's cache) everything fusion calls, before the first frame is there.
 
-With a cache (rhot.process.numba_cache) this takes .3 s, without one 12 s; a service that did it at
+With a cache (rhot.kernels.numba_cache) this takes .3 s, without one 12 s; a service that did it at
 its first frame would stand still for that long.
 """
 

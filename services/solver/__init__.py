@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rhot.process.numba_cache import use_cache
+from rhot.kernels.numba_cache import use_cache
 
 # Before any module of this package imports numba.
 use_cache(Path(__file__).parents[1])

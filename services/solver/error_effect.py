@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains
 from services.solver.maths.kinematics import FUSED, DigitFrames, digit_frames
@@ -55,17 +56,20 @@ def variances(
     chains: HandChains, observations: Observations, estimate: HandEstimate, errors: Errors
 ) -> Array:
     """`ModelError.pose_variances`, for kernels; carries the effect of the errors along."""
+    chains, observations = unowned((chains, observations))
+    estimate, errors = unowned((estimate, errors))
     found = np.empty(UNKNOWNS)
     is_unsure = errors.sigmas.any()
     if is_unsure:
         _carry_along(chains, observations, estimate, errors)
     # A size that is wrong leaves no residual: what it does is as unsure as ever.
     share = max(errors.misfit[0], _LEAST)
+    effect, sigmas, covariance = errors.effect, errors.sigmas, estimate.covariance
     for i in range(UNKNOWNS):
-        found[i] = _FIT_SHARE * share * estimate.covariance[i, i]
+        found[i] = _FIT_SHARE * share * covariance[i, i]
         if is_unsure:
-            for k in range(errors.sigmas.size):
-                by_error = (errors.effect[i, k] * errors.sigmas[k]) ** 2
+            for k in range(sigmas.size):
+                by_error = (effect[i, k] * sigmas[k]) ** 2
                 found[i] += by_error if k == _SIZE else share * by_error
     return found
 
@@ -89,11 +93,36 @@ def _carry_along(
         for k in range(S.shape[1]):
             S[i, k] *= errors.keep
     # Derivatives by pose and by b, in standard deviations.
-    H, J, of_one = np.zeros((3 * m, UNKNOWNS)), np.zeros((3 * m, S.shape[1])), np.empty((3, 10))
-    frames = digit_frames(chains, estimate.angles_rad)
+    H, J, residuals = np.zeros((3 * m, UNKNOWNS)), np.zeros((3 * m, S.shape[1])), np.empty(3 * m)
     pose = Pose(estimate.rotation, estimate.position_m, estimate.angles_rad)
-    residuals = np.empty(3 * m)
-    for n in range(m):
+    frames = digit_frames(chains, pose.angles)
+    columns = errors.paint_columns
+    _linearise(frames, observations, pose, columns, (H, J, residuals), np.empty((3, 10)))
+    gain = estimate.covariance @ H.T
+    B = H @ gain
+    _learn_misfit(observations.whitening, B, residuals, errors)
+    gain *= _consistent_share(B)
+    S -= gain @ (H @ S + J)
+
+
+@njit(cache=True, fastmath=FUSED)
+def _linearise(
+    frames: DigitFrames,
+    observations: Observations,
+    pose: Pose,
+    columns: Integers,
+    out: tuple[Array, Array, Array],
+    of_one: Array,
+) -> None:
+    """To out the landmarks' derivatives by pose (3 m, 26), which are 0, and by the errors (3 m, b),
+    and their residuals (3 m,).
+
+    columns (m,): the first of each landmark's paint; of_one (3, 10): memory.
+    """
+    (H, J, residuals), of_one = unowned((out, of_one))
+    frames, observations = unowned((frames, observations))
+    pose, columns = unowned((pose, columns))
+    for n in range(columns.size):
         error = whitened(frames, observations, n, pose, of_one)
         for a in range(6 + observations.depth[n]):
             i = a if a < 6 else 4 * observations.digit[n] + a
@@ -106,12 +135,7 @@ def _carry_along(
             for k in range(i + 1):
                 way = observations.point_m[n, k] - pose.position_m[k]
                 J[3 * n + i, _SIZE] += observations.whitening[n, i, k] * way
-        _by_errors(frames, observations, n, pose.rotation, errors.paint_columns[n], J)
-    gain = estimate.covariance @ H.T
-    B = H @ gain
-    _learn_misfit(observations.whitening, B, residuals, errors)
-    gain *= _consistent_share(B)
-    S -= gain @ (H @ S + J)
+        _by_errors(frames, observations, n, pose.rotation, columns[n], J)
 
 
 @njit(cache=True)

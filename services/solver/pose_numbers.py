@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.error_effect import Errors, told_misfit, variances
 from services.solver.finger.solve_fingers import (
     Bools,
@@ -101,7 +102,7 @@ def _dls_numbers_unpacked(
     """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long, and
     for what it returns.
     """
-    chains, wrist = chains_of(chains_row), (rotation, position_m)
+    chains, wrist = chains_of(unowned(chains_row)), unowned((rotation, position_m))
     tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
     estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)
@@ -128,12 +129,33 @@ def pose_numbers(
     positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
     hand_frames(chains, wrist[0], wrist[1], angles, positions, rotations)
     quaternions = quaternions_from_rotations(rotations)
+    _fill(
+        numbers,
+        angles,
+        (positions, quaternions),
+        fingers,
+        standard_deviations(variances, chains.limits_rad),
+    )
+    numbers[WRIST_ROW, 2] = rounded(misfit)
+    return numbers
+
+
+@njit(cache=True)
+def _fill(
+    numbers: Array,
+    angles: Array,
+    joints: tuple[Array, Array],
+    fingers: FingerSolution,
+    sigmas: Array,
+) -> None:
+    """Joints (positions (26, 3), quaternions (26, 4)), digits and sigmas (7,) into their rows."""
+    numbers, angles, sigmas = unowned((numbers, angles, sigmas))
+    (positions, quaternions), fingers = unowned((joints, fingers))
     for joint in range(26):
         for i in range(3):
             numbers[joint, i] = rounded(positions[joint, i])
         for i in range(4):
             numbers[joint, 3 + i] = rounded(quaternions[joint, i])
-    sigmas = standard_deviations(variances, chains.limits_rad)
     for row in range(5):
         digit = numbers[_DIGIT_0 + row]
         digit[:4] = angles[row]
@@ -143,8 +165,6 @@ def pose_numbers(
         digit[7] = rounded(min(sigmas[2 + row], _UNKNOWN_RAD))
     numbers[WRIST_ROW, 0] = rounded(min(sigmas[0], _UNKNOWN_M))
     numbers[WRIST_ROW, 1] = rounded(min(sigmas[1], _UNKNOWN_RAD))
-    numbers[WRIST_ROW, 2] = rounded(misfit)
-    return numbers
 
 
 @njit(cache=True)

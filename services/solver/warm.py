@@ -1,6 +1,6 @@
 """Run every kernel once, so that compiling is over before the first message counts.
 
-With a warm numba cache (rhot.process.numba_cache) this takes under a second, without one about a
+With a warm numba cache (rhot.kernels.numba_cache) this takes under a second, without one about a
 minute on a small machine. Needs no input.
 """
 

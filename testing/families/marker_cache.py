@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
-from rhot.process.numba_cache import cache_root
+from rhot.kernels.numba_cache import cache_root
 from testing.source_tree import relative, uses
 
 Made = TypeVar("Made")

@@ -1,7 +1,7 @@
 """`rhot warm`: compile every numba kernel into its cache, before the first start of a service.
 
 Part of `make install`. Kernels are cached in $RHOT_CACHE, systemd's $CACHE_DIRECTORY or
-~/.cache/rhot (rhot.process.numba_cache); running it again costs seconds. A compiler uses one core:
+~/.cache/rhot (rhot.kernels.numba_cache); running it again costs seconds. A compiler uses one core:
 services share no kernels, and each has a process of its own.
 """
 
@@ -21,8 +21,8 @@ import services
 from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig, load_rig
 from rhot.hand import HandModel, HandName
+from rhot.kernels.numba_cache import adopt, cache_folder, clear_old
 from rhot.messages.simulator import SimBoard, SimStage
-from rhot.process.numba_cache import adopt, cache_folder, clear_old
 from services.cli.defaults import sim_toml
 
 

@@ -13,6 +13,7 @@ from numba import njit
 from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import pack
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
@@ -20,7 +21,6 @@ from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts, Estimates, no_estimates
 from services.fusion.one_camera.last_located import LastLocated
-from services.fusion.packed import pack
 
 # A point this uncertain is of no use to anybody (the width of a hand).
 SHOW_SIGMA_M = 0.05

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import Packed, pack
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import oldest_with
@@ -21,7 +22,6 @@ from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
 from services.fusion.method import Counts
-from services.fusion.packed import Packed, pack
 
 # From a resting hand to sharp turns. Chosen on the tuning half of points, as whole sets, before own
 # motion was bounded (own_motion.MOST). Geometric mean of RMS, 95 % and maximum at lag 0, over those

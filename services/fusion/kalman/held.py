@@ -1,4 +1,4 @@
-"""What a hand's filter holds, as kernels are handed it (services.fusion.packed)."""
+"""What a hand's filter holds, as kernels are handed it (rhot.kernels.packed)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import Packed
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import complete_newest, filter_from
@@ -14,7 +15,6 @@ from services.fusion.kalman.frame_update import Fates, FrameLooks, Sights, take_
 from services.fusion.kalman.history import HandHistory
 from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.telling import tell
-from services.fusion.packed import Packed
 
 
 class Held(NamedTuple):

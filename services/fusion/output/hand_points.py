@@ -14,6 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName
+from rhot.kernels.packed import Packed, pack, unowned
 from rhot.messages import HandPoint
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
@@ -23,7 +24,6 @@ from services.fusion.output.hand_plausibility import coherent
 from services.fusion.output.hidden_paint import PaintSeen
 from services.fusion.output.known_paint import KnownPaint, correct_paint
 from services.fusion.output.systematic_error import Systematic, add_systematic
-from services.fusion.packed import Packed, pack
 
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.
@@ -129,9 +129,18 @@ def _point_numbers(packed: Packed, instant_ns: int, *row: Any) -> int:
 
     packed: _Points; row: Estimates.
     """
-    points, estimates = packed.parts, Estimates(*row)
-    paint, systematic, seen, cameras = points.corrections
+    estimates = unowned(Estimates(*row))
     positions, covariances = estimates.positions_m.copy(), estimates.covariances_m2.copy()
+    return _fill(packed.parts, instant_ns, estimates, positions, covariances)
+
+
+@njit(cache=True)
+def _fill(
+    points: _Points, instant_ns: int, estimates: Estimates, positions: Array, covariances: Array
+) -> int:
+    """The same; positions (L, 3) and covariances (L, 3, 3) of the estimates are written over."""
+    positions, covariances = unowned(positions), unowned(covariances)
+    paint, systematic, seen, cameras = points.corrections
     found, seen_by = estimates.found, estimates.seen_by
     correct_paint(paint, instant_ns, positions, covariances, seen_by, cameras)
     seen.places[:] = np.nan

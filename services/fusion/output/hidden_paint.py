@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import Packed, pack
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import View
 from services.fusion.output.expected_area import (
@@ -29,7 +30,6 @@ from services.fusion.output.expected_area import (
     usually_less,
 )
 from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint, turn_on
-from services.fusion.packed import Packed, pack
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
 # cameras' rays, of tips and of dabs. Whole ones seen by two cameras .09 to .15 rad apart: within

@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import Packed, unowned
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.output.paint_centroid import Finger, cross, expected_shift
-from services.fusion.packed import Packed
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
@@ -149,7 +149,22 @@ def correct_paint(
 
     seen_by (L, C) tells which cameras located them.
     """
-    shift, shift_covariance, aim = np.empty(3), np.empty((3, 3)), np.empty((2, 3))
+    located = positions, covariances, seen_by
+    work = np.empty(3), np.empty((3, 3)), np.empty((2, 3))
+    _correct(paint, instant_ns, cameras, located, work)
+
+
+@njit(cache=True)
+def _correct(
+    paint: KnownPaint,
+    instant_ns: int,
+    cameras: Extrinsics,
+    located: tuple[Array, Array, Bools],
+    work: tuple[Array, Array, Array],
+) -> None:
+    """The same, of positions, covariances and seen_by; work (3,), (3, 3), (2, 3): memory."""
+    positions, covariances, seen_by = unowned(located)
+    shift, shift_covariance, aim = unowned(work)
     for row in range(positions.shape[0]):
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)

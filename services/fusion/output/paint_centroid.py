@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.fusion.geometry.normal_equations import invert_symmetric, multiply
 from services.fusion.geometry.projection import Extrinsics, project
 
@@ -109,13 +110,36 @@ def expected_shift(
     locate it.
     """
     count = cameras.R.shape[0]
-    rays, weights = np.empty((count, 3)), np.empty((count, 3, 3))
+    work = Work(np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((2, 3)), np.empty((4, 3)))
+    return _expected_shift(table, p_rig, finger, cameras, work, shift, covariance)
+
+
+class Work(NamedTuple):
+    """Memory for expected_shift by C cameras."""
+
+    rays: Array  # (C, 3)
+    weights: Array  # (C, 3, 3)
+    across: Array  # (2, 3)
+    shifts: Array  # (4, 3)
+
+
+@njit(cache=True)
+def _expected_shift(
+    table: Array,
+    p_rig: Array,
+    finger: Finger,
+    cameras: Extrinsics,
+    work: Work,
+    shift: Array,
+    covariance: Array,
+) -> bool:
+    """The same, with memory to work in."""
+    rays, weights, across, shifts = unowned(work)
     if not _sights(p_rig, cameras, rays, weights):
         return False
-    across, turned, shifts = np.empty((2, 3)), np.empty(3), np.empty((3, 3))
     cross(finger.hinge, finger.direction, across[0])
     across[1] = finger.hinge
-    straight, one, other = shifts[0], shifts[1], shifts[2]
+    straight, one, other, turned = shifts[0], shifts[1], shifts[2], shifts[3]
     _located(table, finger.direction, rays, weights, straight)
     for i in range(3):
         shift[i] = straight[i] / 3.0

@@ -34,12 +34,12 @@ from numba import njit
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS, JOINT_INDEX, HandModel, HandName
+from rhot.kernels.packed import pack
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
 from services.fusion.output.visible_paint import PaintTables, dab_sag_m, paint_tables
-from services.fusion.packed import pack
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.

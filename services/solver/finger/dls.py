@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.finger.dls_equations import COUPLED, Goal, Problem
 from services.solver.finger.dls_step import Memory, iterate
 from services.solver.finger.outcome import NOT_CONVERGED, SOLVED, UNREACHABLE
@@ -70,6 +71,7 @@ def solve(
     Returns (iterations, distance left, SOLVED | UNREACHABLE | NOT_CONVERGED), lengths in the
     chain's unit; SOLVED means within tolerance. Angles are within limits whatever comes in.
     """
+    chain, goal, q = unowned((chain, goal, q))
     clamp_to_limits(q, chain.limits)
     total, far = max_reach(chain), norm(goal.point)
     if not (math.isfinite(far) and total > 1e-9):
@@ -137,7 +139,22 @@ def solve_digits(
 
     angles (5, 4) rad in and out; ends (5, 3) gets (iterations, metres left, outcome).
     """
-    prior, no_rotation = np.empty((2, 4)), np.eye(3)
+    goals, options = (np.empty((2, 4)), np.eye(3)), (max_iterations, tolerance_m)
+    _solve_each(chains, targets, goals, options, angles, ends)
+
+
+@njit(cache=True)
+def _solve_each(
+    chains: HandChains,
+    targets: TipTargets,
+    goals: tuple[Array, Array],
+    options: tuple[int, float],
+    angles: Array,
+    ends: Array,
+) -> None:
+    """The same; goals: memory (2, 4) for a prior, and a rotation (3, 3) that nobody asks for."""
+    chains, targets, angles, ends = unowned((chains, targets, angles, ends))
+    (prior, no_rotation), (max_iterations, tolerance_m) = unowned(goals), options
     for row in range(5):
         if targets.measured[row] != 0:
             clamp_to_limits(angles[row], chains.limits_rad[row])

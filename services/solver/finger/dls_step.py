@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.finger.dls_equations import Problem, normal_equations
 from services.solver.maths.box_qp import Integers, Workspace, box_qp
 from services.solver.maths.cholesky import newton_step4
@@ -64,6 +65,7 @@ def iterate(
 
     Returns the iterations up to the best iterate, its cost and its distance from the target.
     """
+    problem, q, memory = unowned((problem, q, memory))
     qp, best = _step_problem(memory), memory.rows[13]
     best_cost, best_distance, best_iteration = np.inf, np.inf, 0
     largest, damping_scale = 1.0, 1.0

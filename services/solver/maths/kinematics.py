@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.maths.chains import CHAINS, Chain, HandChains, norm
 from services.solver.maths.rotation_vectors import turned
 
@@ -106,11 +107,17 @@ class DigitFrames(NamedTuple):
 def digit_frames(chains: HandChains, angles: Array) -> DigitFrames:
     """Forward kinematics of all digits in the wrist frame; angles (5, 4) rad."""
     frames = DigitFrames(np.empty((5, 4, 3)), np.empty((5, 4, 3)), np.empty((5, 4, 3, 3)))
+    _fill_digits(chains, angles, frames)
+    return frames
+
+
+@njit(cache=True, fastmath=FUSED)
+def _fill_digits(chains: HandChains, angles: Array, frames: DigitFrames) -> None:
+    chains, angles, frames = unowned((chains, angles, frames))
     for row in range(5):
         _fill_digit(
             chains, row, angles[row], frames.roots_m[row], frames.axes[row], frames.rotations[row]
         )
-    return frames
 
 
 @njit(cache=True, fastmath=FUSED)
@@ -154,7 +161,22 @@ def hand_frames(
 
     Angles (5, 4) rad.
     """
-    R, frames = wrist_rotation, digit_frames(chains, angles)
+    frames = digit_frames(chains, angles)
+    _fill_joints(chains, wrist_rotation, wrist_m, frames, positions, rotations)
+
+
+@njit(cache=True, fastmath=FUSED)
+def _fill_joints(
+    chains: HandChains,
+    wrist_rotation: Array,
+    wrist_m: Array,
+    frames: DigitFrames,
+    positions: Array,
+    rotations: Array,
+) -> None:
+    """hand_frames, from those of its digits."""
+    chains, R, wrist_m = unowned((chains, wrist_rotation, wrist_m))
+    frames, positions, rotations = unowned((frames, positions, rotations))
     for joint in range(26):
         for i in range(3):
             positions[joint, i] = wrist_m[i]

@@ -13,12 +13,13 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 
 
 @njit(cache=True)
 def quaternions_from_rotations(rotations: Array) -> Array:
     """Unit quaternions wxyz with w >= 0 of rotations (n, 3, 3); (n, 4)."""
-    quaternions = np.empty((rotations.shape[0], 4))
+    rotations, quaternions = unowned(rotations), np.empty((rotations.shape[0], 4))
     for n in range(rotations.shape[0]):
         w, x, y, z = _shepperd(rotations[n])
         size = math.sqrt(w * w + x * x + y * y + z * z)

@@ -17,7 +17,8 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.solver.maths.box_qp import box_qp, workspace
+from rhot.kernels.packed import unowned
+from services.solver.maths.box_qp import Workspace, box_qp, workspace
 from services.solver.maths.chains import HandChains
 from services.solver.maths.rotation_vectors import apply_rotation_vector
 from services.solver.whole_hand.landmarks import Observations
@@ -59,10 +60,34 @@ def fit(
     The cost is the sum of squares in standard deviations. information (26, 26) is filled with that
     of the pose found: its inverse is the covariance.
     """
-    work = workspace(UNKNOWNS)
-    move = _new_step()
     new_pose = Pose(np.empty((3, 3)), np.empty(3), np.empty((5, 4)))
-    normal, new_normal = _new_equations(), _new_equations()
+    memory = _Memory(workspace(UNKNOWNS), _new_step(), new_pose, _new_equations(), _new_equations())
+    given = chains, observations, prior
+    return _improve(given, pose, max_iterations, information, memory)
+
+
+class _Memory(NamedTuple):
+    """What a fit works in."""
+
+    work: Workspace
+    move: Step
+    new_pose: Pose
+    normal: NormalEquations
+    new_normal: NormalEquations
+
+
+@njit(cache=True)
+def _improve(
+    given: tuple[HandChains, Observations, PosePrior],
+    pose: Pose,
+    max_iterations: int,
+    information: Array,
+    memory: _Memory,
+) -> tuple[float, int]:
+    """`fit`, with memory to work in."""
+    chains, observations, prior = unowned(given)
+    pose, information = unowned((pose, information))
+    work, move, new_pose, normal, new_normal = unowned(memory)
     cost = normal_equations(chains, observations, prior, pose, normal)
     damping = _DAMPING_START
     used = 0

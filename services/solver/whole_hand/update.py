@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import unowned
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains, chains_of
 from services.solver.maths.cholesky import spd_inverse
@@ -99,6 +100,7 @@ def _follow_unpacked(
     seconds: float,
 ) -> tuple[float, int, float, bool]:
     """`follow` with plain arrays for its tuples, the first five for what it returns."""
+    chains_row, posture_row = unowned((chains_row, posture_row))
     whitened[:] = whitening(covariances_m2, misfit_m2)
     observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
     last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)

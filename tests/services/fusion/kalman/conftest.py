@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import pack
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
 from services.fusion.method import Counts, Estimates, no_estimates
-from services.fusion.packed import pack
 from testing.synthetic_points import Motion, MovingHand, SyntheticRig
 
 

@@ -10,11 +10,11 @@ import pytest
 
 from rhot.files.config import load_rig
 from rhot.hand import landmark_point
+from rhot.kernels.packed import pack
 from services.fusion.intake.observations import View
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
 from services.fusion.output.visible_paint import paint_tables
-from services.fusion.packed import pack
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene

@@ -11,10 +11,10 @@ import sys
 
 import pytest
 
-from rhot.process.numba_cache import adopt, cache_folder, clear_old, use_cache
+from rhot.kernels.numba_cache import adopt, cache_folder, clear_old, use_cache
 
 PACKAGE = (
-    "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\n"
+    "from pathlib import Path\n\nfrom rhot.kernels.numba_cache import use_cache\n\n"
     "use_cache(Path(__file__).parent)\n"
 )
 KERNEL = "from numba import njit\n\n\n@njit(cache=True)\ndef {name}(x):\n    return {body}\n"
@@ -28,7 +28,7 @@ def package(tmp_path, monkeypatch):
     folder = tmp_path / "kernels"
     folder.mkdir()
     (folder / "__init__.py").write_text(
-        "from pathlib import Path\n\nfrom rhot.process.numba_cache import use_cache\n\n"
+        "from pathlib import Path\n\nfrom rhot.kernels.numba_cache import use_cache\n\n"
         "use_cache(Path(__file__).parent)\n"
     )
     (folder / "inner.py").write_text(KERNEL.format(name="inner", body="x + 1"))

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from services.fusion.packed import Packed, pack
+from rhot.kernels.packed import Packed, pack
 
 
 class Inner(NamedTuple):
