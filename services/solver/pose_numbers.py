@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import unowned
+from rhot.kernels.packed import Packed, unowned
 from services.solver.error_effect import Errors, told_misfit, variances
 from services.solver.finger.solve_fingers import (
     Bools,
@@ -21,7 +21,7 @@ from services.solver.finger.solve_fingers import (
     tips_in_wrist,
 )
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.chains import HandChains, chains_of
+from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
 from services.solver.whole_hand.hand_estimate import HandEstimate
@@ -40,7 +40,7 @@ _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 
 
 def dls_numbers(
-    chains_row: Array,
+    packed: Packed,
     places: Places,
     observed: Observed,
     whitening: Array,
@@ -50,14 +50,14 @@ def dls_numbers(
 ) -> Array:
     """`pose_numbers` of an estimate whose digits are solved by dls.
 
-    chains_row: of in_a_row. whitening (m, 3, 3), as in Observations, of the landmarks
+    packed: update.Known. whitening (m, 3, 3), as in Observations, of the landmarks
     observed, which sit at places. errors: as `variances` takes them. options: iterations and
     tolerance (m).
     """
     numbers = np.empty((_ROWS, _COLUMNS))
     _dls_numbers_unpacked(
         numbers,
-        chains_row,
+        packed,
         *places,
         observed.points_m,
         observed.covariances_m2,
@@ -73,7 +73,7 @@ def dls_numbers(
 @njit(cache=True)
 def _dls_numbers_unpacked(
     numbers: Array,
-    chains_row: Array,
+    packed: Packed,
     joint: Integers,
     digit: Integers,
     depth: Integers,
@@ -102,7 +102,7 @@ def _dls_numbers_unpacked(
     """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long, and
     for what it returns.
     """
-    chains, wrist = chains_of(unowned(chains_row)), unowned((rotation, position_m))
+    chains, wrist = packed.parts.chains, unowned((rotation, position_m))
     tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
     estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)

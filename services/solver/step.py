@@ -103,7 +103,7 @@ class _Hand:
         if settings.method == DLS:
             options = settings.max_iterations, settings.tolerance_m
             seen = places, observed, fitted.whitening
-            return dls_numbers(tracker.chains_row, *seen, estimate, errors, options)
+            return dls_numbers(tracker.packed, *seen, estimate, errors, options)
         wrist = estimate.rotation, estimate.position_m
         points = places.tip, observed.points_m, observed.covariances_m2, observed.measured
         tips = tips_in_wrist(wrist, points)

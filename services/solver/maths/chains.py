@@ -9,7 +9,6 @@ know neither the world (a result cannot depend on how the hand is turned) nor le
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -68,30 +67,6 @@ def hand_chains(model: HandModel) -> HandChains:
             [(d.coupling, d.coupling_weight) for d in model.digits], dtype=np.float64
         ),
         side=model.side,
-    )
-
-
-def in_a_row(fields: Iterable[Array | float]) -> Array:
-    """The numbers of a tuple of arrays in one array, field after field.
-
-    For kernels that Python calls: numba takes each array of a call apart anew, .1 us each, twice
-    that between messages. In the kernel they are views of the row again (`chains_of`).
-    """
-    return np.concatenate([np.ravel(field) for field in fields])
-
-
-@njit(cache=True)
-def chains_of(row: Array) -> HandChains:
-    """The chains whose numbers are in a row (156,)."""
-    return HandChains(
-        base_m=row[:15].reshape(5, 3),
-        base_rotation=row[15:60].reshape(5, 3, 3),
-        metacarpal_m=row[60:75].reshape(5, 3),
-        lengths_m=row[75:90].reshape(5, 3),
-        tool_m=row[90:105].reshape(5, 3),
-        limits_rad=row[105:145].reshape(5, 4, 2),
-        coupling=row[145:155].reshape(5, 2),
-        side=row[155],
     )
 
 

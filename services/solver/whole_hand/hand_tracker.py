@@ -21,7 +21,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rhot.hand import TIPS, HandModel
-from services.solver.maths.chains import hand_chains, in_a_row
+from rhot.kernels.packed import pack
+from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.glide import Told
@@ -39,7 +40,7 @@ from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
-from services.solver.whole_hand.update import follow
+from services.solver.whole_hand.update import Known, follow
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -68,8 +69,8 @@ class HandTracker:
         """landmarks: those of the model (landmarks.hand_landmarks); restart_every: updates."""
         self.chains = hand_chains(model)
         posture = posture_prior(model)
-        # As kernels are given them.
-        self.chains_row, self._posture_row = in_a_row(self.chains), in_a_row(posture)
+        # As kernels are given it.
+        self.packed = pack(Known(self.chains, posture))
         self._landmarks = landmarks
         self._uninformed = uninformed_prior(posture)
         self._estimate: HandEstimate | None = None
@@ -142,7 +143,7 @@ class HandTracker:
         The pose is followed, and its rival, of which one may have won.
         """
         places = self._landmarks.places(observed.names)
-        given = self.chains_row, self._posture_row, places, observed, self._misfit_m2
+        given = self.packed, places, observed, self._misfit_m2
         taken = follow(*given, last, told.estimate, seconds)
         if self._rival is not None:
             other = follow(*given, self._rival.estimate, told.estimate, seconds)

@@ -19,7 +19,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel
@@ -85,18 +84,6 @@ def posture_prior(model: HandModel) -> PosturePrior:
     )
     return PosturePrior(
         covariance @ pull, information, 0.5 * (covariance + covariance.T), synergies, projection
-    )
-
-
-@njit(cache=True)
-def posture_of(row: Array) -> PosturePrior:
-    """The prior whose numbers are in a row (900,), as chains.in_a_row has them."""
-    return PosturePrior(
-        mean=row[:20],
-        information=row[20:420].reshape(20, 20),
-        covariance=row[420:820].reshape(20, 20),
-        synergies=row[820:860].reshape(20, 2),
-        projection=row[860:].reshape(2, 20),
     )
 
 

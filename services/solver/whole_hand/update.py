@@ -11,9 +11,9 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import unowned
+from rhot.kernels.packed import Packed
 from services.solver.maths.box_qp import Integers
-from services.solver.maths.chains import HandChains, chains_of
+from services.solver.maths.chains import HandChains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.glide import is_quiet
@@ -21,8 +21,15 @@ from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations, Observed, Places, whitening
 from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior, predict
-from services.solver.whole_hand.posture_prior import PosturePrior, posture_of
+from services.solver.whole_hand.posture_prior import PosturePrior
 from services.solver.whole_hand.residuals import Pose
+
+
+class Known(NamedTuple):
+    """What is known of a hand before anything is seen of it."""
+
+    chains: HandChains
+    posture: PosturePrior
 
 
 class Followed(NamedTuple):
@@ -35,8 +42,7 @@ class Followed(NamedTuple):
 
 
 def follow(
-    chains_row: Array,
-    posture_row: Array,
+    packed: Packed,
     places: Places,
     observed: Observed,
     misfit_m2: float,
@@ -46,7 +52,7 @@ def follow(
 ) -> Followed:
     """A message of landmarks that sit at places, some seconds after the last estimate.
 
-    The rows: of in_a_row. last, told: what was believed and what was told.
+    packed: Known. last, told: what was believed and what was told.
     """
     # Arrays to be filled, and tuples unpacked: numba takes four times as long over an array in a
     # tuple, and three times over one that it returns.
@@ -55,8 +61,7 @@ def follow(
     cost, iterations, learned_m2, quiet = _follow_unpacked(
         *found,
         whitened,
-        chains_row,
-        posture_row,
+        packed,
         places.joint,
         places.digit,
         places.depth,
@@ -82,8 +87,7 @@ def _follow_unpacked(
     found_angles: Array,
     found_covariance: Array,
     whitened: Array,
-    chains_row: Array,
-    posture_row: Array,
+    packed: Packed,
     joint: Integers,
     digit: Integers,
     depth: Integers,
@@ -100,11 +104,11 @@ def _follow_unpacked(
     seconds: float,
 ) -> tuple[float, int, float, bool]:
     """`follow` with plain arrays for its tuples, the first five for what it returns."""
-    chains_row, posture_row = unowned((chains_row, posture_row))
+    known: Known = packed.parts
     whitened[:] = whitening(covariances_m2, misfit_m2)
     observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
     last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)
-    own = update(chains_of(chains_row), posture_of(posture_row), observations, last, seconds)
+    own = update(known.chains, known.posture, observations, last, seconds)
     found_rotation[:], found_position_m[:] = own.rotation, own.position_m
     found_angles[:], found_covariance[:] = own.angles_rad, own.covariance
     return (
