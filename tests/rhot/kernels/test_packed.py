@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import gc
+import sys
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed, pack
+from rhot.kernels.packed import Packed, pack, unowned
 
 
 class Inner(NamedTuple):
@@ -51,3 +52,36 @@ def test_arrays_live_as_long_as_what_they_are_packed_in():
         np.full(1000, 7.0)
         scale(packed)
     assert view[0] == 8.0
+
+
+@njit
+def fill(given: tuple[Inner, Array, int]) -> float:
+    inner, out, start = unowned(given)
+    for n in range(out.shape[0]):
+        row = out[n]
+        row[:] = start + n * inner.factor
+    return float(out.sum())
+
+
+@njit
+def made_and_filled(count: int) -> float:
+    """Memory of its own, handed on; and more of it, lest freed memory hold what was there."""
+    total = 0.0
+    for start in range(count):
+        total += fill((Inner(np.zeros(1), 2.0), np.empty((3, 4)), start))
+        total += np.full((3, 4), 1e9)[0, 0] - 1e9
+    return total
+
+
+def test_kernels_count_nothing_of_what_they_were_given():
+    out = np.zeros((3, 2))
+    references = sys.getrefcount(out)
+    assert fill((Inner(np.zeros(1), 2.0), out, 1)) == 18.0
+    np.testing.assert_array_equal(out, [[1.0, 1.0], [3.0, 3.0], [5.0, 5.0]])
+    assert sys.getrefcount(out) == references
+    counted = [name for name in fill.inspect_asm().values() if "NRT_incref" in name]
+    assert not counted
+
+
+def test_memory_that_a_kernel_made_lasts_while_another_works_with_it():
+    assert made_and_filled(1000) == 12.0 * sum(range(1000)) + 1000 * 4.0 * 2.0 * 3.0
