@@ -37,7 +37,8 @@ OUT = 2
 # of its looks are more than expected by this, two a look. Tuning half of points: 1.0 to 1.7 of six
 # lead, and 75 to 99 % of frames wait for no more; what the others then get is below .06 in 99 % of
 # those frames, but .25 to .6 of hands that grab, wave and flap, whose motion changes.
-ALL, LEADING, REST = 0, 1, 2
+# (Not Python's own integers: numba would compile the filter once for each.)
+ALL, LEADING, REST = np.int64(0), np.int64(1), np.int64(2)
 LEADS_ABOVE, MORE_THAN_EXPECTED = 0.003, 8.0
 
 
@@ -47,7 +48,7 @@ def filter_node(
     index: int,
     cameras: Extrinsics,
     filters: tuple[MotionModels, float],
-    which: int,
+    which: np.int64,
 ) -> None:
     """Estimates after node `index` (1 or more) from the node before it; filters: models and gate.
 
