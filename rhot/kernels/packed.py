@@ -4,8 +4,8 @@ Numba takes an array from Python in .1 us, or .3 where other work has driven it 
 processor's caches since, and a hand's filter holds 50: as long as the filter itself takes. One
 object takes .7 and 1.5 us, however much it holds (`pack`).
 
-Kernels count who refers to an array, at every view of it and every call that gets it, by
-instructions that wait for all processors: a third to a half of what ours took. Nothing is counted
+Kernels count who refers to an array, at every view of it and every call that gets it, by locked
+instructions, each as long as a dozen sums: a third to a half of what ours took. Nothing is counted
 of arrays whose owner a kernel does not know (`unowned`); packed ones are such.
 """
 

@@ -1,7 +1,7 @@
 """Compiles (or loads from numba's cache) everything fusion calls, before the first frame is there.
 
-With a cache (rhot.kernels.numba_cache) this takes .3 s, without one 12 s; a service that did it at
-its first frame would stand still for that long.
+With a cache (rhot.kernels.numba_cache) this takes a second or two, without one minutes; a service
+that did it at its first frame would stand still for that long.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def pose_numbers(
     positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
     hand_frames(chains, wrist[0], wrist[1], angles, positions, rotations)
     quaternions = quaternions_from_rotations(rotations)
-    _fill(
+    _write_rows(
         numbers,
         angles,
         (positions, quaternions),
@@ -141,7 +141,7 @@ def pose_numbers(
 
 
 @njit(cache=True)
-def _fill(
+def _write_rows(
     numbers: Array,
     angles: Array,
     joints: tuple[Array, Array],

@@ -46,7 +46,7 @@ def warm(
     known = adopted or any(cache_folder(package).rglob("*.nbc"))
     typer.echo(
         f"{'loading' if known else 'compiling'} the kernels of {', '.join(parts)} into"
-        f" {cache_folder(package)}{'' if known else ': a minute or two, once'}"
+        f" {cache_folder(package)}{'' if known else ': some minutes, once'}"
     )
     # Processes, as numba compiles in one thread at a time; spawned, as its locks do not survive a
     # fork.

@@ -131,14 +131,14 @@ def _point_numbers(packed: Packed, instant_ns: int, *row: Any) -> int:
     """
     estimates = unowned(Estimates(*row))
     positions, covariances = estimates.positions_m.copy(), estimates.covariances_m2.copy()
-    return _fill(packed.parts, instant_ns, estimates, positions, covariances)
+    return _correct_and_round(packed.parts, instant_ns, estimates, positions, covariances)
 
 
 @njit(cache=True)
-def _fill(
+def _correct_and_round(
     points: _Points, instant_ns: int, estimates: Estimates, positions: Array, covariances: Array
 ) -> int:
-    """The same; positions (L, 3) and covariances (L, 3, 3) of the estimates are written over."""
+    """_point_numbers from copies of positions (L, 3) and covariances (L, 3, 3), written over."""
     positions, covariances = unowned(positions), unowned(covariances)
     paint, systematic, seen, cameras = points.corrections
     found, seen_by = estimates.found, estimates.seen_by

@@ -50,12 +50,12 @@ class PaintSeen(NamedTuple):
     """What C cameras saw last of the paint of L landmarks."""
 
     areas: Array  # (L, C) of each look, in the rays' units
-    seen_s: Array  # (L, C) when
+    seen_s: Array  # (L, C) when, s since fusion's epoch
     levels: Array  # (L, C) logarithm of area over expected area of paint that shows whole
     # One standard deviation of each ray: its own, as others see more, and one that all share, as
     # all see less than the pose lets expect.
     sigmas: Array  # (2, L, C)
-    # Where each landmark is, which whoever puts it there writes; NaN where that is unknown.
+    # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
 
 
