@@ -5,16 +5,16 @@ The kernels of model_error.py, which says what is computed.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import unowned
+from rhot.kernels.packed import Layout, unowned
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains
+from services.solver.maths.cholesky import factorise
 from services.solver.maths.kinematics import FUSED, DigitFrames, digit_frames
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations
@@ -37,13 +37,23 @@ _LEAST, _MOST = 0.25, 9.0
 _FIT_SHARE = 0.5
 
 
+class Effect(NamedTuple):
+    """What the errors of a model have done to a pose."""
+
+    S: Array  # (26, b) its derivatives by them, changed in place
+    sigmas: Array  # (b,) standard deviations; all 0: the model is exact
+    misfit: Array  # (1,) squared residuals of landmarks over what is usual, changed in place
+    paint_columns: Integers  # (m,) first columns of the paint of a message's landmarks
+
+
+EFFECT = Layout()
+effect_at = EFFECT.at
+
+
 class Errors(NamedTuple):
     """The errors of a model as a kernel takes them on to a message."""
 
-    effect: Array  # (26, b) S, changed in place
-    sigmas: Array  # (b,) standard deviations; all 0: the model is exact
-    paint_columns: Integers  # (m,) first columns of the paint of a message's landmarks
-    misfit: Array  # (1,) squared residuals of landmarks over what is usual, changed in place
+    effect: Effect
     # What is usual, per degree of freedom (0: not known); and what of a landmark's variance, as the
     # fit is told, is the model's.
     landmark_m2: tuple[float, float]
@@ -59,17 +69,18 @@ def variances(
     chains, observations = unowned((chains, observations))
     estimate, errors = unowned((estimate, errors))
     found = np.empty(UNKNOWNS)
-    is_unsure = errors.sigmas.any()
+    S, sigmas = errors.effect.S, errors.effect.sigmas
+    is_unsure = sigmas.any()
     if is_unsure:
         _carry_along(chains, observations, estimate, errors)
     # A size that is wrong leaves no residual: what it does is as unsure as ever.
-    share = max(errors.misfit[0], _LEAST)
-    effect, sigmas, covariance = errors.effect, errors.sigmas, estimate.covariance
+    share = max(errors.effect.misfit[0], _LEAST)
+    covariance = estimate.covariance
     for i in range(UNKNOWNS):
         found[i] = _FIT_SHARE * share * covariance[i, i]
         if is_unsure:
             for k in range(sigmas.size):
-                by_error = (effect[i, k] * sigmas[k]) ** 2
+                by_error = (S[i, k] * sigmas[k]) ** 2
                 found[i] += by_error if k == _SIZE else share * by_error
     return found
 
@@ -77,7 +88,7 @@ def variances(
 @njit(cache=True)
 def told_misfit(errors: Errors) -> float:
     """Squared residuals of the landmarks over what is usual of such models; -1: not known."""
-    return errors.misfit[0] if errors.landmark_m2[0] > 0.0 else -1.0
+    return errors.effect.misfit[0] if errors.landmark_m2[0] > 0.0 else -1.0
 
 
 @njit(cache=True, fastmath=FUSED)
@@ -85,10 +96,10 @@ def _carry_along(
     chains: HandChains, observations: Observations, estimate: HandEstimate, errors: Errors
 ) -> None:
     """Take S on to a message, of which estimate is the fit."""
-    S, m = errors.effect, observations.joint.size
+    S, m = errors.effect.S, observations.joint.size
     if errors.keep == 0.0:
         S[:] = 0.0
-        errors.misfit[0] = 1.0
+        errors.effect.misfit[0] = 1.0
     for i in range(6, UNKNOWNS):
         for k in range(S.shape[1]):
             S[i, k] *= errors.keep
@@ -96,13 +107,65 @@ def _carry_along(
     H, J, residuals = np.zeros((3 * m, UNKNOWNS)), np.zeros((3 * m, S.shape[1])), np.empty(3 * m)
     pose = Pose(estimate.rotation, estimate.position_m, estimate.angles_rad)
     frames = digit_frames(chains, pose.angles)
-    columns = errors.paint_columns
+    columns = errors.effect.paint_columns
     _linearise(frames, observations, pose, columns, (H, J, residuals), np.empty((3, 10)))
-    gain = estimate.covariance @ H.T
-    B = H @ gain
+    gain, B = np.zeros((3 * m, UNKNOWNS)), np.empty((3 * m, 3 * m))
+    _gains(observations, H, estimate.covariance, gain, B)
     _learn_misfit(observations.whitening, B, residuals, errors)
-    gain *= _consistent_share(B)
-    S -= gain @ (H @ S + J)
+    _correct(observations, H, gain, _consistent_share(B), J, S)
+
+
+@njit(cache=True, inline="always")
+def _angle_of(observations: Observations, n: int, a: int) -> int:
+    """The unknown that moves landmark n as the a-th of those that do."""
+    return a if a < 6 else 4 * observations.digit[n] + a
+
+
+# Products are written out, by rows: each landmark depends on ten unknowns of 26, and the code of a
+# library that multiplies matrices is never in the processor's caches when a message comes.
+@njit(cache=True, fastmath=FUSED)
+def _gains(observations: Observations, H: Array, P: Array, gain: Array, B: Array) -> None:
+    """H P to gain (3 m, 26), which is 0, and H P H' to B (3 m, 3 m); H (3 m, 26), P (26, 26)."""
+    observations, H, P = unowned((observations, H, P))
+    gain, B = unowned((gain, B))
+    for n in range(observations.depth.size):
+        for a in range(6 + observations.depth[n]):
+            i, r = _angle_of(observations, n, a), 3 * n
+            x, y, z = H[r, i], H[r + 1, i], H[r + 2, i]
+            for k in range(UNKNOWNS):
+                gain[r, k] += x * P[i, k]
+                gain[r + 1, k] += y * P[i, k]
+                gain[r + 2, k] += z * P[i, k]
+    for r in range(H.shape[0]):
+        for s in range(r + 1):
+            total = 0.0
+            for a in range(6 + observations.depth[r // 3]):
+                i = _angle_of(observations, r // 3, a)
+                total += H[r, i] * gain[s, i]
+            B[r, s] = B[s, r] = total
+
+
+@njit(cache=True, fastmath=FUSED)
+def _correct(
+    observations: Observations, H: Array, gain: Array, share: float, J: Array, S: Array
+) -> None:
+    """S less a share of what the gain (3 m, 26) makes of H S + J, in place; J is written over."""
+    observations, H, gain = unowned((observations, H, gain))
+    J, S = unowned((J, S))
+    for n in range(observations.depth.size):
+        for a in range(6 + observations.depth[n]):
+            i, r = _angle_of(observations, n, a), 3 * n
+            x, y, z = H[r, i], H[r + 1, i], H[r + 2, i]
+            for k in range(S.shape[1]):
+                J[r, k] += x * S[i, k]
+                J[r + 1, k] += y * S[i, k]
+                J[r + 2, k] += z * S[i, k]
+    for i in range(UNKNOWNS):
+        # A landmark's three at once.
+        for r in range(0, H.shape[0], 3):
+            x, y, z = share * gain[r, i], share * gain[r + 1, i], share * gain[r + 2, i]
+            for k in range(S.shape[1]):
+                S[i, k] -= x * J[r, k] + y * J[r + 1, k] + z * J[r + 2, k]
 
 
 @njit(cache=True, fastmath=FUSED)
@@ -125,7 +188,7 @@ def _linearise(
     for n in range(columns.size):
         error = whitened(frames, observations, n, pose, of_one)
         for a in range(6 + observations.depth[n]):
-            i = a if a < 6 else 4 * observations.digit[n] + a
+            i = _angle_of(observations, n, a)
             for r in range(3):
                 H[3 * n + r, i] = of_one[r, a]
         for i in range(3):
@@ -140,7 +203,7 @@ def _linearise(
 
 @njit(cache=True)
 def _learn_misfit(whitening: Array, B: Array, residuals: Array, errors: Errors) -> None:
-    """Take errors.misfit on to a fit's residuals (3 m,), in standard deviations.
+    """Take the misfit on to a fit's residuals (3 m,), in standard deviations.
 
     whitening (m, 3, 3) of its landmarks. Of B = H P H' (3 m, 3 m) what the fit is free to follow
     leaves no residual; what is noise of the landmarks leaves all of it, so what is known badly
@@ -160,7 +223,8 @@ def _learn_misfit(whitening: Array, B: Array, residuals: Array, errors: Errors) 
         usual += by_model**2 * freedom * (usual_m2 * information + 1.0 - by_model)
     if usual > 0.0:
         old = errors.keep ** (1.0 / _SLOWER)
-        errors.misfit[0] = old * errors.misfit[0] + (1.0 - old) * min(found / usual, _MOST)
+        misfit = errors.effect.misfit
+        misfit[0] = old * misfit[0] + (1.0 - old) * min(found / usual, _MOST)
 
 
 @njit(cache=True, inline="always")
@@ -208,16 +272,11 @@ def _consistent_share(B: Array) -> float:
     that holds, which a Cholesky factorisation tells; else 1 / the largest eigenvalue.
     """
     n = B.shape[0]
-    L = np.zeros((n, n))
+    L = np.empty((n, n))
     for i in range(n):
         for j in range(i + 1):
-            value = (1.0 + _ROUNDING if i == j else 0.0) - B[i, j]
-            for k in range(j):
-                value -= L[i, k] * L[j, k]
-            if i > j:
-                L[i, j] = value / L[j, j]
-            elif value > 0.0:
-                L[i, i] = math.sqrt(value)
-            else:
-                return 1.0 / max(np.linalg.eigvalsh(B)[-1], 1.0)
-    return 1.0
+            L[i, j] = -B[i, j]
+        L[i, i] += 1.0 + _ROUNDING
+    if factorise(L, n, 0.0):
+        return 1.0
+    return float(1.0 / max(np.linalg.eigvalsh(B)[-1], 1.0))

@@ -31,8 +31,8 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from rhot.hand import TIPS, HandModel
-from services.solver.error_effect import PAINT, Errors, variances
-from services.solver.maths.box_qp import Integers
+from rhot.kernels.packed import Packed
+from services.solver.error_effect import EFFECT, PAINT, Effect, Errors, variances
 from services.solver.maths.chains import HandChains
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.hand_tracker import MAX_GAP_S
@@ -70,6 +70,18 @@ _MEASURED = Spread(0.0, 0.02, 1e-3, (5e-4, 5e-4, 1e-3), (1e-3, 5e-4, 1e-3), 1e-3
 _EXACT = Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
+class ErrorsAt(NamedTuple):
+    """Errors whose effect is packed."""
+
+    effect: Packed
+    landmark_m2: tuple[float, float]
+    keep: float
+
+    def unpacked(self) -> Errors:
+        """For kernels that are given arrays."""
+        return Errors(self.effect.parts, self.landmark_m2, self.keep)
+
+
 class ModelError:
     """The errors of one hand's model, and what they have done to its pose."""
 
@@ -82,8 +94,8 @@ class ModelError:
         # The first column of each landmark's paint, in the order in which they were first seen:
         # most hands have paint for many more than are painted.
         self._column: dict[str, int] = {}
-        # The first columns of landmarks' paint, by their names.
-        self._columns: dict[tuple[str, ...], Integers] = {}
+        # By the landmarks of a message: what errors did, and where their paint is in it.
+        self._effects: dict[tuple[str, ...], Packed] = {}
         self._sigmas = np.array([spread.size, *[spread.bone] * 15, *[spread.root_m] * 15])
         self._S = np.zeros((UNKNOWNS, PAINT))
         self._misfit = np.ones(1)
@@ -102,11 +114,11 @@ class ModelError:
         names and observations: the landmarks that it was fitted to, as the fit was told; misfit_m2
         as in errors().
         """
-        errors = self.errors(stamp_ns, names, misfit_m2)
+        errors = self.errors(stamp_ns, names, misfit_m2).unpacked()
         found: Array = variances(self._chains, observations, estimate, errors)
         return found
 
-    def errors(self, stamp_ns: int, names: tuple[str, ...], misfit_m2: float) -> Errors:
+    def errors(self, stamp_ns: int, names: tuple[str, ...], misfit_m2: float) -> ErrorsAt:
         """What `variances` is to take on to a message of landmarks of these names.
 
         misfit_m2 is in the landmarks' variances too, as the fit was told (model_misfit.py).
@@ -114,21 +126,16 @@ class ModelError:
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
         is_gap = not 0.0 <= seconds <= MAX_GAP_S
-        columns = self._columns.get(names)
-        if columns is None:
+        effect = self._effects.get(names)
+        if effect is None:
             columns = np.array([self._column_of(name) for name in names], dtype=np.int64)
+            effect = EFFECT.pack(Effect(self._S, self._sigmas, self._misfit, columns))
             # Names come from the network, in any order: the memory for them is bounded.
-            if len(self._columns) < MAX_LISTS:
-                self._columns[names] = columns
+            if len(self._effects) < MAX_LISTS:
+                self._effects[names] = effect
         keep = 0.0 if is_gap else math.exp(-seconds / _FORGET_S)
-        return Errors(
-            self._S,
-            self._sigmas,
-            columns,
-            self._misfit,
-            (self._spread.residual_m**2, self.landmark_m2 + misfit_m2),
-            keep,
-        )
+        usual_m2 = self._spread.residual_m**2
+        return ErrorsAt(effect, (usual_m2, self.landmark_m2 + misfit_m2), keep)
 
     def _column_of(self, name: str) -> int:
         """The first column of a landmark's paint, which is new where it was never seen."""
@@ -138,4 +145,6 @@ class ModelError:
             paint_m = self._spread.tip_paint_m if name in TIPS else self._spread.dab_m
             self._sigmas = np.append(self._sigmas, paint_m)
             self._S = np.hstack([self._S, np.zeros((UNKNOWNS, 3))])
+            # They have the old arrays.
+            self._effects.clear()
         return known

@@ -13,19 +13,20 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.kernels.packed import Packed, unowned
-from services.solver.error_effect import Errors, told_misfit, variances
+from services.solver.error_effect import Errors, effect_at, told_misfit, variances
 from services.solver.finger.solve_fingers import (
     Bools,
     FingerSolution,
     solve_dls,
     tips_in_wrist,
 )
-from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.maths.quaternions import quaternions_from_rotations
+from services.solver.model_error import ErrorsAt
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.landmarks import Observations, Observed, Places
+from services.solver.whole_hand.landmarks import Observed, Places, observations_of, places_at
+from services.solver.whole_hand.update import known_at
 
 # Micrometres and microradians: a thousandth of what the landmarks are good for.
 _DECIMALS = 6
@@ -41,30 +42,32 @@ _UNKNOWN_RAD, _UNKNOWN_M = math.pi, 1.0
 
 def dls_numbers(
     packed: Packed,
-    places: Places,
+    places: Packed,
     observed: Observed,
     whitening: Array,
     estimate: HandEstimate,
-    errors: Errors,
+    errors: ErrorsAt,
     options: tuple[int, float],
 ) -> Array:
     """`pose_numbers` of an estimate whose digits are solved by dls.
 
-    packed: update.Known. whitening (m, 3, 3), as in Observations, of the landmarks
-    observed, which sit at places. errors: as `variances` takes them. options: iterations and
+    packed: update.Known. whitening (m, 3, 3), as in Observations, of the landmarks observed, which
+    sit at places (PLACES). errors: as `variances` takes them, packed. options: iterations and
     tolerance (m).
     """
     numbers = np.empty((_ROWS, _COLUMNS))
     _dls_numbers_unpacked(
         numbers,
-        packed,
-        *places,
+        packed.address,
+        places.address,
         observed.points_m,
         observed.covariances_m2,
         observed.measured,
         whitening,
         *estimate,
-        *errors,
+        errors.effect.address,
+        errors.landmark_m2,
+        errors.keep,
         *options,
     )
     return numbers
@@ -73,13 +76,8 @@ def dls_numbers(
 @njit(cache=True)
 def _dls_numbers_unpacked(
     numbers: Array,
-    packed: Packed,
-    joint: Integers,
-    digit: Integers,
-    depth: Integers,
-    offset_m: Array,
-    _reach_m: Array,
-    tip: Integers,
+    address: int,
+    places: int,
     points_m: Array,
     covariances_m2: Array,
     measured: Bools,
@@ -90,10 +88,7 @@ def _dls_numbers_unpacked(
     covariance: Array,
     cost: float,
     used: int,
-    effect: Array,
-    sigmas: Array,
-    paint_columns: Integers,
-    misfit: Array,
+    effect: int,
     landmark_m2: tuple[float, float],
     keep: float,
     max_iterations: int,
@@ -102,12 +97,13 @@ def _dls_numbers_unpacked(
     """`dls_numbers` with plain arrays for its tuples, of which numba takes four times as long, and
     for what it returns.
     """
-    chains, wrist = packed.parts.chains, unowned((rotation, position_m))
-    tips = tips_in_wrist(wrist, (tip, points_m, covariances_m2, measured))
+    chains, wrist = known_at(address).chains, unowned((rotation, position_m))
+    sit: Places = places_at(places)
+    tips = tips_in_wrist(wrist, (sit.tip, points_m, covariances_m2, measured))
     fingers = solve_dls(chains, angles, tips, max_iterations, tolerance_m)
     estimate = HandEstimate(rotation, position_m, angles, covariance, cost, used)
-    observations = Observations(joint, digit, depth, offset_m, points_m, whitening)
-    errors = Errors(effect, sigmas, paint_columns, misfit, landmark_m2, keep)
+    observations = observations_of(sit, points_m, whitening)
+    errors = Errors(effect_at(effect), landmark_m2, keep)
     spread = variances(chains, observations, estimate, errors)
     numbers[:] = pose_numbers(chains, wrist, fingers, spread, told_misfit(errors))
 

@@ -18,10 +18,10 @@ from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, HandName, joint_radii_m
 from rhot.messages import HandPoints, HandPose, JointSource
-from services.solver.error_effect import Errors, told_misfit, variances
+from services.solver.error_effect import told_misfit, variances
 from services.solver.finger.solve_fingers import DLS, solve_fingers, tips_in_wrist
 from services.solver.model_check import check_model
-from services.solver.model_error import ModelError
+from services.solver.model_error import ErrorsAt, ModelError
 from services.solver.pose_message import hand_pose, joint_sources
 from services.solver.pose_numbers import dls_numbers, pose_numbers, rounded
 from services.solver.whole_hand.hand_estimate import HandEstimate
@@ -96,20 +96,21 @@ class _Hand:
         sources = self._sources(observed)
         return hand_pose(points, self._settings.method, numbers, self._radii, sources)
 
-    def _numbers(self, estimate: HandEstimate, observed: Observed, errors: Errors) -> Array:
+    def _numbers(self, estimate: HandEstimate, observed: Observed, errors: ErrorsAt) -> Array:
         """All numbers of the pose (32, 8), its digits by the configured method."""
         settings, tracker = self._settings, self.tracker
-        places, fitted = self._landmarks.places(observed.names), tracker.fitted
+        places = self._landmarks.packed(observed.names)
         if settings.method == DLS:
             options = settings.max_iterations, settings.tolerance_m
-            seen = places, observed, fitted.whitening
+            seen = places, observed, tracker.whitening
             return dls_numbers(tracker.packed, *seen, estimate, errors, options)
         wrist = estimate.rotation, estimate.position_m
-        points = places.tip, observed.points_m, observed.covariances_m2, observed.measured
+        points = places.parts.tip, observed.points_m, observed.covariances_m2, observed.measured
         tips = tips_in_wrist(wrist, points)
         fingers = solve_fingers(settings, tracker.chains, estimate.angles_rad, tips)
-        spread = variances(tracker.chains, fitted, estimate, errors)
-        return pose_numbers(tracker.chains, wrist, fingers, spread, told_misfit(errors))
+        given = errors.unpacked()
+        spread = variances(tracker.chains, tracker.fitted, estimate, given)
+        return pose_numbers(tracker.chains, wrist, fingers, spread, told_misfit(given))
 
     def _sources(self, observed: Observed) -> list[JointSource]:
         """Where each joint comes from; the same few sets of landmarks come again and again."""

@@ -13,12 +13,12 @@ from numba import njit
 from rhot.files.rig_tables import Fusion
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import pack
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
+from services.fusion.kalman.held import ESTIMATES
 from services.fusion.method import Counts, Estimates, no_estimates
 from services.fusion.one_camera.last_located import LastLocated
 
@@ -51,7 +51,7 @@ class KalmanMethod:
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
         self._told = no_estimates(len(self._hand), len(cameras))
-        self._told_of = [pack(self._told.of(rows)) for rows in self._rows]
+        self._told_of = [ESTIMATES.pack(self._told.of(rows)) for rows in self._rows]
         self.reset()
 
     def reset(self) -> None:

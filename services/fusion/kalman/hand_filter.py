@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed, pack
+from rhot.kernels.packed import Packed
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import oldest_with
@@ -17,7 +17,14 @@ from services.fusion.kalman.frame_update import (
     no_fates,
     no_sights,
 )
-from services.fusion.kalman.held import Held, complete, filter_again, take_looks, tell_all
+from services.fusion.kalman.held import (
+    HELD,
+    Held,
+    complete,
+    filter_again,
+    take_looks,
+    tell_all,
+)
 from services.fusion.kalman.history import empty_history
 from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
@@ -72,11 +79,12 @@ class HandFilter:
         self._history = empty_history(landmarks, len(MODELS.own))
         self._sights = no_sights(landmarks, len(cameras.t), hold_s)
         self._fates = no_fates(landmarks)
-        self._held = pack(Held(self._history, self._sights, self._fates, cameras, MODELS, GATE))
+        held = Held(self._history, self._sights, self._fates, cameras, MODELS, GATE)
+        self._held = HELD.pack(held)
 
     def observe(self, looks: FrameLooks) -> None:
         """Take in a frame's looks."""
-        outcome = take_looks(self._held, *looks)
+        outcome = take_looks(self._held.address, *looks)
         lost, used, alive = self._fates.counts.tolist()
         self._counts.dropped += lost
         if outcome == LATE:
@@ -90,7 +98,7 @@ class HandFilter:
     def settle(self) -> None:
         """Do what of the last frame points do not wait for; observe() does it where nobody has."""
         if self._history.incomplete[0]:
-            complete(self._held)
+            complete(self._held.address)
 
     def _begin_where_due(self, looks: FrameLooks) -> None:
         """Landmarks of a frame that begin, or begin again, as their fates say."""
@@ -137,10 +145,10 @@ class HandFilter:
         before = history.begins[since, landmark], history.ends[since, landmark]
         history.begins[since, landmark] = since == node
         history.ends[since, landmark] = False
-        filter_again(self._held, index)
+        filter_again(self._held.address, index)
         if not self._has_depth(landmark, indices):
             history.begins[since, landmark], history.ends[since, landmark] = before
-            filter_again(self._held, index)
+            filter_again(self._held.address, index)
             self._counts.refused += 1
             return False
         for k in indices.tolist():
@@ -195,12 +203,12 @@ class HandFilter:
             self._begin(landmark, now_s, RESTART_WINDOW_S)
 
     def tell(self, time_s: float, recent_s: Array, told: Packed) -> bool:
-        """Fill told, Estimates, with what is known at an instant.
+        """Fill told, ESTIMATES, with what is known at an instant.
 
         Lost landmarks end (frame_update.drop_lost).
         recent_s (C,): so old a camera's look may be to count as of that instant. Returns whether
         there is any landmark that no two cameras see.
         """
-        lost, alone = tell_all(self._held, told, time_s, recent_s)
+        lost, alone = tell_all(self._held.address, told.address, time_s, recent_s)
         self._counts.dropped += lost
         return bool(alone)

@@ -1,4 +1,4 @@
-"""What a hand's filter holds, as kernels are handed it (rhot.kernels.packed)."""
+"""What a hand's filter holds, as kernels are handed it: by its address (rhot.kernels.packed)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed
+from rhot.kernels.packed import Layout
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.kalman.filtering import complete_newest, filter_from
@@ -15,6 +15,7 @@ from services.fusion.kalman.frame_update import Fates, FrameLooks, Sights, take_
 from services.fusion.kalman.history import HandHistory
 from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.telling import tell
+from services.fusion.method import Estimates
 
 
 class Held(NamedTuple):
@@ -28,9 +29,13 @@ class Held(NamedTuple):
     gate: float
 
 
+HELD, ESTIMATES = Layout(), Layout()
+_held_at, _estimates_at = HELD.at, ESTIMATES.at
+
+
 @njit(cache=True, error_model="numpy")
 def take_looks(
-    packed: Packed,
+    address: int,
     camera: int,
     landmarks: Ints,
     times_s: Array,
@@ -39,29 +44,30 @@ def take_looks(
     clock_variance: float,
 ) -> int:
     """frame_update.take_in of Held and the parts of FrameLooks."""
-    held: Held = packed.parts
+    held: Held = _held_at(address)
     looks = FrameLooks(camera, landmarks, times_s, rays, sigmas, clock_variance)
     filters = held.models, held.gate
     return take_in(held.history, held.sights, held.cameras, filters, looks, held.fates)
 
 
 @njit(cache=True, error_model="numpy")
-def complete(packed: Packed) -> None:
+def complete(address: int) -> None:
     """filtering.complete_newest of Held."""
-    held: Held = packed.parts
+    held: Held = _held_at(address)
     complete_newest(held.history, held.cameras, (held.models, held.gate))
 
 
 @njit(cache=True, error_model="numpy")
-def filter_again(packed: Packed, index: int) -> None:
+def filter_again(address: int, index: int) -> None:
     """filtering.filter_from of Held."""
-    held: Held = packed.parts
+    held: Held = _held_at(address)
     filter_from(held.history, index, held.cameras, (held.models, held.gate))
 
 
 @njit(cache=True, error_model="numpy")
-def tell_all(packed: Packed, told: Packed, time_s: float, recent_s: Array) -> tuple[int, int]:
-    """telling.tell of Held and Estimates."""
-    held: Held = packed.parts
+def tell_all(address: int, told: int, time_s: float, recent_s: Array) -> tuple[int, int]:
+    """telling.tell of Held, to Estimates at another address."""
+    held: Held = _held_at(address)
     filters = held.models, held.gate
-    return tell(held.history, held.sights, held.cameras, filters, time_s, recent_s, told.parts)
+    to: Estimates = _estimates_at(told)
+    return tell(held.history, held.sights, held.cameras, filters, time_s, recent_s, to)

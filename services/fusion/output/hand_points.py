@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import HandName
-from rhot.kernels.packed import Packed, pack, unowned
+from rhot.kernels.packed import Layout, unowned
 from rhot.messages import HandPoint
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
@@ -53,6 +53,10 @@ class _Points(NamedTuple):
     kept: Bools  # (L,) which of them are told
 
 
+_POINTS = Layout()
+_points_at = _POINTS.at
+
+
 class PointMessages:
     """Makes the messages of L landmarks seen by C cameras."""
 
@@ -79,7 +83,7 @@ class PointMessages:
             np.empty((len(landmarks), 12)),
             np.empty(len(landmarks), dtype=np.bool_),
         )
-        self._packed = pack(self._points)
+        self._packed = _POINTS.pack(self._points)
         # Names of the cameras that see a landmark, by whether each does: few different lists.
         self._seen_by: dict[tuple[bool, ...], list[str]] = {}
 
@@ -90,7 +94,7 @@ class PointMessages:
 
         estimates: of paint's centres.
         """
-        incoherent = _point_numbers(self._packed, instant_ns, *estimates)
+        incoherent = _point_numbers(self._packed.address, instant_ns, *estimates)
         points: dict[HandName, list[HandPoint]] = {hand: [] for hand in self._hands}
         told = zip(
             self._points.kept.tolist(),
@@ -124,14 +128,14 @@ class PointMessages:
 
 
 @njit(cache=True)
-def _point_numbers(packed: Packed, instant_ns: int, *row: Any) -> int:
+def _point_numbers(address: int, instant_ns: int, *row: Any) -> int:
     """Fill the numbers of points, and which of them to tell; how many are incoherent.
 
-    packed: _Points; row: Estimates.
+    address: of _Points; row: Estimates.
     """
     estimates = unowned(Estimates(*row))
     positions, covariances = estimates.positions_m.copy(), estimates.covariances_m2.copy()
-    return _correct_and_round(packed.parts, instant_ns, estimates, positions, covariances)
+    return _correct_and_round(_points_at(address), instant_ns, estimates, positions, covariances)
 
 
 @njit(cache=True)
@@ -140,13 +144,14 @@ def _correct_and_round(
 ) -> int:
     """_point_numbers from copies of positions (L, 3) and covariances (L, 3, 3), written over."""
     positions, covariances = unowned(positions), unowned(covariances)
-    paint, systematic, seen, cameras = points.corrections
+    known = points.corrections
+    seen, cameras = known.seen, known.cameras
     found, seen_by = estimates.found, estimates.seen_by
-    correct_paint(paint, instant_ns, positions, covariances, seen_by, cameras)
+    correct_paint(known.paint, instant_ns, positions, covariances, seen_by, cameras)
     seen.places[:] = np.nan
     for k in np.flatnonzero(found):
         seen.places[k] = positions[k]
-    add_systematic(systematic, seen.sigmas, positions, seen_by, cameras, covariances)
+    add_systematic(known.systematic, seen.sigmas, positions, seen_by, cameras, covariances)
     usable = _usable(positions, covariances, found)
     kept = points.kept
     kept[:] = False

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed, pack
+from rhot.kernels.packed import Layout
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import View
 from services.fusion.output.expected_area import (
@@ -68,6 +68,10 @@ class _Seen(NamedTuple):
     paint: KnownPaint
 
 
+_SEEN = Layout()
+_seen_at = _SEEN.at
+
+
 class HiddenPaint:
     """How far every camera's sight of every landmark may be off: by the areas that all of them see,
     and by what poses let expect of tips.
@@ -89,7 +93,7 @@ class HiddenPaint:
             sigmas=np.empty((2, *shape)),
             places=np.empty((shape[0], 3)),
         )
-        self._packed = pack(_Seen(self.seen, centres_rig, per_rad, paint))
+        self._packed = _SEEN.pack(_Seen(self.seen, centres_rig, per_rad, paint))
         self.reset()
 
     def reset(self) -> None:
@@ -102,7 +106,7 @@ class HiddenPaint:
         """What is to be added, squared, to a view's sigmas (n,)."""
         found = np.empty(len(view.landmarks))
         _compare(
-            self._packed,
+            self._packed.address,
             view.camera,
             view.instant_ns,
             time_s,
@@ -115,7 +119,7 @@ class HiddenPaint:
 
 @njit(cache=True)
 def _compare(
-    packed: Packed,
+    address: int,
     camera: int,
     instant_ns: int,
     time_s: float,
@@ -123,8 +127,12 @@ def _compare(
     areas: Array,
     out: Array,
 ) -> None:
-    """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,)."""
-    seen, centres, per_rad, paint = packed.parts
+    """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,).
+
+    address: of _Seen.
+    """
+    parts: _Seen = _seen_at(address)
+    seen, centres, per_rad, paint = parts.seen, parts.centres_rig, parts.per_rad, parts.paint
     own, shared = seen.sigmas
     # How much less of each shows than its pose lets expect, as a logarithm; NaN where none tells.
     less = np.full(landmarks.size, np.nan)

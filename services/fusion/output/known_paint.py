@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed, unowned
+from rhot.kernels.packed import Layout, unowned
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.output.paint_centroid import Finger, cross, expected_shift
@@ -63,9 +63,13 @@ class KnownPaint(NamedTuple):
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
 
 
+PAINT = Layout()
+_paint_at = PAINT.at
+
+
 @njit(cache=True)
 def note_directions(
-    packed: Packed,
+    address: int,
     rows: Ints,
     directions: Array,
     hinges: Array,
@@ -73,11 +77,11 @@ def note_directions(
     shape_sd: float,
     stamp_ns: int,
 ) -> None:
-    """Remember in KnownPaint how fingers of landmarks (n,) point (n, 3) and bend (n, 3).
+    """Remember, in KnownPaint at an address, how fingers of landmarks (n,) point and bend (n, 3).
 
     sigmas_rad (n, 2), shape_sd: how sure that is, and the shape of their paint, in radii.
     """
-    paint: KnownPaint = packed.parts
+    paint: KnownPaint = _paint_at(address)
     for n in range(rows.size):
         row = rows[n]
         passed_s = 1e-9 * (stamp_ns - paint.stamps_ns[row])
@@ -216,7 +220,7 @@ def _locating(cameras: Extrinsics, seen_by: Bools) -> Extrinsics:
     """The cameras that locate a landmark: those that see it (C,), all where less than two do."""
     count = np.count_nonzero(seen_by)
     if count < 2 or count == seen_by.size:
-        return cameras
+        return Extrinsics(cameras.R, cameras.t)
     chosen = np.flatnonzero(seen_by)
     return Extrinsics(cameras.R[chosen], cameras.t[chosen])
 

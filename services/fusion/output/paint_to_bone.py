@@ -34,11 +34,10 @@ from numba import njit
 from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import DIGITS, JOINT_INDEX, HandModel, HandName
-from rhot.kernels.packed import pack
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
+from services.fusion.output.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
 from services.fusion.output.visible_paint import PaintTables, dab_sag_m, paint_tables
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
@@ -155,7 +154,7 @@ class PaintToBone:
             viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
 
-        self._packed = pack(self.known)
+        self._packed = PAINT.pack(self.known)
 
     def reset(self) -> None:
         """Time starts anew: no direction is known."""
@@ -196,7 +195,7 @@ class PaintToBone:
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
         note_directions(
-            self._packed,
+            self._packed.address,
             told.rows,
             told.directions,
             told.hinges,

@@ -113,7 +113,7 @@ def add_systematic(
     each ray may be off since paint is hidden from it, and all of them as it is from all
     (hidden_paint.py).
     """
-    R, t = cameras
+    R, t = cameras.R, cameras.t
     A = np.empty((3, 3))  # H^T H / own^2, summed
     A_inverse = np.empty((3, 3))
     ray = np.empty(2)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.solver.maths.cholesky import factorise
 
 Integers = npt.NDArray[np.int64]
 
@@ -99,21 +100,14 @@ def _start(g: Array, low: Array, high: Array, x: Array, state: Integers) -> None
 def _newton_step(H: Array, g: Array, x: Array, count: int, work: Workspace) -> bool:
     """Newton's step of the `count` free unknowns, the others held, into work.step[:count].
 
-    False if H is not definite. L's diagonal holds reciprocals: one division a row.
+    False if H is not definite.
     """
     L, step, free = work.L, work.step, work.free
     for a in range(count):
-        i = free[a]
         for b in range(a + 1):
-            total = H[i, free[b]]
-            for k in range(b):
-                total -= L[a, k] * L[b, k]
-            if a == b:
-                if not total > 0.0:
-                    return False
-                L[a, a] = 1.0 / math.sqrt(total)
-            else:
-                L[a, b] = total * L[b, b]
+            L[a, b] = H[free[a], free[b]]
+    if not factorise(L, count, 0.0):
+        return False
     # Right-hand side: -(g + H x) is the descent at x, so the solution is a step from x.
     # Nearly always it starts at zero, where the gradient is g.
     at_zero = not x.any()

@@ -21,7 +21,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rhot.hand import TIPS, HandModel
-from rhot.kernels.packed import pack
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
@@ -34,13 +33,14 @@ from services.solver.whole_hand.landmarks import (
     Observations,
     Observed,
     observation_arrays,
+    observations_of,
 )
 from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
-from services.solver.whole_hand.update import Known, follow
+from services.solver.whole_hand.update import KNOWN, Known, follow
 
 # Landmarks that fix a pose well enough to keep it: three points are a plane with a direction.
 MIN_LANDMARKS = 3
@@ -70,7 +70,7 @@ class HandTracker:
         self.chains = hand_chains(model)
         posture = posture_prior(model)
         # As kernels are given it.
-        self.packed = pack(Known(self.chains, posture))
+        self.packed = KNOWN.pack(Known(self.chains, posture))
         self._landmarks = landmarks
         self._uninformed = uninformed_prior(posture)
         self._estimate: HandEstimate | None = None
@@ -83,8 +83,9 @@ class HandTracker:
         self._misfit_m2 = 0.0
         self._rival: Rival | None = None
         self._restart_landmarks: frozenset[str] = frozenset()
-        # What the last estimate was fitted to.
-        self.fitted = observation_arrays(landmarks, {})
+        # What the last estimate was fitted to: landmarks, and their whitening (m, 3, 3).
+        self._fitted = Observed.of({})
+        self.whitening = np.empty((0, 3, 3))
         # An estimate that is to be compared with a restart, and what it was fitted to.
         self._to_challenge: tuple[HandEstimate, Observations] | None = None
 
@@ -111,6 +112,12 @@ class HandTracker:
             )
         self._stamp_ns = stamp_ns
         return self._told.estimate
+
+    @property
+    def fitted(self) -> Observations:
+        """What the last estimate was fitted to."""
+        places = self._landmarks.places(self._fitted.names)
+        return observations_of(places, self._fitted.points_m, self.whitening)
 
     @property
     def misfit_m2(self) -> float:
@@ -142,7 +149,7 @@ class HandTracker:
 
         The pose is followed, and its rival, of which one may have won.
         """
-        places = self._landmarks.places(observed.names)
+        places = self._landmarks.packed(observed.names)
         given = self.packed, places, observed, self._misfit_m2
         taken = follow(*given, last, told.estimate, seconds)
         if self._rival is not None:
@@ -152,8 +159,8 @@ class HandTracker:
                 taken, self._rival = other, None
             elif self._rival.is_over(taken.estimate):
                 self._rival = None
-        own, whitening, self._misfit_m2, quiet = taken
-        self.fitted = Observations(*places[:4], observed.points_m, whitening)
+        own, self.whitening, self._misfit_m2, quiet = taken
+        self._fitted = observed
         self._challenge_if_due(own, observed)
         if quiet and self._rival is None:
             return own, Told(own, observed.names, observed.points_m)
@@ -168,14 +175,15 @@ class HandTracker:
 
     def _begun(self, observed: Observed) -> tuple[HandEstimate, Told]:
         """The likeliest pose; the next that differs from it is followed as its rival."""
-        self.fitted = observation_arrays(self._landmarks, observed)
+        self._fitted = observed
+        self.whitening = observation_arrays(self._landmarks, observed).whitening
         self._updates_to_restart = RESTART_INTERVAL_BAD
         self._restart_landmarks = frozenset()
         best, *others = initialise(self.chains, self._uninformed, self.fitted)
         self._rival = None
         own = _estimate_of(best)
         self._follow_rival(own, best.cost, others)
-        self._misfit_m2 = learned_misfit(0.0, self.fitted.whitening, own.cost, MAX_GAP_S)
+        self._misfit_m2 = learned_misfit(0.0, self.whitening, own.cost, MAX_GAP_S)
         believed = own if self._rival is None else self._rival.told(own)
         return own, Told(believed, observed.names, observed.points_m)
 
@@ -193,12 +201,13 @@ class HandTracker:
     def _challenge_if_due(self, estimate: HandEstimate, observed: Observed) -> None:
         """Have an estimate compared with a restart, where that is due."""
         self._updates_to_restart -= 1
-        names = frozenset(observed.names)
+        names = observed.names
         bad = estimate.cost > BAD_COST_PER_COORDINATE * 3 * max(len(names), 1)
-        if bad or not names <= self._restart_landmarks:
+        if bad or not self._restart_landmarks.issuperset(names):
             self._updates_to_restart = min(self._updates_to_restart, RESTART_INTERVAL_BAD)
         if self._updates_to_restart <= 0 and len(names) > MIN_LANDMARKS:
-            self._updates_to_restart, self._restart_landmarks = self._restart_every, names
+            self._updates_to_restart = self._restart_every
+            self._restart_landmarks = frozenset(names)
             self._to_challenge = estimate, self.fitted
 
     def _cost_without_history(self, estimate: HandEstimate, observations: Observations) -> float:

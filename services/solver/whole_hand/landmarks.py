@@ -13,6 +13,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from rhot.hand import JOINTS, TIPS, HandModel, landmark_point
+from rhot.kernels.packed import Layout, Packed
 from services.solver.maths.box_qp import Integers
 from services.solver.maths.chains import CHAINS, HandChains, hand_chains
 from services.solver.maths.kinematics import hand_frames
@@ -91,18 +92,27 @@ class Places(NamedTuple):
     tip: Integers  # (m,) row of the digit whose tip it is, -1 of other landmarks
 
 
+PLACES = Layout()
+places_at = PLACES.at
+
+
 class Landmarks(dict[str, Landmark]):
     """Every landmark that a hand's model has paint for, by name."""
 
     def __init__(self, landmarks: Mapping[str, Landmark]) -> None:
         super().__init__(landmarks)
-        self._places: dict[tuple[str, ...], Places] = {}
+        self._places: dict[tuple[str, ...], Packed] = {}
 
     def places(self, names: tuple[str, ...]) -> Places:
-        """Where landmarks sit; the same few lists of names come again with every message."""
+        """Where landmarks sit."""
+        places: Places = self.packed(names).parts
+        return places
+
+    def packed(self, names: tuple[str, ...]) -> Packed:
+        """The same for kernels (PLACES); the same few lists of names come with every message."""
         known = self._places.get(names)
         if known is None:
-            known = self._placed(names)
+            known = PLACES.pack(self._placed(names))
             # Names come from the network, in any order: the memory for them is bounded.
             if len(self._places) < MAX_LISTS:
                 self._places[names] = known
@@ -132,6 +142,14 @@ class Observations(NamedTuple):
     offset_m: Array  # (m, 3)
     point_m: Array  # (m, 3) rig frame
     whitening: Array  # (m, 3, 3) 1/m, lower triangles
+
+
+@njit(cache=True, inline="always")
+def observations_of(places: Places, points_m: Array, whitening: Array) -> Observations:
+    """Landmarks that sit at places, measured at points (m, 3); whitening as in Observations."""
+    return Observations(
+        places.joint, places.digit, places.depth, places.offset_m, points_m, whitening
+    )
 
 
 def hand_landmarks(model: HandModel) -> Landmarks:

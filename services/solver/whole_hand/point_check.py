@@ -18,7 +18,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from rhot.messages import HandPoint, HandPoints
 from services.solver.maths.symmetric import eigen
-from services.solver.whole_hand.landmarks import Bools, Landmarks, Observed
+from services.solver.whole_hand.landmarks import Bools, Landmarks, Observed, places_at
 
 # No camera of this kind sees a finger tip 10 m away.
 _MAX_RANGE_M = 10.0
@@ -65,11 +65,11 @@ def usable_points(points: HandPoints, landmarks: Landmarks, more_m2: float = 0.0
         ):
             seen[point.name] = point
     names, rows = tuple(seen), _rows(seen.values())
-    places = landmarks.places(names)
+    places = landmarks.packed(names)
     # To be filled: an array that a kernel returns costs .6 us, one that it is given .2.
     positions, covariances = np.empty((len(names), 3)), np.empty((len(names), 3, 3))
     measured = np.empty(len(names), dtype=np.bool_)
-    if _check(rows, places.reach_m, more_m2, positions, covariances, measured):
+    if _check(rows, places.address, more_m2, positions, covariances, measured):
         return Observed(names, positions, covariances, measured)
     return _without_outliers(names, rows, landmarks, more_m2)
 
@@ -92,7 +92,7 @@ def _rows(points: Collection[HandPoint]) -> Array:
 @njit(cache=True)
 def _check(
     rows: Array,
-    reach_m: Array,
+    places: int,
     more_m2: float,
     positions: Array,
     covariances: Array,
@@ -100,7 +100,7 @@ def _check(
 ) -> bool:
     """To positions (n, 3), covariances (n, 3, 3), and who is measured (n,); whether all are sound.
 
-    Of points that reach so far (n,) from the wrist; the covariances with more_m2 along each axis.
+    Of points that sit at places (PLACES); the covariances with more_m2 along each axis.
     """
     believed, usable = _usable(rows)
     for n in range(rows.shape[0]):
@@ -110,7 +110,7 @@ def _check(
                 covariances[n, i, k] = believed[n, i, k]
             covariances[n, i, i] += more_m2
         measured[n] = rows[n, 10] == _MEASURED
-    return bool(usable.all()) and _worst_outlier(positions, believed, reach_m) < 0
+    return bool(usable.all()) and _worst_outlier(positions, believed, places_at(places).reach_m) < 0
 
 
 @njit(cache=True)

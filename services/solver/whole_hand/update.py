@@ -11,14 +11,19 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import Packed
-from services.solver.maths.box_qp import Integers
+from rhot.kernels.packed import Layout, Packed
 from services.solver.maths.chains import HandChains
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.glide import is_quiet
 from services.solver.whole_hand.hand_estimate import HandEstimate
-from services.solver.whole_hand.landmarks import Observations, Observed, Places, whitening
+from services.solver.whole_hand.landmarks import (
+    Observations,
+    Observed,
+    observations_of,
+    places_at,
+    whitening,
+)
 from services.solver.whole_hand.model_misfit import learned_misfit
 from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior, predict
 from services.solver.whole_hand.posture_prior import PosturePrior
@@ -32,6 +37,10 @@ class Known(NamedTuple):
     posture: PosturePrior
 
 
+KNOWN = Layout()
+known_at = KNOWN.at
+
+
 class Followed(NamedTuple):
     """What a message made of a hand that nothing rivals."""
 
@@ -43,7 +52,7 @@ class Followed(NamedTuple):
 
 def follow(
     packed: Packed,
-    places: Places,
+    places: Packed,
     observed: Observed,
     misfit_m2: float,
     last: HandEstimate,
@@ -52,7 +61,7 @@ def follow(
 ) -> Followed:
     """A message of landmarks that sit at places, some seconds after the last estimate.
 
-    packed: Known. last, told: what was believed and what was told.
+    packed: Known; places: PLACES. last, told: what was believed and what was told.
     """
     # Arrays to be filled, and tuples unpacked: numba takes four times as long over an array in a
     # tuple, and three times over one that it returns.
@@ -61,11 +70,8 @@ def follow(
     cost, iterations, learned_m2, quiet = _follow_unpacked(
         *found,
         whitened,
-        packed,
-        places.joint,
-        places.digit,
-        places.depth,
-        places.offset_m,
+        packed.address,
+        places.address,
         observed.points_m,
         observed.covariances_m2,
         misfit_m2,
@@ -87,11 +93,8 @@ def _follow_unpacked(
     found_angles: Array,
     found_covariance: Array,
     whitened: Array,
-    packed: Packed,
-    joint: Integers,
-    digit: Integers,
-    depth: Integers,
-    offset_m: Array,
+    address: int,
+    places: int,
     points_m: Array,
     covariances_m2: Array,
     misfit_m2: float,
@@ -104,9 +107,9 @@ def _follow_unpacked(
     seconds: float,
 ) -> tuple[float, int, float, bool]:
     """`follow` with plain arrays for its tuples, the first five for what it returns."""
-    known: Known = packed.parts
+    known: Known = known_at(address)
     whitened[:] = whitening(covariances_m2, misfit_m2)
-    observations = Observations(joint, digit, depth, offset_m, points_m, whitened)
+    observations = observations_of(places_at(places), points_m, whitened)
     last = HandEstimate(rotation, position_m, angles, covariance, 0.0, 0)
     own = update(known.chains, known.posture, observations, last, seconds)
     found_rotation[:], found_position_m[:] = own.rotation, own.position_m

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rhot.geometry.transforms import Array
-from rhot.kernels.packed import pack
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.kalman.frame_update import FrameLooks
 from services.fusion.kalman.hand_filter import HandFilter
+from services.fusion.kalman.held import ESTIMATES
 from services.fusion.method import Counts, Estimates, no_estimates
 from testing.synthetic_points import Motion, MovingHand, SyntheticRig
 
@@ -51,7 +51,7 @@ class OneHand:
     def told(self, time_s: float) -> Estimates:
         """What is known at an instant."""
         told = no_estimates(6, 2)
-        self.filter.tell(time_s, np.full(2, 0.05), pack(told))
+        self.filter.tell(time_s, np.full(2, 0.05), ESTIMATES.pack(told))
         return told
 
     def run(self, numbers: Iterable[int]) -> None:

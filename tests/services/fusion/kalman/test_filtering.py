@@ -65,7 +65,7 @@ def test_models_that_follow_later_end_as_if_filtered_at_once(one_hand):
         newest = history.order[history.size[0] - 1]
         names = ("state", "cov", "probability", "behind", "own", "strikes", "way", "used", "parent")
         followed = {name: getattr(history, name)[newest].copy() for name in names}
-        filter_again(hand.filter._held, history.size[0] - 1)
+        filter_again(hand.filter._held.address, history.size[0] - 1)
         for name, found in followed.items():
             np.testing.assert_array_equal(found, getattr(history, name)[newest], err_msg=name)
     assert waited > 25

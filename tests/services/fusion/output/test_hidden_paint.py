@@ -10,10 +10,9 @@ import pytest
 
 from rhot.files.config import load_rig
 from rhot.hand import landmark_point
-from rhot.kernels.packed import pack
 from services.fusion.intake.observations import View
 from services.fusion.output.hidden_paint import HiddenPaint
-from services.fusion.output.known_paint import LONG_AGO_NS, KnownPaint, note_directions
+from services.fusion.output.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
 from services.fusion.output.visible_paint import paint_tables
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
@@ -55,7 +54,8 @@ def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float, shap
     """A pose tells where the tip points, at 0 s."""
     rows, hinges = np.array([0]), np.array([[1.0, 0.0, 0.0]])
     sigmas = np.array([[sigma_rad, 0.0]])
-    note_directions(pack(paint), rows, np.array([direction]), hinges, sigmas, shape_sd, 0)
+    packed = PAINT.pack(paint)
+    note_directions(packed.address, rows, np.array([direction]), hinges, sigmas, shape_sd, 0)
 
 
 @pytest.fixture
@@ -172,7 +172,8 @@ def test_what_makes_all_tips_smaller_hides_none():
         np.tile((0.0, -1.0, 0.0), (3, 1)),
         np.tile((1.0, 0, 0), (3, 1)),
     )
-    note_directions(pack(known), rows, down, hinges, np.full((3, 2), 0.05), 0.0, 0)
+    packed = PAINT.pack(known)
+    note_directions(packed.address, rows, down, hinges, np.full((3, 2), 0.05), 0.0, 0)
 
     def seen(*areas: float) -> View:
         return look(0, 1.0, 1.0)._replace(landmarks=rows, areas=SIDE * AREA * np.array(areas))
