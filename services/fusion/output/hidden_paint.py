@@ -30,6 +30,7 @@ from services.fusion.output.expected_area import (
     usually_less,
 )
 from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint, turn_on
+from services.fusion.output.unsteady_area import unsteady_sigma
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
 # cameras' rays, of tips and of dabs. Whole ones seen by two cameras .09 to .15 rad apart: within
@@ -55,6 +56,7 @@ class PaintSeen(NamedTuple):
     # One standard deviation of each ray: its own, as others see more, and one that all share, as
     # all see less than the pose lets expect.
     sigmas: Array  # (2, L, C)
+    lately: Array  # (L, C, 2) how areas compared of late (unsteady_area.py)
     # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
 
@@ -91,6 +93,7 @@ class HiddenPaint:
             seen_s=np.empty(shape),
             levels=np.empty(shape),
             sigmas=np.empty((2, *shape)),
+            lately=np.empty((*shape, 2)),
             places=np.empty((shape[0], 3)),
         )
         self._packed = _SEEN.pack(_Seen(self.seen, centres_rig, per_rad, paint))
@@ -100,7 +103,7 @@ class HiddenPaint:
         """Time starts anew."""
         seen = self.seen
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
-        seen.sigmas[:], seen.places[:] = 0.0, np.nan
+        seen.sigmas[:], seen.lately[:], seen.places[:] = 0.0, np.nan, np.nan
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
@@ -155,13 +158,28 @@ def _compare(
         worst = _unlike(seen, centres, per_rad[row], camera, row, time_s)
         own[row, camera] = max(worst, keep * own[row, camera])
         shared[row, camera] *= keep
-        out[n] = own[row, camera]
+        out[n] = math.hypot(own[row, camera], _unsteady(seen, camera, row, passed_s))
     usual = usually_less(less)
     for n in range(landmarks.size):
         row = landmarks[n]
         hidden = hidden_share(less[n] - usual, paint.shape_sds[row])
         off = _SHIFT_BY_POSE * hidden * math.sqrt(areas[n] / (1.0 - hidden))
         shared[row, camera] = max(off, shared[row, camera])
+
+
+@njit(cache=True)
+def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
+    """How far a look may be off, as its area flickers against that which another camera saw last."""
+    time_s, latest = seen.seen_s[row, camera], -1
+    for other in range(seen.areas.shape[1]):
+        if other != camera and time_s - seen.seen_s[row, other] <= _RECENT_S:
+            if latest < 0 or seen.seen_s[row, other] > seen.seen_s[row, latest]:
+                latest = other
+    area = seen.areas[row, camera]
+    if latest < 0 or not (area > 0.0 and seen.areas[row, latest] > 0.0):
+        return 0.0
+    ratio = area / seen.areas[row, latest]
+    return math.sqrt(area) * unsteady_sigma(seen.lately[row, camera], ratio, passed_s)
 
 
 @njit(cache=True)

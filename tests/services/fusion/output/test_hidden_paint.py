@@ -225,3 +225,25 @@ def test_sigmas_cover_fingers_that_pass_before_each_other(repository: Path):
     assert 0.3 < np.mean(squares) < 2.0
     # The whole ones stay small: half of all points within 3 mm in depth.
     assert np.median(sigmas_m) < 3e-3 < np.percentile(sigmas_m, 95)
+
+
+def test_paint_that_flickers_for_one_camera_is_less_sure():
+    """A piece that comes and goes, .1 of a marker 13 px wide: some tenths of a pixel."""
+    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint.seen.places[:] = PLACES
+    told = []
+    for frame in range(12):
+        paint.observe(look(0, 1.0, 1.0), frame / 30)
+        told.append(paint.observe(look(1, 0.96 + 0.08 * (frame % 2), 1.0), frame / 30 + 0.016))
+    tip, dab = told[-1]
+    assert 0.5 < tip / (0.2 * 0.04 * np.sqrt(AREA)) < 1.2
+    assert dab == 0.0
+
+
+def test_paint_that_turns_is_as_sure_as_ever():
+    """All cameras see it grow and shrink."""
+    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint.seen.places[:] = PLACES
+    for frame in range(40):
+        area = np.exp(0.3 * np.sin(frame / 8))
+        assert not paint.observe(look(frame % 2, area, 1.0), frame / 60).any()
