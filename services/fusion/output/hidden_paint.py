@@ -169,12 +169,12 @@ def _compare(
 
 @njit(cache=True)
 def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
-    """How far a look may be off, as its area flickers against that which another camera saw last."""
-    time_s, latest = seen.seen_s[row, camera], -1
-    for other in range(seen.areas.shape[1]):
-        if other != camera and time_s - seen.seen_s[row, other] <= _RECENT_S:
-            if latest < 0 or seen.seen_s[row, other] > seen.seen_s[row, latest]:
-                latest = other
+    """How far a look may be off, as its area flickers against that which another camera saw."""
+    seen_s, latest = seen.seen_s[row], -1
+    for other in range(seen_s.size):
+        fresh = other != camera and seen_s[camera] - seen_s[other] <= _RECENT_S
+        if fresh and (latest < 0 or seen_s[other] > seen_s[latest]):
+            latest = other
     area = seen.areas[row, camera]
     if latest < 0 or not (area > 0.0 and seen.areas[row, latest] > 0.0):
         return 0.0
