@@ -54,7 +54,7 @@ def factorise(L: Array, n: int, least: float) -> bool:
 
     Its diagonal holds reciprocals: one division a row. False where a pivot is not above `least`,
     which counts as 1e-12. Two rows and two columns at once: four sums that do not wait for each
-    other, in a third of the time.
+    other, in 3/5 of the time.
     """
     definite = True
     for a in range(0, n - 1, 2):
