@@ -116,7 +116,7 @@ def _carry_along(
 
 
 @njit(cache=True, inline="always")
-def _angle_of(observations: Observations, n: int, a: int) -> int:
+def _unknown_of(observations: Observations, n: int, a: int) -> int:
     """The unknown that moves landmark n as the a-th of those that do."""
     return a if a < 6 else 4 * observations.digit[n] + a
 
@@ -124,23 +124,29 @@ def _angle_of(observations: Observations, n: int, a: int) -> int:
 # Products are written out, by rows: each landmark depends on ten unknowns of 26, and the code of a
 # library that multiplies matrices is never in the processor's caches when a message comes.
 @njit(cache=True, fastmath=FUSED)
+def _add_product(observations: Observations, H: Array, M: Array, out: Array) -> None:
+    """Add H M to out (3 m, k); H (3 m, 26), M (26, k)."""
+    for n in range(observations.depth.size):
+        for a in range(6 + observations.depth[n]):
+            i, r = _unknown_of(observations, n, a), 3 * n
+            x, y, z = H[r, i], H[r + 1, i], H[r + 2, i]
+            for k in range(M.shape[1]):
+                out[r, k] += x * M[i, k]
+                out[r + 1, k] += y * M[i, k]
+                out[r + 2, k] += z * M[i, k]
+
+
+@njit(cache=True, fastmath=FUSED)
 def _gains(observations: Observations, H: Array, P: Array, gain: Array, B: Array) -> None:
     """H P to gain (3 m, 26), which is 0, and H P H' to B (3 m, 3 m); H (3 m, 26), P (26, 26)."""
     observations, H, P = unowned((observations, H, P))
     gain, B = unowned((gain, B))
-    for n in range(observations.depth.size):
-        for a in range(6 + observations.depth[n]):
-            i, r = _angle_of(observations, n, a), 3 * n
-            x, y, z = H[r, i], H[r + 1, i], H[r + 2, i]
-            for k in range(UNKNOWNS):
-                gain[r, k] += x * P[i, k]
-                gain[r + 1, k] += y * P[i, k]
-                gain[r + 2, k] += z * P[i, k]
+    _add_product(observations, H, P, gain)
     for r in range(H.shape[0]):
         for s in range(r + 1):
             total = 0.0
             for a in range(6 + observations.depth[r // 3]):
-                i = _angle_of(observations, r // 3, a)
+                i = _unknown_of(observations, r // 3, a)
                 total += H[r, i] * gain[s, i]
             B[r, s] = B[s, r] = total
 
@@ -152,14 +158,7 @@ def _correct(
     """S less a share of what the gain (3 m, 26) makes of H S + J, in place; J is written over."""
     observations, H, gain = unowned((observations, H, gain))
     J, S = unowned((J, S))
-    for n in range(observations.depth.size):
-        for a in range(6 + observations.depth[n]):
-            i, r = _angle_of(observations, n, a), 3 * n
-            x, y, z = H[r, i], H[r + 1, i], H[r + 2, i]
-            for k in range(S.shape[1]):
-                J[r, k] += x * S[i, k]
-                J[r + 1, k] += y * S[i, k]
-                J[r + 2, k] += z * S[i, k]
+    _add_product(observations, H, S, J)
     for i in range(UNKNOWNS):
         # A landmark's three at once.
         for r in range(0, H.shape[0], 3):
@@ -188,7 +187,7 @@ def _linearise(
     for n in range(columns.size):
         error = whitened(frames, observations, n, pose, of_one)
         for a in range(6 + observations.depth[n]):
-            i = _angle_of(observations, n, a)
+            i = _unknown_of(observations, n, a)
             for r in range(3):
                 H[3 * n + r, i] = of_one[r, a]
         for i in range(3):

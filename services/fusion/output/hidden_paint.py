@@ -6,7 +6,8 @@ one of them: of rendered tips that both of two cameras (75 mm apart, .5 to .8 m 
 areas differ by 7 % RMS. Where they differ by more, the smaller one counts as partly hidden, and its
 centre as off by as much as an edge at any side of it may shift it. What hides a marker from all
 cameras alike shifts all of them nearly alike: sideways more than in depth. That shows where a tip
-is smaller than its direction lets expect (expected_area.py).
+is smaller than its direction lets expect (expected_area.py). What comes and goes in one camera
+scatters its looks (unsteady_area.py).
 
 A painted finger tip looks up to so much smaller from another side; a dab on curved skin still more.
 """
@@ -56,7 +57,8 @@ class PaintSeen(NamedTuple):
     # One standard deviation of each ray: its own, as others see more, and one that all share, as
     # all see less than the pose lets expect.
     sigmas: Array  # (2, L, C)
-    lately: Array  # (L, C, 2) how areas compared of late (unsteady_area.py)
+    # Mean and variance, of late, of the logarithm of an area's ratio to another camera's.
+    ratios: Array  # (L, C, 2)
     # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
 
@@ -93,7 +95,7 @@ class HiddenPaint:
             seen_s=np.empty(shape),
             levels=np.empty(shape),
             sigmas=np.empty((2, *shape)),
-            lately=np.empty((*shape, 2)),
+            ratios=np.empty((*shape, 2)),
             places=np.empty((shape[0], 3)),
         )
         self._packed = _SEEN.pack(_Seen(self.seen, centres_rig, per_rad, paint))
@@ -103,7 +105,7 @@ class HiddenPaint:
         """Time starts anew."""
         seen = self.seen
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
-        seen.sigmas[:], seen.lately[:], seen.places[:] = 0.0, np.nan, np.nan
+        seen.sigmas[:], seen.ratios[:], seen.places[:] = 0.0, np.nan, np.nan
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,)."""
@@ -169,7 +171,7 @@ def _compare(
 
 @njit(cache=True)
 def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
-    """How far a look may be off, as its area flickers against that which another camera saw."""
+    """How far a look may be off in the rays' units, as its area flickers against another's."""
     seen_s, latest = seen.seen_s[row], -1
     for other in range(seen_s.size):
         fresh = other != camera and seen_s[camera] - seen_s[other] <= _RECENT_S
@@ -179,7 +181,7 @@ def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
     if latest < 0 or not (area > 0.0 and seen.areas[row, latest] > 0.0):
         return 0.0
     ratio = area / seen.areas[row, latest]
-    return math.sqrt(area) * unsteady_sigma(seen.lately[row, camera], ratio, passed_s)
+    return math.sqrt(area) * unsteady_sigma(seen.ratios[row, camera], ratio, passed_s)
 
 
 @njit(cache=True)

@@ -29,18 +29,18 @@ _SCATTER, _STEADY = 0.2, 0.006
 
 
 @njit(cache=True)
-def unsteady_sigma(lately: Array, ratio: float, passed_s: float) -> float:
+def unsteady_sigma(known: Array, ratio: float, passed_s: float) -> float:
     """What is to be added, squared, to the sigma of a look, in roots of its area.
 
-    ratio: of its area to another camera's; passed_s: since the look before. lately (2,): mean and
+    ratio: of its area to another camera's; passed_s: since the look before. known (2,): mean and
     variance of the ratio's logarithm, taken on to this look; NaN at first.
     """
     now = math.log(ratio)
-    if math.isnan(lately[0]) or passed_s > _GAP_S:
-        lately[0], lately[1] = now, 0.0
+    if math.isnan(known[0]) or passed_s > _GAP_S:
+        known[0], known[1] = now, 0.0
         return 0.0
     learned, new = 1.0 - math.exp(-passed_s / _RATIO_S), 1.0 - math.exp(-passed_s / _CHANGE_S)
-    off = now - lately[0]
-    lately[0] += learned * off
-    lately[1] += new * ((1.0 - learned) * off * off - lately[1])
-    return math.sqrt(max(_SCATTER**2 * lately[1] - _STEADY**2, 0.0))
+    off = now - known[0]
+    known[0] += learned * off
+    known[1] += new * ((1.0 - learned) * off * off - known[1])
+    return math.sqrt(max(_SCATTER**2 * known[1] - _STEADY**2, 0.0))
