@@ -1,11 +1,12 @@
-"""Many rigs on one machine: one fusion and one solver process for all of them.
+"""Many rigs on one machine: one fusion and one solver for all of them.
 
     python benchmarks/scale.py [--rigs 1 4 16 32 64] [--fps 30 60] [--routers 1 2] [--seconds 10]
-                               [--json FILE]
+                               [--one-process] [--json FILE]
 
 Real processes: routers (two are joined, with half of the rigs each), rhot-fusion and rhot-solver
-with a folder of rig.toml files. Two cameras' markers of every rig are put at the pace of their
-stamps, no two rigs in step. Of each combination:
+with a folder of rig.toml files (--one-process: fusion in one, also where it would take several).
+Two cameras' markers of every rig are put at the pace of their stamps, no two rigs in step. Of each
+combination:
     poses      share of the poses that are due (a replay of the same frames tells how many) and
                came
     p50, p99   ms from the put of the frame that a pose is due with to the callback that has it
@@ -158,11 +159,11 @@ def instant_ns(frame: MarkerFrame) -> int:
     return frame.stamp_ns + round(0.5 * (frame.size_px[1] - 1) * frame.row_time_ns)
 
 
-def measure(recording: Recording, rigs: int, routers: int) -> dict[str, float]:
+def measure(recording: Recording, rigs: int, routers: int, one_process: bool) -> dict[str, float]:
     """One combination."""
     with (
         tempfile.TemporaryDirectory() as folder,
-        running(Path(folder), recording.rig, rigs, routers) as machine,
+        running(Path(folder), recording.rig, rigs, routers, one_process=one_process) as machine,
     ):
         feed = Feed(machine.endpoints, recording, rigs)
         feed.wait(60.0 + 2.0 * rigs)
@@ -198,6 +199,7 @@ def main() -> None:
     parser.add_argument("--fps", type=float, nargs="+", default=[30.0, 60.0])
     parser.add_argument("--routers", type=int, nargs="+", choices=(1, 2), default=[1, 2])
     parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--one-process", action="store_true")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     # What a time limit ends must end its processes.
@@ -215,7 +217,7 @@ def main() -> None:
             for rigs in options.rigs:
                 if rigs < routers:
                     continue
-                found = measure(recording, rigs, routers)
+                found = measure(recording, rigs, routers, options.one_process)
                 first = first or (rigs, found["memory_mb"])
                 more = max(rigs - first[0], 1)
                 found["mb_per_rig"] = (found["memory_mb"] - first[1]) / more

@@ -53,12 +53,21 @@ class Machine:
         """Resident memory of a kind of process now."""
         return sum(
             int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * _PAGE_MB
-            for pid in self.processes[name]
+            for pid in self._all(name)
         )
+
+    def _all(self, name: str) -> list[int]:
+        """The processes of a kind, and those that serve shares of their rigs."""
+        own = self.processes[name]
+        return own + [
+            int(child)
+            for pid in own
+            for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        ]
 
     def _cpu_s(self, name: str) -> float:
         used = 0
-        for pid in self.processes[name]:
+        for pid in self._all(name):
             # After the name in parentheses, which may have blanks: utime and stime are 14 and 15.
             fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
             used += int(fields[11]) + int(fields[12])
@@ -66,8 +75,10 @@ class Machine:
 
 
 @contextlib.contextmanager
-def running(folder: Path, rig: SyntheticRig, rigs: int, routers: int) -> Iterator[Machine]:
-    """All processes; the rigs take turns with the routers."""
+def running(
+    folder: Path, rig: SyntheticRig, rigs: int, routers: int, *, one_process: bool
+) -> Iterator[Machine]:
+    """All processes; the rigs take turns with the routers. one_process: of fusion."""
     machine = Machine([free_endpoint() for _ in range(routers)])
     configs = folder / "rigs"
     configs.mkdir()
@@ -105,8 +116,9 @@ def running(folder: Path, rig: SyntheticRig, rigs: int, routers: int) -> Iterato
             )
             start("router", "services.cli", "router", "--config", str(file))
             _wait_for(endpoint)
-        for service in ("fusion", "solver"):
-            start(service, f"services.{service}", "--config", str(configs))
+        together = ["--one-process"] if one_process else []
+        start("fusion", "services.fusion", "--config", str(configs), *together)
+        start("solver", "services.solver", "--config", str(configs))
         yield machine
 
 

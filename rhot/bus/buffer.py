@@ -76,10 +76,15 @@ class Buffer(Generic[S]):
         if wake:
             # Not contextlib.suppress, which is three calls more for every message.
             try:
-                self._loop.call_soon_threadsafe(self._wake)
+                self._loop.call_soon_threadsafe(self.wake)
             except RuntimeError:  # the loop has closed; nobody reads any more
                 return dropped
         return dropped
+
+    def add(self, key: str, item: S) -> int:
+        """As push, from the event loop, which wake() then tells."""
+        with self._lock:
+            return self._push_locked(key, item)
 
     def _push_locked(self, key: str, item: S) -> int:
         size = self._size_of(item)
@@ -115,7 +120,8 @@ class Buffer(Generic[S]):
             self._bytes -= self._size_of(item)
             return item
 
-    def _wake(self) -> None:
+    def wake(self) -> None:
+        """Hand over what waits, or wake who waits for it; in the event loop."""
         if self._consume is not None:
             self._consume_some()
         elif self._waiter is not None and not self._waiter.done():
@@ -127,7 +133,7 @@ class Buffer(Generic[S]):
                 return
             self._consume(item)
         # More may wait; others' turn first.
-        self._loop.call_soon(self._wake)
+        self._loop.call_soon(self.wake)
 
     async def each(self, consume: Callable[[S], None]) -> None:
         """Call consume with every item, in the event loop, until closed; what it raises is raised.
@@ -146,7 +152,7 @@ class Buffer(Generic[S]):
 
         self._consume = take
         try:
-            self._wake()
+            self.wake()
             await ended
         finally:
             self._consume = None
@@ -168,7 +174,7 @@ class Buffer(Generic[S]):
     def undeclare(self) -> None:
         """End the subscription and every iteration over it."""
         self._closed, self._consume = True, None
-        self._wake()
+        self.wake()
         if self._entity is not None:
             self._entity.undeclare()
             self._entity = None

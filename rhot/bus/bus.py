@@ -4,8 +4,9 @@ liveliness.
 Zenoh calls back in its own threads. Each subscription copies the payload there, puts it into a
 bounded buffer and wakes the event loop once, however many samples arrive meanwhile: the lowest
 latency measured (210 us direct, 390 us through a router) and no way for a slow consumer to stall
-another subscription. What does not fit is dropped, oldest first, and counted; what does not decode
-is rejected and counted, never raised: every message is untrusted.
+another subscription. (A process with many rigs asks for samples instead: rounds.py.) What does not
+fit is dropped, oldest first, and counted; what does not decode is rejected and counted, never
+raised: every message is untrusted.
 
 Late: a consumer sees at most its buffer's worth of old samples. Missing: nothing arrives, nothing
 raises; after the router's death sessions reconnect by themselves, and what was sent meanwhile is
@@ -37,6 +38,7 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
+from rhot.bus.rounds import Rounds
 from rhot.bus.security.credentials import plain
 from rhot.bus.standing_queue import StandingQueue
 from rhot.bus.stats import Direction, StreamStats
@@ -68,17 +70,22 @@ _CLOSE_S = 3.0
 
 @contextlib.asynccontextmanager
 async def open_bus(
-    rig: str, connect: Sequence[str], *, despite_certificates: bool = True
+    rig: str,
+    connect: Sequence[str],
+    *,
+    despite_certificates: bool = True,
+    rounds: Rounds | None = None,
 ) -> AsyncIterator[Bus]:
     """A session with the router at `connect`; waits for the router as long as it takes, and is
     cancellable.
 
     rig is the name in every key; "*" listens to all rigs (and cannot publish). A certificate that
     keeps the session from opening is a line in the log at once, and waited for like the router: it
-    may be renewed. Without despite_certificates it raises BusError.
+    may be renewed. Without despite_certificates it raises BusError. rounds: messages are asked for
+    in these, which many rigs of a process share.
     """
     session = await connected(connect, despite_certificates)
-    bus = Bus(rig, session)
+    bus = Bus(rig, session, rounds)
     try:
         yield bus
     finally:
@@ -112,8 +119,9 @@ async def open_bus_within(
 class Bus:
     """One rig's keys over one Zenoh session, for the event loop that made it."""
 
-    def __init__(self, rig: str, session: zenoh.Session) -> None:
+    def __init__(self, rig: str, session: zenoh.Session, rounds: Rounds | None = None) -> None:
         self.rig = rig
+        self._rounds = rounds
         self.streams: list[StreamStats] = []
         self._session = session
         # The id of this Zenoh session, as the router lists it.
@@ -191,7 +199,7 @@ class Bus:
 
     def _declared(self, one: Listener, origin: zenoh.Locality = zenoh.Locality.ANY) -> Listener:
         """A subscription to its own key, from now on and until the session ends."""
-        one.declare(self._session, origin)
+        one.declare(self._session, origin, self._rounds)
         self._open.append(one)
         return one
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 import zenoh
 
 from rhot import clock
 from rhot.bus.buffer import Buffer
+from rhot.bus.rounds import Rounds
 from rhot.bus.standing_queue import StandingQueue
 from rhot.bus.stats import StreamStats
 from rhot.errors import UNDECODABLE, BusError
@@ -28,6 +29,9 @@ _SAMPLE_BYTES = 512
 _MAX_ATTACHMENT_BYTES = 65_536
 # Of names that a rig does not have: enough to be named as a fault, too few to be in the way.
 _STRANGERS_A_SECOND = 16
+# Samples that wait for the next round where they are asked for: two seconds of a rig's cameras.
+# More than that in one round is a flood, whose oldest are lost uncounted.
+_RING = 256
 # What a JSON object may begin with, white space of people who type one included.
 _BEGINS_OBJECT = (b"{", b" ", b"\t", b"\r", b"\n")
 # Keys that one subscription knows by heart: a rig has some dozens.
@@ -35,7 +39,9 @@ _MAX_KEYS = 256
 
 
 class Sample(NamedTuple):
-    """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread."""
+    """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread, or about the middle
+    between two rounds.
+    """
 
     key: str
     payload: bytes
@@ -71,37 +77,67 @@ class RawSubscription(Buffer[Sample]):
         self._expected = expected
         # The second it is, and how many of other keys it had.
         self._second, self._strangers = 0, 0
+        # Where samples are asked for.
+        self._rounds: Rounds | None = None
 
-    def declare(self, session: zenoh.Session, origin: zenoh.Locality) -> None:
+    def declare(
+        self, session: zenoh.Session, origin: zenoh.Locality, rounds: Rounds | None = None
+    ) -> None:
+        """Receive from now on: called back, or asked for in rounds."""
         key = self.stats.key
-        self._entity = session.declare_subscriber(key, self._on_sample, allowed_origin=origin)
+        if rounds is None:
+            self._entity = session.declare_subscriber(key, self._on_sample, allowed_origin=origin)
+            return
+        ring: Any = zenoh.handlers.RingChannel(_RING)
+        subscriber: Any = session.declare_subscriber(key, ring, allowed_origin=origin)
+        self._entity, self._rounds = subscriber, rounds
+        rounds.join(self, subscriber.try_recv)
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        received_ns = clock.now_ns()
+        """Take a sample in Zenoh's thread."""
+        taken = self._admitted(sample, clock.now_ns())
+        if taken is not None:
+            self._note_dropped(self.push(taken.key, taken))
+
+    def take_in(self, sample: zenoh.Sample, came_ns: int) -> None:
+        """Take a sample in the event loop, as if it had come at came_ns; wake() hands it over."""
+        taken = self._admitted(sample, came_ns)
+        if taken is not None:
+            self._note_dropped(self.add(taken.key, taken))
+
+    def _note_dropped(self, dropped: int) -> None:
+        if dropped:
+            self.stats.dropped += dropped
+
+    def _admitted(self, sample: zenoh.Sample, received_ns: int) -> Sample | None:
+        """What of a sample goes into the queue; None, counted, if it is to have no place there."""
         # Zenoh makes each of these anew whenever it is asked for one.
         payload, attached, key = sample.payload, sample.attachment, str(sample.key_expr)
         too_much = attached is not None and len(attached) > _MAX_ATTACHMENT_BYTES
         if len(payload) > self.stats.topic.max_bytes or too_much:
             self.stats.rejected += 1
-            return
+            return None
         if self._expected and key not in self._expected and not self._admits_stranger(received_ns):
             self.stats.dropped += 1
-            return
+            return None
         content = payload.to_bytes()
         if self._objects_only and content[:1] not in _BEGINS_OBJECT:
             self.stats.rejected += 1
-            return
+            return None
         attachment = b"" if attached is None else attached.to_bytes()
-        taken = Sample(key, content, attachment, received_ns)
-        dropped = self.push(key, taken)
-        if dropped:
-            self.stats.dropped += dropped
+        return Sample(key, content, attachment, received_ns)
 
     def _admits_stranger(self, now_ns: int) -> bool:
         if now_ns // 10**9 != self._second:
             self._second, self._strangers = now_ns // 10**9, 0
         self._strangers += 1
         return self._strangers <= _STRANGERS_A_SECOND
+
+    def undeclare(self) -> None:
+        if self._rounds is not None:
+            self._rounds.leave(self)
+            self._rounds = None
+        super().undeclare()
 
     def __aiter__(self) -> RawSubscription:
         return self
@@ -139,8 +175,10 @@ class Subscription(Generic[T]):
         # What a key says that its messages say as well: worked out once a key, not once a message.
         self._said: dict[str, tuple[tuple[str, str], ...]] = {}
 
-    def declare(self, session: zenoh.Session, origin: zenoh.Locality) -> None:
-        self._raw.declare(session, origin)
+    def declare(
+        self, session: zenoh.Session, origin: zenoh.Locality, rounds: Rounds | None = None
+    ) -> None:
+        self._raw.declare(session, origin, rounds)
 
     @property
     def waiting(self) -> int:

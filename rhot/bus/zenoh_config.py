@@ -25,6 +25,11 @@ _OPEN_MS = 3000
 # 8 s without a cable at most 1.13 s where ARP asks once a second, 0.47 s where install.sh has set
 # it to four times (deploy/sysctl.d); with pauses of 500 ms 1.22 and 0.71 s.
 _RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
+# Live messages that may wait for the thread that sends them, the most that Zenoh allows. Its own 2
+# are full where processors are busy for a millisecond, and what is put then is lost: of the markers
+# of 32 rigs through one session 1 to 2 % (docs/notes/scale.md). A line that stands keeps so many
+# old ones for its return, a quarter of a second of a camera.
+_LIVE_WAITING = 16
 # Of what Zenoh does not know ("http/...") it says only that nobody answers there.
 _ENDPOINT = re.compile(
     r"(?:(?:tcp|tls|udp|quic|ws)/[^\s/?#]+:(?P<port>\d{1,5})|(?:unixsock-stream|serial|vsock)/.+)"
@@ -35,7 +40,11 @@ _ENDPOINT = re.compile(
 def _transport(max_message_bytes: int | None = None) -> dict[str, Any]:
     # A cut cable is noticed after 1.5 s instead of 9 s; QoS keeps pictures from delaying poses.
     link: dict[str, Any] = {
-        "tx": {"lease": 2000, "keep_alive": 4},
+        "tx": {
+            "lease": 2000,
+            "keep_alive": 4,
+            "queue": {"size": {"real_time": _LIVE_WAITING}},
+        },
         # A host whose certificate has ended is a stranger at once, not from its next start.
         "tls": {"close_link_on_expiration": True},
     }

@@ -7,7 +7,7 @@ from rhot.process.lifecycle import command
 
 def main() -> None:
     """Entry point of rhot-fusion."""
-    command("fusion", "services.fusion.service", __doc__, several_rigs=True)
+    command("fusion", "services.fusion.service", __doc__, several_rigs=True, rigs_a_process=16)
 
 
 if __name__ == "__main__":

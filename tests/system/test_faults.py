@@ -6,6 +6,7 @@ back, on restarts that should not be, on wrong poses, and on what is left over.
 
 from __future__ import annotations
 
+import re
 import signal
 import time
 
@@ -51,6 +52,17 @@ def test_everything_runs_as_installed(rig, watch):
     errors_m = [pose.error_m for pose in watch.poses if pose.live and pose.error_m is not None]
     assert len(errors_m) >= 10, watch.poses[-20:]
     assert sorted(errors_m)[len(errors_m) // 2] < 0.03
+
+
+def test_threads_let_the_event_loop_have_its_turn(rig, watch):
+    """Also in the sandbox, which forbids most other system calls of that kind."""
+    for unit in ("rhot-fusion", "rhot-solver"):
+        main = rig.master.show(f"{unit}.service", "MainPID")["MainPID"]
+        said = rig.master.run("chrt", "--all-tasks", "--pid", main)
+        policies = re.findall(r"pid (\d+)'s current scheduling policy: (\w+)", said)
+        others = {policy for thread, policy in policies if thread != main}
+        assert dict(policies)[main] == "SCHED_OTHER", said
+        assert others == {"SCHED_BATCH"}, said
 
 
 @pytest.mark.parametrize(("host", "unit"), UNITS, ids=[unit for _, unit in UNITS])

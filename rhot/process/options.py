@@ -1,0 +1,63 @@
+"""The options of a service's command, and how it is started again with some of them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rhot.process.service import rhot_version
+
+_SEVERAL = "rig.toml; several of them, or a folder of *.toml: each rig on its own"
+_TOGETHER = "serve all rigs in this process; else each share of up to %d has one, if cores allow"
+
+
+def service_parser(
+    program: str,
+    about: str | None,
+    instance_option: str,
+    *,
+    several_rigs: bool,
+    rigs_a_process: int | None = None,
+) -> argparse.ArgumentParser:
+    """The options of a service: see rhot.process.lifecycle.command."""
+    parser = argparse.ArgumentParser(prog=program, description=about)
+    parser.add_argument(
+        "--config",
+        type=Path,
+        required=True,
+        action="append",
+        help=_SEVERAL if several_rigs else "rig.toml",
+    )
+    required = instance_option != "instance"
+    parser.add_argument(
+        f"--{instance_option}",
+        dest="name",
+        required=required,
+        default="main",
+        help="which one this is",
+    )
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        help="router endpoint, instead of [bus] connect of rig.toml",
+    )
+    if rigs_a_process is not None:
+        parser.add_argument("--one-process", action="store_true", help=_TOGETHER % rigs_a_process)
+    parser.add_argument("--version", action="version", version=rhot_version())
+    parser.set_defaults(serve="serve", one_process=rigs_a_process is None)
+    return parser
+
+
+def command_for(options: argparse.Namespace, files: Sequence[Path]) -> list[str]:
+    """The command that serves some of the rigs in one process, as this one was started."""
+    given = len(sys.argv) - 1
+    command = [*sys.orig_argv[: len(sys.orig_argv) - given], "--one-process"]
+    command += ["--instance", options.name]
+    for endpoint in options.connect:
+        command += ["--connect", endpoint]
+    for file in files:
+        command += ["--config", str(file)]
+    return command
