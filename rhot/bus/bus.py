@@ -4,9 +4,9 @@ liveliness.
 Zenoh calls back in its own threads. Each subscription copies the payload there, puts it into a
 bounded buffer and wakes the event loop once, however many samples arrive meanwhile: the lowest
 latency measured (210 us direct, 390 us through a router) and no way for a slow consumer to stall
-another subscription. (A process with many rigs asks for samples instead: rounds.py.) What does not
-fit is dropped, oldest first, and counted; what does not decode is rejected and counted, never
-raised: every message is untrusted.
+another subscription. (With many rigs a process asks instead: intake/rounds.py.) What does not fit
+is dropped, oldest first, and counted; what does not decode is rejected and counted, never raised:
+every message is untrusted.
 
 Late: a consumer sees at most its buffer's worth of old samples. Missing: nothing arrives, nothing
 raises; after the router's death sessions reconnect by themselves, and what was sent meanwhile is
@@ -27,6 +27,8 @@ import zenoh
 from rhot import topics
 from rhot.bus.clock_exchange import ClockExchange, exchanges
 from rhot.bus.connecting import connected
+from rhot.bus.intake.rounds import Rounds
+from rhot.bus.intake.standing_queue import StandingQueue
 from rhot.bus.liveliness import Alive, AliveWatch
 from rhot.bus.publisher import Payload, Publisher
 from rhot.bus.queries import (
@@ -38,9 +40,7 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
-from rhot.bus.rounds import Rounds
 from rhot.bus.security.credentials import plain
-from rhot.bus.standing_queue import StandingQueue
 from rhot.bus.stats import Direction, StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
@@ -63,8 +63,7 @@ __all__ = [
     "router_config",
 ]
 
-# A session that does not close in this time belongs to a wedged link; the process goes on without
-# it.
+# A session that does not close in this time belongs to a wedged link: the process goes on.
 _CLOSE_S = 3.0
 
 
@@ -81,8 +80,8 @@ async def open_bus(
 
     rig is the name in every key; "*" listens to all rigs (and cannot publish). A certificate that
     keeps the session from opening is a line in the log at once, and waited for like the router: it
-    may be renewed. Without despite_certificates it raises BusError. rounds: messages are asked for
-    in these, which many rigs of a process share.
+    may be renewed. Without despite_certificates it raises BusError. rounds, which rigs of a process
+    share: messages are asked for in these.
     """
     session = await connected(connect, despite_certificates)
     bus = Bus(rig, session, rounds)
@@ -91,8 +90,7 @@ async def open_bus(
     finally:
         bus.stop()
         with contextlib.suppress(TimeoutError, zenoh.ZError):
-            # Shielded: a second cancellation must not leave the session open, which would keep the
-            # process alive for ever.
+            # Shielded: a session that a second cancellation leaves open keeps the process alive.
             await asyncio.shield(asyncio.wait_for(asyncio.to_thread(session.close), _CLOSE_S))
 
 
@@ -124,8 +122,7 @@ class Bus:
         self._rounds = rounds
         self.streams: list[StreamStats] = []
         self._session = session
-        # The id of this Zenoh session, as the router lists it.
-        self.session = str(session.zid())
+        self.session = str(session.zid())  # as the router lists it
         self._loop = asyncio.get_running_loop()
         self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
@@ -156,15 +153,14 @@ class Bus:
     ) -> Subscription[T]:
         """Every message, in order, through a queue of n that drops the oldest.
 
-        expected are the names, in the field that is left open, that the rig has: of others only
-        some messages a second are taken.
+        expected: names that the rig has, of the open field; of others only some a second are taken.
         """
         return self._subscribe(topic, n, names, self._keys(topic, expected, names))
 
     def in_time(
         self, topic: Topic[T], n: int, expected: Iterable[str] = (), **names: str
     ) -> Subscription[T]:
-        """As every(), but a reader who cannot keep up skips what has waited (standing_queue.py)."""
+        """As every(), but who cannot keep up skips what has waited (intake/standing_queue.py)."""
         keys = self._keys(topic, expected, names)
         return self._subscribe(topic, n, names, keys, StandingQueue())
 
@@ -194,8 +190,7 @@ class Bus:
         standing: StandingQueue | None = None,
     ) -> Subscription[T]:
         stats = self._stats(topic, names, "in")
-        one = Subscription(self._loop, topic, stats, n, expected, standing)
-        return self._declared(one)
+        return self._declared(Subscription(self._loop, topic, stats, n, expected, standing))
 
     def _declared(self, one: Listener, origin: zenoh.Locality = zenoh.Locality.ANY) -> Listener:
         """A subscription to its own key, from now on and until the session ends."""
@@ -283,15 +278,15 @@ class Bus:
     ) -> None:
         """Publish bytes on a full key, for replay.
 
-        A line that is full loses them, as it does live data. With wait it is waited for, up to 5 s,
-        which is nothing for the event loop: call it in a thread.
+        A line that is full loses them, as live data. With wait it is waited for, up to 5 s: call it
+        in a thread.
         """
         full = zenoh.CongestionControl.BLOCK if wait else zenoh.CongestionControl.DROP
         # Express: else Zenoh gathers messages for a millisecond.
         self._session.put(key, payload, encoding=encoding, congestion_control=full, express=True)
 
     def close(self, one: Subscription[Any] | RawSubscription | AliveWatch | Publisher[Any]) -> None:
-        """End one subscription or publisher before the session ends; its stream leaves health."""
+        """End one of them before the session ends; its stream leaves health."""
         one.undeclare()
         self._open = [entity for entity in self._open if entity is not one]
         self.streams[:] = [s for s in self.streams if s is not getattr(one, "stats", None)]

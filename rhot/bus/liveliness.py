@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import zenoh
 
-from rhot.bus.buffer import Buffer
+from rhot.bus.intake.buffer import Buffer
 from rhot.topics import ALIVE
 
 

@@ -13,9 +13,9 @@ import msgspec
 import zenoh
 
 from rhot import clock
-from rhot.bus.buffer import Buffer
-from rhot.bus.rounds import Rounds
-from rhot.bus.standing_queue import StandingQueue
+from rhot.bus.intake.buffer import Buffer
+from rhot.bus.intake.rounds import Rounds
+from rhot.bus.intake.standing_queue import StandingQueue
 from rhot.bus.stats import StreamStats
 from rhot.errors import UNDECODABLE, BusError
 from rhot.topics import Topic

@@ -29,7 +29,7 @@ from typing import Any
 import msgspec
 
 from rhot.bus.bus import open_bus
-from rhot.bus.rounds import Rounds
+from rhot.bus.intake.rounds import Rounds
 from rhot.bus.security.credentials import client_endpoints
 from rhot.errors import ConfigError, RhotError, disk_full, leaves
 from rhot.files.config import RigConfig, load_rig
@@ -55,9 +55,9 @@ EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
 # EX_TEMPFAIL of sysexits.h, "try again": nothing is wrong, the service wants to be started anew.
 EXIT_AGAIN = 75
 
-# A process with so many rigs asks for messages in rounds (rhot/bus/rounds.py). Two cameras at 30
-# fps, in turn on two cores: with 24 rigs poses then take 4 ms (median) and 18 (99 %) instead of 7
-# and 35, with 16 3.5 and 11 instead of 2 and 12.
+# A process with so many rigs asks for messages in rounds (rhot/bus/intake/rounds.py). Two cameras
+# at 30 fps, in turn on two cores: with 24 rigs poses then take 4 ms (median) and 18 (99 %) instead
+# of 7 and 35, with 16 3.5 and 11 instead of 2 and 12.
 _RIGS_OF_ROUNDS = 16
 
 

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from rhot.bus.bus import Bus, open_bus
-from rhot.bus.rounds import Rounds
+from rhot.bus.intake.rounds import Rounds
 
 
 @pytest.fixture(params=["called back", "in rounds"])

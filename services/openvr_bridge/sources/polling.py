@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-from rhot.bus.buffer import Buffer
+from rhot.bus.intake.buffer import Buffer
 from rhot.errors import RhotError, SourceError
 from services.openvr_bridge.events import QUIT
 from services.openvr_bridge.sweep import Sweep

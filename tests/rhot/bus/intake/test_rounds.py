@@ -8,7 +8,7 @@ import pytest
 
 from rhot import clock, topics
 from rhot.bus.bus import open_bus
-from rhot.bus.rounds import Rounds
+from rhot.bus.intake.rounds import Rounds
 from rhot.messages import HandPoints
 from testing.waiting import DEADLINE_S, publisher_of, until
 

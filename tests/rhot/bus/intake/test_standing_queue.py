@@ -6,7 +6,7 @@ from collections import deque
 
 import pytest
 
-from rhot.bus.standing_queue import StandingQueue
+from rhot.bus.intake.standing_queue import StandingQueue
 
 
 def read(arrivals_s, step_s, stalls=(), capacity=64):

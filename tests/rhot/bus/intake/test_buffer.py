@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from rhot.bus.buffer import MAX_BYTES, Buffer
+from rhot.bus.intake.buffer import MAX_BYTES, Buffer
 
 
 async def test_a_queue_keeps_the_newest():
