@@ -92,10 +92,13 @@ async def _ended(process: asyncio.subprocess.Process) -> None:
 
 
 def _end_with_parent() -> Callable[[], None]:
-    """What the new process does first: ask Linux to end it with this one, however that ends."""
+    """What the new process does first: ask Linux to end it with this one, however that ends.
+
+    At once: one that is stuck hears nothing else.
+    """
     prctl = ctypes.CDLL(None).prctl
 
     def ask() -> None:
-        prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
     return ask

@@ -141,6 +141,11 @@ async def test_a_stuck_process_is_not_covered_up_by_one_that_turns(
     notified.clear()
     await asyncio.sleep(1.0)
     assert "WATCHDOG=1" not in notified
+    # Nor does it stay behind when the service is killed.
+    shares = children(process.pid)
+    process.kill()
+    await process.wait()
+    await until(lambda: not alive(shares))
 
 
 @several_processors
