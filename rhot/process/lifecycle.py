@@ -39,7 +39,7 @@ from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.certificate_watch import watch_certificate
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
-from rhot.process.options import command_for, service_parser
+from rhot.process.options import are_many, command_for, service_parser
 from rhot.process.restart_hold import hold_back
 from rhot.process.rigs.files import rig_files
 from rhot.process.rigs.keeper import RigKeeper
@@ -54,11 +54,6 @@ log = logging.getLogger("rhot.lifecycle")
 EXIT_OK, EXIT_BUG, EXIT_USER = 0, 1, 2
 # EX_TEMPFAIL of sysexits.h, "try again": nothing is wrong, the service wants to be started anew.
 EXIT_AGAIN = 75
-
-# A process with so many rigs asks for messages in rounds (rhot/bus/intake/rounds.py). Two cameras
-# at 30 fps, in turn on two cores: with 24 rigs poses then take 4 ms (median) and 18 (99 %) instead
-# of 7 and 35, with 16 3.5 and 11 instead of 2 and 12.
-_RIGS_OF_ROUNDS = 16
 
 
 def command(
@@ -110,7 +105,8 @@ def command(
             raise
         parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
     if several:
-        sys.exit(run_several(name, options.name, options.config, serve, options.connect))
+        given = options.config, serve, options.connect
+        sys.exit(run_several(name, options.name, *given, in_rounds=options.rounds))
     config = options.config[0]
     code = run(name, options.name, config, serve, options.connect, keeps_turn=several_rigs)
     sys.exit(code)
@@ -147,9 +143,18 @@ def run(
 
 
 def run_several(
-    name: str, instance: str, paths: Sequence[Path], serve: Serve, connect: Sequence[str] = ()
+    name: str,
+    instance: str,
+    paths: Sequence[Path],
+    serve: Serve,
+    connect: Sequence[str] = (),
+    *,
+    in_rounds: bool = False,
 ) -> int:
-    """Run a service for all rigs of these files and folders, each on its own; its exit code."""
+    """Run a service for all rigs of these files and folders, each on its own; its exit code.
+
+    in_rounds: messages are asked for in rounds, also of few rigs.
+    """
     rounds: Rounds | None = None
     keeper = RigKeeper(
         lambda path: _load(path, connect),
@@ -158,7 +163,7 @@ def run_several(
     )
     try:
         files = rig_files(paths)
-        rounds = Rounds() if len(files) >= _RIGS_OF_ROUNDS else None
+        rounds = Rounds() if in_rounds or are_many(len(files)) else None
         run_loop(_live(keeper.keep_all(files), keeps_turn=True))
     except Exception as error:
         return _explain(error, name, instance)
@@ -180,7 +185,9 @@ def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:
 def _run_shares(name: str, options: argparse.Namespace, shares: list[list[Path]]) -> int:
     """Run a process for each share of a service's rigs; the exit code of this one."""
     try:
-        run_loop(_live(keep_shares(shares, partial(command_for, options)), False, False))
+        rounds = options.rounds or are_many(sum(map(len, shares)))
+        work = keep_shares(shares, partial(command_for, options, rounds))
+        run_loop(_live(work, keeps_turn=False, feeds=False))
     except Exception as error:
         return _explain(error, name, options.name)
     finally:
