@@ -17,7 +17,7 @@ import asyncio
 import contextlib
 import importlib
 import logging
-import os
+import math
 import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping, Sequence
@@ -39,9 +39,9 @@ from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.certificate_watch import watch_certificate
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
-from rhot.process.options import are_many, command_for, service_parser
+from rhot.process.options import command_for, is_much, service_parser
 from rhot.process.restart_hold import hold_back
-from rhot.process.rigs.files import rig_files
+from rhot.process.rigs.files import load_of, rig_files
 from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.rigs.shares import in_shares, keep_shares
 from rhot.process.service import Service
@@ -73,7 +73,7 @@ def command(
     option that says which one of several this is, e.g. "camera"; any other than "instance" is
     required. variants are options without a value: each with the coroutine that it runs instead,
     and its help. several_rigs: --config may be given more than once, or be a folder; of more than
-    rigs_a_process each share has a process (rhot/process/rigs/shares.py).
+    rigs_a_process of two cameras at 30 fps each share has a process (rhot/process/rigs/shares.py).
     """
     # Before anything starts a thread.
     share_one_heap()
@@ -163,7 +163,7 @@ def run_several(
     )
     try:
         files = rig_files(paths)
-        rounds = Rounds() if in_rounds or are_many(len(files)) else None
+        rounds = Rounds() if in_rounds or is_much(load_of(files)) else None
         run_loop(_live(keeper.keep_all(files), keeps_turn=True))
     except Exception as error:
         return _explain(error, name, instance)
@@ -178,14 +178,15 @@ def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:
         files = rig_files(options.config)
     except ConfigError:
         return []
-    processors = 1 if options.one_process else os.cpu_count() or 1
-    return in_shares(files, most or len(files), processors)
+    if most is None or options.one_process:
+        return [files]
+    return in_shares(files, math.ceil(load_of(files) / most))
 
 
 def _run_shares(name: str, options: argparse.Namespace, shares: list[list[Path]]) -> int:
     """Run a process for each share of a service's rigs; the exit code of this one."""
     try:
-        rounds = options.rounds or are_many(sum(map(len, shares)))
+        rounds = options.rounds or is_much(sum(map(load_of, shares)))
         work = keep_shares(shares, partial(command_for, options, rounds))
         run_loop(_live(work, keeps_turn=False, feeds=False))
     except Exception as error:

@@ -11,19 +11,19 @@ from pathlib import Path
 from rhot.process.service import rhot_version
 
 _SEVERAL = "rig.toml; several of them, or a folder of *.toml: each rig on its own"
-_ROUNDS = "ask for messages in rounds, as a computer with %d rigs for each of its cores does"
-_TOGETHER = "serve all rigs in this process; else each share of up to %d has one, if cores allow"
+_ROUNDS = "ask for messages in rounds, as is done for %d rigs (2 cameras at 30 fps) a core and more"
+_TOGETHER = "serve all rigs in this process; else %d rigs (2 cameras at 30 fps) or so have one each"
 
 
-# From so many rigs on messages are asked for in rounds (rhot/bus/intake/rounds.py). Two cameras at
-# 30 fps, in turn on two cores: with 24 rigs poses then take 4 ms (median) and 18 (99 %) instead of
-# 7 and 35, with 16 5 and 11 instead of 2 and 12.
-RIGS_A_PROCESSOR = 12
+# From so many usual rigs on (rigs/files.py) messages are asked for in rounds
+# (rhot/bus/intake/rounds.py). In turn on two cores: with 24 of them poses then take 4 ms (median)
+# and 18 (99 %) instead of 7 and 35, with 16 5 and 11 instead of 2 and 12.
+RIGS_A_PROCESSOR = 12.0
 
 
-def are_many(rigs: int) -> bool:
-    """Whether so many rigs keep this computer busy."""
-    return rigs >= RIGS_A_PROCESSOR * (os.cpu_count() or 1)
+def is_much(load: float) -> bool:
+    """Whether so many usual rigs keep this computer busy."""
+    return load >= RIGS_A_PROCESSOR * (os.cpu_count() or 1)
 
 
 def service_parser(

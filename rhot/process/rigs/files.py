@@ -1,4 +1,6 @@
-"""The rig.toml files that a service is started with: one, several, or all of a folder."""
+"""The rig.toml files that a service is started with: one, several, or all of a folder; and how much
+they give it to do.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rhot.errors import ConfigError
+from rhot.files.config import load_rig
+
+# Of the usual rig: two cameras at 30 a second.
+_FRAMES_HZ = 60.0
 
 
 def rig_files(paths: Sequence[Path]) -> list[Path]:
@@ -23,3 +29,18 @@ def rig_files(paths: Sequence[Path]) -> list[Path]:
     if twice:
         raise ConfigError(f"{twice[0]} is given twice; each rig is served once")
     return found
+
+
+def load_of(paths: Sequence[Path]) -> float:
+    """How many usual rigs, of two cameras at 30 frames a second, have as many frames as these.
+
+    One whose file cannot be read counts as one: what is wrong with it is told when it is served.
+    """
+    return sum(map(_load_of_one, paths))
+
+
+def _load_of_one(path: Path) -> float:
+    try:
+        return sum(camera.fps for camera in load_rig(path).camera) / _FRAMES_HZ
+    except ConfigError:
+        return 1.0

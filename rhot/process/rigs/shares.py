@@ -32,9 +32,9 @@ _USER = 2
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl.h
 
 
-def in_shares(files: Sequence[Path], most: int, processors: int) -> list[list[Path]]:
-    """Files in shares as equal as can be, of `most` where there are processors enough."""
-    parts = min(-(-len(files) // most), max(processors, 1))
+def in_shares(files: Sequence[Path], wanted: int) -> list[list[Path]]:
+    """Files in so many shares as equal as can be, or one for each of this computer's processors."""
+    parts = max(min(wanted, os.cpu_count() or 1, len(files)), 1)
     return [list(files[part::parts]) for part in range(parts)]
 
 

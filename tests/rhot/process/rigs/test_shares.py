@@ -31,20 +31,23 @@ SERVICE = textwrap.dedent("""
             if (service.config.calibration_dir / "stick").exists():
                 while True:
                     pass
-    command("probe", "__main__", "a service of many rigs", several_rigs=True, rigs_a_process=2)
+    command("probe", "__main__", "a service of many rigs", several_rigs=True, rigs_a_process=1)
 """)
 several_processors = pytest.mark.skipif(
     (os.cpu_count() or 1) < 2, reason="with one processor all rigs are served by one process"
 )
 
 
-def test_shares_are_as_equal_as_can_be_and_no_more_than_processors():
+def test_shares_are_as_equal_as_can_be_and_no_more_than_processors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     files = [Path(f"{n}.toml") for n in range(33)]
-    assert in_shares(files[:16], 16, 8) == [files[:16]]
-    assert [len(one) for one in in_shares(files, 16, 8)] == [11, 11, 11]
-    assert [len(one) for one in in_shares(files, 16, 2)] == [17, 16]
-    assert in_shares(files, 16, 1) == [files]
-    assert sorted(file for share in in_shares(files, 5, 64) for file in share) == sorted(files)
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    assert in_shares(files, 1) == [files]
+    assert [len(one) for one in in_shares(files, 3)] == [11, 11, 11]
+    assert [len(one) for one in in_shares(files, 16)] == [9, 8, 8, 8]
+    assert in_shares(files[:2], 16) == [files[:1], files[1:2]]
+    assert sorted(file for share in in_shares(files, 4) for file in share) == sorted(files)
 
 
 @pytest.fixture
@@ -71,7 +74,7 @@ async def process(
         (tmp_path / "rigs" / name).mkdir()
         (tmp_path / "rigs" / f"{name}.toml").write_text(
             f'[rig]\nname = "{name}"\ncalibration = "{name}"\n'
-            f'[bus]\nconnect = ["{endpoint}"]\n[[camera]]\nname = "left"\n'
+            f'[bus]\nconnect = ["{endpoint}"]\n[[camera]]\nname = "left"\nfps = 40\n'
         )
     environment = {
         **os.environ,
@@ -180,7 +183,9 @@ async def test_all_rigs_are_served_together_where_that_is_asked_for(
 @several_processors
 async def test_a_share_that_cannot_begin_ends_the_service_with_its_reason(tmp_path: Path) -> None:
     for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.toml").write_text(f'[rig]\nname = "{name}"\n')
+        (tmp_path / f"{name}.toml").write_text(
+            f'[rig]\nname = "{name}"\n[[camera]]\nname = "left"\nfps = 40\n'
+        )
     # As where the extra is not installed.
     (tmp_path / "probe_part.py").write_text(
         "raise ModuleNotFoundError(\"No module named 'numba'\", name='numba')\n"
