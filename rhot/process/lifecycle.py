@@ -41,7 +41,7 @@ from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
 from rhot.process.options import command_for, is_much, service_parser
 from rhot.process.restart_hold import hold_back
-from rhot.process.rigs.files import load_of, rig_files
+from rhot.process.rigs.files import have_own_names, load_of, rig_files
 from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.rigs.shares import in_shares, keep_shares
 from rhot.process.service import Service
@@ -178,7 +178,8 @@ def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:
         files = rig_files(options.config)
     except ConfigError:
         return []
-    if most is None or options.one_process:
+    # Of two rigs of one name, one process says what is wrong (keeper.py).
+    if most is None or options.one_process or not have_own_names(files):
         return [files]
     return in_shares(files, math.ceil(load_of(files) / most))
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rhot.errors import ConfigError
-from rhot.files.config import load_rig
+from rhot.files.config import RigConfig, load_rig
 
 # Of the usual rig: two cameras at 30 a second.
 _FRAMES_HZ = 60.0
@@ -39,8 +39,19 @@ def load_of(paths: Sequence[Path]) -> float:
     return sum(map(_load_of_one, paths))
 
 
+def have_own_names(paths: Sequence[Path]) -> bool:
+    """Whether no two rigs are called the same, as far as their files can be read."""
+    names = [config.rig.name for config in map(_read, paths) if config is not None]
+    return len(set(names)) == len(names)
+
+
 def _load_of_one(path: Path) -> float:
+    config = _read(path)
+    return 1.0 if config is None else sum(one.fps for one in config.camera) / _FRAMES_HZ
+
+
+def _read(path: Path) -> RigConfig | None:
     try:
-        return sum(camera.fps for camera in load_rig(path).camera) / _FRAMES_HZ
+        return load_rig(path)
     except ConfigError:
-        return 1.0
+        return None

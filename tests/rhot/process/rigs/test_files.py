@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rhot.errors import ConfigError
-from rhot.process.rigs.files import load_of, rig_files
+from rhot.process.rigs.files import have_own_names, load_of, rig_files
 
 
 def test_files_and_folders_in_order(tmp_path: Path) -> None:
@@ -31,5 +31,7 @@ def test_a_load_counts_frames_and_a_file_that_is_wrong_as_a_rig(tmp_path: Path) 
         text = "".join(cameras.format(side, fps) for side in ("left", "right"))
         (tmp_path / f"{name}.toml").write_text(f'[rig]\nname = "{name}"\n{text}')
     (tmp_path / "wrong.toml").write_text("no toml")
+    assert have_own_names(rig_files([tmp_path]))
+    assert not have_own_names([tmp_path / "fast.toml"] * 2)
     assert load_of([tmp_path / "usual.toml"]) == 1.0
     assert load_of([*rig_files([tmp_path]), tmp_path / "gone.toml"]) == 1.0 + 3.0 + 1.0 + 1.0

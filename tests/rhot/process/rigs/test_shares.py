@@ -203,3 +203,26 @@ async def test_a_share_that_cannot_begin_ends_the_service_with_its_reason(tmp_pa
     assert process.returncode == 2, text
     assert "pip install" in text
     assert "cannot begin; it says why" in text
+
+
+async def test_two_files_of_one_rig_are_told_although_there_are_shares(
+    tmp_path: Path, endpoint: str, router: object
+) -> None:
+    (tmp_path / "rigs").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / "rigs" / f"{name}.toml").write_text(
+            f'[rig]\nname = "same"\n[bus]\nconnect = ["{endpoint}"]\n'
+            '[[camera]]\nname = "left"\nfps = 90\n'
+        )
+    argv = [sys.executable, "-c", SERVICE, "--config", str(tmp_path / "rigs")]
+    with (tmp_path / "out").open("wb") as out:
+        process = await asyncio.create_subprocess_exec(
+            *argv, stdout=out, stderr=out, env={**os.environ, "RHOT_LOG_FORMAT": "json"}
+        )
+    await until(lambda: len(said(tmp_path)) >= 2)
+    process.terminate()
+    async with asyncio.timeout(DEADLINE_S):
+        await process.wait()
+    texts = " ".join(line["text"] for line in said(tmp_path))
+    assert "every rig of a network has a [rig] name of its own" in texts
+    assert ready(tmp_path) == ["same"]
