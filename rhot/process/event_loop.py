@@ -1,12 +1,17 @@
-"""The event loop of a process, and the signals that end it, on Linux and on Windows."""
+"""The event loop of a process, the signals that end it, on Linux and on Windows, and how it ends
+processes that it has started.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import ctypes
 import signal
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any
+
+_PR_SET_PDEATHSIG = 1  # of Linux's prctl.h
 
 
 def run_loop(main: Coroutine[Any, Any, None]) -> None:
@@ -51,3 +56,29 @@ def cancelled_by(stopping: asyncio.Event) -> Iterator[None]:
     except asyncio.CancelledError:
         if not stopping.is_set():
             raise
+
+
+async def end_process(process: asyncio.subprocess.Process, patience_s: float) -> None:
+    """End a process, if it has not ended: SIGTERM, and SIGKILL where that takes too long."""
+    if process.returncode is not None:
+        return
+    with contextlib.suppress(ProcessLookupError):
+        process.terminate()
+        try:
+            await asyncio.wait_for(process.wait(), patience_s)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+
+
+def ending_with_parent() -> Callable[[], None]:
+    """For preexec_fn: Linux kills the new process when this one is gone, however it ended.
+
+    At once: one that is stuck hears nothing else.
+    """
+    prctl = ctypes.CDLL(None).prctl
+
+    def ask() -> None:
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+    return ask

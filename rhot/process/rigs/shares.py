@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ctypes
 import logging
 import os
 import signal
@@ -19,6 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rhot.errors import RhotError
+from rhot.process.event_loop import end_process, ending_with_parent
 from rhot.process.rigs.relayed_notes import RelayedNotes
 
 log = logging.getLogger("rhot.rigs")
@@ -29,7 +29,6 @@ _HOLD_S = 5.0
 _END_S = 8.0
 # How a process ends that the user alone can mend (rhot/process/lifecycle.py): a missing extra.
 _USER = 2
-_PR_SET_PDEATHSIG = 1  # of Linux's prctl.h
 
 
 def in_shares(files: Sequence[Path], wanted: int) -> list[list[Path]]:
@@ -62,12 +61,12 @@ async def _keep(
         process = await asyncio.create_subprocess_exec(
             *command,
             env={**os.environ, **notes.environment(number)},
-            preexec_fn=_end_with_parent() if sys.platform == "linux" else None,
+            preexec_fn=ending_with_parent() if sys.platform == "linux" else None,
         )
         try:
             code = await process.wait()
         finally:
-            await _ended(process)
+            await asyncio.shield(end_process(process, _END_S))
             notes.forget(number)
         if code == 0:
             return
@@ -77,28 +76,3 @@ async def _keep(
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"
         log.error("the process of %s ended with %s; it starts again in %g s", rigs, how, _HOLD_S)
         await asyncio.sleep(_HOLD_S)
-
-
-async def _ended(process: asyncio.subprocess.Process) -> None:
-    """End a process, if it has not ended."""
-    with contextlib.suppress(ProcessLookupError):
-        if process.returncode is None:
-            process.terminate()
-            try:
-                await asyncio.wait_for(process.wait(), _END_S)
-            except TimeoutError:
-                process.kill()
-                await process.wait()
-
-
-def _end_with_parent() -> Callable[[], None]:
-    """What the new process does first: ask Linux to end it with this one, however that ends.
-
-    At once: one that is stuck hears nothing else.
-    """
-    prctl = ctypes.CDLL(None).prctl
-
-    def ask() -> None:
-        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-    return ask

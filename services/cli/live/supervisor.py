@@ -8,8 +8,6 @@ its level.
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import ctypes
 import os
 import signal
 import sys
@@ -19,6 +17,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from rhot.process import logs
+from rhot.process.event_loop import end_process, ending_with_parent
 from rhot.process.lifecycle import EXIT_AGAIN, EXIT_USER
 from services.cli.rig.child_output import ChildOutput
 
@@ -29,7 +28,6 @@ _RESTART_S = 0.5
 _RESTART_AFTER_USER_ERROR_S = 5.0
 # A service ends within a second of SIGTERM; five are for a loaded machine.
 _STOP_S = 5.0
-_PR_SET_PDEATHSIG = 1
 _LINE_LIMIT = 1 << 20
 # A child that lived longer than this had started well: what it says next is news again.
 _SETTLED_S = 30.0
@@ -88,7 +86,7 @@ class Supervisor:
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
             start_new_session=True,
-            preexec_fn=_die_with_parent,
+            preexec_fn=ending_with_parent(),
             limit=_LINE_LIMIT,
             # The level of a line is to be read here, whatever the user likes to read.
             env={**os.environ, logs.FORMAT: "json"},
@@ -98,7 +96,7 @@ class Supervisor:
             await _read_lines(process, output)
             return await process.wait()
         finally:
-            await asyncio.shield(_end(process))
+            await asyncio.shield(end_process(process, _STOP_S))
 
 
 async def _read_lines(process: asyncio.subprocess.Process, output: ChildOutput) -> None:
@@ -112,24 +110,6 @@ async def _read_lines(process: asyncio.subprocess.Process, output: ChildOutput) 
         if not line:
             return
         output.take(line.decode(errors="replace").rstrip())
-
-
-def _die_with_parent() -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-async def _end(process: asyncio.subprocess.Process) -> None:
-    """SIGTERM, and SIGKILL for a process that does not end."""
-    # Alike in services/object_tracker/sources/libsurvive.py: a service does not import the command.
-    if process.returncode is not None:
-        return
-    with contextlib.suppress(ProcessLookupError):
-        process.terminate()
-        try:
-            await asyncio.wait_for(process.wait(), _STOP_S)
-        except TimeoutError:
-            process.kill()
-            await process.wait()
 
 
 def _end_text(code: int, ran_s: float, pause_s: float, output: ChildOutput) -> str:
