@@ -63,9 +63,9 @@ async def test_messages_of_all_rigs_come_in_order_and_are_stamped_about_when_the
                 late_ns.append((await anext(raw)).received_ns - put_ns)
     await until(lambda: all(len(seqs) == 200 for seqs in heard.values()))
     assert heard == {"first": list(range(200)), "second": list(range(200))}
-    # The middle between two rounds may be before a message was put, by half a pause.
-    assert sorted(late_ns)[0] > -5e6
-    assert sorted(late_ns)[len(late_ns) // 2] < 50e6
+    # The middle between two rounds may be before a message was put, by half of what a round takes.
+    assert min(late_ns) > -0.5e9
+    assert sorted(late_ns)[len(late_ns) // 2] < 0.2e9
     for task in tasks:
         task.cancel()
 
