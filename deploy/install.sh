@@ -11,6 +11,7 @@ readonly HERE
 # Raspberry Pi OS and Debian build picamera2 for this Python, so no other will do.
 readonly PYTHON=/usr/bin/python3
 readonly ROOT=/opt/rhot ETC=/etc/rhot STATE=/var/lib/rhot CACHE=/var/cache/rhot
+readonly RIGS=$ETC/rigs
 readonly UNITS=/etc/systemd/system USER_UNITS=/etc/systemd/user COMMAND=/usr/local/bin/rhot
 readonly SYSUSERS=/etc/sysusers.d/rhot.conf SYSCTL=/etc/sysctl.d/60-rhot.conf
 readonly KEEP_VERSIONS=3
@@ -19,6 +20,8 @@ usage() {
     cat <<'TEXT'
 install.sh pi CAMERA... --master HOST [options]   a Raspberry Pi with cameras
 install.sh master [options]                       router, fusion, solver, viewer, recorder
+install.sh rig NAME --config FILE [--pki DIR]     one more rig that this master serves
+install.sh rig NAME --remove                      it serves that rig no more
 install.sh upgrade [--wheels DIR]                 a new version, the same roles
 install.sh rollback                               the version before
 install.sh status                                 what is installed and what runs
@@ -146,6 +149,8 @@ make_folders() {
     folder "$ROOT" 755 root
     folder "$ROOT/versions" 755 root
     folder "$ETC" 755 root
+    # Further rigs that this master serves: RIGS/NAME/rig.toml.
+    if has_role master; then folder "$RIGS" 755 root; fi
     folder "$STATE" 755 root
     # The group may write: who calibrates by hand belongs to it. Files keep the group (2...).
     folder "$STATE/calibration" 2775 rhot
@@ -366,7 +371,6 @@ CONFIG='' PKI=''
 rig_says() { "$ROOT/versions/$VERSION/bin/python" -m services.cli.deploy.rig_units "$@"; }
 
 put_config() {
-    local file
     if [[ -z $CONFIG ]]; then
         if [[ ! -f $ETC/rig.toml ]] && has_role pi && ! has_role master; then minimal_config; fi
         return
@@ -376,11 +380,14 @@ put_config() {
         change "keep the old rig.toml as $ETC/rig.toml.bak" cp -p -- "$ETC/rig.toml" "$ETC/rig.toml.bak"
     fi
     put "$CONFIG" "$ETC/rig.toml" 644 root
+    bring_calibration "$STATE/calibration"
+}
+
+# What lies in calibration/ beside --config. Results of this machine are never replaced.
+bring_calibration() {
+    local file
     for file in "$(dirname -- "$CONFIG")"/calibration/*.json; do
-        # Results of this machine are never replaced.
-        if [[ -f $file && ! -e $STATE/calibration/${file##*/} ]]; then
-            put "$file" "$STATE/calibration/${file##*/}" 644 rhot
-        fi
+        if [[ -f $file && ! -e $1/${file##*/} ]]; then put "$file" "$1/${file##*/}" 644 rhot; fi
     done
 }
 
@@ -401,17 +408,18 @@ minimal_config() {
     rm -f -- "$new"
 }
 
+# put_certificates FOLDER: those of --pki.
 put_certificates() {
     local name mode
     [[ -n $PKI ]] || return 0
     for name in ca.pem own.pem own.key; do
         [[ -f $PKI/$name ]] || fail "--pki $PKI: $name is missing; it holds ca.pem, own.pem and own.key of one machine"
     done
-    folder "$ETC/pki" 750 rhot
+    folder "$1" 750 rhot
     for name in ca.pem own.pem own.key; do
         mode=644
         if [[ $name == own.key ]]; then mode=600; fi
-        put "$PKI/$name" "$ETC/pki/$name" "$mode" rhot
+        put "$PKI/$name" "$1/$name" "$mode" rhot
     done
 }
 
@@ -445,7 +453,7 @@ wanted_units() {
     local camera
     if has_role master; then
         if [[ -f $ETC/rig.toml && -z $DRY_RUN ]]; then
-            rig_says units "$ETC/rig.toml"
+            rig_says units "$ETC/rig.toml" "$RIGS"
         else
             printf 'rhot-%s.service\n' router fusion solver viewer
         fi
@@ -530,7 +538,7 @@ install_all() {
     fi
     make_version "$VERSION"
     put_config
-    put_certificates
+    put_certificates "$ETC/pki"
     check_certificates
     check_master
     warm_kernels "$VERSION"
@@ -636,6 +644,72 @@ lock() {
     flock -n 9 || fail "another install.sh is running"
 }
 
+# ---- further rigs of a master --------------------------------------------------------------------
+
+# Beside each other as /etc/rhot has it for the first rig; router, fusion, solver, object tracker and
+# viewer read all of them when they start.
+one_rig() {
+    local name=${1:-} place remove=''
+    [[ $name =~ ^[A-Za-z0-9][A-Za-z0-9_-]*$ ]] ||
+        fail "which rig? install.sh rig NAME --config FILE; NAME of letters, digits, - and _"
+    shift
+    while (($#)); do
+        case $1 in
+            --config | --pki)
+                (($# > 1)) || fail "$1 needs a value"
+                if [[ $1 == --config ]]; then CONFIG=$2; else PKI=$2; fi
+                shift
+                ;;
+            --remove) remove=yes ;;
+            --dry-run) DRY_RUN=yes ;;
+            *) fail "unexpected $1; see install.sh --help" ;;
+        esac
+        shift
+    done
+    place=$RIGS/$name
+    check_arguments '' # --config and --pki
+    has_role master || fail "rhot is not installed as the master here: install.sh master ..."
+    [[ -n $remove || -n $CONFIG ]] || fail "install.sh rig $name --config FILE: its rig.toml"
+    lock
+    VERSION=$(current_version)
+    if [[ -n $remove ]]; then
+        [[ -d $place ]] || fail "there is no rig $name here: $(rig_names)"
+        RESTART=yes
+        change "remove $place" rm -rf -- "$place"
+        say "  (its calibrations stay in $STATE/rigs/$name)"
+    else
+        put_rig "$place" "$STATE/rigs/$name/calibration"
+    fi
+    enable_units
+    start_units
+    if ((CHANGES == 0)); then say "Nothing to do: $name is as it should be."; fi
+}
+
+# put_rig PLACE CALIBRATION
+put_rig() {
+    rig_says check "$CONFIG" >/dev/null || fail "--config: see above"
+    folder "$1" 755 root
+    folder "$2" 2775 rhot
+    link "$2" "$1/calibration"
+    bring_calibration "$2"
+    put_certificates "$1/pki"
+    put "$CONFIG" "$1/rig.toml" 644 root
+    if [[ -n $DRY_RUN ]]; then return; fi
+    # Says which rig does not fit the others, and why.
+    "$ROOT/current/bin/rhot" router --print --config "$ETC/rig.toml" --config "$RIGS" >/dev/null ||
+        fail "see above"
+}
+
+rig_names() {
+    local place further=''
+    for place in "$RIGS"/*/; do
+        if [[ -d $place ]]; then further+=" $(basename -- "$place")"; fi
+    done
+    printf '%s' "${further:- none but that of $ETC/rig.toml}"
+}
+
+# ---- later ---------------------------------------------------------------------------------------
+
 upgrade() {
     [[ -n $ROLES ]] || fail "rhot is not installed here: install.sh pi ... or install.sh master"
     install_role '' "$@"
@@ -661,6 +735,7 @@ status() {
     local unit name
     [[ -n $ROLES ]] || { say "rhot is not installed here."; return; }
     say "roles: $ROLES${CAMERAS:+; cameras: $CAMERAS}${MASTER:+; master: $MASTER}"
+    if has_role master; then say "further rigs:$(rig_names)"; fi
     for name in $(kept_versions); do
         if [[ $name == "$(current_version)" ]]; then say "version $name (current)"; else say "version $name"; fi
     done
@@ -721,12 +796,13 @@ main() {
     read_installed
     case $command in
         pi | master) install_role "$command" "$@" ;;
+        rig) one_rig "$@" ;;
         upgrade) upgrade "$@" ;;
         rollback) rollback ;;
         status) status ;;
         uninstall) uninstall "$@" ;;
         -h | --help | help) usage ;;
-        *) fail "unknown command $command; pi, master, upgrade, rollback, status or uninstall" ;;
+        *) fail "unknown command $command; pi, master, rig, upgrade, rollback, status or uninstall" ;;
     esac
 }
 

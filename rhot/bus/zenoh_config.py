@@ -82,18 +82,18 @@ def client_config(connect: Sequence[str]) -> zenoh.Config:
     )
 
 
-def router_config(listen: Sequence[str], rig: RigConfig | None = None) -> zenoh.Config:
+def router_config(listen: Sequence[str], *rigs: RigConfig) -> zenoh.Config:
     """A router listening at `listen`, inspectable at `@/*/router` from this machine.
 
-    With a rig it lets through what fits that rig, and joins the routers that its rig.toml names.
+    With rigs it lets through what fits those, and joins the routers that their rig.toml name.
     """
-    return _config(router_settings(listen, rig))
+    return _config(router_settings(listen, *rigs))
 
 
-def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict[str, Any]:
+def router_settings(listen: Sequence[str], *rigs: RigConfig) -> dict[str, Any]:
     """What router_config is made of, for Zenoh's own router to read from a file."""
     _check(listen)
-    bounds = {} if rig is None else limits(rig)
+    bounds = limits(*rigs) if rigs else {}
     settings: dict[str, Any] = {
         "mode": "router",
         "listen": {"endpoints": list(listen)},
@@ -102,11 +102,15 @@ def router_settings(listen: Sequence[str], rig: RigConfig | None = None) -> dict
         "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
         **bounds,
     }
-    if rig is not None and rig.bus.access == "certificates":
-        settings["access_control"] = access_control(rig)
-    if rig is not None and rig.bus.routers:
-        endpoints = with_certificates(rig.bus.routers, rig.certificates_dir, "connect")
-        settings["connect"] = {"endpoints": endpoints, "timeout_ms": -1, "retry": _RETRY}
+    if any(rig.bus.access == "certificates" for rig in rigs):
+        settings["access_control"] = access_control(*rigs)
+    others = [
+        endpoint
+        for rig in rigs
+        for endpoint in with_certificates(rig.bus.routers, rig.certificates_dir, "connect")
+    ]
+    if others:
+        settings["connect"] = {"endpoints": others, "timeout_ms": -1, "retry": _RETRY}
     return settings
 
 

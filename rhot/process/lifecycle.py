@@ -94,7 +94,7 @@ def command(
         parser.exit(EXIT_USER, f"{program}: error: {error}\n")
     # A share of one rig is one among others as well.
     together = rigs_a_process is not None and options.one_process
-    several = several_rigs and (together or len(options.config) > 1 or options.config[0].is_dir())
+    several = several_rigs and (together or _are_several(options.config))
     if several and len(shares := _shares(options, rigs_a_process)) > 1:
         sys.exit(_run_shares(name, options, shares))
     try:
@@ -170,6 +170,14 @@ def run_several(
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
+
+
+def _are_several(paths: Sequence[Path]) -> bool:
+    """Whether rigs may be several. A file is one rig, and so it is beside folders without any."""
+    try:
+        return paths[0].is_dir() or len(rig_files(paths)) > 1
+    except ConfigError:
+        return True
 
 
 def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rhot.process.service import rhot_version
 
-_SEVERAL = "rig.toml; several of them, or a folder of *.toml: each rig on its own"
+_SEVERAL = "rig.toml; several of them, or a folder of *.toml (or */rig.toml): each rig on its own"
 _ROUNDS = "ask for messages in rounds, as is done for %d rigs (2 cameras at 30 fps) a core and more"
 _TOGETHER = "serve all rigs in this process; else %d rigs (2 cameras at 30 fps) or so have one each"
 

@@ -41,6 +41,10 @@ def test_shellcheck_has_nothing_to_say(script):
         (["master", "--wheels"], "needs a value"),
         (["master", "left"], "unexpected left"),
         (["master", "--frobnicate"], "unknown option --frobnicate"),
+        (["rig"], "which rig?"),
+        (["rig", "la b", "--config", "rig.toml"], "which rig?"),
+        (["rig", "lab", "--config", "/nowhere/rig.toml"], "no such file"),
+        (["rig", "lab", "--remove"], "not installed as the master"),
         (["dance"], "unknown command dance"),
     ],
 )

@@ -75,6 +75,11 @@ class _Subject:
                 }
             )
 
+    def does_all(self, keys: Iterable[str]) -> None:
+        keys = list(keys)
+        for flow in ("ingress", "egress"):
+            self.allow(flow, _ALL_MESSAGES, keys)
+
     def publishes(self, keys: Iterable[str]) -> None:
         self.allow("ingress", ["put"], keys)
 
@@ -102,18 +107,9 @@ class _Subject:
         self.allow("egress", _DECLARATIONS, [_EVERYTHING])
 
 
-def access_control(config: RigConfig) -> dict[str, Any]:
-    """The `access_control` of the rig's router; nothing is allowed that is not in here."""
-    subjects = [
-        *_masters(config),
-        *(
-            _camera(config, name, cameras)
-            for name, cameras in cameras_by_certificate(config).items()
-        ),
-        *(_object_source(config, name) for name in config.bus.object_sources),
-        *(_viewer(config, name) for name in config.bus.viewers),
-        *(_partner(config, rig) for rig in config.bus.partners),
-    ]
+def access_control(*rigs: RigConfig) -> dict[str, Any]:
+    """The `access_control` of the router of these rigs; nothing is allowed that is not in here."""
+    subjects = [_on_this_computer(rigs), *(one for config in rigs for one in _subjects(config))]
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -126,20 +122,39 @@ def access_control(config: RigConfig) -> dict[str, Any]:
     }
 
 
-def _holder(config: RigConfig, role: Role, name: str) -> _Subject:
-    return _Subject(
-        f"{role}-{name}", {"cert_common_names": [common_name(config.rig.name, role, name)]}
-    )
-
-
-def _masters(config: RigConfig) -> list[_Subject]:
+def _on_this_computer(rigs: Iterable[RigConfig]) -> _Subject:
     here = _Subject("loopback", {"interfaces": list(LOOPBACK), "link_protocols": list(_PLAIN)})
-    master = _holder(config, "master", MASTER)
-    ros = ros_keys.graph_keys(config) if ros_keys.in_rigs_router(config) else []
-    for subject, keys in ((here, [_EVERYTHING, _ADMIN, *ros]), (master, [_EVERYTHING, *ros])):
-        for flow in ("ingress", "egress"):
-            subject.allow(flow, _ALL_MESSAGES, keys)
-    return [here, master]
+    ros = [key for config in rigs for key in _keys_of_ros(config)]
+    here.does_all([_EVERYTHING, _ADMIN, *ros])
+    return here
+
+
+def _subjects(config: RigConfig) -> list[_Subject]:
+    """Everybody who has a certificate of one rig."""
+    cameras = cameras_by_certificate(config).items()
+    return [
+        _master(config),
+        *(_camera(config, name, of_it) for name, of_it in cameras),
+        *(_object_source(config, name) for name in config.bus.object_sources),
+        *(_viewer(config, name) for name in config.bus.viewers),
+        *(_partner(config, rig) for rig in config.bus.partners),
+    ]
+
+
+def _holder(config: RigConfig, role: Role, name: str) -> _Subject:
+    # Common names are told apart by the rig, and so are the ids of who has them.
+    whole = common_name(config.rig.name, role, name)
+    return _Subject(whole, {"cert_common_names": [whole]})
+
+
+def _master(config: RigConfig) -> _Subject:
+    subject = _holder(config, "master", MASTER)
+    subject.does_all([_EVERYTHING, *_keys_of_ros(config)])
+    return subject
+
+
+def _keys_of_ros(config: RigConfig) -> list[str]:
+    return ros_keys.graph_keys(config) if ros_keys.in_rigs_router(config) else []
 
 
 def _camera(config: RigConfig, certificate: str, cameras: list[str]) -> _Subject:
@@ -220,7 +235,9 @@ def _looks_on(subject: _Subject, rigs: list[str]) -> None:
 
 
 def _partner(config: RigConfig, partner: str) -> _Subject:
-    subject = _Subject(f"partner-{partner}", {"cert_common_names": [_router_of(partner)]})
+    subject = _Subject(
+        f"{config.rig.name}-partner-{partner}", {"cert_common_names": [_router_of(partner)]}
+    )
     _looks_on(subject, [config.rig.name])
     theirs = [topic.key(partner) for topic in SEEN]
     subject.publishes(theirs)

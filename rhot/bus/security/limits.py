@@ -7,6 +7,7 @@ message is copied to each of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rhot import topics
@@ -29,29 +30,30 @@ _STREAM_HZ = 20_000.0
 _SLOW_HZ = 200.0
 
 
-def limits(config: RigConfig) -> dict[str, Any]:
-    """Zenoh's filters and bounds for a rig's router."""
-    largest = max(_largest_message(topic, config) for topic in topics.TOPICS)
+def limits(*rigs: RigConfig) -> dict[str, Any]:
+    """Zenoh's filters and bounds for the router of these rigs, of which there is one at least."""
+    largest = max(_largest_message(topic, rigs) for topic in topics.TOPICS)
     return {
-        "low_pass_filter": _sizes(config),
-        "downsampling": _rates(config),
+        "low_pass_filter": _sizes(rigs),
+        "downsampling": _rates(rigs),
         "max_message_size": largest + _OVERHEAD_BYTES,
     }
 
 
-def _largest_message(topic: Topic, config: RigConfig) -> int:
-    """Bytes of the largest message of a topic: of pictures, that of the rig's largest camera."""
-    if topic.message is not None or not config.camera:
+def _largest_message(topic: Topic, rigs: Sequence[RigConfig]) -> int:
+    """Bytes of the largest message of a topic: of pictures, that of the rigs' largest camera."""
+    if topic.message is not None or not all(config.camera for config in rigs):
         return topic.max_bytes
-    pixels = max(width * height for width, height in (c.size_px for c in config.camera))
+    sizes_px = [camera.size_px for config in rigs for camera in config.camera]
+    pixels = max(width * height for width, height in sizes_px)
     return min(topic.max_bytes, round(pixels * _BYTES_PER_PIXEL) + _OVERHEAD_BYTES)
 
 
-def _sizes(config: RigConfig) -> list[dict[str, Any]]:
+def _sizes(rigs: Sequence[RigConfig]) -> list[dict[str, Any]]:
     by_size: dict[int, list[str]] = {}
     for topic in topics.TOPICS:
         if topic.kind is not Kind.TOKEN:
-            by_size.setdefault(_largest_message(topic, config), []).append(topic.key("*"))
+            by_size.setdefault(_largest_message(topic, rigs), []).append(topic.key("*"))
     return [
         {
             "id": f"at-most-{size}-bytes",
@@ -64,11 +66,12 @@ def _sizes(config: RigConfig) -> list[dict[str, Any]]:
     ]
 
 
-def _rates(config: RigConfig) -> list[dict[str, Any]]:
+def _rates(rigs: Sequence[RigConfig]) -> list[dict[str, Any]]:
     # A rule counts all keys that it matches together: with wildcards, what one program sends at one
     # instant for two cameras would be one message too many.
     rules = [
         {"key_expr": key, "freq": _STREAM_HZ if _is_fast(topic) else _SLOW_HZ}
+        for config in rigs
         for topic in topics.TOPICS
         if topic.kind in (Kind.STREAM, Kind.STATE)
         for key in _keys_of(topic, config)

@@ -15,20 +15,30 @@ _FRAMES_HZ = 60.0
 
 
 def rig_files(paths: Sequence[Path]) -> list[Path]:
-    """Files as they are, folders as their *.toml files, by name.
+    """Files as they are; folders as their *.toml files, or else the rig.toml of the folders in
+    them, by name. Beside other rigs, a folder may be empty: one into which rigs will be put.
 
-    Raises ConfigError for a folder without any, and for a file that is given twice.
+    Raises ConfigError for folders without any rig, and for a file that is given twice.
     """
-    found: list[Path] = []
-    for path in paths:
-        files = sorted(path.glob("*.toml")) if path.is_dir() else [path]
-        if not files:
-            raise ConfigError(f"{path}: no *.toml in this folder; a rig is described by one")
-        found += files
+    found = [file for path in paths for file in _files_of(path)]
+    if not found:
+        folders = ", ".join(map(str, paths))
+        raise ConfigError(f"{folders}: no *.toml in this folder; a rig is described by one")
     twice = [path for path in found if found.count(path) > 1]
     if twice:
         raise ConfigError(f"{twice[0]} is given twice; each rig is served once")
     return found
+
+
+def _files_of(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    return sorted(path.glob("*.toml")) or further_rigs(path)
+
+
+def further_rigs(folder: Path) -> list[Path]:
+    """The rigs of a folder that has a folder for each, by name."""
+    return sorted(folder.glob("*/rig.toml"))
 
 
 def load_of(paths: Sequence[Path]) -> float:

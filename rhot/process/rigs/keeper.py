@@ -45,7 +45,8 @@ class RigKeeper:
                 tasks.create_task(self._keep(path))
 
     async def _keep(self, path: Path) -> None:
-        enter(path.stem)
+        # Until its file is read, a rig is called as that is, or as the folder of its rig.toml.
+        enter(path.parent.name if path.name == "rig.toml" else path.stem)
         while True:
             watched = [path, path.parent / "calibration"]
             began_s, before = time.monotonic(), state_of(watched)

@@ -1,7 +1,8 @@
 """Which systemd units a rig.toml asks for on the master, for deploy/install.sh.
 
-`python -m services.cli.deploy.rig_units check|connect|secured|units|user-units rig.toml` prints one
-answer a line. It needs no extra of the package: a Pi's installation has no typer.
+`python -m services.cli.deploy.rig_units check|connect|secured|units|user-units rig.toml [FOLDER]`
+prints one answer a line. FOLDER holds further rigs of the same master, each in a folder of its own:
+what serves one is to run. It needs no extra of the package: a Pi's installation has no typer.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from rhot.bus.security.credentials import is_secured
 from rhot.errors import RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process.lifecycle import EXIT_OK, EXIT_USER
+from rhot.process.rigs.files import further_rigs
 
 
 def master_units(config: RigConfig) -> list[str]:
@@ -41,25 +43,43 @@ def user_units(config: RigConfig) -> list[str]:
     return ["rhot-openvr-bridge.service"] if steamvr else []
 
 
-def answer(question: str, config: RigConfig) -> list[str]:
+def units_of_further_rigs(folder: Path) -> list[str]:
+    """Units that serve all rigs of a master, and that rigs beside the first may ask for."""
+    rigs = list(filter(None, map(_readable, further_rigs(folder))))
+    found = ["rhot-solver.service"] if any(rig.has_depth for rig in rigs) else []
+    return [*found, *(["rhot-object-tracker.service"] if any(rig.object for rig in rigs) else [])]
+
+
+def _readable(path: Path) -> RigConfig | None:
+    """A rig, if its file can be read: what is wrong with it, the services say."""
+    try:
+        return load_rig(path)
+    except RhotError:
+        return None
+
+
+def answer(question: str, config: RigConfig, folder: Path | None = None) -> list[str]:
     """Lines for one question: "check" has none, its answer is that the file can be read.
 
-    Raises KeyError for a question that nobody answers.
+    folder: of further rigs, if any. Raises KeyError for a question that nobody answers.
     """
+    further = units_of_further_rigs(folder) if folder else []
     return {
         "check": list[str],
         "connect": lambda: list(config.bus.connect),
         "secured": lambda: [one for one in config.bus.connect if is_secured(one)],
-        "units": lambda: master_units(config),
+        "units": lambda: list(dict.fromkeys([*master_units(config), *further])),
         "user-units": lambda: user_units(config),
     }[question]()
 
 
 def main() -> int:
     """Answer the question of the command line; its exit code."""
-    question, path = sys.argv[1:]
+    question, path, *folders = sys.argv[1:]
+    folder = Path(folders[0]) if folders else None
     try:
-        print("".join(f"{line}\n" for line in answer(question, load_rig(Path(path)))), end="")
+        lines = answer(question, load_rig(Path(path)), folder)
+        print("".join(f"{line}\n" for line in lines), end="")
     except RhotError as error:
         print(error, file=sys.stderr)
         return EXIT_USER

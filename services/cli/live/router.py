@@ -22,12 +22,13 @@ from rhot.bus.security.tls_diagnosis import own_problem
 from rhot.bus.stalled_links import give_up_stalled_connections
 from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
-from rhot.files.config import RigConfig, load_rig
+from rhot.files.config import RigConfig
 from rhot.process import systemd
 from rhot.process.allocator import share_one_heap
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.process.lifecycle import EXIT_USER, fed_watchdog
 from rhot.process.restart_hold import hold_back
+from services.cli.live.routed_rigs import listening_for, routed_rigs
 from services.cli.options import menu
 from services.cli.rig.ports import taken_ports
 
@@ -35,10 +36,8 @@ _LOOPBACK = "tcp/127.0.0.1:7447"
 
 
 @contextlib.asynccontextmanager
-async def running_router(
-    listen: Sequence[str], rig: RigConfig | None = None
-) -> AsyncIterator[None]:
-    """A router for as long as the block lasts, with the rules of a rig's rig.toml.
+async def running_router(listen: Sequence[str], *rigs: RigConfig) -> AsyncIterator[None]:
+    """A router for as long as the block lasts, with the rules of the rigs' rig.toml.
 
     Raises BusError if an endpoint cannot be listened at, or this host's certificate is no good.
     """
@@ -48,7 +47,7 @@ async def running_router(
         if problem:
             raise BusError(f"no router can listen at {plain(endpoint)}: {problem}")
     try:
-        session = await asyncio.to_thread(zenoh.open, router_config(listen, rig))
+        session = await asyncio.to_thread(zenoh.open, router_config(listen, *rigs))
     except zenoh.ZError as error:
         raise BusError(_why_not(listen, error)) from None
     give_up_stalled_connections()
@@ -74,7 +73,11 @@ def _why_not(listen: Sequence[str], error: zenoh.ZError) -> str:
 
 def router(
     config: Annotated[
-        Path | None, typer.Option(help="rig.toml: where to listen, and who may do what")
+        list[Path] | None,
+        typer.Option(
+            help="rig.toml: where to listen, and who may do what; several, or a folder of them: "
+            "one router for all these rigs"
+        ),
     ] = None,
     listen: Annotated[
         list[str] | None,
@@ -85,16 +88,18 @@ def router(
     ] = False,
 ) -> None:
     """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
+    files = config or []
     if show:
-        typer.echo(router_json5(*_settings(config, listen)))
+        endpoints, rigs = _settings(files, listen)
+        typer.echo(router_json5(endpoints, *rigs))
         return
     share_one_heap()
     started_s = time.monotonic()
     try:
-        uvloop.run(_route(*_settings(config, listen)))
+        uvloop.run(_route(*_settings(files, listen)))
     except RhotError as error:
         typer.echo(f"rhot: error: {error}", err=True)
-        hold_back(error, time.monotonic() - started_s, [config] if config else [])
+        hold_back(error, time.monotonic() - started_s, files)
         raise typer.Exit(EXIT_USER) from None
 
 
@@ -111,26 +116,30 @@ def application() -> typer.Typer:
     return app
 
 
-def _settings(config: Path | None, listen: list[str] | None) -> tuple[list[str], RigConfig | None]:
-    """Endpoints with their certificates, and the rig whose roles the router keeps to."""
-    rig = load_rig(config) if config else None
-    endpoints = listen or (list(rig.bus.listen) if rig else [_LOOPBACK])
-    if rig is not None:
-        endpoints = with_certificates(endpoints, rig.certificates_dir, "listen")
-    return endpoints, rig
+def _settings(
+    paths: Sequence[Path], listen: Sequence[str] | None
+) -> tuple[list[str], list[RigConfig]]:
+    """Endpoints with their certificates, and the rigs whose roles the router keeps to."""
+    rigs = routed_rigs(paths, lambda text: typer.echo(f"rhot: error: {text}", err=True))
+    if not rigs:
+        return list(listen or [_LOOPBACK]), rigs
+    if listen:
+        return with_certificates(listen, rigs[0].certificates_dir, "listen"), rigs
+    return listening_for(rigs), rigs
 
 
-def router_json5(listen: Sequence[str], rig: RigConfig | None) -> str:
+def router_json5(listen: Sequence[str], *rigs: RigConfig) -> str:
     """The router's configuration as a stock zenohd reads it."""
-    settings = msgspec.json.encode(router_settings(listen, rig))
+    settings = msgspec.json.encode(router_settings(listen, *rigs))
     about = "// Written by `rhot router --print`: change rig.toml and print it again."
     return f"{about}\n{msgspec.json.format(settings, indent=2).decode()}"
 
 
-async def _route(endpoints: list[str], rig: RigConfig | None) -> None:
+async def _route(endpoints: list[str], rigs: Sequence[RigConfig]) -> None:
     stopping = stop_on_signals()
     with cancelled_by(stopping):
-        async with fed_watchdog(), running_router(endpoints, rig):
-            typer.echo(f"router listening at {', '.join(map(plain, endpoints))}")
+        async with fed_watchdog(), running_router(endpoints, *rigs):
+            of = f" for {', '.join(config.rig.name for config in rigs)}" if len(rigs) > 1 else ""
+            typer.echo(f"router{of} listening at {', '.join(map(plain, endpoints))}")
             systemd.notify("READY=1")
             await asyncio.Event().wait()

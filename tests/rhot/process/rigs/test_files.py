@@ -25,6 +25,19 @@ def test_a_folder_without_rigs_and_a_file_given_twice_are_refused(tmp_path: Path
         rig_files([tmp_path, tmp_path / "a.toml"])
 
 
+def test_a_folder_may_have_a_folder_for_each_rig_and_be_empty_beside_others(tmp_path: Path) -> None:
+    rig, rigs = tmp_path / "rig.toml", tmp_path / "rigs"
+    rigs.mkdir()
+    assert rig_files([rig, rigs]) == [rig]
+    for name in ("lab", "attic"):
+        (rigs / name).mkdir()
+        (rigs / name / "rig.toml").touch()
+    assert rig_files([rig, rigs]) == [rig, rigs / "attic" / "rig.toml", rigs / "lab" / "rig.toml"]
+    # A capture beside files of rigs is none.
+    (rigs / "desk.toml").touch()
+    assert rig_files([rigs]) == [rigs / "desk.toml"]
+
+
 def test_a_load_counts_frames_and_a_file_that_is_wrong_as_a_rig(tmp_path: Path) -> None:
     cameras = '[[camera]]\nname = "{}"\nfps = {}\n'
     for name, fps in (("usual", 30), ("fast", 90)):

@@ -13,9 +13,9 @@ from services.cli.deploy.rig_units import master_units, user_units
 from services.cli.live.up import children_of
 
 
-def asked(question, path) -> subprocess.CompletedProcess[str]:
+def asked(question, *paths) -> subprocess.CompletedProcess[str]:
     """What install.sh runs."""
-    command = [sys.executable, "-m", "services.cli.deploy.rig_units", question, str(path)]
+    command = [sys.executable, "-m", "services.cli.deploy.rig_units", question, *map(str, paths)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -41,6 +41,22 @@ def test_a_master_runs_what_rhot_up_runs(name, tmp_path):
     names = (child.name.replace("_", "-").replace("/", "@") for child in children)
     units = {*master_units(rig), *user_units(rig)}
     assert units - {"rhot-pi.target"} == {f"rhot-{name}.service" for name in names}
+
+
+def test_a_further_rig_asks_for_what_serves_it(tmp_path):
+    first, rigs = tmp_path / "rig.toml", tmp_path / "rigs"
+    first.write_text(SWITCHED_ON)
+    serves = {"rhot-solver.service", "rhot-object-tracker.service"}
+    alone = set(asked("units", first, rigs).stdout.split())
+    assert not alone & serves
+    for name, text in (
+        ("lab", (config_dir() / "sim.toml").read_text()),
+        ("shop", '[[object]]\nname = "cup"\nserial = "LHR-1"\n'),
+        ("wrong", "no toml"),
+    ):
+        (rigs / name).mkdir(parents=True)
+        (rigs / name / "rig.toml").write_text(text)
+    assert set(asked("units", first, rigs).stdout.split()) == alone | serves
 
 
 @pytest.mark.parametrize(
