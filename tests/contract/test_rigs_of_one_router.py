@@ -1,4 +1,4 @@
-"""Two rigs at one router, each with an authority and a port of its own: neither enters the other."""
+"""Two rigs at one router, each with an authority and a port: neither enters the other."""
 
 from __future__ import annotations
 
