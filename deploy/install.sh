@@ -450,10 +450,11 @@ targets() {
 
 # Units of this machine's roles, one a line; without a rig.toml those that every rig has.
 wanted_units() {
-    local camera
+    local camera rig
     if has_role master; then
         if [[ -f $ETC/rig.toml && -z $DRY_RUN ]]; then
             rig_says units "$ETC/rig.toml" "$RIGS"
+            for rig in $(rig_names); do units_of_rig "$rig"; done
         else
             printf 'rhot-%s.service\n' router fusion solver viewer
         fi
@@ -673,25 +674,29 @@ one_rig() {
     lock
     VERSION=$(current_version)
     if [[ -n $remove ]]; then
-        [[ -d $place ]] || fail "there is no rig $name here: $(rig_names)"
+        [[ -d $place ]] || fail "there is no rig $name here:$(rigs_said)"
         RESTART=yes
+        change "stop what is its own" stop_rig "$name"
         change "remove $place" rm -rf -- "$place"
-        say "  (its calibrations stay in $STATE/rigs/$name)"
+        say "  (its calibrations and recordings stay in $STATE/rigs/$name)"
     else
-        put_rig "$place" "$STATE/rigs/$name/calibration"
+        put_rig "$place" "$STATE/rigs/$name"
     fi
     enable_units
     start_units
     if ((CHANGES == 0)); then say "Nothing to do: $name is as it should be."; fi
 }
 
-# put_rig PLACE CALIBRATION
+# put_rig PLACE DATA
 put_rig() {
+    local kind
     rig_says check "$CONFIG" >/dev/null || fail "--config: see above"
     folder "$1" 755 root
-    folder "$2" 2775 rhot
-    link "$2" "$1/calibration"
-    bring_calibration "$2"
+    for kind in calibration recordings; do
+        folder "$2/$kind" 2775 rhot
+        link "$2/$kind" "$1/$kind"
+    done
+    bring_calibration "$2/calibration"
     put_certificates "$1/pki"
     put "$CONFIG" "$1/rig.toml" 644 root
     if [[ -n $DRY_RUN ]]; then return; fi
@@ -700,12 +705,28 @@ put_rig() {
         fail "see above"
 }
 
+stop_rig() {
+    local -a units
+    mapfile -t units < <(units_of_rig "$1")
+    systemctl disable --quiet "${units[@]}"
+    if booted; then systemctl stop "${units[@]}"; fi
+}
+
+# What a further rig has to itself: its page records and calibrates.
+units_of_rig() { printf 'rhot-%s.service\n' "recorder@$1" "calibrator@$1"; }
+
+# Names of further rigs, one a line.
 rig_names() {
-    local place further=''
+    local place
     for place in "$RIGS"/*/; do
-        if [[ -d $place ]]; then further+=" $(basename -- "$place")"; fi
+        if [[ -d $place ]]; then basename -- "$place"; fi
     done
-    printf '%s' "${further:- none but that of $ETC/rig.toml}"
+}
+
+rigs_said() {
+    local names
+    names=$(rig_names | paste -sd' ')
+    printf ' %s' "${names:-none but that of $ETC/rig.toml}"
 }
 
 # ---- later ---------------------------------------------------------------------------------------
@@ -735,7 +756,7 @@ status() {
     local unit name
     [[ -n $ROLES ]] || { say "rhot is not installed here."; return; }
     say "roles: $ROLES${CAMERAS:+; cameras: $CAMERAS}${MASTER:+; master: $MASTER}"
-    if has_role master; then say "further rigs:$(rig_names)"; fi
+    if has_role master; then say "further rigs:$(rigs_said)"; fi
     for name in $(kept_versions); do
         if [[ $name == "$(current_version)" ]]; then say "version $name (current)"; else say "version $name"; fi
     done

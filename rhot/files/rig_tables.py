@@ -220,7 +220,8 @@ class Viewer(Table, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     # 16 or more letters, digits, "-", "_"; the page is then at http://HOST:8080/?token=TOKEN.
     token: Annotated[str, msgspec.Meta(pattern=r"^([A-Za-z0-9_-]{16,128})?$")] = ""
-    # Of the live view; the next free one if it is taken, 0 for any.
+    # Of the live view; the next free one if it is taken, 0 for any. Of several rigs of a master
+    # that do not choose, the first has this one, and each other the next.
     port: Annotated[int, msgspec.Meta(ge=0, le=65535)] = 8080
     # How often the view is drawn, in Hz.
     rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=60.0)] = 30.0

@@ -13,6 +13,7 @@ import msgspec
 
 from rhot.files.rig_tables import Viewer
 from rhot.files.viewer_access import page_address
+from rhot.process.rigs.context import PLACE
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,16 @@ class RigPage:
         """What to open in a browser, for somebody who knows this token."""
         known = self.table if self.table.token == token else _without_token(self.table)
         return page_address(known, self.port, self.hostname)
+
+
+def at_its_place(table: Viewer) -> Viewer:
+    """The table of one of several rigs: a port that none of them chose is each one's own.
+
+    Whichever started first would have the first rig's else, another one every time.
+    """
+    if table.port != Viewer().port:
+        return table
+    return msgspec.structs.replace(table, port=table.port + PLACE.get())
 
 
 _open: dict[str, RigPage] = {}

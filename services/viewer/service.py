@@ -35,7 +35,7 @@ from services.viewer.guide.captions import Captions
 from services.viewer.guide.section import GuideSection
 from services.viewer.live.model import ViewModel
 from services.viewer.live.views import View
-from services.viewer.pages import RigPage, announced, others
+from services.viewer.pages import RigPage, announced, at_its_place, others
 from services.viewer.panel.banner import Banner
 from services.viewer.panel.fault_texts import starting
 from services.viewer.panel.live_tab import LiveSection
@@ -104,7 +104,7 @@ async def _show(service: Service, link: RecorderLink, replay_address: Callable[[
     setup = load_and_watch(service, _watched(config), lambda: read_setup(config))
     # viser's websocket library logs every browser that comes and goes.
     logging.getLogger("websockets").setLevel(logging.WARNING)
-    with open_server(config.viewer) as server:
+    with open_server(at_its_place(config.viewer)) as server:
         own = RigPage(config.rig.name, config.viewer, server.get_port(), socket.gethostname())
         page = _page(service, server, setup, link, own, replay_address)
         service.values["port"] = own.port

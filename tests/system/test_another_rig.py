@@ -17,7 +17,8 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(1800)]
 
 INSTALL, RHOT = "/opt/rhot/current/deploy/install.sh", "/opt/rhot/current/bin/rhot"
 LAB = "/srv/brought/lab/rig.toml"
-# What a page says of itself.
+OWN = ("rhot-recorder@lab.service", "rhot-calibrator@lab.service")
+# The first rig keeps the first port.
 PAGE = "import urllib.request as r; print(r.urlopen('http://127.0.0.1:8081/').status)"
 
 
@@ -53,8 +54,12 @@ def test_one_more_rig_is_served_beside_the_first(rig, watch, lab, tmp_path):
     assert "left out" not in said
     assert lab.wait_value("solver", "right_from_tables", 1.0, HANG_S), rig.journals()
     assert lab.wait_value("fusion", "observations_hz", 0.0, HANG_S), rig.journals()
+    assert lab.wait_value("recorder", "recording", 1.0, HANG_S), rig.journals()
+    assert list((master.disk / "var/lib/rhot/rigs/lab/recordings").glob("*.mcap"))
+    assert master.run("systemctl", "is-active", *OWN).split() == ["active"] * 2
     assert more_poses(watch, HANG_S), rig.journals()
     assert "7449" in master.run("ss", "-ltn")
+    assert lab.wait_value("viewer", "port", 8081.0, HANG_S), rig.journals()
     assert master.run("/opt/rhot/current/bin/python", "-c", PAGE).strip() == "200"
     assert "further rigs: lab" in master.run(INSTALL, "status")
     assert "Nothing to do" in master.run(INSTALL, "rig", "lab", "--config", LAB, timeout_s=120.0)
@@ -62,7 +67,8 @@ def test_one_more_rig_is_served_beside_the_first(rig, watch, lab, tmp_path):
 
 def test_it_is_taken_away_again(rig, watch, lab):
     said = rig.master.run(INSTALL, "rig", "lab", "--remove", timeout_s=120.0)
-    assert "calibrations stay in /var/lib/rhot/rigs/lab" in said
+    assert "calibrations and recordings stay in /var/lib/rhot/rigs/lab" in said
+    assert rig.master.try_run("systemctl", "is-active", *OWN).split() == ["inactive"] * 2
     assert "further rigs: none" in rig.master.run(INSTALL, "status")
     assert more_poses(watch, HANG_S), rig.journals()
     assert "7449" not in rig.master.run("ss", "-ltn")

@@ -10,6 +10,8 @@ from contextvars import ContextVar
 
 # Tasks inherit it from the task that made them.
 RIG: ContextVar[str] = ContextVar("rig", default="")
+# How many of the process's rigs stand before it, in the order of their files.
+PLACE: ContextVar[int] = ContextVar("place", default=0)
 
 
 # The newest status of each rig.

@@ -15,7 +15,7 @@ from pathlib import Path
 from rhot.errors import ConfigError
 from rhot.files.config import RigConfig
 from rhot.process.restart_hold import is_of_a_file, state_of
-from rhot.process.rigs.context import enter
+from rhot.process.rigs.context import PLACE, enter
 
 # An error of a file waits for a file to change, at most so long; any other starts again so much
 # later (a bug in a loop: 12 tracebacks a minute).
@@ -41,10 +41,11 @@ class RigKeeper:
     async def keep_all(self, paths: Sequence[Path]) -> None:
         """Serve the rigs of all files until each one's service has ended by itself."""
         async with asyncio.TaskGroup() as tasks:
-            for path in paths:
-                tasks.create_task(self._keep(path))
+            for place, path in enumerate(paths):
+                tasks.create_task(self._keep(path, place))
 
-    async def _keep(self, path: Path) -> None:
+    async def _keep(self, path: Path, place: int) -> None:
+        PLACE.set(place)
         # Until its file is read, a rig is called as that is, or as the folder of its rig.toml.
         enter(path.parent.name if path.name == "rig.toml" else path.stem)
         while True:

@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
+from contextvars import copy_context
+
 from rhot.files.rig_tables import Viewer
-from services.viewer.pages import RigPage, announced, others
+from rhot.process.rigs.context import PLACE
+from services.viewer.pages import RigPage, announced, at_its_place, others
+
+
+def test_rigs_that_choose_no_port_have_theirs_in_the_order_of_their_files():
+    assert at_its_place(Viewer()).port == 8080
+    context = copy_context()
+    context.run(PLACE.set, 2)
+    assert context.run(at_its_place, Viewer()).port == 8082
+    assert context.run(at_its_place, Viewer(port=9000)).port == 9000
 
 
 def test_pages_lead_to_each_other_while_they_are_open() -> None:
