@@ -22,11 +22,11 @@ def routed_rigs(paths: Sequence[Path], tell: Callable[[str], None]) -> list[RigC
     for file in files:
         try:
             config = load_rig(file)
-            _check_fits(config, rigs)
+            _check_fits(file, config, rigs)
         except RhotError as error:
             if len(files) == 1:
                 raise
-            tell(f"{file}: {error}; left out until this router is started again")
+            tell(f"{error}; left out until this router is started again")
         else:
             rigs.append(config)
     if files and not rigs:
@@ -39,24 +39,24 @@ def listening_for(rigs: Sequence[RigConfig]) -> list[str]:
     return list(dict.fromkeys(one for config in rigs for one in router_endpoints(config)))
 
 
-def _check_fits(config: RigConfig, rigs: Sequence[RigConfig]) -> None:
+def _check_fits(file: Path, config: RigConfig, rigs: Sequence[RigConfig]) -> None:
     """Raise ConfigError where a rig's rules contradict those of others of the same router."""
     taken = {plain(one): (one, other.rig.name) for other in rigs for one in router_endpoints(other)}
     for endpoint in router_endpoints(config):
         first, owner = taken.get(plain(endpoint), (endpoint, ""))
         if first != endpoint:
             raise ConfigError(
-                f"rig {owner!r} listens at {plain(endpoint)} with other certificates; choose "
-                "another port in [bus] listen, and in [bus] connect of its cameras' computers"
+                f"{file}: rig {owner!r} listens at {plain(endpoint)} with other certificates; "
+                "choose another port in [bus] listen, and in [bus] connect"
             )
     for other in rigs:
         if other.rig.name == config.rig.name:
             raise ConfigError(
-                f"another rig of this router is called {config.rig.name!r}; "
+                f"{file}: another rig of this router is called {config.rig.name!r}; "
                 "every rig of a network has a [rig] name of its own"
             )
         if other.bus.access != config.bus.access:
             raise ConfigError(
-                f'[bus] access is "{config.bus.access}", and "{other.bus.access}" for rig '
-                f"{other.rig.name!r}; one router cannot let everybody in and keep to roles"
+                f'{file}: [bus] access is "{config.bus.access}", and "{other.bus.access}" for '
+                f"rig {other.rig.name!r}; one router cannot let everybody in and keep to roles"
             )
