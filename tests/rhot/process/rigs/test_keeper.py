@@ -22,7 +22,9 @@ SERVICE = textwrap.dedent("""
     import asyncio
     from rhot.errors import CalibrationError, SourceError
     from rhot.process.lifecycle import command
+    from rhot.process.rigs.context import PLACE
     async def serve(service):
+        service.values["place"] = float(PLACE.get())
         wish = (service.config.calibration_dir / "wish").read_text().strip()
         if wish == "uncalibrated":
             raise CalibrationError("no lens yet; run the calibration")
@@ -74,12 +76,14 @@ async def test_a_broken_rig_touches_no_other(
     process: asyncio.subprocess.Process, tmp_path: Path, endpoint: str, notified: socket.socket
 ) -> None:
     beats: dict[str, list[float]] = {}
+    places: dict[str, float] = {}
     async with asyncio.timeout(DEADLINE_S), asyncio.TaskGroup() as tasks:
 
         async def follow(rig: str) -> None:
             async with open_bus(rig, [endpoint]) as bus:
                 async for beat in bus.every(topics.HEALTH, 16):
                     beats.setdefault(rig, []).append(beat.uptime_s)
+                    places[rig] = beat.values.get("place", -1.0)
 
         followers = [tasks.create_task(follow(rig)) for rig in ("well", "broken", "new")]
         while len(beats.get("well", [])) < 3 or not beats.get("new"):
@@ -91,6 +95,8 @@ async def test_a_broken_rig_touches_no_other(
             follower.cancel()
     assert beats["well"] == sorted(beats["well"])
     assert beats["new"][0] < beats["well"][-1]
+    # In the order of their files: broken, new, well.
+    assert (places["new"], places["well"]) == (1.0, 2.0)
     process.send_signal(signal.SIGTERM)
     async with asyncio.timeout(DEADLINE_S):
         output, _ = await process.communicate()
