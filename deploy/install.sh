@@ -425,9 +425,9 @@ put_certificates() {
 
 # A machine without the certificate that its rig.toml calls for gets no session.
 check_certificates() {
-    if [[ -n $DRY_RUN || ! -f $ETC/rig.toml || -f $ETC/pki/own.key ]]; then return; fi
-    if [[ -n $(rig_says secured "$ETC/rig.toml") ]]; then
-        say "  ! $ETC/rig.toml has a tls endpoint, and $ETC/pki holds no certificate of this machine:"
+    if [[ -n $DRY_RUN || ! -f $1/rig.toml || -f $1/pki/own.key ]]; then return; fi
+    if [[ -n $(rig_says secured "$1/rig.toml") ]]; then
+        say "  ! $1/rig.toml has a tls endpoint, and $1/pki holds no certificate of this machine:"
         say "    make it with \`rhot pki init\`, and give its folder with --pki"
     fi
 }
@@ -540,7 +540,7 @@ install_all() {
     make_version "$VERSION"
     put_config
     put_certificates "$ETC/pki"
-    check_certificates
+    check_certificates "$ETC"
     check_master
     warm_kernels "$VERSION"
     switch_to "$VERSION"
@@ -699,6 +699,7 @@ put_rig() {
     bring_calibration "$2/calibration"
     put_certificates "$1/pki"
     put "$CONFIG" "$1/rig.toml" 644 root
+    check_certificates "$1"
     if [[ -n $DRY_RUN ]]; then return; fi
     # Says which rig does not fit the others, and why.
     "$ROOT/current/bin/rhot" router --print --config "$ETC/rig.toml" --config "$RIGS" >/dev/null ||
@@ -708,7 +709,7 @@ put_rig() {
 stop_rig() {
     local -a units
     mapfile -t units < <(units_of_rig "$1")
-    systemctl disable --quiet "${units[@]}"
+    systemctl disable --quiet "${units[@]}" 2>/dev/null || true
     if booted; then systemctl stop "${units[@]}"; fi
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from pathlib import Path
 
 import pytest
@@ -87,6 +88,8 @@ def rig_file(folder: Path, name: str, *lines: str) -> Path:
         ("desk", (), "is called 'desk'"),
         ("lab", ('access = "open"',), 'access is "open"'),
         ("lab", ('listen = ["tls/0.0.0.0:7448"]',), "choose another port"),
+        ("lab", ('connect = ["tls/0.0.0.0:7449"]', "listen = ['tcp/7449']"), "tcp/7449"),
+        ("of.camera.names", (), "cannot stand in a certificate"),
         ("lab", ("listens = 3",), "listens"),
         ("lab", ("no toml",), "rig.toml"),
     ],
@@ -95,11 +98,26 @@ def test_a_rig_that_does_not_fit_is_left_out_and_told(tmp_path, name, lines, why
     first = rig_file(tmp_path / "one", "desk", 'listen = ["tls/0.0.0.0:7448"]')
     other = rig_file(tmp_path / "two", name, *lines)
     told: list[str] = []
-    assert [config.rig.name for config in routed_rigs([first, other], told.append)] == ["desk"]
+    rigs = routed_rigs([first, other], told.append, to_run=False)
+    assert [config.rig.name for config in rigs] == ["desk"]
     (text,) = told
     assert text.count(str(other)) == 1
     assert why in text
     assert "left out until this router is started again" in text
+
+
+def test_a_rig_that_this_host_cannot_listen_for_is_left_out(tmp_path):
+    first = rig_file(tmp_path / "one", "desk")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        busy = rig_file(tmp_path / "two", "lab", f'listen = ["tcp/127.0.0.1:{port}"]')
+        bare = rig_file(tmp_path / "three", "attic", 'listen = ["tls/0.0.0.0:7449"]')
+        told: list[str] = []
+        assert [one.rig.name for one in routed_rigs([first, busy, bare], told.append)] == ["desk"]
+    assert f"port {port} already" in told[0]
+    assert "ca.pem" in told[1]
+    # Elsewhere, a zenohd may have both.
+    assert len(routed_rigs([first, busy, bare], pytest.fail, to_run=False)) == 3
 
 
 def test_a_router_without_any_rig_it_was_given_does_not_run(tmp_path):

@@ -17,8 +17,7 @@ import typer
 import uvloop
 import zenoh
 
-from rhot.bus.security.credentials import credentials_in, is_secured, plain, with_certificates
-from rhot.bus.security.tls_diagnosis import own_problem
+from rhot.bus.security.credentials import plain, with_certificates
 from rhot.bus.stalled_links import give_up_stalled_connections
 from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
@@ -28,9 +27,13 @@ from rhot.process.allocator import share_one_heap
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.process.lifecycle import EXIT_USER, fed_watchdog
 from rhot.process.restart_hold import hold_back
-from services.cli.live.routed_rigs import listening_for, routed_rigs
+from services.cli.live.routed_rigs import (
+    check_certificates,
+    check_ports,
+    listening_for,
+    routed_rigs,
+)
 from services.cli.options import menu
-from services.cli.rig.ports import taken_ports
 
 _LOOPBACK = "tcp/127.0.0.1:7447"
 
@@ -41,34 +44,19 @@ async def running_router(listen: Sequence[str], *rigs: RigConfig) -> AsyncIterat
 
     Raises BusError if an endpoint cannot be listened at, or this host's certificate is no good.
     """
-    for endpoint in filter(is_secured, listen):
-        files = credentials_in(endpoint)
-        problem = own_problem(files, time.time()) if files else None
-        if problem:
-            raise BusError(f"no router can listen at {plain(endpoint)}: {problem}")
+    check_certificates(listen)
     try:
         session = await asyncio.to_thread(zenoh.open, router_config(listen, *rigs))
     except zenoh.ZError as error:
-        raise BusError(_why_not(listen, error)) from None
+        check_ports(listen)
+        where = ", ".join(map(plain, listen))
+        reason = str(error).split(" at /")[0]
+        raise BusError(f"no router can listen at {where}: {reason}") from None
     give_up_stalled_connections()
     try:
         yield
     finally:
         await asyncio.to_thread(session.close)
-
-
-def _why_not(listen: Sequence[str], error: zenoh.ZError) -> str:
-    """Why no router can listen: a port that another process has, else Zenoh's own reason."""
-    where = f"no router can listen at {', '.join(map(plain, listen))}"
-    taken = taken_ports(listen)
-    if not taken:
-        return f"{where}: {str(error).split(' at /')[0]}"
-    port, owner = next(iter(taken.items()))
-    return (
-        f"{where}: {owner or 'a process of another user'} listens at port {port} already; "
-        "if it is a router of yours, use or stop it, else choose another port, e.g. "
-        f"--listen tcp/127.0.0.1:{port + 1}"
-    )
 
 
 def router(
@@ -90,7 +78,7 @@ def router(
     """Run a Zenoh router until Ctrl-C (default: on loopback only)."""
     files = config or []
     if show:
-        endpoints, rigs = _settings(files, listen)
+        endpoints, rigs = _settings(files, listen, to_run=False)
         typer.echo(router_json5(endpoints, *rigs))
         return
     share_one_heap()
@@ -117,10 +105,15 @@ def application() -> typer.Typer:
 
 
 def _settings(
-    paths: Sequence[Path], listen: Sequence[str] | None
+    paths: Sequence[Path], listen: Sequence[str] | None, *, to_run: bool = True
 ) -> tuple[list[str], list[RigConfig]]:
     """Endpoints with their certificates, and the rigs whose roles the router keeps to."""
-    rigs = routed_rigs(paths, lambda text: typer.echo(f"rhot: error: {text}", err=True))
+    given = to_run and not listen
+
+    def tell(text: str) -> None:
+        typer.echo(f"rhot: error: {text}", err=True)
+
+    rigs = routed_rigs(paths, tell, to_run=given)
     if not rigs:
         return list(listen or [_LOOPBACK]), rigs
     if listen:
