@@ -730,7 +730,7 @@ rigs_said() {
     printf ' %s' "${names:-none but that of $ETC/rig.toml}"
 }
 
-# ---- later ---------------------------------------------------------------------------------------
+# ---- new versions, status, removal ---------------------------------------------------------------
 
 upgrade() {
     [[ -n $ROLES ]] || fail "rhot is not installed here: install.sh pi ... or install.sh master"

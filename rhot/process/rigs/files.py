@@ -44,23 +44,24 @@ def further_rigs(folder: Path) -> list[Path]:
 def load_of(paths: Sequence[Path]) -> float:
     """How many usual rigs, of two cameras at 30 frames a second, have as many frames as these.
 
-    One whose file cannot be read counts as one: what is wrong with it is told when it is served.
+    One whose file cannot be read counts as one.
     """
     return sum(map(_load_of_one, paths))
 
 
 def have_own_names(paths: Sequence[Path]) -> bool:
     """Whether no two rigs are called the same, as far as their files can be read."""
-    names = [config.rig.name for config in map(_read, paths) if config is not None]
+    names = [config.rig.name for config in map(readable_rig, paths) if config is not None]
     return len(set(names)) == len(names)
 
 
 def _load_of_one(path: Path) -> float:
-    config = _read(path)
+    config = readable_rig(path)
     return 1.0 if config is None else sum(one.fps for one in config.camera) / _FRAMES_HZ
 
 
-def _read(path: Path) -> RigConfig | None:
+def readable_rig(path: Path) -> RigConfig | None:
+    """A rig, if its file can be read: what is wrong with it is told when it is served."""
     try:
         return load_rig(path)
     except ConfigError:

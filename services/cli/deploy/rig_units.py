@@ -14,7 +14,7 @@ from rhot.bus.security.credentials import is_secured
 from rhot.errors import RhotError
 from rhot.files.config import RigConfig, load_rig
 from rhot.process.lifecycle import EXIT_OK, EXIT_USER
-from rhot.process.rigs.files import further_rigs
+from rhot.process.rigs.files import further_rigs, readable_rig
 
 
 def master_units(config: RigConfig) -> list[str]:
@@ -45,17 +45,9 @@ def user_units(config: RigConfig) -> list[str]:
 
 def units_of_further_rigs(folder: Path) -> list[str]:
     """Units that serve all rigs of a master, and that rigs beside the first may ask for."""
-    rigs = list(filter(None, map(_readable, further_rigs(folder))))
+    rigs = list(filter(None, map(readable_rig, further_rigs(folder))))
     found = ["rhot-solver.service"] if any(rig.has_depth for rig in rigs) else []
     return [*found, *(["rhot-object-tracker.service"] if any(rig.object for rig in rigs) else [])]
-
-
-def _readable(path: Path) -> RigConfig | None:
-    """A rig, if its file can be read: what is wrong with it, the services say."""
-    try:
-        return load_rig(path)
-    except RhotError:
-        return None
 
 
 def answer(question: str, config: RigConfig, folder: Path | None = None) -> list[str]:

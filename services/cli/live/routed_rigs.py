@@ -45,7 +45,7 @@ def _one_more(file: Path, rigs: Sequence[RigConfig], *, to_run: bool) -> RigConf
     config = load_rig(file)
     _check_fits(config, rigs)
     own = [one for one in router_endpoints(config) if one not in listening_for(rigs)]
-    # For what it finds wrong.
+    # Raises where a name cannot stand in a certificate, or an address is none.
     router_settings(own, config)
     if to_run:
         check_certificates(own)

@@ -108,12 +108,12 @@ def _settings(
     paths: Sequence[Path], listen: Sequence[str] | None, *, to_run: bool = True
 ) -> tuple[list[str], list[RigConfig]]:
     """Endpoints with their certificates, and the rigs whose roles the router keeps to."""
-    given = to_run and not listen
 
     def tell(text: str) -> None:
         typer.echo(f"rhot: error: {text}", err=True)
 
-    rigs = routed_rigs(paths, tell, to_run=given)
+    # Where it listens elsewhere, it does not matter whether it could where the rigs say.
+    rigs = routed_rigs(paths, tell, to_run=to_run and not listen)
     if not rigs:
         return list(listen or [_LOOPBACK]), rigs
     if listen:
