@@ -31,6 +31,7 @@ install.sh uninstall [--purge]                    remove rhot (--purge: its data
 --pki DIR       certificates of this machine: ca.pem, own.pem, own.key (from `rhot pki`)
 --wheels DIR    install from these wheels alone, without a network (`make wheels` collects them)
 --wheel FILE    rhot's own wheel (or a folder that holds it); what it needs comes from PyPI
+--replace       the master serves another rig than until now: its file takes the place of the old one
 --simulator     run the simulator of rig.toml on this machine (a rig without cameras)
 --no-start      do not start anything now; it starts with the machine
 --dry-run       say what would be done, do nothing
@@ -365,7 +366,7 @@ remove_version() {
 
 # ---- rig.toml and certificates -------------------------------------------------------------------
 
-CONFIG='' PKI=''
+CONFIG='' PKI='' REPLACE=''
 
 # rig_says QUESTION...: what rig.toml says, read by rhot itself (services/cli/deploy/rig_units.py).
 rig_says() { "$ROOT/versions/$VERSION/bin/python" -m services.cli.deploy.rig_units "$@"; }
@@ -375,12 +376,26 @@ put_config() {
         if [[ ! -f $ETC/rig.toml ]] && has_role pi && ! has_role master; then minimal_config; fi
         return
     fi
-    if [[ -z $DRY_RUN ]]; then rig_says check "$CONFIG" >/dev/null || fail "--config: see above"; fi
+    if [[ -z $DRY_RUN ]]; then
+        rig_says check "$CONFIG" >/dev/null || fail "--config: see above"
+        if has_role master && [[ -z $REPLACE && -f $ETC/rig.toml ]]; then check_same_rig; fi
+    fi
     if [[ -f $ETC/rig.toml ]] && ! cmp -s -- "$CONFIG" "$ETC/rig.toml"; then
         change "keep the old rig.toml as $ETC/rig.toml.bak" cp -p -- "$ETC/rig.toml" "$ETC/rig.toml.bak"
     fi
     put "$CONFIG" "$ETC/rig.toml" 644 root
     bring_calibration "$STATE/calibration"
+}
+
+# A second rig's file in the place of the first one's would end the first.
+check_same_rig() {
+    local here theirs
+    here=$(rig_says name "$ETC/rig.toml" 2>/dev/null) || return 0
+    theirs=$(rig_says name "$CONFIG")
+    if [[ $here == "$theirs" ]]; then return; fi
+    fail "this master serves the rig $here ($ETC/rig.toml), and --config is of the rig $theirs;" \
+        "to serve both: install.sh rig $theirs --config FILE; to serve $theirs in the place of" \
+        "$here: --replace"
 }
 
 # What lies in calibration/ beside --config. Results of this machine are never replaced.
@@ -605,6 +620,7 @@ install_role() {
                 shift
                 ;;
             --simulator) SIMULATOR=yes ;;
+            --replace) REPLACE=yes ;;
             --no-start) NO_START=yes ;;
             --dry-run) DRY_RUN=yes ;;
             -*) fail "unknown option $1; see install.sh --help" ;;

@@ -65,6 +65,16 @@ def test_one_more_rig_is_served_beside_the_first(rig, watch, lab, tmp_path):
     assert "Nothing to do" in master.run(INSTALL, "rig", "lab", "--config", LAB, timeout_s=120.0)
 
 
+def test_its_file_does_not_take_the_place_of_the_first_ones(rig, watch):
+    before = rig.master.run("cat", "/etc/rhot/rig.toml")
+    wrong = ("/srv/deploy/install.sh", "master", "--wheels", "/srv/wheels", "--config", LAB)
+    said = rig.master.try_run(*wrong, timeout_s=300.0)
+    assert f"this master serves the rig {NAME}" in said
+    assert "install.sh rig lab --config FILE" in said
+    assert rig.master.run("cat", "/etc/rhot/rig.toml") == before
+    assert more_poses(watch, HANG_S), rig.journals()
+
+
 def test_it_is_taken_away_again(rig, watch, lab):
     said = rig.master.run(INSTALL, "rig", "lab", "--remove", timeout_s=120.0)
     assert "calibrations and recordings stay in /var/lib/rhot/rigs/lab" in said

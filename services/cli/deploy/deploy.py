@@ -33,6 +33,7 @@ class Order:
     rig_toml: Path
     wheels: Path | None
     master: str
+    replace: bool
     ssh_config: Path | None
     dry_run: bool
 
@@ -55,11 +56,14 @@ def deploy(
     wheels: Annotated[
         Path | None, typer.Option(help="wheels to install from, without a network there")
     ] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="the master serves this rig instead of its first one")
+    ] = False,
     ssh_config: Annotated[Path | None, typer.Option(help="instead of ~/.ssh/config")] = None,
     dry_run: Annotated[bool, typer.Option(help="print each command, run none")] = False,
 ) -> None:
     """Install rhot on the machines of a rig, with its rig.toml and certificates."""
-    order = Order(load_rig(config), config, wheels, master, ssh_config, dry_run)
+    order = Order(load_rig(config), config, wheels, master, replace, ssh_config, dry_run)
     failed = [
         one.host for one in _machines(order, host, everywhere, role, camera) if _deploy(one, order)
     ]
@@ -99,10 +103,12 @@ def _deploy(of: Machine, order: Order) -> int:
             folder.mkdir()
             staging.stage(of, order.config, order.rig_toml, files, folder)
         wheels = "--wheels" if order.wheels else "--wheel"
+        where = str(folder) if of.host == HERE else STAGED
+        install = plan.install_command(
+            of, where, wheels=wheels, master=order.master, replace=order.replace
+        )
         if of.host == HERE:
-            install = plan.install_command(of, str(folder), wheels=wheels, master=order.master)
             return _run([plan.local_command(install, root=os.geteuid() == 0)], order.dry_run)
-        install = plan.install_command(of, STAGED, wheels=wheels, master=order.master)
         options = _ssh_options(order, Path(name))
         return _run(plan.remote_commands(of, str(folder), options, install), order.dry_run)
 

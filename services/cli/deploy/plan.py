@@ -91,10 +91,13 @@ def calibrations(config: RigConfig, of: Machine) -> list[Path]:
     return [path for path in files if path.name.split(".")[0] in of.cameras]
 
 
-def install_command(of: Machine, folder: str, *, wheels: str, master: str = "") -> list[str]:
+def install_command(
+    of: Machine, folder: str, *, wheels: str, master: str = "", replace: bool = False
+) -> list[str]:
     """install.sh with its options, for files staged in `folder`.
 
-    wheels is "--wheels" for a folder that holds all of them, "--wheel" if it holds rhot's alone.
+    wheels is "--wheels" for a folder that holds all of them, "--wheel" if it holds rhot's alone;
+    replace: of a master, which serves another rig no more then.
     """
     command = [f"{folder}/deploy/install.sh", of.role, *of.cameras]
     if master:
@@ -102,6 +105,8 @@ def install_command(of: Machine, folder: str, *, wheels: str, master: str = "") 
     command += ["--config", f"{folder}/rig.toml", wheels, f"{folder}/wheels"]
     if of.certificate:
         command += ["--pki", f"{folder}/pki"]
+    if replace and of.role == "master":
+        command.append("--replace")
     return command
 
 

@@ -1,8 +1,9 @@
-"""Which systemd units a rig.toml asks for on the master, for deploy/install.sh.
+"""What a rig.toml says of its master, systemd units above all, for deploy/install.sh.
 
-`python -m services.cli.deploy.rig_units check|connect|secured|units|user-units rig.toml [FOLDER]`
-prints one answer a line. FOLDER holds further rigs of the same master, each in a folder of its own:
-what serves one is to run. It needs no extra of the package: a Pi's installation has no typer.
+`python -m services.cli.deploy.rig_units QUESTION rig.toml [FOLDER]`, the question being check,
+name, connect, secured, units or user-units, prints one answer a line. FOLDER holds further rigs of
+the same master, each in a folder of its own: what serves one is to run. It needs no extra of the
+package: a Pi's installation has no typer.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ def answer(question: str, config: RigConfig, folder: Path | None = None) -> list
     further = units_of_further_rigs(folder) if folder else []
     return {
         "check": list[str],
+        "name": lambda: [config.rig.name],
         "connect": lambda: list(config.bus.connect),
         "secured": lambda: [one for one in config.bus.connect if is_secured(one)],
         "units": lambda: list(dict.fromkeys([*master_units(config), *further])),

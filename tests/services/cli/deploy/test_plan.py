@@ -66,6 +66,14 @@ def test_the_copy_is_removed_in_the_end_and_nothing_is_split_by_the_shell():
     assert commands[-1][-1] == "rm -rf rhot-deploy"
 
 
+@pytest.mark.parametrize(("role", "told"), [("master", True), ("pi", False)])
+def test_only_a_master_is_told_to_replace_its_rig(role, told):
+    of = Machine("host", role, (), "")
+    command = plan.install_command(of, "x", wheels="--wheels", replace=True)
+    assert ("--replace" in command) == told
+    assert "--replace" not in plan.install_command(of, "x", wheels="--wheels")
+
+
 def test_each_machine_gets_its_own_calibrations(tmp_path):
     (tmp_path / "calibration").mkdir()
     for name in ("left.lens.json", "left.colors.json", "right.lens.json", "rig.json"):

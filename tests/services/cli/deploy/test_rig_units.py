@@ -43,6 +43,11 @@ def test_a_master_runs_what_rhot_up_runs(name, tmp_path):
     assert units - {"rhot-pi.target"} == {f"rhot-{name}.service" for name in names}
 
 
+def test_the_name_of_a_rig_is_told(tmp_path):
+    (tmp_path / "rig.toml").write_text('[rig]\nname = "lab"\n')
+    assert asked("name", tmp_path / "rig.toml").stdout == "lab\n"
+
+
 def test_a_further_rig_asks_for_what_serves_it(tmp_path):
     first, rigs = tmp_path / "rig.toml", tmp_path / "rigs"
     first.write_text(SWITCHED_ON)
