@@ -1,13 +1,14 @@
 /* Sub-pixel centroids of blobs: what services/pi_tracker/measure does, in one call for all blobs.
 
-   Formulas, their reasons and their sources are in measure/centroid.py and paint_fraction.py, from
-   where the constants come as well. A test compares both forms.
+   Formulas, their reasons and their sources are in measure/centroid.py, paint_fraction.py and
+   grown_blob.py, from where the constants come as well. A test compares both forms.
 
    Nothing of the C library is used and nothing is allocated: the caller owns all memory. Sizes and
    rectangles are checked before the first access; a call that returns less than 0 has touched
    nothing. Without -ffast-math and without fused operations results are the same on every
    machine. */
 
+#include "grown.h"
 #include "mixture.h"
 
 /* x, y, area, sigma and quality of a blob. */
@@ -19,7 +20,7 @@
 #endif
 const char *const rhot_digest = RHOT_DIGEST;
 /* Who calls has the same structures: their sizes are compared. */
-const int32_t rhot_sizes[2] = {sizeof(picture), sizeof(constants)};
+const int32_t rhot_sizes[3] = {sizeof(picture), sizeof(constants), sizeof(blob)};
 
 enum { BAD_BLOB = -2, BAD_MASKS = -3, BAD_SCRATCH = -4 };
 
@@ -138,11 +139,22 @@ static shape tile_of(const blob *b, const picture *p) {
     return s;
 }
 
-/* Whether a blob lies in the picture and its tile in the window. */
+/* Whether a blob lies in the picture and its tile in the window, however it grows. */
 static int is_blob(const blob *b, const picture *p) {
     if (b->left < 0 || b->top < 0 || b->right > p->width || b->bottom > p->height) return 0;
     if (b->left >= b->right || b->top >= b->bottom) return 0;
-    shape s = tile_of(b, p);
+    if (b->class < 0 || b->reach < 0 || b->reach > MOST_CELLS) return 0;
+    blob grown = *b;
+    if (b->class) {
+        box window = window_of(b, p);
+        if (window.x0 > b->left || window.y0 > b->top) return 0;
+        if (window.x1 < b->right || window.y1 < b->bottom) return 0;
+        grown.left = window.x0;
+        grown.top = window.y0;
+        grown.right = window.x1;
+        grown.bottom = window.y1;
+    }
+    shape s = tile_of(&grown, p);
     return s.left >= p->left && s.top >= p->top && s.left + s.w <= p->right &&
            s.top + s.h <= p->bottom;
 }
@@ -159,51 +171,66 @@ static void fetch_tile(const shape *s, const picture *p) {
     }
 }
 
-/* Floats of scratch for a blob of w x h cells; less than 0 if there is no such blob. */
+/* Floats that take as much memory as it takes to grow a blob in a window of w x h cells. */
+static int64_t growth_floats(int64_t w, int64_t h) { return GROWTH_MASKS * mask_bytes(w, h) / 4; }
+
+/* Floats of scratch for a blob of w x h cells, those that it may grow into among them; less than 0
+   if there is no such blob. */
 int64_t rhot_centroid_scratch(int32_t w, int32_t h) {
-    if (w < 1 || h < 1 || w > MOST_CELLS || h > MOST_CELLS) return BAD_BLOB;
+    if (w < 1 || h < 1 || w > 3 * MOST_CELLS || h > 3 * MOST_CELLS) return BAD_BLOB;
     int64_t row = ((int64_t)w + 2 * MARGIN + 2 * PAD + 3) / 4 * 4;
-    return PLANES * row * ((int64_t)h + 2 * MARGIN + 2 * PAD);
+    return PLANES * row * ((int64_t)h + 2 * MARGIN + 2 * PAD) + growth_floats(w, h);
 }
 
 /* What is wrong with the arguments of rhot_centroids; 0 if nothing is. */
-static int32_t check(const picture *p, int32_t count, const blob *blobs, int64_t masks_size,
-                     int64_t scratch_size) {
+static int32_t check(const picture *p, const colors *near, int32_t count, const blob *blobs,
+                     int64_t masks_size, int64_t scratch_size) {
     if (!is_picture(p)) return BAD_PICTURE;
     for (int32_t n = 0; n < count; n++) {
-        if (!is_blob(&blobs[n], p)) return BAD_BLOB;
-        int32_t w = blobs[n].right - blobs[n].left, h = blobs[n].bottom - blobs[n].top;
+        const blob *b = &blobs[n];
+        if (!is_blob(b, p) || (b->class && !(near && near->count > 0))) return BAD_BLOB;
+        int32_t w = b->right - b->left, h = b->bottom - b->top, around = b->class ? b->reach : 0;
         masks_size -= (int64_t)w * h;
         if (masks_size < 0) return BAD_MASKS;
-        if (rhot_centroid_scratch(w, h) > scratch_size) return BAD_SCRATCH;
+        if (rhot_centroid_scratch(w + 2 * around, h + 2 * around) > scratch_size)
+            return BAD_SCRATCH;
     }
     return 0;
 }
 
-/* Measures blobs into out, VALUES doubles each. masks are those of their rectangles, one behind the
-   other, not 0 where the blob is; noise is a cell's standard deviation in luma and in chroma. */
-int32_t rhot_centroids(const picture *p, const constants *k, const double noise[2], int32_t count,
-                       const blob *blobs, const uint8_t *masks, int64_t masks_size, float *scratch,
-                       int64_t scratch_size, double *out) {
-    int32_t wrong = check(p, count, blobs, masks_size, scratch_size);
+/* Measures blobs into out, VALUES doubles each. near: the colours into which they grow, or NULL.
+   masks are those of their rectangles, one behind the other, not 0 where the blob is; noise is a
+   cell's standard deviation in luma and in chroma. scratch: aligned as its floats are. */
+int32_t rhot_centroids(const picture *p, const constants *k, const double noise[2],
+                       const colors *near, int32_t count, const blob *blobs, const uint8_t *masks,
+                       int64_t masks_size, float *scratch, int64_t scratch_size, double *out) {
+    int32_t wrong = check(p, near, count, blobs, masks_size, scratch_size);
     for (int32_t n = 0; n < count && !wrong; n++) {
-        const blob *b = &blobs[n];
-        shape s = tile_of(b, p);
+        blob b = blobs[n];
+        int32_t w = b.right - b.left, h = b.bottom - b.top;
+        blob_mask mask = {masks, w};
+        masks += (size_t)w * (size_t)h;
+        float *memory = scratch;
+        if (b.class) {
+            box window = window_of(&b, p);
+            grow(&b, &mask, p, near, (uint8_t *)scratch);
+            memory += growth_floats(window.x1 - window.x0, window.y1 - window.y0);
+        }
+        shape s = tile_of(&b, p);
         if (n + 1 < count) {
-            shape next = tile_of(b + 1, p);
+            shape next = tile_of(&blobs[n + 1], p);
             fetch_tile(&next, p);
         }
         tile t;
-        for (size_t i = 0; i < PLANES; i++) t.plane[i] = scratch + i * s.size;
-        for (size_t i = 0; i < CLEARED * s.size; i++) scratch[i] = 0.0f;
+        for (size_t i = 0; i < PLANES; i++) t.plane[i] = memory + i * s.size;
+        for (size_t i = 0; i < CLEARED * s.size; i++) memory[i] = 0.0f;
         read_picture(&t, &s, p, k);
-        read_masks(&t, &s, k, b, masks);
+        read_masks(&t, &s, k, &b, mask.cells, mask.row);
         mix(&t, &s, k, BY_MASK, 1);
         purify(&t, &s, k);
         mix(&t, &s, k, PURE, 0);
         unmix(&t, &s, k, noise);
-        conclude(out + (size_t)n * VALUES, &t, &s, k, p, b);
-        masks += (size_t)(b->right - b->left) * (size_t)(b->bottom - b->top);
+        conclude(out + (size_t)n * VALUES, &t, &s, k, p, &b);
     }
     return wrong;
 }

@@ -6,13 +6,9 @@
    are checked before the first access, and a call that returns less than 0 has found nothing. */
 
 #include "classes.h"
+#include "masks.h"
 
 enum { BAD_RECT = -2, BAD_SIZE = -3, FOR_PYTHON = -4 };
-
-/* Cells of a rectangle, ends excluded. */
-typedef struct {
-    int32_t x0, y0, x1, y1;
-} box;
 
 typedef struct {
     box at;         /* in the part of the rectangle that has colours */
@@ -72,30 +68,6 @@ static void crop(uint8_t *classes, int32_t w, const box *part, uint8_t *mask) {
             to[x] = from[x];
             mask[x] = from[x] ? 255 : 0;
         }
-    }
-}
-
-/* Rounds of erosion by 2 x 2 cells, then of dilation that puts back what is left where it was, in
-   place, as `opening` of detect/morphology.py: rows of w cells run into each other. spare: memory
-   like the mask's, so that no cell waits for another's. */
-static void open_mask(uint8_t *mask, uint8_t *spare, ptrdiff_t size, ptrdiff_t w, int32_t rounds) {
-    ptrdiff_t left = size;
-    for (int32_t n = 0; n < rounds && left > 0; n++) {
-        left -= w + 1;
-        INDEPENDENT
-        for (ptrdiff_t i = 0; i < left; i++)
-            mask[i] = mask[i] & mask[i + 1] & mask[i + w] & mask[i + w + 1];
-    }
-    for (ptrdiff_t i = left > 0 ? left : 0; i < size; i++) mask[i] = 0;
-    for (int32_t n = 0; n < rounds && left > 0; n++) {
-        left += w + 1;
-        spare[0] = mask[0];
-        for (ptrdiff_t i = 1; i < w; i++) spare[i] = mask[i] | mask[i - 1];
-        spare[w] = mask[w] | mask[w - 1] | mask[0];
-        INDEPENDENT
-        for (ptrdiff_t i = w + 1; i < left; i++)
-            spare[i] = mask[i] | mask[i - 1] | mask[i - w] | mask[i - w - 1];
-        for (ptrdiff_t i = 0; i < left; i++) mask[i] = spare[i];
     }
 }
 

@@ -24,6 +24,9 @@ typedef struct {
 typedef struct {
     int32_t left, top, right, bottom; /* cells of the picture */
     int32_t cells;                    /* of its colour */
+    /* How it grows (grown.h): its colour from 1, or 0 if it does not; how many cells it may have;
+       how many around it are looked at. */
+    int32_t class, most, reach;
 } blob;
 
 typedef struct {
@@ -165,13 +168,13 @@ static int64_t erode(float *to, const float *from, const shape *s) {
     return left;
 }
 
-/* The blob's mask, that of its rectangle, and what follows from it. */
+/* The blob's mask, that of its rectangle in rows of `row` bytes, and what follows from it. */
 static void read_masks(const tile *t, const shape *s, const constants *k, const blob *b,
-                       const uint8_t *mask) {
+                       const uint8_t *mask, int32_t row) {
     size_t w = (size_t)(b->right - b->left);
     for (int32_t y = b->top; y < b->bottom; y++) {
         float *to = t->plane[MASK] + row_at(s, y - s->top) + (b->left - s->left);
-        const uint8_t *from = mask + (size_t)(y - b->top) * w;
+        const uint8_t *from = mask + (ptrdiff_t)(y - b->top) * row;
         for (size_t x = 0; x < w; x++) to[x] = from[x] ? 1.0f : 0.0f;
     }
     dilate(t->plane[REACH], t->plane[MASK], s);

@@ -15,9 +15,9 @@ from rhot.files.rig_tables import Tracker
 from services.pi_tracker.compiled.library import loaded
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.detect.compiled_patches import CompiledPatches, Patches
-from services.pi_tracker.detect.morphology import opening
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours, make_blob
 from services.pi_tracker.image.frame import Image
+from services.pi_tracker.image.morphology import opening
 from services.pi_tracker.image.planes import Rect
 from services.pi_tracker.image.yuv_planes import Picture
 

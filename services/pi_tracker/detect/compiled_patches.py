@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from services.pi_tracker.image.blob import Blob, make_blob
-from services.pi_tracker.image.planes import LIMITED_CHROMA, LIMITED_LUMA, Planes, Rect
+from services.pi_tracker.image.compiled_colors import CompiledColors
+from services.pi_tracker.image.planes import Planes, Rect
 
 # What the function returns (compiled/patches.c).
 _WRONG = {-1: "no such picture", -2: "no such rectangle", -3: "no room for the classes"}
@@ -24,7 +25,6 @@ _NUMBERS = 6
 _INT = ctypes.c_int32
 # Of memory for each cell, of a multiple of 8 of them.
 _BYTES, _PADDING = 7, 7
-Layers = npt.NDArray[np.uint32]  # (layers, 65536) as ColorTable has them
 
 
 class Patches(NamedTuple):
@@ -32,12 +32,6 @@ class Patches(NamedTuple):
 
     cells: int  # of the part of it that has colours, and around it
     blobs: list[Blob]
-
-
-class _Colors(ctypes.Structure):
-    """colors of compiled/classes.h."""
-
-    _fields_ = (("layers", ctypes.c_void_p), ("count", _INT))
 
 
 class CompiledPatches:
@@ -61,9 +55,7 @@ class CompiledPatches:
         self._find.restype = _INT
         void, size = ctypes.c_void_p, ctypes.c_int64
         self._find.argtypes = (void, void, void, void, void, size, void, void)
-        # By whether levels are of full range. The structures have the layers' addresses.
-        self._layers: dict[bool, Layers] = {False: np.ascontiguousarray(layers, np.uint32)}
-        self._colors: dict[bool, _Colors] = {}
+        self._colors = CompiledColors(layers)
         self._options = (_INT * 4)(margin, rounds, min_cells, most)
         self._part, self._out = (_INT * 4)(), (_INT * (_NUMBERS * most))()
         self._memory, self._memory_at = np.empty(0, np.uint8), 0
@@ -78,7 +70,7 @@ class CompiledPatches:
             self._memory = np.empty(size, np.uint8)
             # To ask an array for its address costs a microsecond.
             self._memory_at = self._memory.ctypes.data
-        colors = self._colors.get(planes.full_range) or self._colors_of(planes.full_range)
+        colors = self._colors.of(planes)
         count = self._find(
             planes.in_c,
             (_INT * 4)(*rect),
@@ -106,22 +98,3 @@ class CompiledPatches:
             for u0, v0, u1, v1, k, own in zip(*[numbers] * _NUMBERS, strict=True)
         ]
         return Patches(found.size, blobs)
-
-    def _colors_of(self, full_range: bool) -> _Colors:
-        """The colours for levels of a range, made when the first such picture comes."""
-        if full_range not in self._layers:
-            self._layers[full_range] = full_range_layers(self._layers[False])
-        layers = self._layers[full_range]
-        self._colors[full_range] = _Colors(layers.ctypes.data, len(layers))
-        return self._colors[full_range]
-
-
-def full_range_layers(layers: Layers) -> Layers:
-    """Layers for levels of full range, by what LIMITED_LUMA and LIMITED_CHROMA make of these."""
-    of = layers.view(np.uint8).reshape(-1, 256, 256, 4)[:, LIMITED_CHROMA][:, :, LIMITED_CHROMA]
-    # Both grow with their levels: those between the first and the last that is within.
-    low = np.searchsorted(LIMITED_LUMA, of[..., 1], "left")
-    high = np.searchsorted(LIMITED_LUMA, of[..., 2], "right") - 1
-    none = low > high
-    of[..., 1], of[..., 2] = np.where(none, 255, low), np.where(none, 0, high)
-    return of.view(np.uint32).reshape(-1, 65536)

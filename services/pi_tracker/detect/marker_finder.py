@@ -27,6 +27,7 @@ from services.pi_tracker.image.planes import Rect
 from services.pi_tracker.image.yuv_planes import Picture, picture
 from services.pi_tracker.measure.centroid import Centroid
 from services.pi_tracker.measure.fastest import centroids
+from services.pi_tracker.measure.grown_blob import Growth, NearPaint, limit
 
 # Every so many frames the whole image is searched although nothing is lost, so that a mistake does
 # not last; and in the first ones, to learn the static background.
@@ -50,13 +51,16 @@ OnStage = Callable[[str], None]
 class MarkerFinder:
     """Finds the markers of one camera, frame after frame."""
 
-    def __init__(self, table: ColorTable, settings: Tracker, on_stage: OnStage) -> None:
+    def __init__(
+        self, table: ColorTable, near: ColorTable, settings: Tracker, on_stage: OnStage
+    ) -> None:
         self._names = table.names
         self._settings = settings
         self._detector = BlobDetector(table, settings)
         self._unfiltered_detector = BlobDetector(
             table, msgspec.structs.replace(settings, erode=0, dilate=0, gaussian_px=0)
         )
+        self._near = NearPaint(near)
         self._on_stage = on_stage
         self._noise = Noise()
         self._frame_count = 0
@@ -201,7 +205,9 @@ class MarkerFinder:
     ) -> list[Marker]:
         """Sub-pixel positions; takes them into the tracks."""
         blobs = [association.blob for association in associated.values()]
-        measured = centroids(image, blobs, self._noise)
+        areas_px2 = map(self._identity.area_px2, associated)
+        growth = Growth(self._near, list(map(limit, blobs, areas_px2)))
+        measured = centroids(image, blobs, self._noise, growth)
         markers = []
         for (color, association), centroid in zip(associated.items(), measured, strict=True):
             occluded = self._identity.update(

@@ -38,6 +38,7 @@ from services.pi_tracker.measure.blob_tiles import (
     tiles_around,
 )
 from services.pi_tracker.measure.centroid_sigma import misfit_sigma_px, noise_sigma_px
+from services.pi_tracker.measure.grown_blob import Growth, grown
 from services.pi_tracker.measure.paint_fraction import LinearLight, Mixture, PaintFraction
 
 _SQUARE = np.ones((3, 3), np.uint8)
@@ -98,8 +99,15 @@ class _TileMoments(NamedTuple):
     contrast: float
 
 
-def centroids(picture: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-    """Measure blobs; one result each, in their order."""
+def centroids(
+    picture: Picture, blobs: Sequence[Blob], noise: Noise, growth: Growth | None = None
+) -> list[Centroid]:
+    """Measure blobs, grown first if growth is given; one result each, in their order."""
+    if growth is not None:
+        blobs = [
+            grown(picture, growth.near.table, *one)
+            for one in zip(blobs, growth.limits, strict=True)
+        ]
     small = [blob for blob in blobs if _size(blob) <= _MAX_STACKED_CELLS]
     measured: dict[int, Centroid] = {}
     if small:

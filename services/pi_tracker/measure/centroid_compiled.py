@@ -16,13 +16,15 @@ from services.pi_tracker.compiled.library import loaded
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
-from services.pi_tracker.image.planes import Planes, Rect
+from services.pi_tracker.image.planes import Planes
 from services.pi_tracker.image.yuv_planes import Picture, planes_of
 from services.pi_tracker.measure import centroid, centroid_sigma, paint_fraction
 from services.pi_tracker.measure.blob_tiles import MARGIN
 from services.pi_tracker.measure.centroid import Centroid
+from services.pi_tracker.measure.grown_blob import NO_GROWTH, Growth, Limit, NearPaint
 
-_VALUES = 5  # of a centroid
+# Of a centroid; of a blob (compiled/tile.h).
+_VALUES, BLOB_NUMBERS = 5, 8
 # Floats of scratch that are kept from one frame to the next, 4 MB: what larger blobs need is freed.
 _MOST_KEPT = 1 << 20
 # What the function returns (compiled/centroid.c).
@@ -82,7 +84,7 @@ class CompiledCentroids:
         self._measure = library.rhot_centroids
         self._measure.restype = ctypes.c_int32
         void, count, size = ctypes.c_void_p, ctypes.c_int32, ctypes.c_int64
-        self._measure.argtypes = (void, void, void, count, void, void, size, void, size, void)
+        self._measure.argtypes = (void,) * 4 + (count, void, void, size, void, size, void)
         self._scratch_size = library.rhot_centroid_scratch
         self._scratch_size.restype = size
         self._scratch_size.argtypes = (count, count)
@@ -92,36 +94,54 @@ class CompiledCentroids:
         # Memory between calls. Whoever calls takes one out: threads never share it.
         self._kept: list[_Scratch] = []
 
-    def __call__(self, picture: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-        """Measure blobs; one result each, in their order.
+    def __call__(
+        self,
+        picture: Picture,
+        blobs: Sequence[Blob],
+        noise: Noise,
+        growth: Growth | None = None,
+    ) -> list[Centroid]:
+        """Measure blobs, grown first if growth is given; one result each, in their order.
 
         Raises ValueError of a blob outside the picture.
         """
         if not blobs:
             return []
+        near = None if growth is None else growth.near
+        limits = [NO_GROWTH] * len(blobs) if growth is None else growth.limits
         planes = picture.planes
         if planes is not None:
-            return self._in_planes(planes, blobs, noise)
+            return self._in_planes(planes, blobs, noise, near, limits)
         # What is not in planes is converted, for each blob as much as it needs.
-        parts = [planes_of(picture, _tile(blob.rect, picture.size)) for blob in blobs]
         return [
-            self._in_planes(part, [blob], noise)[0] for part, blob in zip(parts, blobs, strict=True)
+            self._in_planes(_part(picture, blob, of), [blob], noise, near, [of])[0]
+            for blob, of in zip(blobs, limits, strict=True)
         ]
 
-    def _in_planes(self, planes: Planes, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-        count = len(blobs)
-        rects = [number for blob in blobs for number in (*blob.rect, blob.cells)]
+    def _in_planes(
+        self,
+        planes: Planes,
+        blobs: Sequence[Blob],
+        noise: Noise,
+        near: NearPaint | None,
+        limits: Sequence[Limit],
+    ) -> list[Centroid]:
+        count, w, h = len(blobs), 0, 0
+        numbers: list[int] = []
+        for blob, (most, reach) in zip(blobs, limits, strict=True):
+            x0, y0, x1, y1 = rect = blob.rect
+            w, h = max(w, x1 - x0 + 2 * reach), max(h, y1 - y0 + 2 * reach)
+            numbers += (*rect, blob.cells, blob.color + 1 if most else 0, most, reach)
         masks = b"".join([blob.mask.tobytes() for blob in blobs])
-        w = max([blob.rect[2] - blob.rect[0] for blob in blobs])
-        h = max([blob.rect[3] - blob.rect[1] for blob in blobs])
         scratch = self._scratch(self._scratch_size(w, h))
         out = (ctypes.c_double * (_VALUES * count))()
         wrong = self._measure(
             planes.in_c,
             self._constants_at,
             (ctypes.c_double * 2)(noise.luma, noise.chroma),
+            None if near is None else ctypes.byref(near.in_c.of(planes)),
             count,
-            struct.pack(f"{5 * count}i", *rects),
+            struct.pack(f"{BLOB_NUMBERS * count}i", *numbers),
             masks,
             len(masks),
             scratch.address,
@@ -150,12 +170,13 @@ class CompiledCentroids:
         return _Scratch(floats, floats.ctypes.data)
 
 
-def _tile(rect: Rect, size: tuple[int, int]) -> Rect:
-    """The cells that are looked at: a blob's rectangle and MARGIN more, within the picture."""
-    (x0, y0, x1, y1), (width, height) = rect, size
-    w, h = min(x1 - x0 + 2 * MARGIN, width), min(y1 - y0 + 2 * MARGIN, height)
-    x, y = max(min(x0 - MARGIN, width - w), 0), max(min(y0 - MARGIN, height - h), 0)
-    return x, y, x + w, y + h
+def _part(picture: Picture, blob: Blob, limit: Limit) -> Planes:
+    """The cells that are looked at: a blob's tile, however it grows, within the picture."""
+    (width, height), more = picture.size, MARGIN + limit.reach
+    x0, y0, x1, y1 = blob.rect
+    w, h = min(x1 - x0 + 2 * more, width), min(y1 - y0 + 2 * more, height)
+    x, y = max(min(x0 - more, width - w), 0), max(min(y0 - more, height - h), 0)
+    return planes_of(picture, (x, y, x + w, y + h))
 
 
 centroids = None if loaded is None else CompiledCentroids(loaded)

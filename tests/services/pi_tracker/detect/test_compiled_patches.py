@@ -17,6 +17,7 @@ from services.pi_tracker.detect import compiled_patches
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.search_region import whole
+from services.pi_tracker.image.compiled_colors import InC, full_range_layers
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.planes import LIMITED_CHROMA, LIMITED_LUMA
 from services.pi_tracker.image.yuv_planes import picture
@@ -162,7 +163,7 @@ def test_levels_of_full_range_have_the_classes_of_those_they_stand_for(table):
     luma = rng.integers(0, 256, (200, 300), dtype=np.uint8)
     chroma = rng.integers(0, 256, (200, 300, 2), dtype=np.uint8)
     expected = table.classify(LIMITED_LUMA[luma], LIMITED_CHROMA[chroma]).copy()
-    layers = compiled_patches.full_range_layers(np.array(table.layers))
+    layers = full_range_layers(np.array(table.layers))
     classes = np.zeros_like(luma)
     for layer in layers:
         entries = layer[chroma[..., 0] | chroma[..., 1].astype(np.int64) << 8]
@@ -203,5 +204,5 @@ def test_planes_smaller_than_the_picture_are_refused(table, compiled):
 def test_both_sides_have_the_same_structures(compiled):
     sizes = (ctypes.c_int32 * 3).in_dll(compiled, "rhot_patches_sizes")
     number = ctypes.sizeof(ctypes.c_int32)
-    colors = ctypes.sizeof(compiled_patches._Colors)
+    colors = ctypes.sizeof(InC)
     assert list(sizes) == [colors, 4 * number, compiled_patches._NUMBERS * number]

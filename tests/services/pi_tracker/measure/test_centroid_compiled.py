@@ -11,6 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhot.files.calibration import ColorRange, Colors
+from rhot.files.rig_tables import Tracker
+from services.pi_tracker.detect.blob_search import BlobDetector
+from services.pi_tracker.detect.color_table import compile_colors
+from services.pi_tracker.detect.near_colors import near_colors
 from services.pi_tracker.detect.search_region import whole
 from services.pi_tracker.image.blob import make_blob
 from services.pi_tracker.image.frame import Frame
@@ -19,6 +24,7 @@ from services.pi_tracker.image.planes import PICTURE_IN_C
 from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure import centroid_compiled, fastest
 from services.pi_tracker.measure.centroid import centroids
+from services.pi_tracker.measure.grown_blob import Growth, Limit, NearPaint, limit
 from testing import synthetic_images
 
 # Cells of the pictures of random levels.
@@ -114,6 +120,76 @@ def test_hostile_blobs_of_random_levels_are_measured_like_others(measure, seed, 
         )
 
 
+def grows_by(rng, count):
+    """Growth by colours that random levels often have, to any number of cells."""
+    ranges = {"any": ColorRange(hsv_low=(0, 0, 0), hsv_high=(int(rng.integers(20, 180)), 255, 255))}
+    near = NearPaint(compile_colors(Colors(colors=ranges), ["any"]))
+    limits = [Limit(int(rng.integers(0, 300)), int(rng.integers(0, 30))) for _ in range(count)]
+    return Growth(near, limits)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 1 << 30),
+    places=st.lists(rects, min_size=1, max_size=4),
+    fill=st.floats(0, 1),
+)
+def test_blobs_of_random_levels_grow_alike(measure, seed, places, fill):
+    """To the edges of the picture among others; what they grow into decides their areas."""
+    rng = np.random.default_rng(seed)
+    levels = rng.integers(0, 256, (HEIGHT * 3, WIDTH * 2), np.uint8)
+    image = picture_of(levels, full_range=bool(seed % 2))
+    mask = (rng.uniform(size=(HEIGHT, WIDTH)) < fill).astype(np.uint8) * 255
+    blobs = [blob_of(rect, mask) for rect in places]
+    growth, noise = grows_by(rng, len(blobs)), Noise(1.0, 1.0)
+    expected = centroids(image, blobs, noise, growth)
+    for found, other in zip(measure(image, blobs, noise, growth), expected, strict=True):
+        assert np.isfinite(found).all()
+        assert found.area_px == pytest.approx(other.area_px, rel=1e-2, abs=0.5)
+        assert found.quality == pytest.approx(other.quality, rel=1e-2, abs=1e-4)
+
+
+@pytest.mark.parametrize("layout", ["i420", "bgr"])
+def test_markers_half_of_which_their_ranges_miss_grow_alike(studio, tip, colors, measure, layout):
+    narrow = Colors(colors={name: narrowed(own) for name, own in colors.colors.items()})
+    table = compile_colors(narrow, list(studio.paints))
+    near = NearPaint(compile_colors(near_colors(narrow), list(studio.paints)))
+    grew = 0
+    for seed in range(12):
+        tips = [
+            tip(paint, 25.0 + 45 * (n % 3), 30.0 + 50 * (n // 3), 9.0, light_rad=0.2 * seed)
+            for n, paint in enumerate(studio.paints)
+        ]
+        image = picture(studio.frame(tips, seq=seed, size_px=(150, 120), layout=layout)[0])
+        blobs = BlobDetector(table, Tracker()).detect(image, whole(image.size))
+        growth = Growth(near, [limit(blob, 0.0) for blob in blobs])
+        noise = Noise(1.44, 1.47)
+        found = measure(image, blobs, noise, growth)
+        agree(found, centroids(image, blobs, noise, growth))
+        alone = measure(image, blobs, noise)
+        grew += sum(
+            one.area_px > 1.1 * other.area_px for one, other in zip(found, alone, strict=True)
+        )
+    assert grew > 5
+
+
+def narrowed(own: ColorRange) -> ColorRange:
+    """The lower half of a range's hues."""
+    (low, *floors), (high, *tops) = own.hsv_low, own.hsv_high
+    return ColorRange(
+        hsv_low=(low, *floors), hsv_high=((low + (high - low) % 180 // 2) % 180, *tops)
+    )
+
+
+@pytest.mark.parametrize("numbers", [(9, -1), (9, 1 << 20), (9, 2**31 - 1)])
+def test_cells_around_a_blob_that_are_none_are_refused(measure, numbers):
+    image = picture_of(np.zeros((3 * HEIGHT, 2 * WIDTH), np.uint8))
+    blob = make_blob(0, (2, 2, 6, 6), np.ones((4, 4), np.uint8), 16)
+    growth = grows_by(np.random.default_rng(0), 0)._replace(limits=[Limit(*numbers)])
+    with pytest.raises(ValueError, match="no such blob"):
+        measure(image, [blob], Noise(), growth)
+
+
 @pytest.mark.parametrize(
     "rect",
     [
@@ -153,9 +229,10 @@ def test_planes_smaller_than_the_picture_are_refused(measure):
 
 
 def test_both_sides_have_the_same_structures(compiled):
-    sizes = (ctypes.c_int32 * 2).in_dll(compiled, "rhot_sizes")
+    sizes = (ctypes.c_int32 * 3).in_dll(compiled, "rhot_sizes")
     constants = centroid_compiled._constants()
-    assert list(sizes) == [PICTURE_IN_C.size, ctypes.sizeof(constants)]
+    blob = 4 * centroid_compiled.BLOB_NUMBERS
+    assert list(sizes) == [PICTURE_IN_C.size, ctypes.sizeof(constants), blob]
 
 
 def test_threads_do_not_share_memory(studio, tip, detector, noise, measure):
