@@ -22,6 +22,10 @@ _COLD = Light(
     (Lamp((-0.8, -0.2, -0.3), (3.4, 3.7, 4.2)), Lamp((0.3, -1.2, 0.1), (2.6, 2.7, 2.9))),
     (1.5, 1.6, 1.75),
 )
+_WINDOW = Light(
+    (Lamp((1.4, -0.4, -0.6), (4.0, 4.3, 4.6)), Lamp((-0.9, -0.9, 0.0), (1.2, 1.1, 0.9))),
+    (1.6, 1.6, 1.6),
+)
 _DARK, _PALE = (0.22, 0.115, 0.08), (0.72, 0.47, 0.38)
 
 CLIPS: dict[Half, dict[str, Clip]] = {
@@ -53,8 +57,7 @@ CLIPS: dict[Half, dict[str, Clip]] = {
             given_scale=1.05,
             seed=4,
         ),
-    },
-    "held_out": {
+        # Held out until November 2026, and looked at too often since.
         "splay, rolling, small": Clip(
             Play("HandSplay-110fps", Carried("roll", 20.0, 0.5), 1.0, scale=0.84, distance_m=0.4),
             build=Build(0.95, 0.95),
@@ -92,6 +95,61 @@ CLIPS: dict[Half, dict[str, Clip]] = {
             rig=Rig(phase_s=0.0065),
             given_scale=1.05,
             seed=14,
+        ),
+    },
+    "held_out": {
+        "splay, other person": Clip(
+            Play("HandSplay-110fps", speed=0.8, scale=1.02, distance_m=0.5, yaw_deg=14.0),
+            build=Build(1.03, 1.0),
+            job=Job((11.0, 15.0), 0.7, dab_off_mm=3.0, seed=21),
+            light=_WINDOW,
+            rig=Rig(baseline_m=0.1, toe_in_deg=3.0, fov_deg=66.0, phase_s=0.0138),
+            seed=21,
+        ),
+        "roll": Clip(
+            Play("pinch", Carried("roll", 30.0, 0.4), 0.4, begin=0.5, end=0.7, scale=0.94),
+            build=Build(0.96, 0.97),
+            job=Job((12.0, 16.0), 0.6, skin=(0.6, 0.36, 0.27), seed=22),
+            sensor=Sensor(electrons=1800.0, sharpen=0.3),
+            rig=Rig(phase_s=0.0071, clock_error_s=-0.0004),
+            given_scale=0.95,
+            seed=22,
+        ),
+        "wait": Clip(
+            Play("HandSplay-110fps", Carried("wait", 30.0, 0.4), 0.3, 0.2, 0.6, tilt_deg=15.0),
+            job=Job((12.0, 17.0), 0.9, dab_off_mm=4.0, skin=_DARK, seed=23),
+            light=_WINDOW,
+            sensor=Sensor(jpeg=88, blur_px=0.7),
+            rig=Rig(baseline_m=0.07, phase_s=0.0189, skew_s=-0.011),
+            given_scale=1.04,
+            seed=23,
+        ),
+        "flapping at 1 Hz": Clip(
+            Play("pinch", Carried("flap", 35.0, 1.0), 0.3, 0.0, 0.2, distance_m=0.55),
+            build=Build(1.02, 1.03),
+            job=Job((13.0, 16.0), 0.7, seed=24),
+            shutter=Shutter(exposure_s=0.004, row_s=25e-6),
+            rig=Rig(phase_s=0.0248),
+            seed=24,
+        ),
+        "grab and roll, child": Clip(
+            Play("grab", Carried("roll", 22.0, 0.45), 0.5, 0.1, 0.4, scale=0.8, distance_m=0.4),
+            build=Build(0.97, 1.0),
+            job=Job((9.0, 12.0), 0.6, skin=_PALE, seed=25),
+            light=_COLD,
+            sensor=Sensor(electrons=2200.0),
+            rig=Rig(fov_deg=58.0, phase_s=0.0036),
+            given_scale=0.84,
+            seed=25,
+        ),
+        "waving far off": Clip(
+            Play("wave", Carried("drift", 50.0, 0.5), 0.8, scale=1.06, distance_m=0.65),
+            job=Job((14.0, 18.0), 1.0, skin=(0.35, 0.19, 0.13), seed=26),
+            light=_WARM,
+            sensor=Sensor(gain=0.9, white=(0.97, 1.04)),
+            rig=Rig(baseline_m=0.11, toe_in_deg=4.0, phase_s=0.0157),
+            given_scale=1.02,
+            seed=26,
         ),
     },
 }
