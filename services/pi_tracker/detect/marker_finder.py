@@ -206,12 +206,13 @@ class MarkerFinder:
         """Sub-pixel positions; takes them into the tracks."""
         blobs = [association.blob for association in associated.values()]
         areas_px2 = map(self._identity.area_px2, associated)
-        growth = Growth(self._near, list(map(limit, blobs, areas_px2)))
+        found_px2 = map(self._identity.found_px2, associated)
+        growth = Growth(self._near, list(map(limit, blobs, areas_px2, found_px2)))
         measured = centroids(image, blobs, self._noise, growth)
         markers = []
         for (color, association), centroid in zip(associated.items(), measured, strict=True):
             occluded = self._identity.update(
-                color, centroid.x_px, centroid.y_px, centroid.area_px, stamp_ns
+                color, *centroid[:3], stamp_ns, association.blob.area_px
             )
             markers.append(_marker(self._names[color], centroid, association.certainty, occluded))
         return markers

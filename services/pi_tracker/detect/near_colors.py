@@ -18,6 +18,8 @@ from services.pi_tracker.image.hue import hue_difference
 # that rolls: .83 and .22 px without, .19 and .09 so, .20 and .09 with 8 hues, .47 and .09 with 12,
 # .26 and .13 with 8 hues and no paler, .27 and .08 with 8 and .7.
 _HUES, _SHARE = 5, 0.85
+# Skin's hues; and of paint that is so near to them, no paler cells are taken.
+_SKIN, _SKINLIKE = ColorRange(hsv_low=(0, 0, 0), hsv_high=(20, 255, 255)), 12
 
 
 def near_colors(colors: Colors) -> Colors:
@@ -28,12 +30,15 @@ def near_colors(colors: Colors) -> Colors:
 
 def _wider(name: str, ranges: Mapping[str, ColorRange]) -> ColorRange:
     own = ranges[name]
-    others = [other for key, other in ranges.items() if key != name]
+    others = [_SKIN, *(other for key, other in ranges.items() if key != name)]
     down, up = (min([_HUES, *(gap(own, other, side) // 2 for other in others)]) for side in (-1, 1))
+    # What parts paint of a hue like skin's from skin is how saturated it is.
+    skinlike = min(gap(own, _SKIN, -1), gap(own, _SKIN, 1)) < _SKINLIKE
+    share = 1.0 if skinlike else _SHARE
     low, saturation, value = own.hsv_low
     high, most_saturation, most_value = own.hsv_high
     return ColorRange(
-        hsv_low=((low - down) % 180, round(_SHARE * saturation), round(_SHARE * value)),
+        hsv_low=((low - down) % 180, round(share * saturation), round(share * value)),
         hsv_high=((high + up) % 180, most_saturation, most_value),
     )
 

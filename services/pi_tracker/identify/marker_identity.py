@@ -102,12 +102,24 @@ class MarkerIdentity:
             for color, member in enumerate(best)
         ]
 
-    def update(self, color: int, x_px: float, y_px: float, area_px: float, stamp_ns: int) -> float:
-        """Take in a marker's measurement; returns which fraction of it is occluded, 0..1."""
+    def update(
+        self,
+        color: int,
+        x_px: float,
+        y_px: float,
+        area_px: float,
+        stamp_ns: int,
+        found_px2: float = 0.0,
+    ) -> float:
+        """Take in a marker's measurement, and how large its blob was as it was found.
+
+        Returns which fraction of it is occluded, 0..1.
+        """
         track = self._tracks[color]
         if track is None:
-            self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns)
+            self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns, found_px2)
             return 0.0
+        track.note_found(found_px2)
         missing = 1.0 - area_px / max(track.area_px, 1.0)
         touched = self._touched[color]
         area_memory = _AREA_MEMORY_TOUCHED if touched else AREA_MEMORY
@@ -125,6 +137,11 @@ class MarkerIdentity:
         """How large a marker was when it was seen, 0 if it never was."""
         track = self._tracks[color]
         return 0.0 if track is None else track.area_px
+
+    def found_px2(self, color: int) -> float:
+        """How large its blobs were as they were found, 0 if it never was."""
+        track = self._tracks[color]
+        return 0.0 if track is None else track.found_px2
 
     def _preselected(self, color: int, own: list[Blob], stamp_ns: int) -> list[Blob]:
         """The blobs of a colour to compare with all others.

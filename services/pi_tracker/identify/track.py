@@ -36,6 +36,8 @@ class Track:
     y_px: float
     area_px: float
     stamp_ns: int
+    # Of its blobs as they were found, before they grew.
+    found_px2: float = 0.0
     vx_px_s: float = 0.0
     vy_px_s: float = 0.0
     # Frames in a row in which it has not moved.
@@ -69,6 +71,10 @@ class Track:
         self._move(x_px, y_px, stamp_ns)
         self.area_px = area_memory * self.area_px + (1.0 - area_memory) * area_px
         self.seen_ns = stamp_ns
+
+    def note_found(self, blob_px2: float) -> None:
+        """Remember how large its blob was as it was found."""
+        self.found_px2 = AREA_MEMORY * self.found_px2 + (1.0 - AREA_MEMORY) * blob_px2
 
     def coast(self, dx_px: float, dy_px: float, stamp_ns: int) -> None:
         """It was not seen; the other markers moved by (dx_px, dy_px)."""

@@ -24,9 +24,9 @@ from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.morphology import opening
 from services.pi_tracker.image.yuv_planes import Picture
 
-# A blob grows to so many times its cells at most, or to this share of the cells that the marker had
-# a moment ago, whichever is more.
-_MOST_TIMES, _MOST_SHARE = 2.5, 1.15
+# A blob grows to so many times its cells at most, or those that were found of its marker a moment
+# ago, whichever is more. (Limits by what it had grown to let it grow on over skin.)
+_MOST_TIMES = 2.5
 # Cells beside the blob that are looked at: of a marker as large as it was a moment ago, or as the
 # blob may become, so much longer than a square, what the blob does not have; within these bounds.
 _LONG, _REACH = 1.3, (3, 24)
@@ -73,15 +73,16 @@ class Growth(NamedTuple):
     limits: Sequence[Limit]
 
 
-def limit(blob: Blob, marker_px2: float) -> Limit:
-    """Of a blob whose marker had such an area a moment ago; 0: nobody knows."""
-    cells, had = _MOST_TIMES * blob.cells, 0.25 * marker_px2
+def limit(blob: Blob, marker_px2: float, found_px2: float) -> Limit:
+    """Of a blob whose marker had such an area a moment ago, and such a blob; 0: nobody knows."""
+    had = 0.25 * marker_px2
     if had and blob.cells >= _WHOLE * had:
         return NO_GROWTH
+    most = _MOST_TIMES * max(blob.cells, 0.25 * found_px2)
     x0, y0, x1, y1 = blob.rect
     least, farthest = _REACH
-    missing = math.ceil(_LONG * math.sqrt(had or cells)) - min(x1 - x0, y1 - y0)
-    return Limit(round(max(cells, _MOST_SHARE * had)), min(max(missing, least), farthest))
+    missing = math.ceil(_LONG * math.sqrt(had or most)) - min(x1 - x0, y1 - y0)
+    return Limit(round(most), min(max(missing, least), farthest))
 
 
 def grown(picture: Picture, near: Classes, blob: Blob, by: Limit) -> Blob:

@@ -38,11 +38,17 @@ def test_ranges_that_meet_do_not_grow_into_each_other(other):
 
 
 def test_hues_go_on_through_red():
-    found = wider(red=span(176, 3), magenta=span(160, 170))
-    assert (found["magenta"].hsv_high[0], found["red"].hsv_low[0]) == (172, 174)
-    assert found["red"].hsv_high[0] == 8
+    found = wider(violet=span(140, 150), magenta=span(160, 170))
+    assert (found["violet"].hsv_high[0], found["magenta"].hsv_low[0]) == (154, 156)
     assert gap(span(176, 3), span(160, 170), -1) == 5
     assert gap(span(176, 3), span(160, 170), 1) == 90
+
+
+def test_paint_of_a_hue_like_skins_is_no_paler_and_keeps_away_from_skin():
+    found = wider(magenta=span(162, 175), blue=span(105, 120))
+    assert found["magenta"].hsv_low == (157, 100, 60)
+    assert found["magenta"].hsv_high[0] == 177
+    assert found["blue"].hsv_low == (100, 85, 51)
 
 
 def test_a_calibrations_own_cells_keep_their_class():

@@ -38,9 +38,9 @@ def the_blob(image):
     return blob
 
 
-def after(image, marker_px2=0.0):
+def after(image, marker_px2=0.0, found_px2=0.0):
     blob = the_blob(image)
-    return grown(image, NEAR, blob, limit(blob, marker_px2))
+    return grown(image, NEAR, blob, limit(blob, marker_px2, found_px2))
 
 
 def test_the_half_that_a_range_misses_is_found():
@@ -57,7 +57,7 @@ def test_a_small_piece_grows_into_what_its_marker_had():
     unknown = after(image)
     assert unknown is not None
     assert unknown.cells <= 2.5 * 9
-    assert after(image, marker_px2=4 * 121.0).rect == (10, 8, 21, 19)
+    assert after(image, 4 * 121.0, found_px2=4 * 60.0).rect == (10, 8, 21, 19)
 
 
 @pytest.mark.parametrize("hue", [OTHER, 60])
@@ -70,12 +70,12 @@ def test_a_wall_of_nearly_its_colour_is_not_taken():
     image = shown((0, 0, *SIZE, NEARLY), (10, 8, 18, 16, OWN))
     blob = the_blob(image)
     for marker_px2 in (0.0, 300.0):
-        assert grown(image, NEAR, blob, limit(blob, marker_px2)) is blob
+        assert grown(image, NEAR, blob, limit(blob, marker_px2, 0.7 * marker_px2)) is blob
 
 
 def test_a_line_of_one_cell_does_not_connect():
     image = shown((10, 8, 16, 14, OWN), (16, 10, 19, 11, NEARLY), (19, 8, 24, 14, NEARLY))
-    assert after(image, marker_px2=4 * 80.0).rect[2] <= 18
+    assert after(image, 4 * 80.0, 4 * 60.0).rect[2] <= 18
 
 
 def test_a_marker_at_the_edge_of_the_picture_grows_too():
@@ -85,13 +85,20 @@ def test_a_marker_at_the_edge_of_the_picture_grows_too():
 
 def test_what_is_whole_is_left_alone():
     blob = the_blob(shown((10, 8, 20, 18, OWN)))
-    assert limit(blob, 4.0 * blob.cells / 0.9) == NO_GROWTH
-    assert limit(blob, 4.0 * blob.cells / 0.7).most > blob.cells
+    assert limit(blob, 4.0 * blob.cells / 0.9, blob.area_px) == NO_GROWTH
+    assert limit(blob, 4.0 * blob.cells / 0.7, blob.area_px).most > blob.cells
     assert grown(shown(), NEAR, blob, NO_GROWTH) is blob
+
+
+def test_what_a_marker_has_grown_to_does_not_let_it_grow_on():
+    image = shown((10, 8, 16, 14, OWN), (16, 6, 30, 20, NEARLY))
+    blob = the_blob(image)
+    for marker_px2 in (0.0, 500.0, 1000.0, 5000.0):
+        assert grown(image, NEAR, blob, limit(blob, marker_px2, blob.area_px)) is blob
 
 
 def test_limits_of_a_huge_blob_are_within_bounds():
     blob = the_blob(shown((0, 0, *SIZE, OWN)))
-    assert limit(blob, 0.0).reach == 24
-    assert limit(blob, 1e-9) == NO_GROWTH
-    assert limit(blob._replace(cells=1, rect=(5, 5, 6, 6)), 1e6) == Limit(287500, 24)
+    assert limit(blob, 0.0, 0.0).reach == 24
+    assert limit(blob, 1e-9, 0.0) == NO_GROWTH
+    assert limit(blob._replace(cells=1, rect=(5, 5, 6, 6)), 1e6, 4e5) == Limit(250000, 24)
