@@ -40,9 +40,10 @@ from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.yuv_planes import Picture
 from services.pi_tracker.measure import centroid, centroid_compiled
 from services.pi_tracker.measure.centroid import Centroid
+from services.pi_tracker.measure.grown_blob import Growth
 from services.pi_tracker.step import TrackerStep
 
-Measure = Callable[[Picture, Sequence[Blob], Noise], list[Centroid]]
+Measure = Callable[[Picture, Sequence[Blob], Noise, Growth | None], list[Centroid]]
 
 
 class Timed:
@@ -52,10 +53,12 @@ class Timed:
         self._measure = measure
         self.last_ns = 0
 
-    def __call__(self, picture: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
+    def __call__(
+        self, picture: Picture, blobs: Sequence[Blob], noise: Noise, growth: Growth | None
+    ) -> list[Centroid]:
         """Measure, and note how long it took."""
         started = time.thread_time_ns()
-        found = self._measure(picture, blobs, noise)
+        found = self._measure(picture, blobs, noise, growth)
         self.last_ns = time.thread_time_ns() - started
         return found
 
@@ -110,8 +113,10 @@ def agreement(frames: list[Frame], forms: dict[str, Measure]) -> dict[str, float
     """How far apart the centres are that both forms find of the same blobs, px."""
     apart: list[float] = []
 
-    def both(picture: Picture, blobs: Sequence[Blob], noise: Noise) -> list[Centroid]:
-        found = [measure(picture, blobs, noise) for measure in forms.values()]
+    def both(
+        picture: Picture, blobs: Sequence[Blob], noise: Noise, growth: Growth | None
+    ) -> list[Centroid]:
+        found = [measure(picture, blobs, noise, growth) for measure in forms.values()]
         apart.extend(
             max(abs(one.x_px - other.x_px), abs(one.y_px - other.y_px))
             for one, other in zip(*found, strict=True)

@@ -205,15 +205,17 @@ class MarkerFinder:
     ) -> list[Marker]:
         """Sub-pixel positions; takes them into the tracks."""
         blobs = [association.blob for association in associated.values()]
-        areas_px2 = map(self._identity.area_px2, associated)
-        found_px2 = map(self._identity.found_px2, associated)
-        growth = Growth(self._near, list(map(limit, blobs, areas_px2, found_px2)))
+        identity = self._identity
+        limits = [
+            limit(blob, identity.area_px2(color), identity.found_px2(color))
+            for color, blob in zip(associated, blobs, strict=True)
+        ]
+        growth = Growth(self._near, limits) if any(most for most, _ in limits) else None
         measured = centroids(image, blobs, self._noise, growth)
         markers = []
         for (color, association), centroid in zip(associated.items(), measured, strict=True):
-            occluded = self._identity.update(
-                color, *centroid[:3], stamp_ns, association.blob.area_px
-            )
+            x, y, area = centroid.x_px, centroid.y_px, centroid.area_px
+            occluded = identity.update(color, x, y, area, stamp_ns, association.blob.area_px)
             markers.append(_marker(self._names[color], centroid, association.certainty, occluded))
         return markers
 

@@ -15,8 +15,8 @@ from services.pi_tracker.image.hue import hue_difference
 
 # Hues beyond either end, at most, and which share of the least saturation and value. Tuning half of
 # the other renderer, what a marker's centre jumps by from frame to frame, of a grasp and of a hand
-# that rolls: .83 and .22 px without, .19 and .09 so, .20 and .09 with 8 hues, .47 and .09 with 12,
-# .26 and .13 with 8 hues and no paler, .27 and .08 with 8 and .7.
+# that rolls, before skin was kept away from: .83 and .22 px without, .19 and .09 so, .20 and .09
+# with 8 hues, .47 and .09 with 12, .26 and .13 with 8 hues and no paler, .27 and .08 with 8 and .7.
 _HUES, _SHARE = 5, 0.85
 # Skin's hues; and of paint that is so near to them, no paler cells are taken.
 _SKIN, _SKINLIKE = ColorRange(hsv_low=(0, 0, 0), hsv_high=(20, 255, 255)), 12

@@ -119,11 +119,10 @@ class MarkerIdentity:
         if track is None:
             self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns, found_px2)
             return 0.0
-        track.note_found(found_px2)
         missing = 1.0 - area_px / max(track.area_px, 1.0)
         touched = self._touched[color]
         area_memory = _AREA_MEMORY_TOUCHED if touched else AREA_MEMORY
-        track.update(x_px, y_px, area_px, stamp_ns, area_memory)
+        track.update(x_px, y_px, area_px, stamp_ns, area_memory, found_px2)
         return missing if missing > (_AREA_NOISE if touched else _AREA_STEP) else 0.0
 
     def predicted(self, color: int, stamp_ns: int) -> tuple[float, float] | None:

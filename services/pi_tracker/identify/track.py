@@ -64,17 +64,15 @@ class Track:
         area_px: float,
         stamp_ns: int,
         area_memory: float = AREA_MEMORY,
+        found_px2: float = 0.0,
     ) -> None:
         """Take in a measurement; area_memory is the weight of the old area."""
         moved_px = abs(x_px - self.x_px) + abs(y_px - self.y_px)
         self.stationary_frames = self.stationary_frames + 1 if moved_px < _STATIONARY_PX else 0
         self._move(x_px, y_px, stamp_ns)
         self.area_px = area_memory * self.area_px + (1.0 - area_memory) * area_px
+        self.found_px2 += (1.0 - AREA_MEMORY) * (found_px2 - self.found_px2)
         self.seen_ns = stamp_ns
-
-    def note_found(self, blob_px2: float) -> None:
-        """Remember how large its blob was as it was found."""
-        self.found_px2 = AREA_MEMORY * self.found_px2 + (1.0 - AREA_MEMORY) * blob_px2
 
     def coast(self, dx_px: float, dy_px: float, stamp_ns: int) -> None:
         """It was not seen; the other markers moved by (dx_px, dy_px)."""
@@ -98,7 +96,8 @@ class Track:
             0.0 if unseen_ns <= 0 else 1.0 if unseen_ns >= 1_000_000_000 else unseen_ns * 1e-9
         )
         reach_px = margin_px + _MAX_SPEED_PX_S * unseen_s
-        a, b = blob.area_px, self.area_px
+        # Blobs are compared as they are found, before they grow.
+        a, b = blob.area_px, self.found_px2 or self.area_px
         if a > b:
             a, b = b, a
         size_ratio = a / b if b > 1.0 else a

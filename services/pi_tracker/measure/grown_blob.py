@@ -32,8 +32,9 @@ _MOST_TIMES = 2.5
 _LONG, _REACH = 1.3, (3, 24)
 # A blob of this share of the cells that its marker had has all of it: some cells of the rim are in
 # no range. Tuning half of the other renderer, what a centre jumps by from frame to frame, of a
-# grasp and of a hand that rolls: .83 and .22 px ungrown, .31 and .16 with .65, .24 and .10 with .8,
-# .23 and .09 with .85, .21 and .09 with all blobs grown, which takes 20 us more a frame.
+# grasp and of a hand that rolls, before limits were what they are: .83 and .22 px ungrown, .31 and
+# .16 with .65, .24 and .10 with .8, .23 and .09 with .85, .21 and .09 with all blobs grown, which
+# takes 20 us more a frame.
 _WHOLE = 0.85
 
 
