@@ -214,8 +214,14 @@ class MarkerFinder:
         measured = centroids(image, blobs, self._noise, growth)
         markers = []
         for (color, association), centroid in zip(associated.items(), measured, strict=True):
-            x, y, area = centroid.x_px, centroid.y_px, centroid.area_px
-            occluded = identity.update(color, x, y, area, stamp_ns, association.blob.area_px)
+            occluded = identity.update(
+                color,
+                centroid.x_px,
+                centroid.y_px,
+                centroid.area_px,
+                association.blob.area_px,
+                stamp_ns,
+            )
             markers.append(_marker(self._names[color], centroid, association.certainty, occluded))
         return markers
 

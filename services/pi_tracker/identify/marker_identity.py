@@ -108,8 +108,8 @@ class MarkerIdentity:
         x_px: float,
         y_px: float,
         area_px: float,
+        found_px2: float,
         stamp_ns: int,
-        found_px2: float = 0.0,
     ) -> float:
         """Take in a marker's measurement, and how large its blob was as it was found.
 
@@ -117,12 +117,12 @@ class MarkerIdentity:
         """
         track = self._tracks[color]
         if track is None:
-            self._tracks[color] = Track(x_px, y_px, area_px, stamp_ns, found_px2)
+            self._tracks[color] = Track(x_px, y_px, area_px, found_px2, stamp_ns)
             return 0.0
         missing = 1.0 - area_px / max(track.area_px, 1.0)
         touched = self._touched[color]
         area_memory = _AREA_MEMORY_TOUCHED if touched else AREA_MEMORY
-        track.update(x_px, y_px, area_px, stamp_ns, area_memory, found_px2)
+        track.update(x_px, y_px, area_px, found_px2, stamp_ns, area_memory)
         return missing if missing > (_AREA_NOISE if touched else _AREA_STEP) else 0.0
 
     def predicted(self, color: int, stamp_ns: int) -> tuple[float, float] | None:

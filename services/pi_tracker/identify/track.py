@@ -35,9 +35,9 @@ class Track:
     x_px: float
     y_px: float
     area_px: float
-    stamp_ns: int
     # Of its blobs as they were found, before they grew.
-    found_px2: float = 0.0
+    found_px2: float
+    stamp_ns: int
     vx_px_s: float = 0.0
     vy_px_s: float = 0.0
     # Frames in a row in which it has not moved.
@@ -62,9 +62,9 @@ class Track:
         x_px: float,
         y_px: float,
         area_px: float,
+        found_px2: float,
         stamp_ns: int,
         area_memory: float = AREA_MEMORY,
-        found_px2: float = 0.0,
     ) -> None:
         """Take in a measurement; area_memory is the weight of the old area."""
         moved_px = abs(x_px - self.x_px) + abs(y_px - self.y_px)
@@ -97,7 +97,7 @@ class Track:
         )
         reach_px = margin_px + _MAX_SPEED_PX_S * unseen_s
         # Blobs are compared as they are found, before they grow.
-        a, b = blob.area_px, self.found_px2 or self.area_px
+        a, b = blob.area_px, self.found_px2
         if a > b:
             a, b = b, a
         size_ratio = a / b if b > 1.0 else a

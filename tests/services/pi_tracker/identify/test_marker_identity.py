@@ -20,7 +20,8 @@ def associated(identity, blobs, seq):
     blobs_found = [None if one is None else one.blob for one in associations]
     for color, found in enumerate(blobs_found):
         if found is not None:
-            identity.update(color, found.x_px, found.y_px, found.area_px, stamp_ns)
+            area_px2 = found.area_px
+            identity.update(color, found.x_px, found.y_px, area_px2, area_px2, stamp_ns)
     return blobs_found
 
 
@@ -101,14 +102,14 @@ def test_the_occluded_fraction_of_a_marker_is_told():
     stamp_ns = START_NS + 4 * FRAME_NS
     assert None not in identity.associate([[left], [near]], stamp_ns)
     whole_px2 = left.area_px
-    assert identity.update(0, left.x_px, left.y_px, 0.5 * whole_px2, stamp_ns) == pytest.approx(0.5)
+    at, half_px2 = (left.x_px, left.y_px), 0.5 * whole_px2
+    assert identity.update(0, *at, half_px2, whole_px2, stamp_ns) == pytest.approx(0.5)
     # Nothing touches it: it turns away.
     for share, occluded in ((0.9, 0.0), (0.8, 0.0), (0.7, 0.0), (0.4, 0.5)):
         stamp_ns += FRAME_NS
         assert None not in identity.associate([[left], [right]], stamp_ns)
-        assert identity.update(
-            0, left.x_px, left.y_px, share * whole_px2, stamp_ns
-        ) == pytest.approx(occluded, abs=0.1)
+        told = identity.update(0, *at, share * whole_px2, whole_px2, stamp_ns)
+        assert told == pytest.approx(occluded, abs=0.1)
 
 
 def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():

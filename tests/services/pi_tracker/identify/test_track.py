@@ -13,23 +13,33 @@ FRAME_NS = 33_333_333
 
 @pytest.mark.parametrize("stamps", [[0, 0, 0], [5, 3, 1], [0, 2**62, 3]])
 def test_stamps_that_stand_still_or_run_backwards_are_survived(stamps):
-    track = Track(10.0, 10.0, 100.0, 0)
+    track = Track(10.0, 10.0, 100.0, 100.0, 0)
     for stamp_ns in stamps:
         likeness = track.likeness(square_blob(0, 12, 10, 10), stamp_ns, 40)
         assert 0.0 <= likeness <= 1.0
-        track.update(12.0, 10.0, 100.0, stamp_ns)
+        track.update(12.0, 10.0, 100.0, 100.0, stamp_ns)
         assert np.isfinite([track.vx_px_s, track.vy_px_s]).all()
 
 
 def test_velocity_predicts_for_a_tenth_of_a_second_and_no_longer():
-    track = Track(10.0, 20.0, 100.0, 0)
-    track.update(13.0, 18.0, 100.0, FRAME_NS)
+    track = Track(10.0, 20.0, 100.0, 100.0, 0)
+    track.update(13.0, 18.0, 100.0, 100.0, FRAME_NS)
     assert track.predicted(2 * FRAME_NS) == pytest.approx((16.0, 16.0), abs=1e-6)
     assert track.predicted(FRAME_NS + 10**8) == track.predicted(FRAME_NS + 10**10)
 
 
+def test_blobs_are_compared_as_they_are_found_and_not_as_they_grow():
+    small, large = square_blob(0, 10, 10, 10), square_blob(0, 10, 10, 20)
+    track = Track(small.x_px, small.y_px, large.area_px, small.area_px, 0)
+    assert track.likeness(small, FRAME_NS, 40) == pytest.approx(1.0)
+    assert track.likeness(large, FRAME_NS, 40) < 0.6
+    for frame in range(1, 30):
+        track.update(10.0, 10.0, large.area_px, large.area_px, frame * FRAME_NS)
+    assert track.found_px2 == pytest.approx(large.area_px, rel=0.01)
+
+
 def test_a_coasting_track_moves_but_was_not_seen():
-    track = Track(10.0, 20.0, 100.0, 0)
+    track = Track(10.0, 20.0, 100.0, 100.0, 0)
     track.coast(5.0, -2.0, FRAME_NS)
     assert (track.x_px, track.y_px, track.seen_ns) == (15.0, 18.0, 0)
     assert track.is_recent(FRAME_NS)
