@@ -15,7 +15,8 @@ instants with a point, NEES (mean and median), points within three sigmas; `fed`
 pose fed back, `alone` without. Then, of the same markers, what is left of a clock that is off by
 20 and by 500 ms and says that it is right to .1 ms. `misses`: slow clips (to .8 m/s at most) more
 than 10 mm off, fast ones more than 18; RMS above 2.2 and 1.15 times the spline's at lags 0 and 2;
-presence below 98 %; a median of NEES outside .2 to 1.5; clocks 1.5 ms off or more.
+presence below 98 %; a median of NEES outside .2 to 1.5; clocks 1.5 ms off or more. Beside the
+spline: what centres of markers that are seen whole jump by from picture to picture, px.
 --tuning: the half that constants may be chosen on, which is no evidence.
 """
 
@@ -28,9 +29,12 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 from held_out_score import LAGS, Figures, make_fusion, run, scores
 
-from testing.families.case import Case, Half
+from rhot.geometry.transforms import Array
+from testing.families.case import UNHIDDEN_SHARE, Case, Half
+from testing.synthetic_points import START_NS
 from testing.wrong_markers import with_clock_error
 
 # Announced clock errors of the right camera, s.
@@ -52,6 +56,32 @@ def clock_left_ms(case: Case, offset_s: float) -> float:
     late_s, errors_s = fusion.clocks.late_s, case.clock_errors_s or {}
     apart_s = late_s["right"] - late_s["left"] + (found.late_s if found else 0.0)
     return 1e3 * (apart_s - offset_s - errors_s.get("right", 0.0))
+
+
+def jumps_px(case: Case) -> float:
+    """What the centres of whole markers jump by from picture to picture, RMS of a coordinate, px.
+
+    Second differences of their errors, over the square root of 6: those of white noise are itself.
+    """
+    landmarks = {case.config.hand[case.hand].markers[name]: name for name in case.landmarks}
+    squares: list[Array] = []
+    for camera in case.cameras.values():
+        own = [n for n, frame in enumerate(case.frames) if frame.camera == camera.name]
+        errors_px = np.full((len(own), len(landmarks), 2), np.nan)
+        late_s = (case.clock_errors_s or {}).get(camera.name, 0.0)
+        for row, n in enumerate(own):
+            frame = case.frames[n]
+            begin_s = (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9 - late_s
+            for marker in frame.markers:
+                column = case.landmarks.index(landmarks[marker.color])
+                if case.visible[n][column] >= UNHIDDEN_SHARE:
+                    at_s = begin_s + marker.y_px * frame.row_time_ns * 1e-9
+                    where = case.truth(np.array([at_s]))[0, column]
+                    centre_px = np.array([marker.x_px, marker.y_px])
+                    errors_px[row, column] = centre_px - camera.project(where).ravel()
+        seconds = errors_px[2:] - 2.0 * errors_px[1:-1] + errors_px[:-2]
+        squares.append(np.nanmean(seconds**2, axis=(0, 2)) / 6.0)
+    return float(np.sqrt(np.mean(squares)))
 
 
 def misses(fed: Figures, clocks_ms: list[float]) -> list[str]:
@@ -101,12 +131,14 @@ def measure(half: Half, part: str) -> dict[str, dict[str, Figures]]:
         fed, alone = scores(case, feedback=True), scores(case, feedback=False)
         clocks_ms = [clock_left_ms(case, offset_s) for offset_s in OFFSETS_S]
         left = dict(zip(("left_20ms", "left_500ms"), clocks_ms, strict=True))
-        results[name] = {"fed": fed, "alone": alone, "clocks": left}
+        jumps = {"jumps_px": round(jumps_px(case), 3)}
+        results[name] = {"fed": fed, "alone": alone, "clocks": left, "markers": jumps}
         for row in (*lines(name, fed, "fed"), *lines("", alone, "alone")):
             print(row)
         print(
             f"{'':25}spline  {fed['rms_spline']:10.2f}{fed['p95_spline']:7.2f}"
-            f"{fed['max_spline']:7.1f}; {fed['speed']:.2f} m/s at most; clocks are"
+            f"{fed['max_spline']:7.1f}; {fed['speed']:.2f} m/s at most; markers jump by"
+            f" {jumps['jumps_px']:.2f} px; clocks are"
             f" {clocks_ms[0]:.2f} and {clocks_ms[1]:.2f} ms off; misses:"
             f" {' '.join(misses(fed, clocks_ms)) or 'none'}",
             flush=True,
