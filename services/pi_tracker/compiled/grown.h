@@ -90,6 +90,13 @@ static box box_of(const uint8_t *cells, int32_t row, int32_t h, int32_t *count) 
     return at;
 }
 
+/* Whether what cells of a window make up goes on beyond it, in the picture. */
+static int goes_on(const box *at, const box *window, const picture *p) {
+    return (at->x0 == 0 && window->x0 > p->left) || (at->y0 == 0 && window->y0 > p->top) ||
+           (at->x1 == window->x1 - window->x0 && window->x1 < p->right) ||
+           (at->y1 == window->y1 - window->y0 && window->y1 < p->bottom);
+}
+
 /* Grows a blob with its mask, which then lies in memory: GROWTH_MASKS of its window. Leaves both as
    they are where it would not become larger, or too large. */
 static void grow(blob *b, blob_mask *m, const picture *p, const colors *near, uint8_t *memory) {
@@ -104,7 +111,7 @@ static void grow(blob *b, blob_mask *m, const picture *p, const colors *near, ui
     open_mask(alike, spare, size, row, 1);
     spread(taken, alike, spare, size, row);
     box at = box_of(taken, row, h, &cells);
-    if (cells <= own || cells > b->most) return;
+    if (cells <= own || cells > b->most || goes_on(&at, &window, p)) return;
     m->cells = taken + (ptrdiff_t)at.y0 * row + at.x0;
     m->row = row;
     b->left = window.x0 + at.x0;

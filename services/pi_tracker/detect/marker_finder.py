@@ -44,6 +44,9 @@ _REMAINDER_MARGIN_PX = 14
 # occluder's own edge is less. (Of the two crescents of half visible markers that the seam test took
 # in the hard scene, one had .35, the other .47 of the marker's area.)
 _MIN_THIN_SHARE = 0.25
+# Cells around a marker in which no background is learnt: its own rim, in the colours of blur and of
+# light from the side; and more around what is smaller than the hand's markers are, a piece of one.
+_MARKER_MARGIN = 4
 # Called with the name of each stage at its end.
 OnStage = Callable[[str], None]
 
@@ -88,7 +91,13 @@ class MarkerFinder:
         self._on_stage("search")
         associated = {
             color: association
-            for color, association in enumerate(self._identity.associate(blobs, frame.stamp_ns))
+            for color, association in enumerate(
+                self._identity.associate(
+                    blobs,
+                    frame.stamp_ns,
+                    lambda blob: self._background.resembles(image, blob, self._noise),
+                )
+            )
             if association is not None
         }
         self._update_background(image, associated, frame.stamp_ns)
@@ -184,7 +193,11 @@ class MarkerFinder:
     ) -> None:
         """Learn what was found and is no marker, while there is anything to learn."""
         if len(self._all_blobs) > len(associated) or not self._background.settled:
-            markers = [association.blob.rect for association in associated.values()]
+            usual = self._identity.width_cells()
+            markers = [
+                _unlearnt_around(association.blob.rect, usual)
+                for association in associated.values()
+            ]
             self._background.update(
                 image, self._searched, self._all_blobs, markers, self._noise, stamp_ns
             )
@@ -224,6 +237,13 @@ class MarkerFinder:
             )
             markers.append(_marker(self._names[color], centroid, association.certainty, occluded))
         return markers
+
+
+def _unlearnt_around(rect: Rect, usual_cells: float) -> Rect:
+    """A marker's rectangle and its surroundings; usual_cells: how wide the hand's markers are."""
+    x0, y0, x1, y1 = rect
+    margin = _MARKER_MARGIN + max(round(usual_cells) - min(x1 - x0, y1 - y0), 0)
+    return x0 - margin, y0 - margin, x1 + margin, y1 + margin
 
 
 def _cells(blob: Blob) -> int:

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from services.pi_tracker.identify.cell_colors import Gate, agree, slices, yuv
+from services.pi_tracker.identify.uncovered_cells import with_uncovered
 from services.pi_tracker.image.blob import Blob, blobs_of_contours, external_contours
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.noise import Noise
@@ -28,20 +30,19 @@ _STATIC_SIGHTINGS, _MAX_SIGHTINGS = 4, 16
 _MISMATCH_COST = 2
 # A cell agrees with its mean when luma, U and V are within this many of their standard deviations,
 # and a little for shadows. Five, because not one of an object's thousand cells should differ.
-_GATE_SIGMAS, _SHADOW = 5.0, 3.0
+_GATE: Gate = 5.0, 3.0
 # Weight of a new sighting in the mean.
 _NEW_WEIGHT = 0.2
 # A blob of which less than this share is background is a marker whose rim touches it: left as it
 # is.
 _RIM_SHARE = 0.1
-# Cells around a marker in which nothing is learnt: its own rim, in the colours of blur and of light
-# from the side.
-_MARKER_MARGIN = 4
 # What is left of a blob, in cells, to be examined: shadows and the shimmer of edges leave less.
 _MIN_CELLS = 6
 # An object not seen for one to two such times is gone, or hidden for good.
 _FORGET_NS = 30_000_000_000
-_SQUARE = np.ones((2, 2), np.uint8)
+_SQUARE, _RIM = np.ones((2, 2), np.uint8), np.ones((3, 3), np.uint8)
+# Blobs are compared with what is known within so many cells of them.
+_AROUND_CELLS = 32
 
 
 class BackgroundModel:
@@ -52,7 +53,6 @@ class BackgroundModel:
         self._mean = np.empty((0, 0, 3), np.float32)  # (h, w, 3) Y, U, V
         self._sightings = np.empty((0, 0), np.int16)  # (h, w) 0 where nothing is known
         self._seen_since_sweep = np.empty((0, 0), bool)
-        self._seen_now = np.empty((0, 0), bool)
         self._swept_ns = 0
         self._empty = True
         # Whether no cell waits for more sightings.
@@ -67,6 +67,21 @@ class BackgroundModel:
             return list(blobs)
         return [part for blob in blobs for part in self._foreground_of(image, blob, noise)]
 
+    def resembles(self, image: Picture, blob: Blob, noise: Noise) -> bool:
+        """Whether a blob has the colour of static background around it: a part not known yet."""
+        if self._empty or image.size != self._size:
+            return False
+        x0, y0, x1, y1 = blob.rect
+        around = (
+            slice(max(y0 - _AROUND_CELLS, 0), y1 + _AROUND_CELLS),
+            slice(max(x0 - _AROUND_CELLS, 0), x1 + _AROUND_CELLS),
+        )
+        known = self._mean[around][self._sightings[around] >= _STATIC_SIGHTINGS]
+        if 2 * len(known) < blob.cells:
+            return False
+        mean = yuv(image, blob.rect)[blob.mask > 0].mean(axis=0)
+        return 2 * int(np.count_nonzero(agree(known, mean, noise, _GATE))) >= blob.cells
+
     def update(
         self,
         image: Picture,
@@ -76,31 +91,17 @@ class BackgroundModel:
         noise: Noise,
         stamp_ns: int,
     ) -> None:
-        """Take in all blobs detected in a region, except where markers are."""
+        """Take in all blobs detected in a region, but not where markers are, and about them."""
         if image.size != self._size:
             self._reset(image.size, stamp_ns)
         if not 0 <= stamp_ns - self._swept_ns < _FORGET_NS:
             self._sightings[~self._seen_since_sweep] = 0
             self._seen_since_sweep[:] = False
             self._swept_ns = stamp_ns
-        for blob in blobs:
-            inside = blob.mask > 0
-            for marker in markers:
-                _exclude_marker(inside, blob.rect, marker)
-            if inside.any():
-                self._learn(image, blob.rect, inside, noise)
-                self._empty = self.settled = False
-        if not self.settled:
-            self._drop_interrupted(region)
-
-    def _drop_interrupted(self, region: Rect) -> None:
-        """Reset cells that are not static yet and were not seen this time."""
-        part = _slices(region)
-        sightings, seen_now = self._sightings[part], self._seen_now[part]
-        waiting = sightings < _STATIC_SIGHTINGS
-        sightings[waiting & ~seen_now] = 0
-        self.settled = not (waiting & seen_now).any()
-        seen_now[:] = False
+        seen = _with_rims(blobs, region)
+        for marker in markers:
+            _exclude(seen, region, marker)
+        self._learn(image, region, seen, noise)
 
     def _reset(self, size: tuple[int, int], stamp_ns: int) -> None:
         width, height = size
@@ -108,32 +109,45 @@ class BackgroundModel:
         self._mean = np.zeros((height, width, 3), np.float32)
         self._sightings = np.zeros((height, width), np.int16)
         self._seen_since_sweep = np.zeros((height, width), bool)
-        self._seen_now = np.zeros((height, width), bool)
 
-    def _learn(self, image: Picture, rect: Rect, inside: Image, noise: Noise) -> None:
-        """Count a sighting of the cells `inside` (h, w) of a rectangle, and move their mean."""
-        part = _slices(rect)
-        mean, seen = self._mean[part], _yuv(image, rect)
+    def _learn(self, image: Picture, region: Rect, seen: Image, noise: Noise) -> None:
+        """Count a sighting of the cells `seen` (h, w) of a region, and move their mean.
+
+        Of those that wait, whatever colour noise gave them now, it is one where they look the same.
+        """
+        part = slices(region)
         sightings = self._sightings[part]
-        agrees = (sightings > 0) & _agrees(seen, mean, noise)
-        counted = np.where(
-            agrees, np.minimum(sightings + 1, _MAX_SIGHTINGS), sightings - _MISMATCH_COST
+        waiting = (sightings > 0) & (sightings < _STATIC_SIGHTINGS)
+        rows, columns = np.nonzero(seen | waiting)
+        self.settled = not len(rows)
+        if self.settled:
+            return
+        self._empty = False
+        luma, chroma = image.cells(region)
+        now = np.column_stack((luma[rows, columns], chroma[rows, columns])).astype(np.float32)
+        mean, count, own = self._mean[part], sightings[rows, columns], seen[rows, columns]
+        before = mean[rows, columns]
+        agrees = (count > 0) & agree(now, before, noise, _GATE)
+        counted = np.where(agrees, np.minimum(count + 1, _MAX_SIGHTINGS), count - _MISMATCH_COST)
+        replaced = counted <= 0
+        after = np.where(agrees[:, None], before + _NEW_WEIGHT * (now - before), before)
+        after[replaced] = now[replaced]
+        mean[rows, columns] = after
+        # What waited, and has changed without being seen, is forgotten.
+        sightings[rows, columns] = np.where(
+            own, np.maximum(counted, 1), np.where(agrees, counted, 0)
         )
-        replaced = inside & (counted <= 0)
-        confirmed = inside & agrees
-        mean[confirmed] += _NEW_WEIGHT * (seen[confirmed] - mean[confirmed])
-        mean[replaced] = seen[replaced]
-        np.copyto(sightings, np.maximum(counted, 1), where=inside)
-        self._seen_since_sweep[part] |= inside
-        self._seen_now[part] |= inside
+        self._seen_since_sweep[part] |= seen
 
     def _foreground_of(self, image: Picture, blob: Blob, noise: Noise) -> list[Blob]:
-        part = _slices(blob.rect)
+        part = slices(blob.rect)
         static = self._sightings[part] >= _STATIC_SIGHTINGS
         if not static.any():
             return [blob]
-        static &= _agrees(_yuv(image, blob.rect), self._mean[part], noise)
-        foreground: Image = ((blob.mask > 0) & ~static).view(np.uint8)
+        now = yuv(image, blob.rect)
+        static &= agree(now, self._mean[part], noise, _GATE)
+        known = with_uncovered(static, blob.mask, now, noise)
+        foreground: Image = ((blob.mask > 0) & ~known).view(np.uint8)
         cells = cv2.countNonZero(foreground)
         if cells >= (1.0 - _RIM_SHARE) * blob.cells:
             return [blob]
@@ -146,35 +160,22 @@ class BackgroundModel:
         )
 
 
-def _slices(rect: Rect) -> tuple[slice, slice]:
-    """Rows and columns of a rectangle."""
-    x0, y0, x1, y1 = rect
-    return slice(y0, y1), slice(x0, x1)
+def _with_rims(blobs: Sequence[Blob], region: Rect) -> Image:
+    """Where blobs are in a region (h, w), bool, and the cells about them.
+
+    At the edge of a colour noise decides which cells have it, anew in each frame.
+    """
+    left, top, right, bottom = region
+    covered = np.zeros((bottom - top, right - left), np.uint8)
+    for blob in blobs:
+        x0, y0, x1, y1 = blob.rect
+        covered[y0 - top : y1 - top, x0 - left : x1 - left] |= blob.mask
+    return cv2.dilate(covered, _RIM) > 0
 
 
-def _yuv(image: Picture, rect: Rect) -> Image:
-    """Y, U, V of cells, float32 (h, w, 3)."""
-    luma, chroma = image.cells(rect)
-    return np.dstack((luma, chroma)).astype(np.float32)
-
-
-def _agrees(seen: Image, mean: Image, noise: Noise) -> Image:
-    """Which cells (h, w) are within the gate about their mean."""
-    difference = np.abs(seen - mean)
-    luma_gate = _GATE_SIGMAS * noise.luma + _SHADOW
-    chroma_gate = _GATE_SIGMAS * noise.chroma + _SHADOW
-    return (
-        (difference[..., 0] <= luma_gate)
-        & (difference[..., 1] <= chroma_gate)
-        & (difference[..., 2] <= chroma_gate)
-    )
-
-
-def _exclude_marker(inside: Image, rect: Rect, marker: Rect) -> None:
-    """Clear the cells of a marker and around it in a mask `inside` (h, w) of a rectangle."""
-    x0 = max(marker[0] - _MARKER_MARGIN - rect[0], 0)
-    y0 = max(marker[1] - _MARKER_MARGIN - rect[1], 0)
-    x1 = marker[2] + _MARKER_MARGIN - rect[0]
-    y1 = marker[3] + _MARKER_MARGIN - rect[1]
+def _exclude(seen: Image, region: Rect, rect: Rect) -> None:
+    """Clear the cells of a rectangle in a mask (h, w) of a region."""
+    left, top = region[:2]
+    x1, y1 = rect[2] - left, rect[3] - top
     if x1 > 0 and y1 > 0:
-        inside[y0:y1, x0:x1] = False
+        seen[max(rect[1] - top, 0) : y1, max(rect[0] - left, 0) : x1] = False

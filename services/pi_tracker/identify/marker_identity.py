@@ -9,10 +9,13 @@ missing rather than guessed. Static background is removed before (background.py)
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Callable
 from statistics import median
 from typing import NamedTuple
 
 from services.pi_tracker.identify.blob_shape import may_be_rim, touch
+from services.pi_tracker.identify.carried_blobs import CarriedBlobs
 from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
 from services.pi_tracker.identify.track import AREA_MEMORY, Track
 from services.pi_tracker.image.blob import Blob
@@ -47,6 +50,10 @@ _STATIONARY_FRAMES = 4
 _RIM_FACTOR = 0.3
 
 
+# ... where it has the colour of things in the room: those may be a part that a hand uncovers.
+_ROOM_FACTOR = 0.5
+
+
 class Association(NamedTuple):
     """The blob that is a colour's marker.
 
@@ -71,10 +78,20 @@ class MarkerIdentity:
         self._tracks: list[Track | None] = [None] * count
         # Which of the markers associated last have another's paint beside them.
         self._touched = [False] * count
+        self._carried = CarriedBlobs(count)
 
-    def associate(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Association | None]:
-        """Each colour's marker, None where there is none."""
-        associated = self._obvious(blobs, stamp_ns) or self._compared(blobs, stamp_ns)
+    def associate(
+        self, blobs: list[list[Blob]], stamp_ns: int, like_room: Callable[[Blob], bool]
+    ) -> list[Association | None]:
+        """Each colour's marker, None where there is none.
+
+        like_room: whether a blob has the colour of static background beside it.
+        """
+        associated = self._obvious(blobs, stamp_ns)
+        if associated:
+            self._carried.forget()
+        else:
+            associated = self._compared(blobs, stamp_ns, like_room)
         self._note_touching(associated)
         self._coast_unseen(associated, stamp_ns)
         return associated
@@ -92,10 +109,15 @@ class MarkerIdentity:
             found.append(Association(blob, 1.0, 1.0))
         return found
 
-    def _compared(self, blobs: list[list[Blob]], stamp_ns: int) -> list[Association | None]:
+    def _compared(
+        self, blobs: list[list[Blob]], stamp_ns: int, like_room: Callable[[Blob], bool]
+    ) -> list[Association | None]:
         """Each colour's marker, by its track and the other colours' blobs."""
         blobs = [self._preselected(color, own, stamp_ns) for color, own in enumerate(blobs)]
-        candidates = [self._candidates(color, blobs, stamp_ns) for color in range(len(blobs))]
+        self._carried.follow(blobs, self._tracks, stamp_ns)
+        candidates = [
+            self._candidates(color, blobs, stamp_ns, like_room) for color in range(len(blobs))
+        ]
         best = most_consistent_set(candidates)
         return [
             None if member is None else _accepted(candidates[color], *member)
@@ -136,6 +158,11 @@ class MarkerIdentity:
         """How large a marker was when it was seen, 0 if it never was."""
         track = self._tracks[color]
         return 0.0 if track is None else track.area_px
+
+    def width_cells(self) -> float:
+        """How wide the markers are that were seen, the median of them; 0 if there is none."""
+        areas = [track.area_px for track in self._tracks if track is not None]
+        return 0.5 * math.sqrt(median(areas)) if areas else 0.0
 
     def found_px2(self, color: int) -> float:
         """How large its blobs were as they were found, 0 if it never was."""
@@ -180,10 +207,20 @@ class MarkerIdentity:
             if one is None and track is not None:
                 track.coast(dx_px, dy_px, stamp_ns)
 
-    def _candidates(self, color: int, blobs: list[list[Blob]], stamp_ns: int) -> list[Candidate]:
+    def _candidates(
+        self,
+        color: int,
+        blobs: list[list[Blob]],
+        stamp_ns: int,
+        like_room: Callable[[Blob], bool],
+    ) -> list[Candidate]:
         """The blobs of a colour with their priors."""
         own = blobs[color]
         priors = [self._prior(color, blob, blobs, stamp_ns) for blob in own]
+        priors = [
+            prior * (_ROOM_FACTOR if like_room(blob) else 1.0)
+            for blob, prior in zip(own, priors, strict=True)
+        ]
         track = self._tracks[color]
         if track is None:
             return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
@@ -191,6 +228,9 @@ class MarkerIdentity:
             # What has not moved for a while may be static background; among others it has no
             # advantage.
             priors = [min(prior, _REACQUISITION_PRIOR) for prior in priors]
+        if len(own) > 1:
+            factors = self._carried.prior_factors(color, len(own))
+            priors = [prior * factor for prior, factor in zip(priors, factors, strict=True)]
         partly_occluded = [
             track.is_at(blob, stamp_ns) and blob.area_px < track.area_px for blob in own
         ]

@@ -22,6 +22,7 @@ from services.pi_tracker.image.blob import Blob, make_blob
 from services.pi_tracker.image.compiled_colors import CompiledColors
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.morphology import opening
+from services.pi_tracker.image.planes import Rect
 from services.pi_tracker.image.yuv_planes import Picture
 
 # A blob grows to so many times its cells at most, or those that were found of its marker a moment
@@ -106,4 +107,12 @@ def grown(picture: Picture, near: Classes, blob: Blob, by: Limit) -> Blob:
         return blob
     x, y, w, h = cv2.boundingRect(mask)
     rect = (left + x, top + y, left + x + w, top + y + h)
+    if _goes_on(rect, (left, top, right, bottom), picture.size):
+        return blob
     return make_blob(blob.color, rect, np.ascontiguousarray(mask[y : y + h, x : x + w]), cells)
+
+
+def _goes_on(rect: Rect, window: Rect, size: tuple[int, int]) -> bool:
+    """Whether what has a rectangle in a window of a picture goes on beyond the window."""
+    inner = window[0] > 0, window[1] > 0, window[2] < size[0], window[3] < size[1]
+    return any(edge and at == limit for edge, at, limit in zip(inner, rect, window, strict=True))

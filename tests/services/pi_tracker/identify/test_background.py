@@ -103,6 +103,53 @@ def test_markers_and_their_rims_are_not_learnt(noise):
     )
 
 
+def test_cells_that_noise_moves_in_and_out_of_a_colour_are_learnt(noise):
+    """Half of the cells are within the range in each frame, other ones in each."""
+    model, rect, rng = BackgroundModel(), (20, 20, 40, 44), np.random.default_rng(3)
+    for seq in range(12):
+        mask = np.where(rng.random((24, 20)) < 0.5, np.uint8(255), np.uint8(0))
+        image = shot(seq, (rect, THING))
+        region = (0, 0, *image.size)
+        model.update(image, region, [blob(rect, mask)], [], noise, (1 + seq) * FRAME_NS)
+    assert model.foreground(shot(20, (rect, THING)), [blob(rect)], noise) == []
+
+
+@pytest.mark.parametrize(
+    ("uncovered", "known"), [((40, 20, 52, 44), True), ((40, 20, 70, 44), False)]
+)
+def test_what_a_hand_uncovers_of_a_known_thing_is_known_at_once(noise, uncovered, known):
+    """But not where more of it would be uncovered than was known."""
+    model, seen = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, seen)
+    whole = (20, 20, uncovered[2], 44)
+    found = foreground(model, shot(50, (whole, THING)), [blob(whole)], noise)
+    assert found == ([] if known else [uncovered])
+
+
+def test_a_marker_beside_what_is_uncovered_is_no_part_of_it(noise):
+    model, seen = BackgroundModel(), (20, 20, 40, 44)
+    learn(model, noise, seen)
+    image = shot(50, ((20, 20, 48, 44), THING), ((44, 28, 51, 35), MARKER))
+    mask = np.zeros((24, 31), np.uint8)
+    mask[:, :28] = 255
+    mask[8:15, 24:31] = 255
+    (part,) = model.foreground(image, [blob((20, 20, 51, 44), mask)], noise)
+    assert max(abs(np.subtract(part.rect, (44, 28, 51, 35)))) <= 1
+
+
+def test_what_has_the_colour_of_known_things_nearby_resembles_them(noise):
+    model, seen = BackgroundModel(), (20, 20, 40, 44)
+    piece, marker, far = (46, 20, 54, 40), (20, 50, 27, 57), (100, 70, 108, 80)
+    image = shot(50, (seen, THING), (piece, THING), (marker, MARKER), (far, THING))
+    assert not model.resembles(image, blob(piece), noise)
+    learn(model, noise, seen)
+    assert model.resembles(image, blob(piece), noise)
+    assert not model.resembles(image, blob(marker), noise)
+    assert not model.resembles(image, blob(far), noise)
+    # More than the known thing could be another one.
+    assert not model.resembles(image, blob((42, 2, 90, 60)), noise)
+
+
 def test_what_passes_again_and_again_is_not_static(noise):
     model, rect = BackgroundModel(), (20, 20, 30, 30)
     for round_ in range(6):

@@ -13,10 +13,15 @@ FRAME_NS = 33_333_333
 START_NS = 1_700_000_000_000_000_000
 
 
-def associated(identity, blobs, seq):
+def nothing_known(blob):
+    """Of the room: no blob looks like it."""
+    return False
+
+
+def associated(identity, blobs, seq, like_room=nothing_known):
     """Associate, and update with what was associated; the blobs."""
     stamp_ns = START_NS + seq * FRAME_NS
-    associations = identity.associate(blobs, stamp_ns)
+    associations = identity.associate(blobs, stamp_ns, like_room)
     blobs_found = [None if one is None else one.blob for one in associations]
     for color, found in enumerate(blobs_found):
         if found is not None:
@@ -100,14 +105,14 @@ def test_the_occluded_fraction_of_a_marker_is_told():
         associated(identity, [[left], [right]], seq)
     near = square_blob(1, 112, 100)
     stamp_ns = START_NS + 4 * FRAME_NS
-    assert None not in identity.associate([[left], [near]], stamp_ns)
+    assert None not in identity.associate([[left], [near]], stamp_ns, nothing_known)
     whole_px2 = left.area_px
     at, half_px2 = (left.x_px, left.y_px), 0.5 * whole_px2
     assert identity.update(0, *at, half_px2, whole_px2, stamp_ns) == pytest.approx(0.5)
     # Nothing touches it: it turns away.
     for share, occluded in ((0.9, 0.0), (0.8, 0.0), (0.7, 0.0), (0.4, 0.5)):
         stamp_ns += FRAME_NS
-        assert None not in identity.associate([[left], [right]], stamp_ns)
+        assert None not in identity.associate([[left], [right]], stamp_ns, nothing_known)
         told = identity.update(0, *at, share * whole_px2, whole_px2, stamp_ns)
         assert told == pytest.approx(occluded, abs=0.1)
 
@@ -154,9 +159,10 @@ def test_a_speck_far_away_is_not_the_marker_that_left_a_moment_ago():
 def test_two_alike_are_ambiguous():
     identity = MarkerIdentity(1, 40)
     associated(identity, [[square_blob(0, 100, 100)]], 0)
-    (alone,) = identity.associate([[square_blob(0, 100, 100)]], START_NS + FRAME_NS)
+    stamp_ns = START_NS + FRAME_NS
+    (alone,) = identity.associate([[square_blob(0, 100, 100)]], stamp_ns, nothing_known)
     (doubtful,) = identity.associate(
-        [[square_blob(0, 90, 100), square_blob(0, 110, 100)]], START_NS + FRAME_NS
+        [[square_blob(0, 90, 100), square_blob(0, 110, 100)]], stamp_ns, nothing_known
     )
     assert doubtful.certainty < 0.6 < alone.certainty
 
@@ -189,3 +195,50 @@ def test_at_first_the_largest_of_many_are_compared():
     """
     tips = hand_blobs(300, 250)
     assert associated(MarkerIdentity(6, 40), among_specks(tips, 4, seed=5), 0) == tips
+
+
+def test_what_looks_like_the_room_is_not_the_marker_that_hides():
+    """A tip is hidden, and a piece of a thing of its colour appears beside the hand."""
+    for like_room, found in ((lambda blob: blob.color == 2, None), (nothing_known, "piece")):
+        identity = MarkerIdentity(6, 40)
+        for seq in range(5):
+            associated(identity, [[tip] for tip in hand_blobs(300, 250)], seq)
+        piece = square_blob(2, 300, 140, 8)
+        blobs = [[tip] if tip.color != 2 else [piece] for tip in hand_blobs(300, 250)]
+        taken = associated(identity, blobs, 12, like_room)[2]
+        assert taken is (piece if found else None)
+
+
+def test_a_marker_that_looks_like_the_room_goes_on_being_followed():
+    identity = MarkerIdentity(6, 40)
+    for seq in range(5):
+        associated(identity, [[tip] for tip in hand_blobs(300 + 5 * seq, 250)], seq)
+    tips, speck = hand_blobs(325, 250), square_blob(2, 500, 60, 8)
+    blobs = [[tip] if tip.color != 2 else [speck, tip] for tip in tips]
+    assert associated(identity, blobs, 5, lambda blob: blob.color == 2) == tips
+
+
+@pytest.mark.parametrize(("dx_px", "dy_px"), [(8, 0), (0, -8)])
+def test_what_stands_still_is_given_up_for_what_the_hand_carries_along(dx_px, dy_px):
+    """A thing was taken for a tip from the first frame on, and looks more like itself than it."""
+    identity = MarkerIdentity(6, 40)
+    thing = square_blob(2, 260, 140, 26)
+    for seq in range(6):
+        tips = hand_blobs(300 + dx_px * seq, 250 + dy_px * seq)
+        blobs = [[tip] if tip.color != 2 or seq == 0 else [thing, tip] for tip in tips]
+        blobs[2] = [thing] if seq == 0 else blobs[2]
+        found = associated(identity, blobs, seq)[2]
+        if seq < 2:
+            assert found is thing
+    assert found is tips[2]
+
+
+def test_a_thumb_that_lies_still_stays_one_while_the_fingers_move():
+    identity = MarkerIdentity(6, 40)
+    thumb = square_blob(0, 240, 230)
+    for seq in range(12):
+        tips = hand_blobs(300, 250 - 6 * seq)
+        speck = square_blob(0, 400 + 60 * (seq % 2), 300, 8)
+        blobs = [[tip] for tip in tips]
+        blobs[0] = [thumb, speck]
+        assert associated(identity, blobs, seq)[0] is thumb

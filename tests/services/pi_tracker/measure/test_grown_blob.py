@@ -73,6 +73,15 @@ def test_a_wall_of_nearly_its_colour_is_not_taken():
         assert grown(image, NEAR, blob, limit(blob, marker_px2, 0.7 * marker_px2)) is blob
 
 
+def test_a_stripe_of_nearly_its_colour_that_goes_on_is_not_taken():
+    """A finger before a striped thing: paint ends where it is looked for."""
+    image = shown((10, 8, 18, 16, OWN), (18, 0, 22, SIZE[1], NEARLY))
+    blob = the_blob(image)
+    assert grown(image, NEAR, blob, Limit(most=250, reach=6)) is blob
+    ends = shown((10, 8, 18, 16, OWN), (18, 4, 22, 20, NEARLY))
+    assert grown(ends, NEAR, blob, Limit(most=250, reach=6)).rect == (10, 4, 22, 20)
+
+
 def test_a_line_of_one_cell_does_not_connect():
     image = shown((10, 8, 16, 14, OWN), (16, 10, 19, 11, NEARLY), (19, 8, 24, 14, NEARLY))
     assert after(image, 4 * 80.0, 4 * 60.0).rect[2] <= 18

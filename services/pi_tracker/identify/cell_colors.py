@@ -1,0 +1,37 @@
+"""Colours of cells, and whether two looks of them are of the same thing, within noise. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from services.pi_tracker.image.frame import Image
+from services.pi_tracker.image.noise import Noise
+from services.pi_tracker.image.planes import Rect
+from services.pi_tracker.image.yuv_planes import Picture
+
+# How far apart luma, U and V may be: so many standard deviations, and so many grey levels beside.
+Gate = tuple[float, float]
+
+
+def slices(rect: Rect) -> tuple[slice, slice]:
+    """Rows and columns of a rectangle."""
+    x0, y0, x1, y1 = rect
+    return slice(y0, y1), slice(x0, x1)
+
+
+def yuv(image: Picture, rect: Rect) -> Image:
+    """Y, U, V of the cells of a rectangle, float32 (h, w, 3)."""
+    luma, chroma = image.cells(rect)
+    return np.dstack((luma, chroma)).astype(np.float32)
+
+
+def agree(seen: Image, known: Image, noise: Noise, gate: Gate) -> Image:
+    """Which of cells (..., 3), Y, U, V, are within a gate about what is known of them; (...)."""
+    difference = np.abs(seen - known)
+    sigmas, levels = gate
+    luma, chroma = sigmas * noise.luma + levels, sigmas * noise.chroma + levels
+    return (
+        (difference[..., 0] <= luma)
+        & (difference[..., 1] <= chroma)
+        & (difference[..., 2] <= chroma)
+    )
