@@ -16,7 +16,8 @@ pose fed back, `alone` without. Then, of the same markers, what is left of a clo
 20 and by 500 ms and says that it is right to .1 ms. `misses`: slow clips (to .8 m/s at most) more
 than 10 mm off, fast ones more than 18; RMS above 2.2 and 1.15 times the spline's at lags 0 and 2;
 presence below 98 %; a median of NEES outside .2 to 1.5; clocks 1.5 ms off or more. Beside the
-spline: what centres of markers that are seen whole jump by from picture to picture, px.
+spline: what centres of markers that are seen whole jump by from picture to picture, px, and how
+many of them are on something else.
 --tuning: the half that constants may be chosen on, which is no evidence.
 """
 
@@ -42,6 +43,8 @@ OFFSETS_S = (0.02, 0.5)
 _CLAIMED_NS = 100_000
 _SLOW_M_S, _SLOW_MM, _FAST_MM = 0.8, 10.0, 18.0
 _LAG_0, _LAG_2, _PRESENCE, _MEDIAN, _CLOCK_MS = 2.2, 1.15, 98.0, (0.2, 1.5), 1.5
+# A marker so far from its paint is on something else: a tip is 12 to 25 px wide.
+_ASTRAY_PX = 14.0
 _WITHOUT_VTK = (
     "benchmarks/other_renderer.py: VTK is not installed; pip install 'rhot[other-renderer]'"
 )
@@ -58,13 +61,13 @@ def clock_left_ms(case: Case, offset_s: float) -> float:
     return 1e3 * (apart_s - offset_s - errors_s.get("right", 0.0))
 
 
-def jumps_px(case: Case) -> float:
-    """What the centres of whole markers jump by from picture to picture, RMS of a coordinate, px.
+def centre_errors_px(case: Case) -> list[Array]:
+    """How far the centres of whole markers are off, (frames, landmarks, 2) of each camera, px.
 
-    Second differences of their errors, over the square root of 6: those of white noise are itself.
+    NaN where there is none, or something hides some of it.
     """
     landmarks = {case.config.hand[case.hand].markers[name]: name for name in case.landmarks}
-    squares: list[Array] = []
+    errors: list[Array] = []
     for camera in case.cameras.values():
         own = [n for n, frame in enumerate(case.frames) if frame.camera == camera.name]
         errors_px = np.full((len(own), len(landmarks), 2), np.nan)
@@ -79,9 +82,23 @@ def jumps_px(case: Case) -> float:
                     where = case.truth(np.array([at_s]))[0, column]
                     centre_px = np.array([marker.x_px, marker.y_px])
                     errors_px[row, column] = centre_px - camera.project(where).ravel()
-        seconds = errors_px[2:] - 2.0 * errors_px[1:-1] + errors_px[:-2]
-        squares.append(np.nanmean(seconds**2, axis=(0, 2)) / 6.0)
+        errors.append(errors_px)
+    return errors
+
+
+def jumps_px(errors_px: list[Array]) -> float:
+    """What centres jump by from picture to picture, RMS of a coordinate, px.
+
+    Second differences of their errors, over the square root of 6: those of white noise are itself.
+    """
+    seconds = [of[2:] - 2.0 * of[1:-1] + of[:-2] for of in errors_px]
+    squares = [np.nanmean(of**2, axis=(0, 2)) / 6.0 for of in seconds]
     return float(np.sqrt(np.mean(squares)))
+
+
+def astray(errors_px: list[Array]) -> int:
+    """How many of them are on something else."""
+    return sum(int(np.sum(np.linalg.norm(of, axis=2) > _ASTRAY_PX)) for of in errors_px)
 
 
 def misses(fed: Figures, clocks_ms: list[float]) -> list[str]:
@@ -131,14 +148,15 @@ def measure(half: Half, part: str) -> dict[str, dict[str, Figures]]:
         fed, alone = scores(case, feedback=True), scores(case, feedback=False)
         clocks_ms = [clock_left_ms(case, offset_s) for offset_s in OFFSETS_S]
         left = dict(zip(("left_20ms", "left_500ms"), clocks_ms, strict=True))
-        jumps = {"jumps_px": round(jumps_px(case), 3)}
-        results[name] = {"fed": fed, "alone": alone, "clocks": left, "markers": jumps}
+        errors_px = centre_errors_px(case)
+        markers = {"jumps_px": round(jumps_px(errors_px), 3), "astray": astray(errors_px)}
+        results[name] = {"fed": fed, "alone": alone, "clocks": left, "markers": markers}
         for row in (*lines(name, fed, "fed"), *lines("", alone, "alone")):
             print(row)
         print(
             f"{'':25}spline  {fed['rms_spline']:10.2f}{fed['p95_spline']:7.2f}"
             f"{fed['max_spline']:7.1f}; {fed['speed']:.2f} m/s at most; markers jump by"
-            f" {jumps['jumps_px']:.2f} px; clocks are"
+            f" {markers['jumps_px']:.2f} px, {markers['astray']} are astray; clocks are"
             f" {clocks_ms[0]:.2f} and {clocks_ms[1]:.2f} ms off; misses:"
             f" {' '.join(misses(fed, clocks_ms)) or 'none'}",
             flush=True,

@@ -131,6 +131,25 @@ CLIPS: dict[Half, dict[str, Clip]] = {
             given_scale=1.03,
             seed=105,
         ),
+        # A child's hand, and a rolling one whose errors were told too surely.
+        "grab, small": Clip(
+            Play("grab", Carried("roll", 18.0, 0.5), 0.5, 0.1, 0.45, scale=0.82, distance_m=0.42),
+            build=Build(1.0, 0.98),
+            job=Job((9.0, 12.0), 0.7, seed=31),
+            light=_WINDOW,
+            rig=Rig(phase_s=0.0122),
+            given_scale=0.86,
+            seed=31,
+        ),
+        "roll, pinching": Clip(
+            Play("pinch", Carried("roll", 24.0, 0.45), 0.5, 0.15, 0.75, yaw_deg=6.0),
+            build=Build(1.05, 1.0),
+            job=Job((12.0, 16.0), 0.8, skin=_PALE, seed=32),
+            light=_COLD,
+            rig=Rig(phase_s=0.0203, baseline_m=0.09),
+            given_scale=1.02,
+            seed=32,
+        ),
         # Held out for some days, until their rooms were looked at for the same reason.
         "splay, other person": Clip(
             Play("HandSplay-110fps", speed=0.8, scale=1.02, distance_m=0.5, yaw_deg=14.0),

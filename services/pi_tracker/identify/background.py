@@ -1,10 +1,11 @@
 """Background subtraction: removes static background in a marker's colour from blobs, cell by cell.
 
 So a marker is seen that is in front of such an object or beside it. Pure. Only blobs that were not
-taken for a marker are learnt, where they stay the same for a few sightings. A cell that differs
-from its mean is foreground, such as a marker that passes. Nothing is known at the start. An object
-that is removed is forgotten. Where the light changes, or the camera is moved, everything is learnt
-again. A picture of another size starts a new model.
+taken for a marker are learnt, with the cells about them, where they stay the same for a few
+sightings. A cell that differs from its mean is foreground, such as a marker that passes. What looks
+like known cells beside it is known, too (uncovered_cells.py). Nothing is known at the start. An
+object that is removed is forgotten. Where the light changes, or the camera is moved, everything is
+learnt again. A picture of another size starts a new model.
 """
 
 from __future__ import annotations

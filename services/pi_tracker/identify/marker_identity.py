@@ -216,21 +216,19 @@ class MarkerIdentity:
     ) -> list[Candidate]:
         """The blobs of a colour with their priors."""
         own = blobs[color]
-        priors = [self._prior(color, blob, blobs, stamp_ns) for blob in own]
-        priors = [
-            prior * (_ROOM_FACTOR if like_room(blob) else 1.0)
-            for blob, prior in zip(own, priors, strict=True)
-        ]
         track = self._tracks[color]
-        if track is None:
-            return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
-        if len(own) > 1 and track.stationary_frames >= _STATIONARY_FRAMES:
+        priors = [self._prior(color, blob, blobs, stamp_ns) for blob in own]
+        if track is not None and len(own) > 1 and track.stationary_frames >= _STATIONARY_FRAMES:
             # What has not moved for a while may be static background; among others it has no
             # advantage.
             priors = [min(prior, _REACQUISITION_PRIOR) for prior in priors]
-        if len(own) > 1:
-            factors = self._carried.prior_factors(color, len(own))
-            priors = [prior * factor for prior, factor in zip(priors, factors, strict=True)]
+        factors = self._carried.prior_factors(color, len(own))
+        priors = [
+            prior * factor * (_ROOM_FACTOR if like_room(blob) else 1.0)
+            for blob, prior, factor in zip(own, priors, factors, strict=True)
+        ]
+        if track is None:
+            return [Candidate(blob, prior) for blob, prior in zip(own, priors, strict=True)]
         partly_occluded = [
             track.is_at(blob, stamp_ns) and blob.area_px < track.area_px for blob in own
         ]
