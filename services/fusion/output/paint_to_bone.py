@@ -47,12 +47,12 @@ _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
 # A hand that the tables' model fits badly has other fingers and other paint than the model, too:
 # none of that from the first of these misfits (HandPose.model_misfit) down, so many radii from the
 # second up, and no more, so that what this makes of a pose cannot grow by itself. Hands that the
-# simulator drew have .1 to .9, recorded ones 1.1 to 3.6. Chosen on the other renderer's tuning half
-# and on our own: at lag 2 mean NEES of the former 1.5, 1.4, 4.5 and 4.3 without, .7, .6, 1.5 and
-# 1.7 with it (98, 97, 59 and 66 % within three sigmas, 100, 99, 100 and 90); of recorded hands in
-# our own pictures 2.3 and 1.0, .7 and .5; of others as without. With (.6, 1.0) and .15 radii it was
-# .6, .6, 1.4 and 1.3, and of a small adult .32 instead of .40.
-_MISFITS, _UNLIKE_SHAPE = (0.7, 1.2), 0.14
+# simulator drew by the tables have medians of .1 to .4, people of other sizes .6 and .7, recorded
+# ones of ours 1.3 and 3.2; of the other renderer .5 to 5.5, three of eleven below .7. Median NEES
+# without lag of six of these with (.7, 1.2) and with (.4, .8): 5.7, 2.5, 2.1, 1.2, 1.3, 2.5 and
+# 3.2, 1.4, .9, .8, 1.1, 1.4; within three sigmas 43 to 85 % and 56 to 100 %; of our people of other
+# sizes .40, .37 and .26, .16, of the others as before (all on tuning halves).
+_MISFITS, _UNLIKE_SHAPE = (0.4, 0.8), 0.14
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
 # Abduction alone turns a finger sideways. Against the root mean square over a digit's angles, which
