@@ -3,6 +3,7 @@
 A thing in a room may be as near to the other markers and as large as the marker that it is taken
 for. It does not move with them. That a blob stands still says nothing by itself: a finger may lie
 on a table while the others move. It does beside another blob of the colour that is carried along.
+What only one direction shows to stand still, as a wrist about which a hand turns does, moves.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ Way = tuple[float, float]
 # So far the hand must have gone along an axis while a blob was followed, cells, to tell: half a
 # marker's width.
 _TOLD_CELLS = 6.0
-# What stands still keeps one of its two edges across that axis to so many cells, whatever the hand
-# covers or uncovers of it. Both edges of what is carried along go this share of the hand's way, or
-# more: fingers move by themselves, too.
+# What stands still keeps one of its two edges across each axis to so many cells, whatever the hand
+# covers or uncovers of it. (Of the axis of the hand's way alone: 11 of 984 dabs of a hard room lost
+# for specks.) Both edges of what is carried along go this share of the hand's way, or more: fingers
+# move by themselves, too.
 _STILL_CELLS, _CARRIED_SHARE = 1, 0.5
 # A blob is the one of the frame before when it is within so much of where that was, or of where the
 # hand carried it, cells and share of the hand's way.
@@ -47,15 +49,15 @@ class _Followed(NamedTuple):
 
     def next(self, rect: Rect, hand: Way) -> _Followed:
         """The same blob a frame later."""
-        hand_way = hand[0] - self.hand_from[0], hand[1] - self.hand_from[1]
-        axis = 0 if abs(hand_way[0]) >= abs(hand_way[1]) else 1
-        way = hand_way[axis]
-        carried = self.carried
-        if abs(way) >= _TOLD_CELLS:
-            edges = [rect[side] - self.first[side] for side in (axis, axis + 2)]
-            if min(map(abs, edges)) <= _STILL_CELLS:
+        ways = hand[0] - self.hand_from[0], hand[1] - self.hand_from[1]
+        axis = 0 if abs(ways[0]) >= abs(ways[1]) else 1
+        edges = [[rect[side] - self.first[side] for side in (n, n + 2)] for n in (0, 1)]
+        stayed = all(min(map(abs, of)) <= _STILL_CELLS for of in edges)
+        carried = self.carried if stayed or self.carried else None
+        if abs(ways[axis]) >= _TOLD_CELLS:
+            if stayed:
                 carried = False
-            elif min(edge / way for edge in edges) >= _CARRIED_SHARE:
+            elif min(edge / ways[axis] for edge in edges[axis]) >= _CARRIED_SHARE:
                 carried = True
         return _Followed(rect, self.first, self.hand_from, carried)
 

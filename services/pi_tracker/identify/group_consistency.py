@@ -18,6 +18,9 @@ from services.pi_tracker.image.blob import Blob
 _REACH_WIDTHS = 14.0
 # Tips seen end on or half occluded and a dab on the wrist seen in full differ in area up to this.
 _SIZE_RATIO = 4.0
+# Within that, those of one size are likelier to be one hand's: power of the ratio of areas. With 0 a
+# thing of four times a dab's size was the dab in the first five pictures of a hard room.
+_LIKE_SIZE = 0.2
 # Weight of the priors beside the pairs' consistency, so that lone markers count.
 _PRIOR_WEIGHT = 0.01
 
@@ -71,7 +74,7 @@ def _partner(anchor: Candidate, own: Sequence[Candidate]) -> Candidate | None:
     """The candidate of a colour that is most consistent with the anchor; of its own, itself."""
     if any(candidate is anchor for candidate in own):
         return anchor
-    return max(own, key=lambda c: c.prior * _pair_consistency(anchor.whole, c.whole), default=None)
+    return max(own, key=lambda c: c.prior * _pair_weight(anchor.whole, c.whole), default=None)
 
 
 def _set_score(members: Sequence[Candidate]) -> float:
@@ -79,7 +82,7 @@ def _set_score(members: Sequence[Candidate]) -> float:
     score = _PRIOR_WEIGHT * sum(member.prior for member in members)
     for i, a in enumerate(members):
         for b in members[:i]:
-            score += _pair_consistency(a.whole, b.whole) * a.prior * b.prior
+            score += _pair_weight(a.whole, b.whole) * a.prior * b.prior
     return score
 
 
@@ -96,3 +99,9 @@ def _pair_consistency(a: Blob, b: Blob) -> float:
     # Of two sizes the smaller one is less often wrong: background and blur make blobs large.
     nearness = 1.0 / (1.0 + (distance2 / (_REACH_WIDTHS**2 * smaller)) ** 2)
     return nearness * min(1.0, _SIZE_RATIO * smaller / larger)
+
+
+def _pair_weight(a: Blob, b: Blob) -> float:
+    """Their consistency, more of those of like sizes: to choose between sets, not to judge one."""
+    smaller, larger = sorted((a.area_px, b.area_px))
+    return _pair_consistency(a, b) * (smaller / max(larger, 1.0)) ** _LIKE_SIZE
