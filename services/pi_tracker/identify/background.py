@@ -120,8 +120,8 @@ class BackgroundModel:
         sightings = self._sightings[part]
         waiting = (sightings > 0) & (sightings < _STATIC_SIGHTINGS)
         rows, columns = np.nonzero(seen | waiting)
-        self.settled = not len(rows)
-        if self.settled:
+        if not len(rows):
+            self.settled = True
             return
         self._empty = False
         luma, chroma = image.cells(region)
@@ -135,9 +135,9 @@ class BackgroundModel:
         after[replaced] = now[replaced]
         mean[rows, columns] = after
         # What waited, and has changed without being seen, is forgotten.
-        sightings[rows, columns] = np.where(
-            own, np.maximum(counted, 1), np.where(agrees, counted, 0)
-        )
+        counted = np.where(own, np.maximum(counted, 1), np.where(agrees, counted, 0))
+        sightings[rows, columns] = counted
+        self.settled = not ((counted > 0) & (counted < _STATIC_SIGHTINGS)).any()
         self._seen_since_sweep[part] |= seen
 
     def _foreground_of(self, image: Picture, blob: Blob, noise: Noise) -> list[Blob]:
