@@ -7,7 +7,7 @@ for all cameras: that shifts a landmark sideways and leaves its depth alone. Wha
 paint bleeds into its blurred edge, differently for each camera: that is an error of disparity, and
 it stays as long as the marker keeps its place before the background.
 
-So the filter gets the white part, and what is suddenly there, and the two others are added to its covariance when points are
+So the filter gets the white part, and the two others are added to its covariance when points are
 put out. Landmarks without extent (synthetic points) have white noise only. An estimate needs a
 marker's latest sigma; before the first view it counts as 0.
 """
@@ -32,13 +32,6 @@ from services.fusion.intake.observations import View
 # .16 px at 0.5 m; sigma_px is .08 and .15-.3 there, much of it light. Taking all of it for noise
 # made playing fingers at half a metre 1.95 mm RMS without lag, this 1.49, and nothing worse.
 WHITE_PX, WHITE_SHARE = 0.1, 0.2
-# What of a sigma exceeds this multiple of the marker's usual one is as new as itself: all of it is
-# noise. A blob that a poster's cells or a shadow's edge changed for one frame moved points by 19 mm.
-# Tuning halves, geometric means over what they were without it, RMS and maximum without lag and at
-# two frames: our pictures .994, .968, .993, .965, the other renderer's .981, .916, .994, .966. With
-# 1.4 1.001 and .97 of the latter without lag, with 4 .982 and .912, and .998 and .98 to .99 at two
-# frames of both.
-_SUDDEN = 2.0
 # Systematic, each camera's own: depths of resting hands are .27-.34 mm off on average at .5 m and
 # 1.06-1.15 at 1.0 m (seeds 1-4, 5-8), .026-.03 px of each view. Squared error over variance is then
 # .85-.97 and .81-.88 for resting hands, .88-1.0 for moving ones.
@@ -97,12 +90,9 @@ def _white_sigmas(
     """SystematicError.white_sigmas to white (n,); floor: WHITE_PX in the rays' units."""
     for n in range(landmarks.shape[0]):
         row, sigma = landmarks[n], sigmas[n]
-        usual = running[row] if running[row] > 0.0 else sigma
-        running[row] = (1.0 - _NEW) * usual + _NEW * sigma
+        running[row] = sigma if running[row] == 0.0 else (1.0 - _NEW) * running[row] + _NEW * sigma
         if extended[row]:
-            sudden = max(sigma - _SUDDEN * usual, 0.0)
-            steady = min(sigma, math.hypot(floor, WHITE_SHARE * (sigma - sudden)))
-            sigma = math.hypot(steady, sudden)
+            sigma = min(sigma, math.hypot(floor, WHITE_SHARE * sigma))
         white[n] = math.hypot(sigma, hidden[n])
 
 

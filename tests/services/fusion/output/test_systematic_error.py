@@ -68,20 +68,6 @@ def test_only_a_part_of_a_large_sigma_is_noise(errors):
     assert errors.white_sigmas(view(0.05), np.zeros(2))[0] * FOCAL_PX == pytest.approx(0.05)
 
 
-def test_a_sudden_sigma_is_noise_but_for_what_is_usual(errors):
-    for _ in range(100):
-        errors.white_sigmas(view(0.3), np.zeros(2))
-    usual_px, _ = errors.white_sigmas(view(0.6), np.zeros(2)) * FOCAL_PX
-    assert usual_px == pytest.approx(np.hypot(WHITE_PX, 0.6 * WHITE_SHARE), rel=0.05)
-    sudden_px, point_px = errors.white_sigmas(view(2.0), np.zeros(2)) * FOCAL_PX
-    assert sudden_px == pytest.approx(2.0 - 2.0 * 0.33, rel=0.1)
-    assert point_px == pytest.approx(2.0)
-    # What lasts becomes usual.
-    for _ in range(100):
-        lasting_px, _ = errors.white_sigmas(view(2.0), np.zeros(2)) * FOCAL_PX
-    assert lasting_px == pytest.approx(np.hypot(WHITE_PX, 2.0 * WHITE_SHARE), rel=0.01)
-
-
 def test_own_errors_are_disparity_and_shared_ones_are_not(errors):
     for _ in range(100):
         errors.white_sigmas(view(0.2), np.zeros(2))
