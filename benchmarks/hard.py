@@ -168,7 +168,9 @@ def main() -> None:
         "--frames", type=int, default=10_000, help="of all cameras and seeds together"
     )
     parser.add_argument("--seeds", type=int, default=5, help="different rooms and motions")
-    parser.add_argument("--first-seed", type=int, default=1, help="1 to 5 were tuned on")
+    parser.add_argument(
+        "--first-seed", type=int, default=1, help="1 to 5 and 11 to 13 were tuned on"
+    )
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     cv2.setNumThreads(1)

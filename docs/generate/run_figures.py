@@ -70,8 +70,8 @@ RUNS = {
     "hard": _script("hard", "--seeds 2", "--frames 8 --seeds 1", 8),
     "hard_other_rooms": _script(
         "hard",
-        "--first-seed 11 --seeds 1 --frames 1000",
-        "--first-seed 11 --seeds 1 --frames 8",
+        "--first-seed 21 --seeds 3 --frames 3000",
+        "--first-seed 21 --seeds 3 --frames 24",
         6,
     ),
     "held_out": _script("held_out", "", "--family skin", 8),

@@ -3,7 +3,6 @@
 A thing in a room may be as near to the other markers and as large as the marker that it is taken
 for. It does not move with them. That a blob stands still says nothing by itself: a finger may lie
 on a table while the others move. It does beside another blob of the colour that is carried along.
-What only one direction shows to stand still, as a wrist about which a hand turns does, moves.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from services.pi_tracker.image.planes import Rect
 # Cells along x and y.
 Way = tuple[float, float]
 
-# So far the hand must have gone along an axis while a blob was followed, cells, to tell: half a
-# marker's width.
+# Set by what was seen in two clips of the other renderer, all of these, not swept. So far the hand
+# must have gone along an axis while a blob was followed, cells, to tell: half a marker's width.
 _TOLD_CELLS = 6.0
 # What stands still keeps one of its two edges across each axis to so many cells, whatever the hand
 # covers or uncovers of it. (Of the axis of the hand's way alone: 11 of 984 dabs of a hard room lost
@@ -96,11 +95,11 @@ class CarriedBlobs:
         for own in self._followed:
             own.clear()
 
-    def prior_factors(self, color: int, count: int) -> list[float]:
+    def prior_factors(self, color: int) -> list[float]:
         """Factors of the priors of a colour's blobs, in the order in which they were followed."""
         own = self._followed[color]
-        if len(own) != count or not any(one.carried for one in own):
-            return [1.0] * count
+        if not any(one.carried for one in own):
+            return [1.0] * len(own)
         return [_STILL_FACTOR if one.carried is False else 1.0 for one in own]
 
     def _next(self, rect: Rect, before: Sequence[_Followed], moved: Way) -> _Followed:

@@ -48,9 +48,8 @@ _STATIONARY_FRAMES = 4
 # Factor of a prior where the blob may be the rim of another's paint, unless it is where the marker
 # itself must be by now (Track.is_at): half occluded by the other.
 _RIM_FACTOR = 0.3
-
-
-# ... where it has the colour of things in the room: those may be a part that a hand uncovers.
+# Factor of a prior where the blob has the colour of known things beside it, and may be a part of
+# them that a hand uncovers: what is like its track is taken all the same, nothing else.
 _ROOM_FACTOR = 0.5
 
 
@@ -222,7 +221,7 @@ class MarkerIdentity:
             # What has not moved for a while may be static background; among others it has no
             # advantage.
             priors = [min(prior, _REACQUISITION_PRIOR) for prior in priors]
-        factors = self._carried.prior_factors(color, len(own))
+        factors = self._carried.prior_factors(color)
         priors = [
             prior * factor * (_ROOM_FACTOR if like_room(blob) else 1.0)
             for blob, prior, factor in zip(own, priors, factors, strict=True)
