@@ -102,10 +102,11 @@ def write_rig(folder: Path, rig: SyntheticRig) -> Path:
 
 
 @contextlib.contextmanager
-def running(folder: Path, recording: Recording, *, direct: bool) -> Iterator[str]:
-    """The router, fusion, the solver and two bare relays as processes; the router's endpoint.
+def running(folder: Path, recording: Recording, *, apart: bool, direct: bool) -> Iterator[str]:
+    """The router, fusion with the solver and two bare relays as processes; the router's endpoint.
 
-    direct: peers without a router; the endpoint is that of their hub.
+    apart: the solver has a process of its own. direct: peers without a router; the endpoint is that
+    of their hub.
     """
     port = free_port()
     endpoint = f"tcp/127.0.0.1:{port}"
@@ -120,8 +121,8 @@ def running(folder: Path, recording: Recording, *, direct: bool) -> Iterator[str
         (peer, "hub", endpoint)
         if direct
         else ("-m", "services.cli", "router", "--listen", endpoint),
-        (*run, "services.fusion", *common),
-        (*run, "services.solver", *common),
+        (*run, "services.fusion", *([] if apart else ["--solve"]), *common),
+        *([(*run, "services.solver", *common)] if apart else []),
         (*run, "latency_relay", endpoint, *BARE_KEYS[:2], str(folder / "points")),
         (*run, "latency_relay", endpoint, *BARE_KEYS[1:], str(folder / "pose")),
     ]

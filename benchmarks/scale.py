@@ -1,16 +1,16 @@
-"""Many rigs on one machine: one fusion and one solver for all of them.
+"""Many rigs on one machine: one fusion, which solves as well, for all of them.
 
     python benchmarks/scale.py [--rigs 1 4 16 32 64] [--fps 30 60] [--routers 1 2] [--seconds 10]
-                               [--one-process] [--json FILE]
+                               [--one-process] [--apart] [--json FILE]
 
-Real processes: routers (two are joined, with half of the rigs each), rhot-fusion and rhot-solver
-with a folder of rig.toml files (--one-process: fusion in one, also where it would take several).
-Two cameras' markers of every rig are put at the pace of their stamps, no two rigs in step. Of each
-combination:
+Real processes: routers (two are joined, with half of the rigs each), `rhot-fusion --solve` with a
+folder of rig.toml files (--one-process: in one, also where it would take several; --apart: without
+--solve, and rhot-solver beside it). Two cameras' markers of every rig are put at the pace of their
+stamps, no two rigs in step. Of each combination:
     poses      share of the poses that are due (a replay of the same frames tells how many) and
                came
     p50, p99   ms from the put of the frame that a pose is due with to the callback that has it
-    core       processor time of router, fusion and solver, as shares of one core
+    core       processor time of routers, and of fusion and solver, as shares of one core
     us/frame   the same for each frame of markers
     MB         memory of fusion and solver together, and by how much each further rig adds to it
     offered    frames that were put, of those that should have been: less than 1 means that this
@@ -159,11 +159,14 @@ def instant_ns(frame: MarkerFrame) -> int:
     return frame.stamp_ns + round(0.5 * (frame.size_px[1] - 1) * frame.row_time_ns)
 
 
-def measure(recording: Recording, rigs: int, routers: int, one_process: bool) -> dict[str, float]:
+def measure(
+    recording: Recording, rigs: int, routers: int, *, one_process: bool, apart: bool
+) -> dict[str, float]:
     """One combination."""
+    how = {"one_process": one_process, "apart": apart}
     with (
         tempfile.TemporaryDirectory() as folder,
-        running(Path(folder), recording.rig, rigs, routers, one_process=one_process) as machine,
+        running(Path(folder), recording.rig, rigs, routers, **how) as machine,
     ):
         feed = Feed(machine.endpoints, recording, rigs)
         feed.wait(60.0 + 2.0 * rigs)
@@ -178,13 +181,13 @@ def used(machine: Machine, frames: int) -> dict[str, float]:
     cores = machine.cores()
     found = {f"{name}_core": share for name, share in cores.items()}
     found["us_per_frame"] = machine.elapsed_s() * sum(cores.values()) / frames * 1e6
-    found["memory_mb"] = sum(machine.memory_mb(name) for name in SERVICES)
+    found["memory_mb"] = machine.memory_mb("services")
     return found
 
 
 def show(fps: float, routers: int, rigs: int, found: dict[str, float]) -> str:
     """A row of the table."""
-    cores = " ".join(f"{found[f'{name}_core']:5.2f}" for name in ("router", "fusion", "solver"))
+    cores = " ".join(f"{found[f'{name}_core']:5.2f}" for name in ("router", "services"))
     return (
         f"{fps:4.0f} {routers:7d} {rigs:5d} {100.0 * found['poses']:7.2f} {found['p50_ms']:6.2f} "
         f"{found['p99_ms']:7.2f} {found['max_ms']:7.1f}  {cores} {found['us_per_frame']:8.0f} "
@@ -200,13 +203,14 @@ def main() -> None:
     parser.add_argument("--routers", type=int, nargs="+", choices=(1, 2), default=[1, 2])
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--one-process", action="store_true")
+    parser.add_argument("--apart", action="store_true")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     # What a time limit ends must end its processes.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     print(
         f"{'fps':>4} {'routers':>7} {'rigs':>5} {'poses %':>7} {'p50 ms':>6} {'p99':>7} {'max':>7}"
-        f"  {'core: router fusion solver':>17} {'us/frame':>8} {'MB':>4} {'MB/rig':>7} "
+        f"  {'core: both':>11} {'us/frame':>8} {'MB':>4} {'MB/rig':>7} "
         f"{'offered':>7}"
     )
     results: dict[str, dict[str, dict[str, dict[str, float]]]] = {}
@@ -217,7 +221,8 @@ def main() -> None:
             for rigs in options.rigs:
                 if rigs < routers:
                     continue
-                found = measure(recording, rigs, routers, options.one_process)
+                how = {"one_process": options.one_process, "apart": options.apart}
+                found = measure(recording, rigs, routers, **how)
                 first = first or (rigs, found["memory_mb"])
                 more = max(rigs - first[0], 1)
                 found["mb_per_rig"] = (found["memory_mb"] - first[1]) / more

@@ -1,4 +1,4 @@
-"""The machine of benchmarks/scale.py: routers, one fusion and one solver for all rigs."""
+"""The machine of benchmarks/scale.py: routers, one fusion, which solves as well, for all rigs."""
 
 from __future__ import annotations
 
@@ -76,9 +76,11 @@ class Machine:
 
 @contextlib.contextmanager
 def running(
-    folder: Path, rig: SyntheticRig, rigs: int, routers: int, *, one_process: bool
+    folder: Path, rig: SyntheticRig, rigs: int, routers: int, *, one_process: bool, apart: bool
 ) -> Iterator[Machine]:
-    """All processes; the rigs take turns with the routers. one_process: of fusion."""
+    """All processes; the rigs take turns with the routers. one_process: of fusion; apart: the
+    solver has its own.
+    """
     machine = Machine([free_endpoint() for _ in range(routers)])
     configs = folder / "rigs"
     configs.mkdir()
@@ -116,9 +118,11 @@ def running(
             )
             start("router", "services.cli", "router", "--config", str(file))
             _wait_for(endpoint)
-        together = ["--one-process"] if one_process else []
-        start("fusion", "services.fusion", "--config", str(configs), *together)
-        start("solver", "services.solver", "--config", str(configs))
+        options = ["--one-process"] if one_process else []
+        options += [] if apart else ["--solve"]
+        start("services", "services.fusion", "--config", str(configs), *options)
+        if apart:
+            start("services", "services.solver", "--config", str(configs))
         yield machine
 
 

@@ -19,7 +19,7 @@ readonly KEEP_VERSIONS=3
 usage() {
     cat <<'TEXT'
 install.sh pi CAMERA... --master HOST [options]   a Raspberry Pi with cameras
-install.sh master [options]                       router, fusion, solver, viewer, recorder
+install.sh master [options]                       router, fusion and solver, viewer, recorder
 install.sh rig NAME --config FILE [--pki DIR]     one more rig that this master serves
 install.sh rig NAME --remove                      it serves that rig no more
 install.sh upgrade [--wheels DIR]                 a new version, the same roles
@@ -317,6 +317,18 @@ put_units() {
     while IFS= read -r -d '' file; do
         put "$from/$file" "$UNITS/$file" 644 root
     done < <(cd "$from" && find . -type f -printf '%P\0' | sort -z)
+    for file in "$UNITS"/rhot-*.service; do
+        if [[ -f $file && ! -f $from/${file##*/} ]]; then
+            change "take away ${file##*/}, which this version does not have" retire "${file##*/}"
+        fi
+    done
+}
+
+# What it did, another unit does now: it is to be over before that starts.
+retire() {
+    if booted; then systemctl stop "$1"; fi
+    systemctl disable --quiet "$1" 2>/dev/null || true
+    rm -f -- "$UNITS/$1"
 }
 
 # Units that each user may start: SteamVR belongs to who is logged in.
@@ -471,7 +483,7 @@ wanted_units() {
             rig_says units "$ETC/rig.toml" "$RIGS"
             for rig in $(rig_names); do units_of_rig "$rig"; done
         else
-            printf 'rhot-%s.service\n' router fusion solver viewer
+            printf 'rhot-%s.service\n' router fusion viewer
         fi
     fi
     for camera in $CAMERAS; do printf 'rhot-pi-tracker@%s.service\n' "$camera"; done
@@ -765,6 +777,8 @@ rollback() {
     grep -vxF -- "$before" "$ROOT/history" | head -n -1 >"$ROOT/history.new" || true
     printf '%s\n' "$before" >>"$ROOT/history.new"
     mv -f -- "$ROOT/history.new" "$ROOT/history"
+    # The version before may have units that the one after it did without.
+    enable_units
     start_units
     say "rhot $before runs again. \`install.sh upgrade\` goes forward."
 }

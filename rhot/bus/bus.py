@@ -127,6 +127,15 @@ class Bus:
         self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
         self._tasks = Tasks(self._loop)
+        self._beside: list[Bus] = []
+
+    def beside(self) -> Bus:
+        """A bus of streams of its own over the same session, for another service of this process:
+        what one of them publishes, the other one gets without the router. It ends with this one.
+        """
+        other = Bus(self.rig, self._session, self._rounds)
+        self._beside.append(other)
+        return other
 
     @property
     def routers(self) -> list[str]:
@@ -293,6 +302,8 @@ class Bus:
 
     def stop(self) -> None:
         """Undeclare everything and end every iteration over it."""
+        for other in self._beside:
+            other.stop()
         self._tasks.cancel()
         for entity in self._open:
             with contextlib.suppress(zenoh.ZError):

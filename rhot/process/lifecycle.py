@@ -20,7 +20,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping, Sequence
+from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -28,15 +28,12 @@ from typing import Any
 
 import msgspec
 
-from rhot.bus.bus import open_bus
 from rhot.bus.intake.rounds import Rounds
-from rhot.bus.security.credentials import client_endpoints
 from rhot.errors import ConfigError, RhotError, disk_full, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
 from rhot.process.allocator import share_one_heap
 from rhot.process.calibration_watch import CalibrationChangedError
-from rhot.process.certificate_watch import watch_certificate
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
 from rhot.process.options import command_for, is_much, service_parser
@@ -44,10 +41,8 @@ from rhot.process.restart_hold import hold_back
 from rhot.process.rigs.files import have_own_names, load_of, rig_files
 from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.rigs.shares import in_shares, keep_shares
-from rhot.process.service import Service
+from rhot.process.served import Companion, Serve, Served
 from rhot.process.thread_turns import keep_the_turn
-
-Serve = Callable[[Service], Awaitable[None]]
 
 log = logging.getLogger("rhot.lifecycle")
 
@@ -65,6 +60,7 @@ def command(
     variants: Mapping[str, tuple[str, str]] = MappingProxyType({}),
     several_rigs: bool = False,
     rigs_a_process: int | None = None,
+    companion: Companion | None = None,
 ) -> None:
     """The whole main() of a service: options, imports, logging, loop, exit code.
 
@@ -74,12 +70,18 @@ def command(
     required. variants are options without a value: each with the coroutine that it runs instead,
     and its help. several_rigs: --config may be given more than once, or be a folder; of more than
     rigs_a_process of two cameras at 30 fps each share has a process (rhot/process/rigs/shares.py).
+    companion: what the process serves as well, if asked (rhot/process/served.py).
     """
     # Before anything starts a thread.
     share_one_heap()
     program = _program(name)
     parser = service_parser(
-        program, about, instance_option, several_rigs=several_rigs, rigs_a_process=rigs_a_process
+        program,
+        about,
+        instance_option,
+        several_rigs=several_rigs,
+        rigs_a_process=rigs_a_process,
+        companion=companion,
     )
     for option, (function, text) in variants.items():
         parser.add_argument(
@@ -96,30 +98,23 @@ def command(
     together = rigs_a_process is not None and options.one_process
     several = several_rigs and (together or _are_several(options.config))
     if several and len(shares := _shares(options, rigs_a_process)) > 1:
-        sys.exit(_run_shares(name, options, shares))
+        sys.exit(_run_shares(name, options, companion, shares))
     try:
         serve: Serve = getattr(importlib.import_module(module), options.serve)
+        beside = companion.imported() if companion and options.accompanied else None
+        served = Served(name, options.name, serve, beside)
     except ModuleNotFoundError as error:
         missing = missing_extra(error, program)
         if missing is None:
             raise
         parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
     if several:
-        given = options.config, serve, options.connect
-        sys.exit(run_several(name, options.name, *given, in_rounds=options.rounds))
-    config = options.config[0]
-    code = run(name, options.name, config, serve, options.connect, keeps_turn=several_rigs)
-    sys.exit(code)
+        sys.exit(run_several(served, options.config, options.connect, in_rounds=options.rounds))
+    sys.exit(run(served, options.config[0], options.connect, keeps_turn=several_rigs))
 
 
 def run(
-    name: str,
-    instance: str,
-    config_path: Path,
-    serve: Serve,
-    connect: Sequence[str] = (),
-    *,
-    keeps_turn: bool = False,
+    served: Served, config_path: Path, connect: Sequence[str] = (), *, keeps_turn: bool = False
 ) -> int:
     """Run a service to its end; its exit code. connect replaces the endpoints of rig.toml.
 
@@ -131,9 +126,9 @@ def run(
     try:
         config = _load(config_path, connect)
         files = [config_path, config.calibration_dir]
-        run_loop(_live(_serve_rig(name, instance, config, serve), keeps_turn))
+        run_loop(_live(served.serve_rig(config), keeps_turn))
     except Exception as error:
-        code = _explain(error, name, instance)
+        code = _explain(error, served.name, served.instance)
         if code != EXIT_AGAIN:
             hold_back(error, time.monotonic() - started_s, files)
         return code
@@ -143,13 +138,7 @@ def run(
 
 
 def run_several(
-    name: str,
-    instance: str,
-    paths: Sequence[Path],
-    serve: Serve,
-    connect: Sequence[str] = (),
-    *,
-    in_rounds: bool = False,
+    served: Served, paths: Sequence[Path], connect: Sequence[str] = (), *, in_rounds: bool = False
 ) -> int:
     """Run a service for all rigs of these files and folders, each on its own; its exit code.
 
@@ -158,15 +147,15 @@ def run_several(
     rounds: Rounds | None = None
     keeper = RigKeeper(
         lambda path: _load(path, connect),
-        lambda config: _serve_rig(name, instance, config, serve, rounds),
-        lambda error: _explain(error, name, instance) == EXIT_AGAIN,
+        lambda config: served.serve_rig(config, rounds),
+        lambda error: _explain(error, served.name, served.instance) == EXIT_AGAIN,
     )
     try:
         files = rig_files(paths)
         rounds = Rounds() if in_rounds or is_much(load_of(files)) else None
         run_loop(_live(keeper.keep_all(files), keeps_turn=True))
     except Exception as error:
-        return _explain(error, name, instance)
+        return _explain(error, served.name, served.instance)
     finally:
         systemd.notify("STOPPING=1")
     return EXIT_OK
@@ -192,11 +181,16 @@ def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:
     return in_shares(files, math.ceil(load_of(files) / most))
 
 
-def _run_shares(name: str, options: argparse.Namespace, shares: list[list[Path]]) -> int:
+def _run_shares(
+    name: str,
+    options: argparse.Namespace,
+    companion: Companion | None,
+    shares: list[list[Path]],
+) -> int:
     """Run a process for each share of a service's rigs; the exit code of this one."""
     try:
         rounds = options.rounds or is_much(sum(map(load_of, shares)))
-        work = keep_shares(shares, partial(command_for, options, rounds))
+        work = keep_shares(shares, partial(command_for, options, companion, rounds))
         run_loop(_live(work, keeps_turn=False, feeds=False))
     except Exception as error:
         return _explain(error, name, options.name)
@@ -256,23 +250,6 @@ async def _live(work: Coroutine[Any, Any, None], keeps_turn: bool, feeds: bool =
             finally:
                 if turn is not None:
                     turn.cancel()
-
-
-async def _serve_rig(
-    name: str, instance: str, config: RigConfig, serve: Serve, rounds: Rounds | None = None
-) -> None:
-    """Run the service for one rig, with a bus, a task group and health of its own."""
-    async with (
-        open_bus(config.rig.name, client_endpoints(config), rounds=rounds) as bus,
-        asyncio.TaskGroup() as tasks,
-    ):
-        service = Service(name, instance, config, bus, tasks)
-        company = (service.beat(), service.listen(), watch_certificate(service))
-        companions = [tasks.create_task(one) for one in company]
-        await serve(service)
-        # A source that ended (a file, a replay) ends its service; what keeps it company goes too.
-        for task in companions:
-            task.cancel()
 
 
 @contextlib.asynccontextmanager

@@ -2,9 +2,9 @@
 
 RHOT_LOG_FORMAT is `text` (the default) or `json`; RHOT_LOG sets the level (default info). Text has
 the time, except in the journal, which has its own; there each line begins with its priority
-(sd-daemon(3)). Where a process serves several rigs, the line names the rig. One record is one line,
-and control characters of strangers' texts are spaces; only a traceback, which is a bug's, has
-several.
+(sd-daemon(3)). Where a process serves several rigs, the line names the rig; where it serves another
+service as well, what that one says names it. One record is one line, and control characters of
+strangers' texts are spaces; only a traceback, which is a bug's, has several.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TextIO
 
 from rhot.errors import ConfigError
 from rhot.plain_text import printable
-from rhot.process.rigs.context import RIG
+from rhot.process.rigs.context import RIG, SERVICE, who
 
 FORMAT = "RHOT_LOG_FORMAT"
 _FORMATS = ("text", "json")
@@ -88,8 +88,8 @@ class _JsonLines(logging.Formatter):
             "who": self._who,
             "text": printable(record.getMessage()),
         }
-        if rig := RIG.get():
-            line["rig"] = rig
+        names = {"rig": RIG.get(), "service": SERVICE.get()}
+        line |= {what: name for what, name in names.items() if name}
         if record.exc_info:
             line["trace"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)
@@ -114,8 +114,8 @@ class _JournalLines(_Lines):
     """`<4>text`: the journal knows time, host and unit itself."""
 
     def start(self, record: logging.LogRecord) -> str:
-        rig = RIG.get()
-        return f"<{_PRIORITY.get(record.levelname, 6)}>{f'{rig}: ' if rig else ''}"
+        name = who()
+        return f"<{_PRIORITY.get(record.levelname, 6)}>{f'{name}: ' if name else ''}"
 
 
 class _TimedLines(_Lines):
@@ -127,8 +127,7 @@ class _TimedLines(_Lines):
 
     def start(self, record: logging.LogRecord) -> str:
         level = "" if record.levelname == "INFO" else f" {record.levelname.lower()}"
-        rig = f" {RIG.get()}" if RIG.get() else ""
-        return f"{self.formatTime(record, self.datefmt)} {self._who}{rig}{level}: "
+        return f"{self.formatTime(record, self.datefmt)} {who(self._who)}{level}: "
 
 
 class _CommandLines(_Lines):

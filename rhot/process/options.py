@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from rhot.process.served import Companion
 from rhot.process.service import rhot_version
 
 _SEVERAL = "rig.toml; several of them, or a folder of *.toml (or */rig.toml): each rig on its own"
@@ -33,6 +34,7 @@ def service_parser(
     *,
     several_rigs: bool,
     rigs_a_process: int | None = None,
+    companion: Companion | None = None,
 ) -> argparse.ArgumentParser:
     """The options of a service: see rhot.process.lifecycle.command."""
     parser = argparse.ArgumentParser(prog=program, description=about)
@@ -61,16 +63,25 @@ def service_parser(
         parser.add_argument("--rounds", action="store_true", help=_ROUNDS % RIGS_A_PROCESSOR)
     if rigs_a_process is not None:
         parser.add_argument("--one-process", action="store_true", help=_TOGETHER % rigs_a_process)
+    if companion is not None:
+        option = f"--{companion.option}"
+        parser.add_argument(option, dest="accompanied", action="store_true", help=companion.text)
     parser.add_argument("--version", action="version", version=rhot_version())
-    parser.set_defaults(serve="serve", rounds=False, one_process=rigs_a_process is None)
+    parser.set_defaults(
+        serve="serve", rounds=False, one_process=rigs_a_process is None, accompanied=False
+    )
     return parser
 
 
-def command_for(options: argparse.Namespace, rounds: bool, files: Sequence[Path]) -> list[str]:
+def command_for(
+    options: argparse.Namespace, companion: Companion | None, rounds: bool, files: Sequence[Path]
+) -> list[str]:
     """The command that serves some of the rigs in one process, as this one was started."""
     given = len(sys.argv) - 1
     command = [*sys.orig_argv[: len(sys.orig_argv) - given], "--one-process"]
     command += ["--instance", options.name, *(["--rounds"] if rounds else [])]
+    if companion is not None and options.accompanied:
+        command.append(f"--{companion.option}")
     for endpoint in options.connect:
         command += ["--connect", endpoint]
     for file in files:

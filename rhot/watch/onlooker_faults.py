@@ -84,8 +84,9 @@ def _fault(
 
 
 def unit(row: ServiceRow) -> str:
-    """The name of a service's systemd unit."""
-    name = f"rhot-{row.service.replace('_', '-')}"
+    """The name of a service's systemd unit; the solver's is fusion's, whose process solves."""
+    service = "fusion" if row.service == "solver" else row.service
+    name = f"rhot-{service.replace('_', '-')}"
     return f"{name}@{row.instance}" if row.service == "pi_tracker" else name
 
 

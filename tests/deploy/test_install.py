@@ -152,6 +152,22 @@ def test_an_upgrade_and_a_rollback_switch_what_runs(pi):
     assert f"version {old} (current)" in pi.run(RUNS, "status")
 
 
+def test_a_unit_that_the_new_version_does_without_goes(pi):
+    """What it did may be another one's work now, and is not to be done twice."""
+    text = "[Service]\nExecStart=/bin/sleep infinity\n[Install]\nWantedBy=rhot-pi.target\n"
+    pi.run("sh", "-c", f"printf '{text}' >/etc/systemd/system/rhot-former.service")
+    pi.run("systemctl", "daemon-reload")
+    pi.run("systemctl", "enable", "rhot-former.service")
+    # Not waited for: units of rhot say when they are ready, and this one never does.
+    pi.run("systemctl", "start", "--no-block", "rhot-former.service")
+    said = pi.run(INSTALL, "upgrade", "--wheels", "/srv/now", timeout_s=600.0)
+    assert "take away rhot-former.service" in said
+    found = pi.show("rhot-former.service", "ActiveState", "LoadState", "UnitFileState")
+    assert (found["ActiveState"], found["LoadState"]) == ("inactive", "not-found")
+    assert "rhot-former" not in pi.run("ls", "/etc/systemd/system/rhot-pi.target.wants")
+    wait_until_active(pi, UNIT)
+
+
 def test_three_versions_are_kept(pi):
     for name in ("0.0.1-a", "0.0.2-b", "0.0.3-c"):
         pi.run(

@@ -53,7 +53,6 @@ def test_every_service_of_the_rig_has_a_unit():
         "rhot-router.service",
         "rhot-pi-tracker@.service",
         "rhot-fusion.service",
-        "rhot-solver.service",
         "rhot-object-tracker.service",
         "rhot-viewer.service",
         "rhot-calibrator.service",

@@ -113,7 +113,7 @@ async def _played_live(recording: Capture, rate: float) -> Heard:
     logged: list[str] = []
     supervisor = Supervisor(lambda name, level, text: logged.append(f"[{name}] {level}: {text}"))
     config = load_rig(recording.rig_toml)
-    wanted = ("router", "fusion", "solver")
+    wanted = ("router", "fusion")
     children = [
         child
         for child in children_of(config, recording.rig_toml, viewer=False, endpoint=[endpoint])

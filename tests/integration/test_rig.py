@@ -249,7 +249,7 @@ async def test_absurd_but_well_formed_messages_do_no_harm(rig):
 
 
 @pytest.mark.parametrize(
-    "name", ["pi_tracker/left", "fusion", "solver", "simulator", "object_tracker", "router"]
+    "name", ["pi_tracker/left", "fusion", "simulator", "object_tracker", "router"]
 )
 async def test_killing_any_one_process_brings_poses_back_without_touching_the_others(rig, name):
     before = dict(rig.supervisor.pids)

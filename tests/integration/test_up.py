@@ -148,11 +148,10 @@ async def test_new_calibrations_start_anew_who_uses_them(up):
     await up.until(r"\[fusion\] note: rig.json changed: starting again", since=since)
     await up.until(r"\[viewer\] note: rig.json changed: starting again", since=since)
     await a_pose(up)
-    assert "[solver] note" not in up.text[since:]
     since = len(up.text)
     save(up.calibration / "hand.right.json", default_hand("right", 1.02))
-    await up.until(r"\[solver\] note: hand.right.json changed: starting again", since=since)
-    await up.until(r"\[fusion\] note: hand.right.json changed", since=since)
+    await up.until(r"\[fusion\] note: hand.right.json changed: starting again", since=since)
+    await a_pose(up)
 
 
 async def test_ctrl_c_leaves_nothing_behind(up):
@@ -174,7 +173,7 @@ async def test_markers_of_one_camera_are_a_rig(tmp_path):
         port = free_port()
         async with running(config, port, "--no-viewer") as up:
             await up.until(r"rig 'sim' is up after \d+ s", START_S)
-            assert "[solver]" not in up.text
+            assert "solver" not in up.text
             async with open_bus("sim", [f"tcp/127.0.0.1:{port}"]) as bus:
                 async with asyncio.timeout(SOON_S):
                     frame = await anext(bus.latest(topics.MARKERS))

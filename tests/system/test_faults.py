@@ -28,7 +28,6 @@ UNITS = [
     ("right", "rhot-pi-tracker@right"),
     (MASTER, "rhot-router"),
     (MASTER, "rhot-fusion"),
-    (MASTER, "rhot-solver"),
     (MASTER, "rhot-object-tracker"),
     (MASTER, "rhot-viewer"),
     (MASTER, "rhot-recorder"),
@@ -56,13 +55,12 @@ def test_everything_runs_as_installed(rig, watch):
 
 def test_threads_let_the_event_loop_have_its_turn(rig, watch):
     """Also in the sandbox, which forbids most other system calls of that kind."""
-    for unit in ("rhot-fusion", "rhot-solver"):
-        main = rig.master.show(f"{unit}.service", "MainPID")["MainPID"]
-        said = rig.master.run("chrt", "--all-tasks", "--pid", main)
-        policies = re.findall(r"pid (\d+)'s current scheduling policy: (\w+)", said)
-        others = {policy for thread, policy in policies if thread != main}
-        assert dict(policies)[main] == "SCHED_OTHER", said
-        assert others == {"SCHED_BATCH"}, said
+    main = rig.master.show("rhot-fusion.service", "MainPID")["MainPID"]
+    said = rig.master.run("chrt", "--all-tasks", "--pid", main)
+    policies = re.findall(r"pid (\d+)'s current scheduling policy: (\w+)", said)
+    others = {policy for thread, policy in policies if thread != main}
+    assert dict(policies)[main] == "SCHED_OTHER", said
+    assert others == {"SCHED_BATCH"}, said
 
 
 @pytest.mark.parametrize(("host", "unit"), UNITS, ids=[unit for _, unit in UNITS])

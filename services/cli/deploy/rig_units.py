@@ -26,8 +26,6 @@ def master_units(config: RigConfig) -> list[str]:
     always = ("router", "fusion", "viewer", "calibrator", "recorder")
     units += [f"rhot-{name}.service" for name in always]
     units += [f"rhot-pi-tracker@{camera.name}.service" for camera in local]
-    if config.has_depth:
-        units.append("rhot-solver.service")
     if any(camera.source == "simulator" for camera in local):
         units.append("rhot-simulator.service")
     if config.object:
@@ -47,8 +45,7 @@ def user_units(config: RigConfig) -> list[str]:
 def units_of_further_rigs(folder: Path) -> list[str]:
     """Units that serve all rigs of a master, and that rigs beside the first may ask for."""
     rigs = list(filter(None, map(readable_rig, further_rigs(folder))))
-    found = ["rhot-solver.service"] if any(rig.has_depth for rig in rigs) else []
-    return [*found, *(["rhot-object-tracker.service"] if any(rig.object for rig in rigs) else [])]
+    return ["rhot-object-tracker.service"] if any(rig.object for rig in rigs) else []
 
 
 def answer(question: str, config: RigConfig, folder: Path | None = None) -> list[str]:

@@ -35,10 +35,11 @@ _SETTLED_S = 30.0
 
 @dataclass(frozen=True)
 class Child:
-    """A process to keep running."""
+    """A process to keep running, called after the service in it; others may be in it too."""
 
     name: str
     argv: Sequence[str]
+    others: tuple[str, ...] = ()
 
 
 def service_argv(package: str, *options: str) -> list[str]:

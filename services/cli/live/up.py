@@ -1,9 +1,9 @@
 """`rhot up CONFIG`: the master's processes of a real rig, supervised.
 
-These are router, fusion, solver, object tracker, viewer, recorder, metrics and bridges to other
-programs. Cameras whose `host` is empty are tracked on this machine too; those of other hosts run
-`rhot-pi-tracker` there. It says that the rig is up once it is, and otherwise what is missing and
-why.
+These are router, fusion with the solver in its process, object tracker, viewer, recorder, metrics
+and bridges to other programs. Cameras whose `host` is empty are tracked on this machine too; those
+of other hosts run `rhot-pi-tracker` there. It says that the rig is up once it is, and otherwise
+what is missing and why.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def children_of(
         for c in local
     ]
     # Fusion is the master of session and clock, also where markers alone are tracked.
-    for name in ("fusion", "solver") if config.has_depth else ("fusion",):
-        children.append(Child(name, service_argv(name, *common)))
+    fusion = service_argv("fusion", "--solve", *common)
+    children.append(Child("fusion", fusion, ("solver",) if config.has_depth else ()))
     if config.object:
         children.append(Child("object_tracker", service_argv("object_tracker", *common)))
     if config.object and config.objects.source == "steamvr" and not config.objects.host:
@@ -102,5 +102,6 @@ async def _up(config: RigConfig, path: Path, viewer: bool, terminal: Terminal) -
                     f"the {hand} hand was never measured: `rhot calibrate hand {hand} --watch "
                     f"--config {path}` does it while somebody uses the rig"
                 )
-            watch = RigWatch(config, path, [child.name for child in children], terminal.line)
+            services = [name for child in children for name in (child.name, *child.others)]
+            watch = RigWatch(config, path, services, terminal.line)
             await watch.run(supervisor.reasons)

@@ -74,6 +74,8 @@ def parsed(line: str) -> tuple[str, str]:
     try:
         record = json.loads(line)
         text = str(record["text"]) + ("\n" + record["trace"] if "trace" in record else "")
-        return str(record["level"]), text
+        # What another service says in this one's process.
+        whose = f"{record['service']}: " if "service" in record else ""
+        return str(record["level"]), whose + text
     except (json.JSONDecodeError, KeyError, TypeError, RecursionError):
         return "info", line

@@ -51,7 +51,7 @@ def test_the_name_of_a_rig_is_told(tmp_path):
 def test_a_further_rig_asks_for_what_serves_it(tmp_path):
     first, rigs = tmp_path / "rig.toml", tmp_path / "rigs"
     first.write_text(SWITCHED_ON)
-    serves = {"rhot-solver.service", "rhot-object-tracker.service"}
+    serves = {"rhot-object-tracker.service"}
     alone = set(asked("units", first, rigs).stdout.split())
     assert not alone & serves
     for name, text in (
