@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args
 
 from rhot import clock, topics
-from rhot.bus.bus import Bus, open_bus_within
+from rhot.bus.bus import Bus
+from rhot.bus.bus_within import open_bus_within
 from rhot.bus.liveliness import AliveWatch
 from rhot.bus.security.credentials import with_certificates
 from rhot.bus.subscription import Subscription

@@ -40,7 +40,6 @@ from rhot.bus.queries import (
     decoded,
     only_answer,
 )
-from rhot.bus.security.credentials import plain
 from rhot.bus.stats import Direction, StreamStats
 from rhot.bus.subscription import RawSubscription, Sample, Subscription
 from rhot.bus.zenoh_config import client_config, router_config
@@ -59,7 +58,6 @@ __all__ = [
     "Subscription",
     "client_config",
     "open_bus",
-    "open_bus_within",
     "router_config",
 ]
 
@@ -92,26 +90,6 @@ async def open_bus(
         with contextlib.suppress(TimeoutError, zenoh.ZError):
             # Shielded: a session that a second cancellation leaves open keeps the process alive.
             await asyncio.shield(asyncio.wait_for(asyncio.to_thread(session.close), _CLOSE_S))
-
-
-@contextlib.asynccontextmanager
-async def open_bus_within(
-    timeout_s: float | None, rig: str, connect: Sequence[str], advice: str
-) -> AsyncIterator[Bus]:
-    """As open_bus(), for who does not wait for ever: raises BusError if no router answers in time.
-
-    advice: what a person should do then. A certificate that is refused is a BusError at once.
-    """
-    async with contextlib.AsyncExitStack() as stack:
-        try:
-            async with asyncio.timeout(timeout_s):
-                bus = await stack.enter_async_context(
-                    open_bus(rig, connect, despite_certificates=False)
-                )
-        except TimeoutError:
-            found = ", ".join(map(plain, connect))
-            raise BusError(f"no router answers at {found}; {advice}") from None
-        yield bus
 
 
 class Bus:

@@ -7,7 +7,7 @@ mend it, 1: a bug), and systemd or `rhot up` starts it anew. SIGTERM and SIGINT 
 new calibration files end it with code 75, to be started with them at once.
 While the router is away at start, the service waits for it. Fusion, solver, object tracker and
 viewer may serve several rigs (rhot/process/rigs/); no thread interrupts their loop
-(rhot/process/thread_turns.py).
+(rhot/process/threads/thread_turns.py).
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ from rhot.bus.intake.rounds import Rounds
 from rhot.errors import ConfigError, RhotError, disk_full, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.process import logs, systemd
-from rhot.process.allocator import share_one_heap
 from rhot.process.calibration_watch import CalibrationChangedError
 from rhot.process.event_loop import cancelled_by, run_loop, stop_on_signals
 from rhot.process.extras import missing_extra
@@ -42,7 +41,8 @@ from rhot.process.rigs.files import have_own_names, load_of, rig_files
 from rhot.process.rigs.keeper import RigKeeper
 from rhot.process.rigs.shares import in_shares, keep_shares
 from rhot.process.served import Companion, Serve, Served
-from rhot.process.thread_turns import keep_the_turn
+from rhot.process.threads.allocator import share_one_heap
+from rhot.process.threads.thread_turns import keep_the_turn
 
 log = logging.getLogger("rhot.lifecycle")
 

@@ -9,7 +9,8 @@ import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from rhot.bus.bus import Bus, open_bus_within
+from rhot.bus.bus import Bus
+from rhot.bus.bus_within import open_bus_within
 from rhot.bus.security.credentials import client_endpoints, with_certificates
 from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml

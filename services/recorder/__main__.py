@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rhot.process.allocator import keep_large_blocks_apart
 from rhot.process.lifecycle import command
+from rhot.process.threads.allocator import keep_large_blocks_apart
 
 
 def main() -> None:

@@ -23,10 +23,10 @@ from rhot.bus.zenoh_config import router_config, router_settings
 from rhot.errors import BusError, RhotError
 from rhot.files.config import RigConfig
 from rhot.process import systemd
-from rhot.process.allocator import share_one_heap
 from rhot.process.event_loop import cancelled_by, stop_on_signals
 from rhot.process.lifecycle import EXIT_USER, fed_watchdog
 from rhot.process.restart_hold import hold_back
+from rhot.process.threads.allocator import share_one_heap
 from services.cli.live.routed_rigs import (
     check_certificates,
     check_ports,

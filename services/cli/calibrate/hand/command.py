@@ -137,7 +137,7 @@ def _report(made: HandFile, written: Path | None) -> None:
     typer.echo(report_text(made))
     if written is not None:
         typer.echo(
-            f"written: {written}; rhot-fusion and rhot-solver of this rig start again with it"
+            f"written: {written}; fusion and solver of this rig start again with it"
         )
 
 

@@ -21,6 +21,10 @@ def output(lines, before=None):
     [
         ('{"level": "warning", "text": "careful"}', ("warning", "careful")),
         ('{"level": "error", "text": "oops", "trace": "a\\nb"}', ("error", "oops\na\nb")),
+        (
+            '{"level": "info", "who": "fusion/main", "service": "solver", "text": "ready"}',
+            ("info", "solver: ready"),
+        ),
         ("rhot: error: no router can listen", ("error", "no router can listen")),
         ("rhot-viewer: error: needs viser", ("error", "needs viser")),
         ("plain", ("info", "plain")),

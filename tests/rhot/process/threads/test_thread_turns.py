@@ -10,7 +10,7 @@ import pytest
 # How each thread is scheduled: of the loop, of one that was there, and of one that came later.
 POLICIES = """
 import asyncio, os, threading
-from rhot.process.thread_turns import keep_the_turn
+from rhot.process.threads.thread_turns import keep_the_turn
 done = threading.Event()
 def started():
     thread = threading.Thread(target=done.wait)

@@ -11,7 +11,7 @@ import pytest
 # How many heaps there are after eight threads have had memory at the same time.
 HEAPS = """
 import ctypes, sys, threading
-from rhot.process.allocator import share_one_heap
+from rhot.process.threads.allocator import share_one_heap
 if "shared" in sys.argv:
     assert share_one_heap()
 libc = ctypes.CDLL(None)
@@ -34,7 +34,7 @@ libc.fflush(file)
 # By how many bytes the heap grows for a hundred blocks of 64 kB.
 GROWTH = """
 import ctypes, sys
-from rhot.process.allocator import keep_large_blocks_apart
+from rhot.process.threads.allocator import keep_large_blocks_apart
 if "apart" in sys.argv:
     assert keep_large_blocks_apart()
 libc = ctypes.CDLL(None)
