@@ -7,9 +7,15 @@ from stands beside it.
 from __future__ import annotations
 
 # Bone lengths, Buryanov & Kotiuk, "Proportions of Hand Segments", Int. J. Morphol. 28(3), 2010, n =
-# 66: metacarpal, proximal, middle, distal + pulp.
+# 66: metacarpal, proximal, middle, distal + pulp. Not the thumb's: with that metacarpal (46.2) and
+# its distal bone (21.7 + 5.7) it reaches 9 and 14 mm farther than the thumbs of two trackers of
+# hands whose fingers are as long as these (the recorded poses of iwer, 32.5, 33.8, 24.6; the Leap
+# recordings, 40.0, 31.6, 20.0 + pulp); a thumb that is too long bends, and rolls the whole hand.
+# Bones and base are about their mean. benchmarks/unmeasured_posture.py, of the Leap and of the
+# poses: the thumb's last bone off by 35 and 26 -> 23 and 11 deg RMS, orientation by 16.6 and 7.0 ->
+# 14.7 and 6.4, fingers by 23 and 16 -> 23 and 18.
 BONES_MM = {
-    "thumb": (46.2, 31.6, 0.0, 21.7 + 5.7),
+    "thumb": (36.0, 32.5, 0.0, 24.8),
     "index": (68.1, 39.8, 22.4, 15.8 + 3.8),
     "middle": (64.6, 44.6, 26.3, 17.4 + 4.0),
     "ring": (58.0, 41.4, 25.7, 17.3 + 4.0),
@@ -17,9 +23,9 @@ BONES_MM = {
 }
 # Start of the metacarpals in the wrist frame, and their directions (towards the thumb), fitted by
 # eye to the three recorded OpenXR poses of the npm package iwer 2.5.0 (relaxed, point, pinch),
-# mirrored.
+# mirrored; the thumb's between theirs (-20, -25, -38) and the Leap recordings' (-25, -8, -24).
 CARPUS_MM = {
-    "thumb": (-25.0, -14.0, -27.0),
+    "thumb": (-23.0, -16.0, -31.0),
     "index": (-17.0, -6.0, -30.0),
     "middle": (-3.0, -4.0, -31.0),
     "ring": (10.0, -5.0, -30.0),

@@ -89,6 +89,7 @@ RUNS = {
     "solver_markers": _script("solver_markers", "", None, 0.6),
     "tracker": _script("tracker", "", "--frames 90", 1),
     "tracker_compiled": _script("tracker_compiled", "", "--frames 90", 0.3),
+    "unmeasured_posture": _script("unmeasured_posture", "", None, 0.1),
     "video_sync": _script("video_sync", "--seeds 1", "--only clean --seeds 1", 6),
 }
 
