@@ -23,8 +23,11 @@ from rhot.process.service import Service
 from services.solver.step import SolverStep
 from services.solver.warm import warm_up
 
-# Points of one hand that may wait: what fusion, held up by something else, tells in one go.
-_WAITING = 4
+# Points of one hand that may wait: what fusion, held up by something else, tells in one go. In
+# fusion's own process that is all of a burst of 32 frames: of 32 rigs at 60 fps, which are too many
+# for two cores, 60 and 63 % of the poses came with 4 in turn with 86 and 83 with 16. No more: a
+# solver of its own that cannot keep up is late by all that waits.
+_WAITING = 16
 # A challenge, which takes 5 ms, waits so long after its pose: the other hand's points come at once
 # after those of this one, the next ones after 8 ms at the least.
 _CHALLENGE_S = 0.002

@@ -98,7 +98,7 @@ async def test_points_in_poses_out_with_garbage_between(
 async def test_points_that_come_at_once_have_their_poses(
     router: str, tmp_path: Path, world: Callable
 ) -> None:
-    """As from a fusion that something held up: the first of five is skipped."""
+    """As from a fusion that something held up: the first of 17 is skipped."""
     ours = world("right")
     message = ours.message(ours.points(ours.motion(1, 1)[0]), 0)
 
@@ -106,7 +106,7 @@ async def test_points_that_come_at_once_have_their_poses(
         return msgspec.structs.replace(message, seq=seq, stamp_ns=10**18 + seq * 20_000_000)
 
     async with running(router, rig(tmp_path, "right")) as (_, bus):
-        points, poses = bus.publisher(topics.POINTS, hand="right"), bus.every(topics.POSE, 16)
+        points, poses = bus.publisher(topics.POINTS, hand="right"), bus.every(topics.POSE, 32)
         sent = 0
 
         def send() -> None:
@@ -116,7 +116,7 @@ async def test_points_that_come_at_once_have_their_poses(
 
         def send_at_once() -> None:
             """The solver shares this event loop: all of them come before it can take one."""
-            for seq in range(1001, 1006):
+            for seq in range(1001, 1018):
                 points.put(numbered(seq))
             time.sleep(0.5)
 
@@ -125,8 +125,8 @@ async def test_points_that_come_at_once_have_their_poses(
         sender.cancel()
         await asyncio.sleep(0.2)
         send_at_once()
-        told = [seq async for seq in _seqs(poses, 1005)]
-    assert [seq for seq in told if seq > 1000] == [1002, 1003, 1004, 1005]
+        told = [seq async for seq in _seqs(poses, 1017)]
+    assert [seq for seq in told if seq > 1000] == list(range(1002, 1018))
 
 
 async def _seqs(poses: Subscription[HandPose], last: int) -> AsyncIterator[int]:
