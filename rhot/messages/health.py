@@ -58,6 +58,7 @@ class Health(Message, frozen=True, kw_only=True):
 
     stage times in ms or the clock offset; faults is what is wrong now. session is the id of its
     Zenoh session, as the router lists it, and new at each start: two of one name are two services.
+    cpu_percent and rss_mb are the process's, also where several services or rigs share it.
     """
 
     service: Name

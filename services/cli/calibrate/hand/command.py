@@ -136,9 +136,7 @@ def _report(made: HandFile, written: Path | None) -> None:
 
     typer.echo(report_text(made))
     if written is not None:
-        typer.echo(
-            f"written: {written}; fusion and solver of this rig start again with it"
-        )
+        typer.echo(f"written: {written}; fusion and solver of this rig start again with it")
 
 
 def lengths_of(texts: list[str]) -> dict[tuple[int, int], float]:
