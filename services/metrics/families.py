@@ -71,8 +71,8 @@ def _services(rows: Sequence[ServiceRow]) -> Iterator[Metric]:
     yield gauge("rhot_service_up", about, _SERVICE, zip(names, alive, strict=True))
     beats = [row.health for row in rows if row.health is not None]
     figures = (
-        ("cpu_ratio", "share of one core, of its process", [beat.cpu_percent * 0.01 for beat in beats]),
-        ("resident_memory_bytes", "resident memory of its process", [beat.rss_mb * 1e6 for beat in beats]),
+        ("cpu_ratio", "its process's share of a core", [beat.cpu_percent * 0.01 for beat in beats]),
+        ("resident_memory_bytes", "its process's memory", [beat.rss_mb * 1e6 for beat in beats]),
         ("uptime_seconds", "since its start", [beat.uptime_s for beat in beats]),
         ("errors", "errors survived since its start", [float(beat.errors) for beat in beats]),
     )
