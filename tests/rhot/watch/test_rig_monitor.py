@@ -15,7 +15,9 @@ from rhot.files.rig_tables import (
     ObjectTable,
     RigTable,
 )
+from rhot.watch.onlooker_faults import unit
 from rhot.watch.rig_monitor import RigMonitor, expected_services
+from rhot.watch.rig_state import ServiceRow
 from testing.sample_health import NOW_NS, SECOND_NS, beat, fault, stream
 
 CONFIG = RigConfig(
@@ -194,3 +196,20 @@ def test_the_paint_on_an_objects_tracker_is_no_marker_of_a_hand():
     alone = msgspec.structs.replace(CONFIG, object=[cup], hand={})
     monitor = RigMonitor(alone, NOW_NS)
     assert {row.expected_markers for row in monitor.state(NOW_NS).cameras} == {1}
+
+
+@pytest.mark.parametrize(
+    ("service", "instance", "name"),
+    [
+        ("pi_tracker", "left", "rhot-pi-tracker@left"),
+        ("fusion", "main", "rhot-fusion"),
+        # Whose process solves.
+        ("solver", "main", "rhot-fusion"),
+        ("object_tracker", "main", "rhot-object-tracker"),
+    ],
+)
+def test_a_service_is_looked_at_by_the_unit_that_runs_it(service, instance, name, repository):
+    row = ServiceRow(service=service, instance=instance, state="gone", health=None)
+    assert unit(row) == name
+    file = f"{name.partition('@')[0]}{'@' if '@' in name else ''}.service"
+    assert (repository / "deploy" / "systemd" / file).is_file()
