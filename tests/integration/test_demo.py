@@ -179,7 +179,7 @@ async def test_what_a_user_sets_goes_to_the_working_folder_and_never_to_the_pack
 async def test_ctrl_c_ends_everything():
     process = await demo("--no-viewer")
     async with asyncio.timeout(DEADLINE_S):
-        pids = await children_running(process, 7)
+        pids = await children_running(process, 6)
         process.send_signal(signal.SIGINT)
         await process.communicate()
     assert none_left(pids)
@@ -189,7 +189,7 @@ async def test_a_kill_takes_the_children_along(tmp_path):
     # Nobody is left to remove the temporary folder.
     process = await demo("--no-viewer", env={**os.environ, "TMPDIR": str(tmp_path)})
     async with asyncio.timeout(DEADLINE_S):
-        pids = await children_running(process, 7)
+        pids = await children_running(process, 6)
         os.kill(process.pid, signal.SIGKILL)
         await process.communicate()
         while not none_left(pids):
