@@ -1,7 +1,7 @@
 """`rhot demo`: the whole rig, simulated, on one machine, until Ctrl-C or for N seconds.
 
-Router, simulator, trackers, fusion, solver, object tracker and viewer are processes of their own,
-as in `rhot up`. They run on a copy of the configuration that rhot ships.
+Router, simulator, trackers, fusion with the solver, object tracker and viewer are processes of
+their own, as in `rhot up`. They run on a copy of the configuration that rhot ships.
 """
 
 from __future__ import annotations
