@@ -210,7 +210,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     print(
         f"{'fps':>4} {'routers':>7} {'rigs':>5} {'poses %':>7} {'p50 ms':>6} {'p99':>7} {'max':>7}"
-        f"  {'core: both':>11} {'us/frame':>8} {'MB':>4} {'MB/rig':>7} "
+        f"  {'router both':>11} {'us/frame':>8} {'MB':>4} {'MB/rig':>7} "
         f"{'offered':>7}"
     )
     results: dict[str, dict[str, dict[str, dict[str, float]]]] = {}

@@ -69,8 +69,8 @@ def command(
     option that says which one of several this is, e.g. "camera"; any other than "instance" is
     required. variants are options without a value: each with the coroutine that it runs instead,
     and its help. several_rigs: --config may be given more than once, or be a folder; of more than
-    rigs_a_process of two cameras at 30 fps each share has a process (rhot/process/rigs/shares.py).
-    companion: what the process serves as well, if asked (rhot/process/served.py).
+    rigs_a_process of two cameras at 30 fps each share has a process (rigs/shares.py). companion:
+    what the process serves as well, if asked (served.py).
     """
     # Before anything starts a thread.
     share_one_heap()
@@ -83,10 +83,8 @@ def command(
         rigs_a_process=rigs_a_process,
         companion=companion,
     )
-    for option, (function, text) in variants.items():
-        parser.add_argument(
-            f"--{option}", dest="serve", action="store_const", const=function, help=text
-        )
+    for option, (own, text) in variants.items():
+        parser.add_argument(f"--{option}", dest="serve", action="store_const", const=own, help=text)
     options = parser.parse_args()
     if not several_rigs and len(options.config) > 1:
         parser.error("--config is given twice; this service serves one rig")
@@ -98,16 +96,17 @@ def command(
     together = rigs_a_process is not None and options.one_process
     several = several_rigs and (together or _are_several(options.config))
     if several and len(shares := _shares(options, rigs_a_process)) > 1:
-        sys.exit(_run_shares(name, options, companion, shares))
+        sys.exit(_run_shares(name, options, shares))
     try:
         serve: Serve = getattr(importlib.import_module(module), options.serve)
-        beside = companion.imported() if companion and options.accompanied else None
-        served = Served(name, options.name, serve, beside)
+        if options.beside is not None:
+            options.beside.imported()
     except ModuleNotFoundError as error:
         missing = missing_extra(error, program)
         if missing is None:
             raise
         parser.exit(EXIT_USER, f"{program}: error: {missing}\n")
+    served = Served(name, options.name, serve, options.beside)
     if several:
         sys.exit(run_several(served, options.config, options.connect, in_rounds=options.rounds))
     sys.exit(run(served, options.config[0], options.connect, keeps_turn=several_rigs))
@@ -181,16 +180,11 @@ def _shares(options: argparse.Namespace, most: int | None) -> list[list[Path]]:
     return in_shares(files, math.ceil(load_of(files) / most))
 
 
-def _run_shares(
-    name: str,
-    options: argparse.Namespace,
-    companion: Companion | None,
-    shares: list[list[Path]],
-) -> int:
+def _run_shares(name: str, options: argparse.Namespace, shares: list[list[Path]]) -> int:
     """Run a process for each share of a service's rigs; the exit code of this one."""
     try:
         rounds = options.rounds or is_much(sum(map(load_of, shares)))
-        work = keep_shares(shares, partial(command_for, options, companion, rounds))
+        work = keep_shares(shares, partial(command_for, options, rounds))
         run_loop(_live(work, keeps_turn=False, feeds=False))
     except Exception as error:
         return _explain(error, name, options.name)

@@ -65,23 +65,23 @@ def service_parser(
         parser.add_argument("--one-process", action="store_true", help=_TOGETHER % rigs_a_process)
     if companion is not None:
         option = f"--{companion.option}"
-        parser.add_argument(option, dest="accompanied", action="store_true", help=companion.text)
+        parser.add_argument(
+            option, dest="beside", action="store_const", const=companion, help=companion.text
+        )
     parser.add_argument("--version", action="version", version=rhot_version())
     parser.set_defaults(
-        serve="serve", rounds=False, one_process=rigs_a_process is None, accompanied=False
+        serve="serve", rounds=False, one_process=rigs_a_process is None, beside=None
     )
     return parser
 
 
-def command_for(
-    options: argparse.Namespace, companion: Companion | None, rounds: bool, files: Sequence[Path]
-) -> list[str]:
+def command_for(options: argparse.Namespace, rounds: bool, files: Sequence[Path]) -> list[str]:
     """The command that serves some of the rigs in one process, as this one was started."""
     given = len(sys.argv) - 1
     command = [*sys.orig_argv[: len(sys.orig_argv) - given], "--one-process"]
     command += ["--instance", options.name, *(["--rounds"] if rounds else [])]
-    if companion is not None and options.accompanied:
-        command.append(f"--{companion.option}")
+    if options.beside is not None:
+        command.append(f"--{options.beside.option}")
     for endpoint in options.connect:
         command += ["--connect", endpoint]
     for file in files:

@@ -36,18 +36,10 @@ class Companion:
     of: Callable[[RigConfig], bool]
     text: str
 
-    def imported(self) -> Beside:
-        """It, with what runs it: of a module that is imported only where the option is given."""
-        return Beside(self.name, importlib.import_module(self.module).serve, self.of)
-
-
-@dataclass(frozen=True)
-class Beside:
-    """A companion that is there."""
-
-    name: str
-    serve: Serve
-    of: Callable[[RigConfig], bool]
+    def imported(self) -> Serve:
+        """What runs it, of a module that is imported only where the option is given."""
+        serve: Serve = importlib.import_module(self.module).serve
+        return serve
 
 
 @dataclass(frozen=True)
@@ -59,7 +51,7 @@ class Served:
     name: str
     instance: str
     serve: Serve
-    beside: Beside | None = None
+    beside: Companion | None = None
 
     async def serve_rig(self, config: RigConfig, rounds: Rounds | None = None) -> None:
         """Run it all for one rig until it has ended; an error of one service ends both."""
@@ -71,9 +63,9 @@ class Served:
             if self.beside is not None and self.beside.of(config):
                 tasks.create_task(self._serve_beside(self.beside, config, bus.beside()))
 
-    async def _serve_beside(self, other: Beside, config: RigConfig, bus: Bus) -> None:
+    async def _serve_beside(self, other: Companion, config: RigConfig, bus: Bus) -> None:
         SERVICE.set(other.name)
-        await self._serve(other.name, other.serve, config, bus)
+        await self._serve(other.name, other.imported(), config, bus)
 
     async def _serve(self, name: str, serve: Serve, config: RigConfig, bus: Bus) -> None:
         """Run a service with a task group and health of its own."""

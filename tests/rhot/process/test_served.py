@@ -13,7 +13,7 @@ from rhot.errors import SourceError, leaves
 from rhot.files.config import RigConfig, load_rig
 from rhot.messages import Session
 from rhot.process.rigs.context import who
-from rhot.process.served import Beside, Served
+from rhot.process.served import Companion, Served
 from rhot.process.service import Service
 
 DEADLINE_S = 30.0
@@ -31,7 +31,11 @@ def every_rig(config: RigConfig) -> bool:
 
 
 def both(own, other, of=every_rig) -> Served:
-    return Served("fusion", "main", own, Beside("solver", other, of))
+    class Solver(Companion):
+        def imported(self):
+            return other
+
+    return Served("fusion", "main", own, Solver("solver", "solve", "", of, ""))
 
 
 async def forever(service: Service) -> None:
