@@ -24,14 +24,14 @@ NOWHERE = {"hsv_low": [2, 250, 250], "hsv_high": [4, 255, 255]}
 
 
 class Watch:
-    """The newest health of each service, by session: two services of a name are two."""
+    """The newest health of each service of each session: two of a name are two."""
 
     def __init__(self) -> None:
-        self.healths: dict[str, Health] = {}
+        self.healths: dict[tuple[str, str], Health] = {}
 
     async def follow(self, bus) -> None:
         async for health in bus.every(topics.HEALTH, 256):
-            self.healths[health.session] = health
+            self.healths[health.session, health.service] = health
 
     def faults(self, service: str, code: str) -> list[Fault]:
         return [
@@ -103,11 +103,11 @@ async def test_a_second_fusion_is_named_by_both_until_it_is_gone(rig, watch):
         assert "2 services answer" in watch.faults("pi_tracker", "second_clock")[0].text
         await rig.until(lambda: len(watch.faults("fusion", "second_clock")) == 2)
     # The last word of the second is no news of it.
-    for session, health in list(watch.healths.items()):
+    for key, health in list(watch.healths.items()):
         if health.service == "fusion" and health.uptime_s < max(
             h.uptime_s for h in watch.healths.values() if h.service == "fusion"
         ):
-            del watch.healths[session]
+            del watch.healths[key]
     await rig.until(lambda: not watch.faults("fusion", "second_service"))
     await rig.until(lambda: not watch.faults("pi_tracker", "second_clock"))
     await rig.until(lambda: not watch.faults("fusion", "second_clock"))

@@ -133,7 +133,7 @@ async def test_a_hand(page: Page) -> None:
         difference = np.subtract(digit.lengths_m, of_truth.lengths_m)
         # With all pictures 1.5 mm are left.
         assert np.abs(difference).max() < 4e-3, (digit, of_truth)
-    await page.taken_over("solver", "hand.right.json")
+    await page.taken_over("fusion", "hand.right.json")
 
 
 async def test_a_tracker(page: Page) -> None:

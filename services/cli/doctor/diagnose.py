@@ -109,8 +109,10 @@ def _where(config: RigConfig, row: ServiceRow) -> str:
 
 def _one_of_each(seen: Observations, faults: list[Fault]) -> Link:
     if seen.doubles:
-        name, places = next(iter(seen.doubles.items()))
-        text = f"{len(places)} services of the name {name} run: {' and '.join(places)}"
+        # Services that share a process come twice together.
+        places = next(iter(seen.doubles.values()))
+        names = " and ".join(sorted(name for name, at in seen.doubles.items() if at == places))
+        text = f"{len(places)} of {names} run: {' and '.join(places)}"
         return broken("one of each", "second_service", text)
     found = from_faults("one of each", [f for f in faults if f.code == "second_service"])
     return found or holds("one of each", "no service runs twice")

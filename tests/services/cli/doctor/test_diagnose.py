@@ -143,6 +143,13 @@ def test_a_hint_does_not_hide_what_is_broken():
     assert (found.name, found.code) == ("camera left", "camera_silent")
 
 
+def test_services_of_one_process_that_runs_twice_are_named_together():
+    places = ["process 1 on desk", "process 2 on desk"]
+    doubles = {"solver": places, "fusion": places, "recorder": ["process 3", "process 4"]}
+    text = first_cause(diagnose(observations(doubles=doubles))).text
+    assert text == "2 of fusion and solver run: process 1 on desk and process 2 on desk"
+
+
 @pytest.mark.parametrize(
     ("teller", "code", "subject", "name"),
     [
