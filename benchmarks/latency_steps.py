@@ -22,7 +22,7 @@ from services.solver.whole_hand.point_check import usable_points
 from services.solver.whole_hand.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 
-# Of each list of times: filters and caches have settled by then.
+# Of each list of times, unless it is shorter: filters and caches have settled by then.
 _WARM = 30
 # Of the kernel that steps are held against; a pose that follows another takes 4.
 _ITERATIONS = 4
@@ -54,12 +54,13 @@ def alone_us(recording: Recording) -> dict[str, float]:
         for points in told:
             heard = timed("decode_points", decode_points, timed("encode_points", encode, points))
             pose = timed("solver", solver.step, heard)
-            solver.challenge("right")
+            if solver.challenge_due("right"):
+                timed("challenge", solver.challenge, "right")
             if pose is not None:
                 timed("encode_pose", encode, pose)
                 fusion.note_pose(pose)
     _time_kernel(recording, timed)
-    found = {name: float(np.median(values[_WARM:])) for name, values in times.items()}
+    found = {name: float(np.median(values[_WARM:] or values)) for name, values in times.items()}
     # Rare and long: searches and regressions of clocks, which a median does not show.
     found["fusion_settle_mean"] = float(np.mean(times["fusion_settle"][_WARM:]))
     kernel_us = found["hand_fit"]

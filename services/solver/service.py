@@ -28,7 +28,7 @@ from services.solver.warm import warm_up
 # for two cores, 60 and 63 % of the poses came with 4 in turn with 86 and 83 with 16. No more: a
 # solver of its own that cannot keep up is late by all that waits.
 _WAITING = 16
-# A challenge, which takes 5 ms, waits so long after its pose: the other hand's points come at once
+# A challenge, which takes 2 ms, waits so long after its pose: the other hand's points come at once
 # after those of this one, the next ones after 8 ms at the least.
 _CHALLENGE_S = 0.002
 # Weight of the newest time in the running mean: a second or so at 30 poses a second.

@@ -55,7 +55,7 @@ class SolverStep:
         return self._hands[hand].tracker.challenge_due
 
     def challenge(self, hand: HandName) -> None:
-        """Look for another pose that explains the points as well, where that is due: 5 ms.
+        """Look for another pose that explains the points as well, where that is due: 2 ms.
 
         For when the pose is out; the next step() does it where nobody has.
         """

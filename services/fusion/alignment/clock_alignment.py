@@ -21,7 +21,7 @@ from services.fusion.alignment.offset_search import Offset, find_offset
 from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import View
 
-# A search takes 2 to 4 ms; every two seconds that is one or two in a thousand. The first comes when
+# A search takes 2 to 3 ms; every two seconds that is one or two in a thousand. The first comes when
 # there is enough to compare, and one that found something is soon followed by another.
 _EVERY_S, _FIRST_S, _AGAIN_S = 2.0, 3.0, 1.0
 # A search is put off in so many frames at most: one or two seconds of those that are learned from.

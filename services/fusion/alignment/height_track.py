@@ -54,11 +54,16 @@ def _interpolate(
     Lagrange's, as ray_interpolation.polynomial_weights has it, for all instants at once.
     """
     half, count = samples // 2, len(times)
+    right = 0
     frame_s = np.median(np.diff(times))
     widest_s = (_GAP_FRAMES + samples - 2) * frame_s
     for n in range(len(at_s)):
-        after = int(np.searchsorted(times, at_s[n], side="right"))
-        after = min(max(after, half), count - half)
+        # How many samples are not later: instants mostly follow each other.
+        while right < count and times[right] <= at_s[n]:
+            right += 1
+        while right > 0 and times[right - 1] > at_s[n]:
+            right -= 1
+        after = min(max(right, half), count - half)
         begin, end = after - half, after + half
         within = times[half - 1] <= at_s[n] <= times[count - half]
         inside[n] = within and times[end - 1] - times[begin] <= widest_s

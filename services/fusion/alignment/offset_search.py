@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.alignment.height_track import HeightTrack, interpolated, resampled
@@ -220,32 +221,42 @@ class _Samples(NamedTuple):
     heights: Array
     speeds: Array  # by their neighbours
     spans: Array
+    of_landmark: list[Ints]  # which are of each landmark
 
 
 def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
     """Of each landmark's track, those whose neighbours are as far before as after."""
-    columns = []
     begin_s = min(float(track.times_s[0]) for track in tracks)
-    for row, (times_s, heights) in enumerate(tracks):
-        every = max(1, round(1.0 / (_ROWS_HZ * float(np.median(np.diff(times_s))))))
-        k = np.arange(1, len(times_s) - 1, every)
-        times = times_s[k]
-        span = times_s[k + 1] - times_s[k - 1]
-        even = np.abs(times_s[k + 1] + times_s[k - 1] - 2.0 * times) <= 0.1 * span
-        speed = (heights[k + 1] - heights[k - 1]) / span
-        numbers = np.round((times - begin_s) * _ROWS_HZ)
-        table = [numbers, np.full(len(k), row), times, heights[k], speed, span]
-        columns.append(np.stack(table)[:, even])
+    columns = [
+        _even_samples(track.times_s, track.heights, begin_s, row)
+        for row, track in enumerate(tracks)
+    ]
     joined = np.concatenate(columns, axis=1)
     instants, landmarks, *others = joined[:, np.argsort(joined[0], kind="stable")]
-    return _Samples(instants.astype(np.int64), landmarks.astype(np.int64), *others)
+    of_landmark = [np.flatnonzero(landmarks == row) for row in range(len(tracks))]
+    return _Samples(instants.astype(np.int64), landmarks.astype(np.int64), *others, of_landmark)
+
+
+@njit(cache=True, error_model="numpy")
+def _even_samples(times_s: Array, heights: Array, begin_s: float, landmark: int) -> Array:
+    """Of one landmark: (6, n), what _Samples has."""
+    every = max(1, round(1.0 / (_ROWS_HZ * np.median(np.diff(times_s)))))
+    table, n = np.empty((6, len(times_s))), 0
+    for k in range(1, len(times_s) - 1, every):
+        span = times_s[k + 1] - times_s[k - 1]
+        if abs(times_s[k + 1] + times_s[k - 1] - 2.0 * times_s[k]) <= 0.1 * span:
+            table[0, n] = round((times_s[k] - begin_s) * _ROWS_HZ)
+            table[1, n] = landmark
+            table[2, n], table[3, n] = times_s[k], heights[k]
+            table[4, n], table[5, n] = (heights[k + 1] - heights[k - 1]) / span, span
+            n += 1
+    return table[:, :n]
 
 
 def _rows(samples: _Samples, others: Sequence[HeightTrack], offset_s: float) -> Heights:
     """Differences between samples and the second camera's heights at an offset, where known."""
     there, inside = np.zeros(len(samples.times_s)), np.zeros(len(samples.times_s), dtype=bool)
-    for row, other in enumerate(others):
-        own = samples.landmarks == row
+    for own, other in zip(samples.of_landmark, others, strict=True):
         there[own], inside[own] = interpolated(other, samples.times_s[own] + offset_s)
     n = np.count_nonzero(inside)
     return Heights(

@@ -51,7 +51,7 @@ MAX_GAP_S = 1.0
 _PLACED_SIGMA_M = 0.1
 # A fit whose squared distances exceed this per landmark coordinate is bad (expected: below 1).
 BAD_COST_PER_COORDINATE = 16.0
-# Updates between restarts, and while fits are bad: a restart takes 5 ms, i.e. 0.05 and 1.2 ms an
+# Updates between restarts, and while fits are bad: a restart takes 2 ms, i.e. 0.02 and 0.5 ms an
 # update.
 RESTART_INTERVAL, RESTART_INTERVAL_BAD = 90, 4
 # Another pose is followed as a rival unless the odds against it exceed this (logarithm): a truth
@@ -132,7 +132,7 @@ class HandTracker:
     def challenge(self) -> None:
         """Compare the last pose with a restart, where one is due.
 
-        It takes 5 ms: after the pose is out; the next track() does it where nobody has.
+        It takes 2 ms: after the pose is out; the next track() does it where nobody has.
         """
         if self._to_challenge is not None:
             own, observations = self._to_challenge

@@ -263,7 +263,7 @@ def test_a_tip_out_of_reach_says_so(world: Callable) -> None:
 
 
 def test_rigs_whose_hands_come_together_restart_at_times_of_their_own(world: Callable) -> None:
-    """Restarts take 5 ms: of 32 rigs at once, poses would wait for a tenth of a second."""
+    """Restarts take 2 ms: of 32 rigs at once, poses would wait for a twentieth of a second."""
     rigs = [f"room{n}" for n in range(32)]
     intervals = np.array([restart_interval(f"{rig}/right") for rig in rigs])
     assert np.mean(intervals) == pytest.approx(RESTART_INTERVAL, rel=0.1)
