@@ -228,8 +228,7 @@ def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
     """Of each landmark's track, those whose neighbours are as far before as after."""
     begin_s = min(float(track.times_s[0]) for track in tracks)
     columns = [
-        _even_samples(track.times_s, track.heights, begin_s, row)
-        for row, track in enumerate(tracks)
+        even_samples(track.times_s, track.heights, begin_s, row) for row, track in enumerate(tracks)
     ]
     joined = np.concatenate(columns, axis=1)
     instants, landmarks, *others = joined[:, np.argsort(joined[0], kind="stable")]
@@ -238,8 +237,8 @@ def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
 
 
 @njit(cache=True, error_model="numpy")
-def _even_samples(times_s: Array, heights: Array, begin_s: float, landmark: int) -> Array:
-    """Of one landmark: (6, n), what _Samples has."""
+def even_samples(times_s: Array, heights: Array, begin_s: float, landmark: int) -> Array:
+    """Of one landmark's track (m,), (m,), from begin_s on: (6, n), what _Samples has of each."""
     every = max(1, round(1.0 / (_ROWS_HZ * np.median(np.diff(times_s)))))
     table, n = np.empty((6, len(times_s))), 0
     for k in range(1, len(times_s) - 1, every):
