@@ -19,7 +19,7 @@ from services.solver.step import SolverStep
 
 def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
     """Solve five messages of a made-up hand with the configured method: of one it is elsewhere, of
-    one a point is.
+    one a point is; and look for another posture of it.
     """
     for name, model in hands.items():
         step = SolverStep(config, {name: model})
@@ -52,3 +52,4 @@ def warm_up(config: RigConfig, hands: Mapping[HandName, HandModel]) -> None:
         first, *others = points.points
         astray = msgspec.structs.replace(first, position_m=(5.0, 5.0, 5.0))
         step.step(msgspec.structs.replace(points, seq=4, stamp_ns=10**9, points=[astray, *others]))
+        step.challenge(name)
