@@ -231,9 +231,10 @@ def _samples(tracks: Sequence[HeightTrack]) -> _Samples:
         even_samples(track.times_s, track.heights, begin_s, row) for row, track in enumerate(tracks)
     ]
     joined = np.concatenate(columns, axis=1)
-    instants, landmarks, *others = joined[:, np.argsort(joined[0], kind="stable")]
+    table = joined[:, np.argsort(joined[0], kind="stable")]
+    instants, landmarks = table[:2].astype(np.int64)
     of_landmark = [np.flatnonzero(landmarks == row) for row in range(len(tracks))]
-    return _Samples(instants.astype(np.int64), landmarks.astype(np.int64), *others, of_landmark)
+    return _Samples(instants, landmarks, table[2], table[3], table[4], table[5], of_landmark)
 
 
 @njit(cache=True, error_model="numpy")
