@@ -111,8 +111,9 @@ def _one_of_each(seen: Observations, faults: list[Fault]) -> Link:
     if seen.doubles:
         # Services that share a process come twice together.
         places = next(iter(seen.doubles.values()))
-        names = " and ".join(sorted(name for name, at in seen.doubles.items() if at == places))
-        text = f"{len(places)} of {names} run: {' and '.join(places)}"
+        names = sorted(name for name, at in seen.doubles.items() if at == places)
+        run = "runs" if len(names) == 1 else "run"
+        text = f"{' and '.join(names)} {run} {len(places)} times: {' and '.join(places)}"
         return broken("one of each", "second_service", text)
     found = from_faults("one of each", [f for f in faults if f.code == "second_service"])
     return found or holds("one of each", "no service runs twice")

@@ -134,7 +134,7 @@ def _place(chains: HandChains, observations: Observations, turns: Array, found: 
     """Wrists for the postures of found, whose angles are given: each posture is aligned with the
     landmarks and then turned about their centroid, by each of turns (t, 3, 3).
     """
-    seen = _mean(observations.point_m)
+    seen = observations.point_m.sum(axis=0) / len(observations.point_m)
     model = np.empty_like(observations.point_m)  # (m, 3) wrist frame
     positions, rotations = np.empty((26, 3)), np.empty((26, 3, 3))
     for n in range(0, len(found.cost), len(turns)):
@@ -144,21 +144,12 @@ def _place(chains: HandChains, observations: Observations, turns: Array, found: 
             model[m] = offset_m
             if observations.digit[m] >= 0:
                 model[m] = positions[joint] + rotations[joint] @ offset_m
-        centre = _mean(model)
+        centre = model.sum(axis=0) / len(model)
         R0 = _aligning(model - centre, observations.point_m - seen)
         for k in range(len(turns)):
             R = R0 @ turns[k]
             found.rotation[n + k] = R
             found.position_m[n + k] = seen - R @ centre
-
-
-@njit(cache=True)
-def _mean(points_m: Array) -> Array:
-    """The centroid (3,) of points (m, 3)."""
-    mean = np.zeros(3)
-    for m in range(len(points_m)):
-        mean += points_m[m]
-    return mean / len(points_m)
 
 
 @njit(cache=True)

@@ -147,7 +147,7 @@ def test_services_of_one_process_that_runs_twice_are_named_together():
     places = ["process 1 on desk", "process 2 on desk"]
     doubles = {"solver": places, "fusion": places, "recorder": ["process 3", "process 4"]}
     text = first_cause(diagnose(observations(doubles=doubles))).text
-    assert text == "2 of fusion and solver run: process 1 on desk and process 2 on desk"
+    assert text == "fusion and solver run 2 times: process 1 on desk and process 2 on desk"
 
 
 @pytest.mark.parametrize(
