@@ -27,6 +27,7 @@ import zenoh
 from rhot import topics
 from rhot.bus.clock_exchange import ClockExchange, exchanges
 from rhot.bus.connecting import connected
+from rhot.bus.handover import Handover
 from rhot.bus.intake.rounds import Rounds
 from rhot.bus.intake.standing_queue import StandingQueue
 from rhot.bus.liveliness import Alive, AliveWatch
@@ -106,12 +107,20 @@ class Bus:
         self._open: list[Any] = []
         self._tasks = Tasks(self._loop)
         self._beside: list[Bus] = []
+        # Between the services of this process, where there are several.
+        self._handover: Handover | None = None
 
     def beside(self) -> Bus:
         """A bus of streams of its own over the same session, for another service of this process:
-        what one of them publishes, the other one gets without the router. It ends with this one.
+        messages that one of them publishes are handed over to the other. It ends with this one.
+
+        To be asked for before there is any stream: raises BusError otherwise.
         """
+        if self._open:
+            raise BusError(f"the bus of rig {self.rig} has streams already: too late for another")
+        self._handover = self._handover or Handover()
         other = Bus(self.rig, self._session, self._rounds)
+        other._handover = self._handover  # noqa: SLF001
         self._beside.append(other)
         return other
 
@@ -127,7 +136,8 @@ class Bus:
             raise BusError(
                 f"cannot publish on the pattern {key}; give {list(topic.fields)} and the rig's name"
             )
-        publisher = Publisher(self._session, topic, key, self._stats(topic, names, "out"))
+        stats = self._stats(topic, names, "out")
+        publisher = Publisher(self._session, topic, key, stats, self._handover)
         self._open.append(publisher)
         return publisher
 
@@ -177,7 +187,8 @@ class Bus:
         standing: StandingQueue | None = None,
     ) -> Subscription[T]:
         stats = self._stats(topic, names, "in")
-        return self._declared(Subscription(self._loop, topic, stats, n, expected, standing))
+        one = Subscription(self._loop, topic, stats, n, expected, standing, self._handover)
+        return self._declared(one)
 
     def _declared(self, one: Listener, origin: zenoh.Locality = zenoh.Locality.ANY) -> Listener:
         """A subscription to its own key, from now on and until the session ends."""

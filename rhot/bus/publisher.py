@@ -8,6 +8,7 @@ import msgspec
 import zenoh
 
 from rhot import clock
+from rhot.bus.handover import Handover
 from rhot.bus.stats import StreamStats
 from rhot.topics import Priority, Topic
 
@@ -25,10 +26,17 @@ class Publisher(Generic[T]):
     """Sends one stream; never blocks: what the network cannot take is dropped."""
 
     def __init__(
-        self, session: zenoh.Session, topic: Topic[T], key: str, stats: StreamStats
+        self,
+        session: zenoh.Session,
+        topic: Topic[T],
+        key: str,
+        stats: StreamStats,
+        handover: Handover | None = None,
     ) -> None:
+        """handover: to readers of this process, where there are several services in it."""
         self.key = key
         self.stats = stats
+        self._handover = handover
         self._encoder = msgspec.json.Encoder()
         self._message = topic.message
         self._says_when = "sent_ns" in getattr(topic.message, "__struct_fields__", ())
@@ -60,6 +68,9 @@ class Publisher(Generic[T]):
         if b"null" in payload and not self._decodes(payload):
             self.stats.rejected += 1
             return
+        if self._handover is not None:
+            for reader in self._handover.readers(self.key):
+                reader.hand_over(self.key, message, now_ns)
         self._publisher.put(payload)
         stamp_ns = getattr(message, "stamp_ns", 0)
         self._count(now_ns - stamp_ns if stamp_ns else None)

@@ -13,6 +13,7 @@ import msgspec
 import zenoh
 
 from rhot import clock
+from rhot.bus.handover import Handover
 from rhot.bus.intake.buffer import Buffer
 from rhot.bus.intake.rounds import Rounds
 from rhot.bus.intake.standing_queue import StandingQueue
@@ -40,13 +41,14 @@ _MAX_KEYS = 256
 
 class Sample(NamedTuple):
     """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread, or about the middle
-    between two rounds.
+    between two rounds. message: of this process, as it is; then there is no payload.
     """
 
     key: str
     payload: bytes
     attachment: bytes
     received_ns: int
+    message: Any = None
 
 
 def _size_of(sample: Sample) -> int:
@@ -105,6 +107,10 @@ class RawSubscription(Buffer[Sample]):
         if taken is not None:
             self._note_dropped(self.add(taken.key, taken))
 
+    def hand_over(self, key: str, message: Any, now_ns: int) -> None:
+        """Take a message of this process, as it is; from any thread."""
+        self._note_dropped(self.push(key, Sample(key, b"", b"", now_ns, message)))
+
     def _note_dropped(self, dropped: int) -> None:
         if dropped:
             self.stats.dropped += dropped
@@ -159,8 +165,11 @@ class Subscription(Generic[T]):
         capacity: int | None,
         expected: frozenset[str] = frozenset(),
         standing: StandingQueue | None = None,
+        handover: Handover | None = None,
     ) -> None:
-        """standing: for a reader who is to answer in time rather than everything."""
+        """standing: for a reader who is to answer in time rather than everything; handover: from
+        publishers of this process, where there are several services in it.
+        """
         if topic.message is None:
             raise BusError(
                 f"topic {topic.template} carries {topic.media_type}, no message; use raw()"
@@ -170,6 +179,7 @@ class Subscription(Generic[T]):
         self.waited_s = 0.0
         self._topic = topic
         self._standing = standing
+        self._handover = handover
         self._raw = RawSubscription(loop, stats, capacity, objects_only=True, expected=expected)
         self._decoder = msgspec.json.Decoder(topic.message)
         # What a key says that its messages say as well: worked out once a key, not once a message.
@@ -178,7 +188,19 @@ class Subscription(Generic[T]):
     def declare(
         self, session: zenoh.Session, origin: zenoh.Locality, rounds: Rounds | None = None
     ) -> None:
+        if self._handover is not None:
+            self._handover.join(self)
+            origin = zenoh.Locality.REMOTE
         self._raw.declare(session, origin, rounds)
+
+    @property
+    def key(self) -> str:
+        """The key expression it reads."""
+        return self.stats.key
+
+    def hand_over(self, key: str, message: T, now_ns: int) -> None:
+        """Take a message of this process, as it is; from any thread."""
+        self._raw.hand_over(key, message, now_ns)
 
     @property
     def waiting(self) -> int:
@@ -216,7 +238,7 @@ class Subscription(Generic[T]):
             if self._standing.skips(self.waited_s, now_ns * 1e-9):
                 self.stats.dropped += 1
                 return None
-        message = self._decode(sample)
+        message = self._decode(sample) if sample.message is None else sample.message
         if message is None:
             self.stats.rejected += 1
             return None
@@ -250,4 +272,6 @@ class Subscription(Generic[T]):
         return said
 
     def undeclare(self) -> None:
+        if self._handover is not None:
+            self._handover.leave(self)
         self._raw.undeclare()

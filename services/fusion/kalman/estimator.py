@@ -48,6 +48,7 @@ class KalmanMethod:
             self._hand[rows] = number
         self._recent_s = SEEN_FRAMES * periods_s  # (C,)
         self._span_s = float(periods_s.min())
+        self._frames_per_s = float((1.0 / periods_s).sum())
         self._hold_s = max(settings.hold_s, SEEN_FRAMES * float(periods_s.max()))
         self._max_distance_m = settings.max_distance_m
         self._told = no_estimates(len(self._hand), len(cameras))
@@ -65,6 +66,7 @@ class KalmanMethod:
                 self._hold_s,
                 self._max_distance_m,
                 self.counts,
+                self._frames_per_s,
             )
             for rows in self._rows
         ]
@@ -92,10 +94,10 @@ class KalmanMethod:
         _keep_useful(told.found, told.positions_m, told.covariances_m2, told.measured, alone_with)
         return told
 
-    def settle(self) -> None:
+    def settle(self, *, behind: bool = False) -> None:
         """Learn from the last estimates, and from the last frame what they did not wait for."""
         for hand in self._hands:
-            hand.settle()
+            hand.settle(behind=behind)
         self._located.settle()
 
 

@@ -22,10 +22,11 @@ from services.fusion.kalman.held import (
     Held,
     complete,
     filter_again,
+    pass_over,
     take_looks,
     tell_all,
 )
-from services.fusion.kalman.history import empty_history
+from services.fusion.kalman.history import empty_history, nodes_of
 from services.fusion.kalman.motion.motion_models import MotionModels
 from services.fusion.kalman.starting import Looks, fit_start
 from services.fusion.method import Counts
@@ -72,11 +73,13 @@ class HandFilter:
         hold_s: float,
         max_distance_m: float,
         counts: Counts,
+        frames_per_s: float,
     ) -> None:
+        """hold_s: so long a landmark stays that nobody sees; frames_per_s: of all cameras."""
         self._cameras = cameras
         self._max_distance_m = max_distance_m
         self._counts = counts
-        self._history = empty_history(landmarks, len(MODELS.own))
+        self._history = empty_history(landmarks, len(MODELS.own), nodes_of(frames_per_s))
         self._sights = no_sights(landmarks, len(cameras.t), hold_s)
         self._fates = no_fates(landmarks)
         held = Held(self._history, self._sights, self._fates, cameras, MODELS, GATE)
@@ -95,9 +98,16 @@ class HandFilter:
         if outcome == UNUSUAL:
             self._begin_where_due(looks)
 
-    def settle(self) -> None:
-        """Do what of the last frame points do not wait for; observe() does it where nobody has."""
-        if self._history.incomplete[0]:
+    def settle(self, *, behind: bool = False) -> None:
+        """Do what of the last frame points do not wait for; observe() does it where nobody has.
+
+        behind: other frames wait; models that do not lead may pass this one over.
+        """
+        if not self._history.incomplete[0]:
+            return
+        if behind:
+            pass_over(self._held.address)
+        else:
             complete(self._held.address)
 
     def _begin_where_due(self, looks: FrameLooks) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.arrays import Ints
@@ -63,23 +64,16 @@ def fit_start(
     if met.status is not TriangulationStatus.OK:
         return None
     motion = np.concatenate([met.position_m, velocity, np.zeros(3)])
-    residual = np.inf
-    for _ in range(_ROUNDS):
-        fitted = _fit_round(looks, cameras, motion, velocity)
-        if fitted is None:
-            return None
-        motion, residual = fitted
-    return Start(motion, residual)
+    residual = _fit(looks, cameras, velocity, motion)
+    return None if residual < 0.0 else Start(motion, residual)
 
 
-def _fit_round(
-    looks: Looks, cameras: Extrinsics, motion: Array, velocity: Array
-) -> tuple[Array, float] | None:
-    """One round: the motion (9,) fitted with Jacobians at `motion`, and its residual."""
-    prior = np.concatenate([motion[:3], velocity, np.zeros(3), [0.0]])  # (10,)
-    x, P = prior.copy(), np.diag(np.append(np.repeat(np.square(START_SIGMAS), 3), 0.0))
-    at = np.append(motion, 0.0)
-    innovation = Innovation(
+@njit(cache=True, error_model="numpy")
+def _fit(looks: Looks, cameras: Extrinsics, velocity: Array, motion: Array) -> float:
+    """Fit a motion (9,), in place; its residual, or -1 if it leads behind a camera."""
+    variances = np.repeat(np.array(START_SIGMAS) ** 2, 3)  # (9,)
+    at, x, H = np.zeros(10), np.empty(9), np.empty((2, 9))
+    out = Innovation(
         np.zeros((2, 3)),
         np.zeros(2),
         np.zeros(2),
@@ -88,27 +82,29 @@ def _fit_round(
         np.zeros(1),
     )
     chi_squared = 0.0
-    for n in range(len(looks.time_s)):
-        delay_s = float(looks.time_s[n] - looks.time_s[0])
-        camera = int(looks.camera[n])
-        drift = float(np.sum(np.square(START_SIGMAS[1] / 0.5))) * float(looks.clock_variance[n])
-        look = Look(
-            0,
-            delay_s,
-            looks.ray[n],
-            float(looks.variance[n]) + drift,
-            cameras.R[camera],
-            cameras.t[camera],
-        )
-        # The ray that a filter linearised at x must be given to act as one linearised at `motion`.
-        if not predict_ray(at, look, (0.0, 0.0, 0.0), innovation):
-            return None
-        by_order = np.array([1.0, delay_s, 0.5 * delay_s**2])
-        H = np.concatenate([weight * innovation.H for weight in by_order], axis=1)  # (2, 9)
-        S = H @ P[:9, :9] @ H.T + look.ray_variance * np.eye(2)
-        nu = innovation.nu - H @ (x - at)[:9]
-        K = P[:9, :9] @ H.T @ np.linalg.inv(S)
-        x[:9] += K @ nu
-        P[:9, :9] -= K @ S @ K.T
-        chi_squared += float(nu @ np.linalg.solve(S, nu))
-    return x[:9], float(np.sqrt(chi_squared / max(2 * len(looks.time_s) - 3, 1)))
+    for _ in range(_ROUNDS):
+        at[:9] = motion
+        x[:3], x[3:6], x[6:] = motion[:3], velocity, 0.0
+        P, chi_squared = np.diag(variances), 0.0
+        for n in range(looks.time_s.size):
+            camera, delay_s = looks.camera[n], looks.time_s[n] - looks.time_s[0]
+            drift = (START_SIGMAS[1] / 0.5) ** 2 * looks.clock_variance[n]
+            variance = looks.variance[n] + drift
+            R, t = cameras.R[camera], cameras.t[camera]
+            look = Look(0, delay_s, looks.ray[n], variance, R, t)
+            # The ray that a filter linearised at x must be given to act as one linearised at
+            # `motion`.
+            if not predict_ray(at, look, (0.0, 0.0, 0.0), out):
+                return -1.0
+            H[:, :3], H[:, 3:6], H[:, 6:] = out.H, delay_s * out.H, 0.5 * delay_s**2 * out.H
+            nu = out.nu - H @ (x - motion)
+            PHt = P @ H.T  # (9, 2)
+            S = H @ PHt
+            S00, S11, S01 = S[0, 0] + variance, S[1, 1] + variance, S[0, 1]
+            inverse = np.array([[S11, -S01], [-S01, S00]]) / (S00 * S11 - S01 * S01)
+            K = PHt @ inverse
+            x += K @ nu
+            P -= K @ PHt.T
+            chi_squared += nu @ inverse @ nu
+        motion[:] = x
+    return float(np.sqrt(chi_squared / max(2 * looks.time_s.size - 3, 1)))
