@@ -96,7 +96,14 @@ async def open_bus(
 class Bus:
     """One rig's keys over one Zenoh session, for the event loop that made it."""
 
-    def __init__(self, rig: str, session: zenoh.Session, rounds: Rounds | None = None) -> None:
+    def __init__(
+        self,
+        rig: str,
+        session: zenoh.Session,
+        rounds: Rounds | None = None,
+        handover: Handover | None = None,
+    ) -> None:
+        """handover: between the services of this process, where there are several (beside)."""
         self.rig = rig
         self._rounds = rounds
         self.streams: list[StreamStats] = []
@@ -107,8 +114,7 @@ class Bus:
         self._open: list[Any] = []
         self._tasks = Tasks(self._loop)
         self._beside: list[Bus] = []
-        # Between the services of this process, where there are several.
-        self._handover: Handover | None = None
+        self._handover = handover
 
     def beside(self) -> Bus:
         """A bus of streams of its own over the same session, for another service of this process:
@@ -119,8 +125,7 @@ class Bus:
         if self._open:
             raise BusError(f"the bus of rig {self.rig} has streams already: too late for another")
         self._handover = self._handover or Handover()
-        other = Bus(self.rig, self._session, self._rounds)
-        other._handover = self._handover  # noqa: SLF001
+        other = Bus(self.rig, self._session, self._rounds, self._handover)
         self._beside.append(other)
         return other
 

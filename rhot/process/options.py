@@ -17,9 +17,10 @@ _TOGETHER = "serve all rigs in this process; else %d rigs (2 cameras at 30 fps) 
 
 
 # From so many usual rigs on (rigs/files.py) messages are asked for in rounds
-# (rhot/bus/intake/rounds.py). In turn on two cores: with 24 of them poses then take 4 ms (median)
-# and 18 (99 %) instead of 7 and 35, with 16 5 and 11 instead of 2 and 12.
-RIGS_A_PROCESSOR = 12.0
+# (rhot/bus/intake/rounds.py). In turn on two cores, twice, poses take (median, 99 %, ms), called
+# back and in rounds: of 20 rigs 5, 70 and 12, 129, then 7, 27 and 5, 21; of 16 1.9, 13 and 2.2, 23,
+# then 3.1, 11 and 3.0, 18.
+RIGS_A_PROCESSOR = 9.0
 
 
 def is_much(load: float) -> bool:

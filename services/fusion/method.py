@@ -92,11 +92,8 @@ class Method(Protocol):
         """
         ...
 
-    def settle(self, *, behind: bool = False) -> None:
-        """Do what the last estimates do not wait for; estimate() does it where nobody has.
-
-        behind: other frames wait, for which some of it may be left out.
-        """
+    def settle(self) -> None:
+        """Do what the last estimates do not wait for; estimate() does it where nobody has."""
         ...
 
     def reset(self) -> None:

@@ -168,16 +168,14 @@ class FusionStep:
         frame on. behind: other frames wait, which is worth more than to learn from all of them.
         """
         unsettled, self._unsettled = self._unsettled, []
-        passes_over = False
         if unsettled:
             self._passed_over = self._passed_over + 1 if behind else 0
-            passes_over = self._passed_over % _LEARN_ONE_OF > 0
-            if passes_over:
+            if self._passed_over % _LEARN_ONE_OF:
                 self.unlearned += 1
             else:
                 for work in unsettled:
                     work(behind)
-        self.method.settle(behind=passes_over)
+        self.method.settle()
 
     def _watch(self, view: View, times_s: Array, _behind: bool) -> None:
         """Learn from an admitted frame, whose observations have times_s (n,)."""

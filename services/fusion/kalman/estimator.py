@@ -94,10 +94,10 @@ class KalmanMethod:
         _keep_useful(told.found, told.positions_m, told.covariances_m2, told.measured, alone_with)
         return told
 
-    def settle(self, *, behind: bool = False) -> None:
+    def settle(self) -> None:
         """Learn from the last estimates, and from the last frame what they did not wait for."""
         for hand in self._hands:
-            hand.settle(behind=behind)
+            hand.settle()
         self._located.settle()
 
 

@@ -130,19 +130,6 @@ def complete_newest(
 
 
 @njit(cache=True, error_model="numpy")
-def pass_newest_over(history: HandHistory) -> None:
-    """In place of complete_newest, where there is no time for it: models that filter_inserted left
-    go on from the likeliest one's estimate at the next frame.
-    """
-    if history.incomplete[0]:
-        last, node = history.order[history.size[0] - 2], history.order[history.size[0] - 1]
-        for m in range(history.behind.shape[1]):
-            if not _leads(history, last, m):
-                history.behind[node, m] = BEHIND_FRAMES
-        history.incomplete[0] = False
-
-
-@njit(cache=True, error_model="numpy")
 def _goes_on_from(history: HandHistory, last: int, m: int, likeliest: int) -> bool:
     """Whether a model gives its estimate up for the likeliest one's.
 

@@ -22,7 +22,6 @@ from services.fusion.kalman.held import (
     Held,
     complete,
     filter_again,
-    pass_over,
     take_looks,
     tell_all,
 )
@@ -98,16 +97,9 @@ class HandFilter:
         if outcome == UNUSUAL:
             self._begin_where_due(looks)
 
-    def settle(self, *, behind: bool = False) -> None:
-        """Do what of the last frame points do not wait for; observe() does it where nobody has.
-
-        behind: other frames wait; models that do not lead may pass this one over.
-        """
-        if not self._history.incomplete[0]:
-            return
-        if behind:
-            pass_over(self._held.address)
-        else:
+    def settle(self) -> None:
+        """Do what of the last frame points do not wait for; observe() does it where nobody has."""
+        if self._history.incomplete[0]:
             complete(self._held.address)
 
     def _begin_where_due(self, looks: FrameLooks) -> None:

@@ -10,7 +10,7 @@ from rhot.geometry.transforms import Array
 from rhot.kernels.packed import Layout
 from services.fusion.arrays import Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.kalman.filtering import complete_newest, filter_from, pass_newest_over
+from services.fusion.kalman.filtering import complete_newest, filter_from
 from services.fusion.kalman.frame_update import Fates, FrameLooks, Sights, take_in
 from services.fusion.kalman.history import HandHistory
 from services.fusion.kalman.motion.motion_models import MotionModels
@@ -55,13 +55,6 @@ def complete(address: int) -> None:
     """filtering.complete_newest of Held."""
     held: Held = _held_at(address)
     complete_newest(held.history, held.cameras, (held.models, held.gate))
-
-
-@njit(cache=True, error_model="numpy")
-def pass_over(address: int) -> None:
-    """filtering.pass_newest_over of Held."""
-    held: Held = _held_at(address)
-    pass_newest_over(held.history)
 
 
 @njit(cache=True, error_model="numpy")

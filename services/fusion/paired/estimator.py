@@ -107,7 +107,7 @@ class PairedMethod:
             detected=seen_by.sum(axis=1) >= 2,
         )
 
-    def settle(self, *, behind: bool = False) -> None:
+    def settle(self) -> None:
         """Nothing waits."""
 
     def _rays(self, landmark: int, time_s: float) -> dict[int, InterpolatedRay]:
