@@ -26,6 +26,8 @@ from services.solver.whole_hand.residuals import Pose
 _WARM = 30
 # Of the kernel that steps are held against; a pose that follows another takes 4.
 _ITERATIONS = 4
+# Hands that begin, and frames by which each has.
+_BEGINNINGS, _FIRST = 30, 6
 
 
 def alone_us(recording: Recording) -> dict[str, float]:
@@ -60,12 +62,28 @@ def alone_us(recording: Recording) -> dict[str, float]:
                 timed("encode_pose", encode, pose)
                 fusion.note_pose(pose)
     _time_kernel(recording, timed)
+    _time_beginning(recording, hands, times)
     found = {name: float(np.median(values[_WARM:] or values)) for name, values in times.items()}
     # Rare and long: searches and regressions of clocks, which a median does not show.
     found["fusion_settle_mean"] = float(np.mean(times["fusion_settle"][_WARM:]))
     kernel_us = found["hand_fit"]
     ratios = {f"{name}_over_fit": found[name] / kernel_us for name in ("fusion_telling", "solver")}
     return {**found, **ratios}
+
+
+def _time_beginning(
+    recording: Recording, hands: dict[HandName, HandModel], times: dict[str, list[float]]
+) -> None:
+    """The longest of the first frames' steps: the one in which all landmarks of a hand begin."""
+    for _ in range(_BEGINNINGS):
+        fusion = FusionStep(recording.rig.config(), recording.rig.rig(), hands)
+        fusion.step(recording.frames[0])  # it begins anew with the first frame, which is no hand's
+        took = []
+        for frame in recording.frames[1:_FIRST]:
+            begin_ns = time.thread_time_ns()
+            fusion.step(frame)
+            took.append((time.thread_time_ns() - begin_ns) * 1e-3)
+        times.setdefault("fusion_begins", []).append(max(took))
 
 
 def _time_kernel(recording: Recording, timed: Callable[..., Any]) -> None:

@@ -1,7 +1,7 @@
 """What a process serves for a rig: its own service, and perhaps one that follows it closely.
 
-They share a session on the bus, so what one tells the other need not go through the router; all
-else is each one's own: its streams, its tasks, its health.
+They share a session on the bus, and what one tells the other is handed over as it is; all else is
+each one's own: its streams, its tasks, its health.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
-from rhot.messages import ClockEcho, MarkerFrame
+from rhot.messages import ClockEcho, HandPose, MarkerFrame
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
@@ -104,8 +104,16 @@ async def _serve_without_depth(service: Service) -> None:
 
 
 async def _note_poses(service: Service, step: FusionStep) -> None:
-    """Where the fingers point tells where in its paint a tip is."""
-    await service.bus.latest(topics.POSE).each(step.note_pose)
+    """Where the fingers point tells where in its paint a tip is.
+
+    A solver of this process has just handed it over, and Zenoh sends it meanwhile.
+    """
+    loop = asyncio.get_running_loop()
+
+    def take(pose: HandPose) -> None:
+        loop.call_later(_SETTLE_S, step.note_pose, pose)
+
+    await service.bus.latest(topics.POSE).each(take)
 
 
 def _serve_session_and_clock(service: Service) -> SessionState:
