@@ -103,24 +103,19 @@ class Bus:
         rounds: Rounds | None = None,
         handover: Handover | None = None,
     ) -> None:
-        """handover: between the services of this process, where there are several (beside)."""
-        self.rig = rig
-        self._rounds = rounds
+        self.rig, self._session, self._rounds = rig, session, rounds
         self.streams: list[StreamStats] = []
-        self._session = session
         self.session = str(session.zid())  # as the router lists it
         self._loop = asyncio.get_running_loop()
         self._asker = Asker(session, self._loop)
         self._open: list[Any] = []
         self._tasks = Tasks(self._loop)
         self._beside: list[Bus] = []
-        self._handover = handover
+        self._handover = handover  # between the services of this process, if there are several
 
     def beside(self) -> Bus:
-        """A bus of streams of its own over the same session, for another service of this process:
-        messages that one of them publishes are handed over to the other. It ends with this one.
-
-        To be asked for before there is any stream: raises BusError otherwise.
+        """A bus of its own over the same session, for another service of this process, to which
+        messages are handed over. It ends with this one. BusError if this one has streams already.
         """
         if self._open:
             raise BusError(f"the bus of rig {self.rig} has streams already: too late for another")
