@@ -104,16 +104,18 @@ async def _serve_without_depth(service: Service) -> None:
 
 
 async def _note_poses(service: Service, step: FusionStep) -> None:
-    """Where the fingers point tells where in its paint a tip is.
-
-    A solver of this process has just handed it over, and Zenoh sends it meanwhile.
-    """
-    loop = asyncio.get_running_loop()
+    """Where the fingers point tells where in its paint a tip is."""
 
     def take(pose: HandPose) -> None:
-        loop.call_later(_SETTLE_S, step.note_pose, pose)
+        service.tasks.create_task(_note_later(step, pose))
 
     await service.bus.latest(topics.POSE).each(take)
+
+
+async def _note_later(step: FusionStep, pose: HandPose) -> None:
+    """A solver of this process has just handed it over: let Zenoh send it first."""
+    await asyncio.sleep(_SETTLE_S)
+    step.note_pose(pose)
 
 
 def _serve_session_and_clock(service: Service) -> SessionState:

@@ -15,10 +15,10 @@ from typing import Generic, Protocol, TypeVar
 from rhot.hand import HandName
 
 # A pose counts for points this much later than its own. From points to pose and back takes 2 to 3
-# ms between real processes (median; 10 to 80 at most on two cores that eight others use too). At
-# 30 frames a second it is the pose of the instant before; one instant older costs 6 % of the RMS of
-# a closing fist from pictures (1.14 -> 1.21 mm), two 14 %, where directions do not turn on
-# (known_paint.py).
+# ms between real processes (median; 10 to 80 at most on two cores that eight others use too), and 2
+# more until fusion looks at it. At 30 frames a second it is the pose of the instant before; one
+# instant older costs 6 % of the RMS of a closing fist from pictures (1.14 -> 1.21 mm), two 14 %,
+# where directions do not turn on (known_paint.py).
 POSE_DELAY_NS = 25_000_000
 # Poses that wait, at most; a rig has two hands, and some frames within the delay. Stamps come from
 # the network: those of a far future must not fill the memory.
