@@ -19,7 +19,7 @@ class Reader(Protocol):
     def key(self) -> str: ...
 
     def hand_over(self, key: str, message: Any, now_ns: int) -> None:
-        """Take a message that was published on a key at now_ns; from any thread."""
+        """Take a message that was published on a key at now_ns; in the event loop."""
         ...
 
 

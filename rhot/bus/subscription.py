@@ -107,9 +107,10 @@ class RawSubscription(Buffer[Sample]):
         if taken is not None:
             self._note_dropped(self.add(taken.key, taken))
 
-    def hand_over(self, key: str, message: Any, now_ns: int) -> None:
-        """Take a message of this process, as it is; from any thread."""
-        self._note_dropped(self.push(key, Sample(key, b"", b"", now_ns, message)))
+    def hand_over(self, sample: Sample, patience_s: float) -> None:
+        """Take a message of this process, in the event loop; its reader is woken so much later."""
+        self._note_dropped(self.add(sample.key, sample))
+        self._loop.call_later(patience_s, self.wake)
 
     def _note_dropped(self, dropped: int) -> None:
         if dropped:
@@ -177,6 +178,8 @@ class Subscription(Generic[T]):
         self.stats = stats
         # How long the last message had waited for its reader; told to one who is to be in time.
         self.waited_s = 0.0
+        # So long may wait what is handed over, where the loop has better to do.
+        self.patience_s = 0.0
         self._topic = topic
         self._standing = standing
         self._handover = handover
@@ -199,8 +202,8 @@ class Subscription(Generic[T]):
         return self.stats.key
 
     def hand_over(self, key: str, message: T, now_ns: int) -> None:
-        """Take a message of this process, as it is; from any thread."""
-        self._raw.hand_over(key, message, now_ns)
+        """Take a message of this process, as it is; in the event loop."""
+        self._raw.hand_over(Sample(key, b"", b"", now_ns, message), self.patience_s)
 
     @property
     def waiting(self) -> int:

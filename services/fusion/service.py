@@ -18,7 +18,7 @@ from rhot.files.calibration import load_hand, load_rig_cameras
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
 from rhot.hand import HandModel, HandName
-from rhot.messages import ClockEcho, HandPose, MarkerFrame
+from rhot.messages import ClockEcho, MarkerFrame
 from rhot.process.calibration_watch import load_and_watch
 from rhot.process.computer.watch import watch_computer
 from rhot.process.service import Service
@@ -105,17 +105,9 @@ async def _serve_without_depth(service: Service) -> None:
 
 async def _note_poses(service: Service, step: FusionStep) -> None:
     """Where the fingers point tells where in its paint a tip is."""
-
-    def take(pose: HandPose) -> None:
-        service.tasks.create_task(_note_later(step, pose))
-
-    await service.bus.latest(topics.POSE).each(take)
-
-
-async def _note_later(step: FusionStep, pose: HandPose) -> None:
-    """A solver of this process has just handed it over: let Zenoh send it first."""
-    await asyncio.sleep(_SETTLE_S)
-    step.note_pose(pose)
+    poses = service.bus.latest(topics.POSE)
+    poses.patience_s = _SETTLE_S
+    await poses.each(step.note_pose)
 
 
 def _serve_session_and_clock(service: Service) -> SessionState:
