@@ -60,6 +60,7 @@ class Publisher(Generic[T]):
         """Send a message, with sent_ns filled in.
 
         A value that is not finite has no JSON: such a message is not sent, and counted as rejected.
+        Where there are several services in the process, to be called in the event loop.
         """
         now_ns = clock.now_ns()
         if self._says_when:
@@ -68,10 +69,10 @@ class Publisher(Generic[T]):
         if b"null" in payload and not self._decodes(payload):
             self.stats.rejected += 1
             return
+        self._publisher.put(payload)
         if self._handover is not None:
             for reader in self._handover.readers(self.key):
                 reader.hand_over(self.key, message, now_ns)
-        self._publisher.put(payload)
         stamp_ns = getattr(message, "stamp_ns", 0)
         self._count(now_ns - stamp_ns if stamp_ns else None)
 

@@ -41,7 +41,8 @@ _MAX_KEYS = 256
 
 class Sample(NamedTuple):
     """One undecoded sample; received_ns is CLOCK_REALTIME in Zenoh's thread, or about the middle
-    between two rounds. message: of this process, as it is; then there is no payload.
+    between two rounds. message: what a service of this process hands over to a typed subscription,
+    without a payload; raw() gives none.
     """
 
     key: str

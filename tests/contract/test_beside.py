@@ -95,6 +95,22 @@ async def test_only_the_newest_counts_where_only_that_is_wanted(services):
     assert heard.stats.dropped == 4
 
 
+async def test_a_patient_reader_is_woken_later(services):
+    fusion, solver = services
+    heard: list[HandPoints] = []
+    subscription = solver.latest(topics.POINTS)
+    subscription.patience_s = _LATER_S
+    listening = asyncio.create_task(subscription.each(heard.append))
+    publisher = fusion.publisher(topics.POINTS, hand="right")
+    await asyncio.sleep(0)
+    began_s = asyncio.get_running_loop().time()
+    publisher.put(points(3))
+    await until(lambda: heard)
+    assert asyncio.get_running_loop().time() - began_s >= 0.9 * _LATER_S
+    assert [message.seq for message in heard] == [3]
+    listening.cancel()
+
+
 async def test_undecoded_samples_of_the_same_session_go_through_zenoh(services):
     fusion, solver = services
     heard = solver.raw(topics.POINTS, 8)
