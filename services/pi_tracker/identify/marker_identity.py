@@ -158,6 +158,11 @@ class MarkerIdentity:
         track = self._tracks[color]
         return 0.0 if track is None else track.area_px
 
+    def whole_px2(self, color: int) -> float:
+        """How large a marker is where all of it shows, 0 if it never was seen."""
+        track = self._tracks[color]
+        return 0.0 if track is None else track.whole_px2
+
     def width_cells(self) -> float:
         """How wide the markers are that were seen, the median of them; 0 if there is none."""
         areas = [track.area_px for track in self._tracks if track is not None]

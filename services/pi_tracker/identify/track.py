@@ -14,6 +14,10 @@ from services.pi_tracker.image.blob import Blob
 _MAX_SPEED_PX_S = 2100.0
 # A remembered area follows the marker with this weight of the old one per frame.
 AREA_MEMORY = 0.8
+# What it is where all of it shows rises as fast and falls so slowly: frames in which half of a
+# marker is found follow one another, and each would let the next have no more. It rises to no more
+# than so many times what was found before it grew: else it might grow on, with each frame.
+_WHOLE_MEMORY, _SURE_TIMES = 0.98, 2.5
 # A track that moves less than this a frame stands still.
 _STATIONARY_PX = 1.0
 # Velocity predicts for so long; after a longer gap the old place tells nothing of it.
@@ -43,9 +47,11 @@ class Track:
     # Frames in a row in which it has not moved.
     stationary_frames: int = 0
     seen_ns: int = -1
+    # Its area where all of it shows.
+    whole_px2: float = -1.0
 
     def __post_init__(self) -> None:
-        self.seen_ns = self.stamp_ns
+        self.seen_ns, self.whole_px2 = self.stamp_ns, self.area_px
 
     def predicted(self, stamp_ns: int) -> tuple[float, float]:
         """Its position at a time, px."""
@@ -72,6 +78,9 @@ class Track:
         self._move(x_px, y_px, stamp_ns)
         self.area_px = area_memory * self.area_px + (1.0 - area_memory) * area_px
         self.found_px2 += (1.0 - AREA_MEMORY) * (found_px2 - self.found_px2)
+        sure_px2 = min(area_px, _SURE_TIMES * max(found_px2, self.found_px2))
+        memory = AREA_MEMORY if sure_px2 > self.whole_px2 else _WHOLE_MEMORY
+        self.whole_px2 += (1.0 - memory) * (sure_px2 - self.whole_px2)
         self.seen_ns = stamp_ns
 
     def coast(self, dx_px: float, dy_px: float, stamp_ns: int) -> None:

@@ -157,4 +157,22 @@ TUNING: dict[str, Clip] = {
         rig=Rig(phase_s=0.0248),
         seed=24,
     ),
+    # Held out until 2026-11-29, when its wrist led to what a marker is where all of it shows.
+    "wave, waiting": Clip(
+        Play(
+            "wave",
+            Carried("wait", 25.0, 0.4),
+            0.6,
+            distance_m=0.47,
+            tilt_deg=-12.0,
+            yaw_deg=10.0,
+        ),
+        build=Build(1.0, 1.04),
+        job=Job((12.0, 16.0), 1.1, patchy=0.2, skin=PALE, seed=73),
+        light=COLD,
+        sensor=Sensor(jpeg=80, sharpen=0.4),
+        rig=Rig(phase_s=0.0066, skew_s=0.013, baseline_m=0.072),
+        given_scale=0.97,
+        seed=73,
+    ),
 }
