@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -60,3 +61,28 @@ def test_a_marker_that_is_gone_is_not_guessed(shows, colors):
 def test_without_having_been_seen_a_sliver_is_nothing(shows, colors):
     step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
     assert set(markers(step, shows(0, 62))) == {"blue"}
+
+
+@pytest.mark.parametrize("hues", [3, 30])
+def test_a_marker_out_of_its_range_is_found_where_it_must_be_if_it_is_nearly_its_color(
+    studio, colors, hues
+):
+    """By some hues; what is quite another colour is not it."""
+
+    def shows(seq, paint):
+        image = np.full((SIZE[1], SIZE[0], 3), 140.0, np.float32)
+        image[40:60, 60:80] = paint
+        image[40:60, 120:140] = studio.paints["blue"]
+        return studio.of(studio.bgr(image, 0.0, seq), seq)
+
+    high = colors.colors["green"].hsv_high
+    shaded = cv2.cvtColor(np.uint8([[[high[0] + hues, 220, 150]]]), cv2.COLOR_HSV2BGR)[0, 0]
+    step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
+    assert "green" not in markers(step, shows(0, shaded))
+    step = TrackerStep("left", colors, Tracker(), SIZE, ["green", "blue"])
+    for seq in range(6):
+        markers(step, shows(seq, studio.paints["green"]))
+    found = markers(step, shows(6, shaded))
+    assert set(found) == ({"green", "blue"} if hues == 3 else {"blue"})
+    if hues == 3:
+        assert found["green"].x_px == pytest.approx(69.5, abs=0.5)

@@ -38,6 +38,24 @@ def test_blobs_are_compared_as_they_are_found_and_not_as_they_grow():
     assert track.found_px2 == pytest.approx(large.area_px, rel=0.01)
 
 
+def test_what_a_marker_is_as_a_whole_is_learned_soon_and_forgotten_slowly():
+    track = Track(10.0, 10.0, 100.0, 100.0, 0)
+    for frame in range(1, 15):
+        track.update(10.0, 10.0, 200.0, 180.0, frame * FRAME_NS)
+    assert track.whole_px2 == pytest.approx(200.0, rel=0.05)
+    for frame in range(15, 30):
+        track.update(10.0, 10.0, 50.0, 40.0, frame * FRAME_NS)
+    assert track.area_px < 60.0
+    assert track.whole_px2 > 150.0
+
+
+def test_a_marker_is_no_larger_as_a_whole_than_what_is_found_of_it_lets_it_be():
+    track = Track(10.0, 10.0, 100.0, 100.0, 0)
+    for frame in range(1, 200):
+        track.update(10.0, 10.0, 1.5 * track.whole_px2, 100.0, frame * FRAME_NS)
+    assert track.whole_px2 <= 250.0
+
+
 def test_a_coasting_track_moves_but_was_not_seen():
     track = Track(10.0, 20.0, 100.0, 100.0, 0)
     track.coast(5.0, -2.0, FRAME_NS)

@@ -12,6 +12,7 @@ from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.detect.near_colors import near_colors
 from services.pi_tracker.detect.search_region import whole
+from services.pi_tracker.identify.track import Track
 from services.pi_tracker.image.yuv_planes import picture
 from services.pi_tracker.measure.grown_blob import NO_GROWTH, Limit, grown, limit
 from testing import synthetic_images
@@ -38,9 +39,9 @@ def the_blob(image):
     return blob
 
 
-def after(image, marker_px2=0.0, found_px2=0.0):
+def after(image, whole_px2=0.0, found_px2=0.0):
     blob = the_blob(image)
-    return grown(image, NEAR, blob, limit(blob, marker_px2, found_px2))
+    return grown(image, NEAR, blob, limit(blob, whole_px2, found_px2))
 
 
 def test_the_half_that_a_range_misses_is_found():
@@ -69,8 +70,8 @@ def test_another_paint_beside_it_is_not_taken(hue):
 def test_a_wall_of_nearly_its_colour_is_not_taken():
     image = shown((0, 0, *SIZE, NEARLY), (10, 8, 18, 16, OWN))
     blob = the_blob(image)
-    for marker_px2 in (0.0, 300.0):
-        assert grown(image, NEAR, blob, limit(blob, marker_px2, 0.7 * marker_px2)) is blob
+    for whole_px2 in (0.0, 300.0):
+        assert grown(image, NEAR, blob, limit(blob, whole_px2, 0.7 * whole_px2)) is blob
 
 
 def test_a_stripe_of_nearly_its_colour_that_goes_on_is_not_taken():
@@ -102,8 +103,25 @@ def test_what_is_whole_is_left_alone():
 def test_what_a_marker_has_grown_to_does_not_let_it_grow_on():
     image = shown((10, 8, 16, 14, OWN), (16, 6, 30, 20, NEARLY))
     blob = the_blob(image)
-    for marker_px2 in (0.0, 500.0, 1000.0, 5000.0):
-        assert grown(image, NEAR, blob, limit(blob, marker_px2, blob.area_px)) is blob
+    track = Track(blob.x_px, blob.y_px, blob.area_px / 0.65, blob.area_px, 0)
+    for frame in range(1, 60):
+        found = grown(image, NEAR, blob, limit(blob, track.whole_px2, track.found_px2))
+        assert found is blob
+        # What is measured of few cells may be half as much again.
+        track.update(blob.x_px, blob.y_px, found.area_px / 0.65, blob.area_px, frame * 33_000_000)
+
+
+def test_of_a_marker_that_was_found_whole_a_piece_grows_to_all_of_it():
+    """A dab comes into shade: most of it is out of its range, in one picture after another."""
+    lit = shown((10, 8, 21, 19, OWN))
+    shaded = shown((10, 8, 13, 11, OWN), (10, 8, 21, 19, NEARLY), (10, 8, 13, 11, OWN))
+    blob, piece = the_blob(lit), the_blob(shaded)
+    track = Track(blob.x_px, blob.y_px, blob.area_px / 0.85, blob.area_px, 0)
+    for frame in range(1, 15):
+        found = grown(shaded, NEAR, piece, limit(piece, track.whole_px2, track.found_px2))
+        assert found.rect == blob.rect
+        track.update(blob.x_px, blob.y_px, found.area_px / 0.85, piece.area_px, frame * 33_000_000)
+    assert track.found_px2 < 0.2 * blob.area_px
 
 
 def test_limits_of_a_huge_blob_are_within_bounds():
