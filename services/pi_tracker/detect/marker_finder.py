@@ -236,7 +236,12 @@ class MarkerFinder:
         blobs = [association.blob for association in associated.values()]
         identity = self._identity
         limits = [
-            limit(blob, identity.whole_px2(color), identity.found_px2(color))
+            limit(
+                blob,
+                identity.area_px2(color),
+                identity.whole_px2(color),
+                identity.found_px2(color),
+            )
             for color, blob in zip(associated, blobs, strict=True)
         ]
         growth = Growth(self._near, limits) if any(most for most, _ in limits) else None

@@ -39,15 +39,6 @@ HELD_OUT: dict[str, Clip] = {
         given_scale=1.02,
         seed=26,
     ),
-    "splay, lime picture": Clip(
-        Play("HandSplay-110fps", Carried("drift", 70.0, 0.4), 0.7, roll_deg=-8.0, at=(0.0, 0.05)),
-        build=Build(0.98, 1.03),
-        job=Job((12.0, 15.0), 1.1, dab_off_mm=3.0, seed=67),
-        sensor=Sensor(electrons=1800.0, jpeg=85),
-        rig=Rig(phase_s=0.0143, baseline_m=0.085),
-        given_scale=1.02,
-        seed=67,
-    ),
     "grab, violet picture": Clip(
         Play("grab", Carried("roll", 25.0, 0.5), 0.5, 0.1, 0.6, distance_m=0.5, at=(0.02, -0.06)),
         job=Job((11.0, 16.0), 0.7, skin=DARK, seed=42),

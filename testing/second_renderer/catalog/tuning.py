@@ -157,7 +157,17 @@ TUNING: dict[str, Clip] = {
         rig=Rig(phase_s=0.0248),
         seed=24,
     ),
-    # Held out until 2026-11-29, when its wrist led to what a marker is where all of it shows.
+    # Held out until 2026-11-29, when they led to what a marker is where all of it shows, and to how
+    # far beside a blob is looked for it.
+    "splay, lime picture": Clip(
+        Play("HandSplay-110fps", Carried("drift", 70.0, 0.4), 0.7, roll_deg=-8.0, at=(0.0, 0.05)),
+        build=Build(0.98, 1.03),
+        job=Job((12.0, 15.0), 1.1, dab_off_mm=3.0, seed=67),
+        sensor=Sensor(electrons=1800.0, jpeg=85),
+        rig=Rig(phase_s=0.0143, baseline_m=0.085),
+        given_scale=1.02,
+        seed=67,
+    ),
     "wave, waiting": Clip(
         Play(
             "wave",

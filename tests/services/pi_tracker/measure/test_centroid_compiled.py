@@ -163,7 +163,7 @@ def test_markers_half_of_which_their_ranges_miss_grow_alike(studio, tip, colors,
         ]
         image = picture(studio.frame(tips, seq=seed, size_px=(150, 120), layout=layout)[0])
         blobs = BlobDetector(table, Tracker()).detect(image, whole(image.size))
-        growth = Growth(near, [limit(blob, 0.0, 0.0) for blob in blobs])
+        growth = Growth(near, [limit(blob, 0.0, 0.0, 0.0) for blob in blobs])
         noise = Noise(1.44, 1.47)
         found = measure(image, blobs, noise, growth)
         agree(found, centroids(image, blobs, noise, growth))

@@ -39,9 +39,13 @@ def the_blob(image):
     return blob
 
 
-def after(image, whole_px2=0.0, found_px2=0.0):
+def after(image, marker_px2=0.0, found_px2=0.0):
     blob = the_blob(image)
-    return grown(image, NEAR, blob, limit(blob, whole_px2, found_px2))
+    return grown(image, NEAR, blob, limit(blob, marker_px2, marker_px2, found_px2))
+
+
+def areas(track):
+    return track.area_px, track.whole_px2, track.found_px2
 
 
 def test_the_half_that_a_range_misses_is_found():
@@ -71,7 +75,7 @@ def test_a_wall_of_nearly_its_colour_is_not_taken():
     image = shown((0, 0, *SIZE, NEARLY), (10, 8, 18, 16, OWN))
     blob = the_blob(image)
     for whole_px2 in (0.0, 300.0):
-        assert grown(image, NEAR, blob, limit(blob, whole_px2, 0.7 * whole_px2)) is blob
+        assert grown(image, NEAR, blob, limit(blob, whole_px2, whole_px2, 0.7 * whole_px2)) is blob
 
 
 def test_a_stripe_of_nearly_its_colour_that_goes_on_is_not_taken():
@@ -95,8 +99,8 @@ def test_a_marker_at_the_edge_of_the_picture_grows_too():
 
 def test_what_is_whole_is_left_alone():
     blob = the_blob(shown((10, 8, 20, 18, OWN)))
-    assert limit(blob, 4.0 * blob.cells / 0.9, blob.area_px) == NO_GROWTH
-    assert limit(blob, 4.0 * blob.cells / 0.7, blob.area_px).most > blob.cells
+    assert limit(blob, *2 * [4.0 * blob.cells / 0.9], blob.area_px) == NO_GROWTH
+    assert limit(blob, *2 * [4.0 * blob.cells / 0.7], blob.area_px).most > blob.cells
     assert grown(shown(), NEAR, blob, NO_GROWTH) is blob
 
 
@@ -105,7 +109,7 @@ def test_what_a_marker_has_grown_to_does_not_let_it_grow_on():
     blob = the_blob(image)
     track = Track(blob.x_px, blob.y_px, blob.area_px / 0.65, blob.area_px, 0)
     for frame in range(1, 60):
-        found = grown(image, NEAR, blob, limit(blob, track.whole_px2, track.found_px2))
+        found = grown(image, NEAR, blob, limit(blob, *areas(track)))
         assert found is blob
         # What is measured of few cells may be half as much again.
         track.update(blob.x_px, blob.y_px, found.area_px / 0.65, blob.area_px, frame * 33_000_000)
@@ -118,7 +122,7 @@ def test_of_a_marker_that_was_found_whole_a_piece_grows_to_all_of_it():
     blob, piece = the_blob(lit), the_blob(shaded)
     track = Track(blob.x_px, blob.y_px, blob.area_px / 0.85, blob.area_px, 0)
     for frame in range(1, 15):
-        found = grown(shaded, NEAR, piece, limit(piece, track.whole_px2, track.found_px2))
+        found = grown(shaded, NEAR, piece, limit(piece, *areas(track)))
         assert found.rect == blob.rect
         track.update(blob.x_px, blob.y_px, found.area_px / 0.85, piece.area_px, frame * 33_000_000)
     assert track.found_px2 < 0.2 * blob.area_px
@@ -126,6 +130,6 @@ def test_of_a_marker_that_was_found_whole_a_piece_grows_to_all_of_it():
 
 def test_limits_of_a_huge_blob_are_within_bounds():
     blob = the_blob(shown((0, 0, *SIZE, OWN)))
-    assert limit(blob, 0.0, 0.0).reach == 24
-    assert limit(blob, 1e-9, 0.0) == NO_GROWTH
-    assert limit(blob._replace(cells=1, rect=(5, 5, 6, 6)), 1e6, 4e5) == Limit(250000, 24)
+    assert limit(blob, 0.0, 0.0, 0.0).reach == 24
+    assert limit(blob, 1e-9, 1e-9, 0.0) == NO_GROWTH
+    assert limit(blob._replace(cells=1, rect=(5, 5, 6, 6)), 1e6, 1e5, 4e5) == Limit(250000, 24)
