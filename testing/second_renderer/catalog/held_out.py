@@ -64,7 +64,7 @@ HELD_OUT: dict[str, Clip] = {
         rig=Rig(phase_s=0.0191, toe_in_deg=1.0),
         seed=59,
     ),
-    # Looked at once, on 2026-11-29.
+    # Made on 2026-11-29, and looked at four times that day.
     "splay, large hand": Clip(
         Play(
             "HandSplay-110fps",
