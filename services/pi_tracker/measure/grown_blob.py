@@ -29,8 +29,8 @@ from services.pi_tracker.image.yuv_planes import Picture
 # ago; or to so much of what its marker is where all of it shows; whichever is more. (Limits by what
 # it had just grown to let it grow on over skin.) Without the latter a dab of which 5 of 50 cells
 # were in its range stayed at these, 4 px off: 16 tuning clips of the other renderer, geometric mean
-# of what centres jump by .28 -> .26 px, of points' largest errors without lag 17.0 -> 14.5 mm. (With
-# .85 two of five clips were as before.)
+# of what centres jump by .28 -> .26 px, of points' largest errors without lag 17.0 -> 14.5 mm.
+# (With .85 two of five clips were as before.)
 _MOST_TIMES, _MOST_OF_WHOLE = 2.5, 0.95
 # Cells beside the blob that are looked at: of a marker as large as it was a moment ago, or as the
 # blob may become, so much longer than a square, what the blob does not have; within these bounds.
