@@ -193,8 +193,10 @@ class MarkerFinder:
         least_px2, most_px2 = (share * self._identity.whole_px2(color) for share in _NEARLY_SHARES)
         blobs = self._near_detector.detect(image, region)
         found = self._of_color(image, color, blobs)
-        self._only_nearly.add(color)
-        return [blob for blob in found if least_px2 <= blob.area_px <= most_px2]
+        found = [blob for blob in found if least_px2 <= blob.area_px <= most_px2]
+        if found:
+            self._only_nearly.add(color)
+        return found
 
     def _of_color(self, image: Picture, color: int, blobs: list[Blob]) -> list[Blob]:
         """Those of a colour that may be its marker."""
