@@ -37,10 +37,10 @@ _MOST_TIMES, _MOST_OF_WHOLE = 2.5, 0.95
 # (By what it is where all of it shows, more of a poster was looked at: a tip 26 -> 34 mm off.)
 _LONG, _REACH = 1.3, (3, 24)
 # A blob of this share of the cells that its marker has where all of it shows is left as it is: some
-# cells of the rim are in no range. Tuning half of the other renderer, what a centre jumps by from frame to frame, of a
-# grasp and of a hand that rolls, before limits were what they are: .83 and .22 px ungrown, .31 and
-# .16 with .65, .24 and .10 with .8, .23 and .09 with .85, .21 and .09 with all blobs grown, which
-# takes 20 us more a frame.
+# cells of the rim are in no range. Tuning half of the other renderer, what a centre jumps by from
+# frame to frame, of a grasp and of a hand that rolls, before limits were what they are: .83 and .22
+# px ungrown, .31 and .16 with .65, .24 and .10 with .8, .23 and .09 with .85, .21 and .09 with all
+# blobs grown, which takes 20 us more a frame.
 _WHOLE = 0.85
 
 
