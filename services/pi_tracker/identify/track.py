@@ -6,7 +6,7 @@ Pure. Stamps may stand still or run backwards: velocity is then zero, and likene
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from services.pi_tracker.image.blob import Blob
 
@@ -48,7 +48,7 @@ class Track:
     stationary_frames: int = 0
     seen_ns: int = -1
     # Its area where all of it shows.
-    whole_px2: float = -1.0
+    whole_px2: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.seen_ns, self.whole_px2 = self.stamp_ns, self.area_px
