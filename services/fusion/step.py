@@ -185,7 +185,7 @@ class FusionStep:
 
     def _align(self, view: View, behind: bool) -> None:
         """Look in a frame, as announced, for clocks that are off by more."""
-        if self.alignment.observe(view, behind=behind):
+        if self.alignment.observe(view, behind=behind, doubted=self.clocks.doubted):
             self._restart(self._admission.newest_ns or view.instant_ns)
 
     def note_pose(self, pose: HandPose) -> None:

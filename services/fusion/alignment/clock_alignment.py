@@ -1,11 +1,11 @@
 """Clocks that are off by more than the tuner of clocks may learn: found from motion, put right.
 
-Every two seconds of frames, whether they are admitted or not, each camera's heights are compared
-with those of a reference camera over all offsets within 2.5 s (offset_search.py). Where the views
-fit at another offset than the one in use, by more than the tuner reaches, twice in a row, that
-camera's frames are shifted by it from then on: some seconds of motion outweigh what a clock claims
-of itself. It comes before the timeline, which refuses frames half a second astray. A clock that is
-set, or stamps that are right again, end it.
+Every two seconds of frames, whether they are admitted or not, and every eight where all is well,
+each camera's heights are compared with those of a reference camera over all offsets within 2.5 s
+(offset_search.py). Where the views fit at another offset than the one in use, by more than the
+tuner reaches, twice in a row, that camera's frames are shifted by it from then on: some seconds of
+motion outweigh what a clock claims of itself. It comes before the timeline, which refuses frames
+half a second astray. A clock that is set, or stamps that are right again, end it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from services.fusion.alignment.offset_search import Offset, find_offset
 from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import View
 
-# A search takes 2 to 3 ms; every two seconds that is one or two in a thousand. The first comes when
-# there is enough to compare, and one that found something is soon followed by another.
-_EVERY_S, _FIRST_S, _AGAIN_S = 2.0, 3.0, 1.0
+# A search takes 2 to 3 ms; every two seconds that would be a tenth of all that a rig costs. The
+# first comes when there is enough to compare, and one that found something is soon followed by
+# another. After each in a row that found a camera's clock to be right the next one waits twice as
+# long, up to this many times, as long as the tuner's heights do not say that something changed.
+_EVERY_S, _FIRST_S, _AGAIN_S, _MOST_PATIENT = 2.0, 3.0, 1.0, 4
 # A search is put off in so many frames at most: one or two seconds of those that are learned from.
 _MOST_PUT_OFF = 30
 # Share of these two seconds by which rigs differ.
@@ -80,6 +82,8 @@ class ClockAlignment:
         # By camera: how many frames in a row were refused.
         self._astray = [0] * len(cameras)
         self._searched_s: dict[int, float] = {}
+        # By camera: how many times as long as usual the next search waits.
+        self._patience = [1] * len(cameras)
         # By camera: in how many frames a search was due, and other frames waited.
         self._put_off = [0] * len(cameras)
         self.searches = 0
@@ -89,27 +93,36 @@ class ClockAlignment:
         """The cameras whose clocks are put right."""
         return {self._names[camera]: one for camera, one in sorted(self._corrections.items())}
 
-    def observe(self, view: View, *, behind: bool = False) -> bool:
+    def observe(self, view: View, *, behind: bool = False, doubted: bool = False) -> bool:
         """Take in a frame as announced; whether clocks are put right otherwise than before.
 
         behind: other frames wait, also for a search, which is then put off for some frames.
+        doubted: something says that clocks are not what they were found to be.
         """
         if not self.enabled:
             return False
         changed = self.note_announced(view)
         self._memory.add(view)
-        newest_s = self._memory.newest_s(view.camera)
-        known_s = self._memory.length_s(view.camera)
-        since_s = 0.0 if newest_s is None else newest_s - self._searched_s.get(view.camera, -np.inf)
-        wait_s = _AGAIN_S if view.camera in self._candidates else self._every_s
-        due = known_s >= _FIRST_S and not 0.0 <= since_s < wait_s
-        if due and behind and self._put_off[view.camera] < _MOST_PUT_OFF:
-            self._put_off[view.camera] += 1
-        elif due and newest_s is not None and view.camera != (reference := self._reference()):
-            self._put_off[view.camera] = 0
-            self._searched_s[view.camera] = newest_s
-            changed |= self._search(reference, view.camera)
+        camera = view.camera
+        if doubted:
+            self._patience[camera] = 1
+        if self._is_due(camera):
+            if behind and self._put_off[camera] < _MOST_PUT_OFF:
+                self._put_off[camera] += 1
+            else:
+                self._put_off[camera] = 0
+                changed |= self._search(camera)
         return changed
+
+    def _is_due(self, camera: int) -> bool:
+        """Whether a camera is to be compared with the reference."""
+        newest_s = self._memory.newest_s(camera)
+        if newest_s is None or self._memory.length_s(camera) < _FIRST_S:
+            return False
+        wait_s = self._every_s * self._patience[camera]
+        if camera in self._candidates:
+            wait_s = _AGAIN_S
+        return not 0.0 <= newest_s - self._searched_s.get(camera, -np.inf) < wait_s
 
     def aligned(self, view: View) -> View:
         """A view with its clock put right."""
@@ -127,6 +140,8 @@ class ClockAlignment:
         A camera whose clock is put right is refused only where its stamps have changed.
         """
         self._astray[camera] = self._astray[camera] + 1 if astray else 0
+        if astray:
+            self._patience[camera] = 1
         if self._astray[camera] < _ASTRAY or camera not in self._corrections:
             return False
         self._forget(camera)
@@ -135,6 +150,7 @@ class ClockAlignment:
     def _forget(self, camera: int) -> None:
         self._corrections.pop(camera, None)
         self._candidates.pop(camera, None)
+        self._patience[camera] = 1
         self._memory.clear(camera)
 
     def note_announced(self, view: View) -> bool:
@@ -161,8 +177,10 @@ class ClockAlignment:
             return min(as_announced, key=lambda c: (self._announced[c][1], c))
         return known[0]
 
-    def _search(self, reference: int, camera: int) -> bool:
+    def _search(self, camera: int) -> bool:
         """Compare a camera with the reference; whether its clock is put right otherwise now."""
+        self._searched_s[camera] = self._memory.newest_s(camera) or 0.0
+        reference = self._reference()
         pair = (min(reference, camera), max(reference, camera))
         if pair not in self._pairs:
             return False
@@ -171,7 +189,10 @@ class ClockAlignment:
         found = find_offset(*self._memory.tracks(*pair, self._pairs[pair]), together=True)
         late_s = sign * found.offset_s + self._late_s(reference)
         candidate = self._candidates.pop(camera, None)
-        if not found.decided or not self._beyond_reach(reference, camera, late_s, found):
+        is_right = found.decided and not self._beyond_reach(reference, camera, late_s, found)
+        longer = min(2 * self._patience[camera], _MOST_PATIENT)
+        self._patience[camera] = longer if is_right else 1
+        if is_right or not found.decided:
             return False
         if candidate is None or abs(late_s - candidate) > _AGREE_S:
             self._candidates[camera] = late_s

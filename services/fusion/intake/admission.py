@@ -10,7 +10,6 @@ on the new time, time itself has moved (a pause, a clock set everywhere): it sta
 
 from __future__ import annotations
 
-from collections import deque
 from enum import Enum
 
 # Frames this far from the newest instant are not of the same time. Longer than any hold, shorter
@@ -37,7 +36,8 @@ class FrameAdmission:
 
     def __init__(self, cameras: int) -> None:
         self.newest_ns: int | None = None
-        self._known: list[deque[int]] = [deque(maxlen=_REMEMBERED) for _ in range(cameras)]
+        # By camera: the latest stamps, as keys in their order.
+        self._known: list[dict[int, None]] = [{} for _ in range(cameras)]
         self._newest_seq: list[int | None] = [None] * cameras
         # By camera, since a frame was last admitted: its latest instant astray, and how many such
         # frames came in a row.
@@ -56,7 +56,10 @@ class FrameAdmission:
             return Verdict.TWICE
         verdict = self._by_instant(camera, instant_ns)
         if verdict is not Verdict.ASTRAY:
-            self._known[camera].append(stamp_ns)
+            known = self._known[camera]
+            known[stamp_ns] = None
+            if len(known) > _REMEMBERED:
+                del known[next(iter(known))]
             self._newest_seq[camera] = seq
             self._astray.clear()
         return verdict

@@ -15,6 +15,8 @@ A clock that was set anew (its announced offset jumps) starts the estimation aga
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -46,7 +48,8 @@ _BOUND_SIGMAS, _BOUND_S = 3.0, 2.5e-3
 # Two seconds of motion may outweigh the announced clocks.
 _INSTANTS = 20
 # The last instants (a second) outweigh what was learned before if they contradict it by so much:
-# by 4, noise of 3 px that lasts for some frames does so now and then. Looked at now and then.
+# by 4, noise of 3 px that lasts for some frames does so now and then. Once there are twice as many,
+# every fourth one is fitted with those before it: of .1 s more, some seconds say nearly the same.
 _RECENT, _CONTRADICTS, _LOOK_BACK = 10, 6.0, 4
 # Share of a new squared residual in its running mean: over the last hundred or so observations.
 _NEW_RESIDUAL = 0.01
@@ -91,6 +94,9 @@ class ClockOffsetEstimator:
             for pair, place in self._pairs.items()
         }
         self._found = dict.fromkeys(self._pairs, NOTHING)
+        # By pair: the instant of its window that was fitted last, and what `doubted` says of it.
+        self._fitted = dict.fromkeys(self._pairs, 0)
+        self._doubted = dict.fromkeys(self._pairs, False)
         # By pair: of each landmark, the instant that was compared last.
         self._compared_s = {pair: np.full(self._landmarks, np.nan) for pair in self._pairs}
         self._moved = MovedCameraMonitor(len(self._pairs), self._landmarks)
@@ -106,6 +112,13 @@ class ClockOffsetEstimator:
         Some tenths on a calibrated rig with agreeing clocks.
         """
         return float(np.sqrt(self._residual_px2))
+
+    @property
+    def doubted(self) -> bool:
+        """Whether heights cannot be compared, or say that clocks are off by more than may be
+        learned, or have changed.
+        """
+        return any(self._doubted.values())
 
     @property
     def late_s(self) -> dict[str, float]:
@@ -148,8 +161,8 @@ class ClockOffsetEstimator:
                 elapsed_s = newest_s - self._updated_s[pair]
                 if view.camera in pair and elapsed_s >= self._every_s:
                     self._updated_s[pair] = newest_s
-                    self._update_pair(index, pair, newest_s)
-                    self._combine(newest_s)
+                    if self._update_pair(index, pair, newest_s):
+                        self._combine(newest_s)
         return self._of(view.camera)
 
     def note_announced(self, view: View) -> tuple[float, float]:
@@ -164,7 +177,8 @@ class ClockOffsetEstimator:
             for pair in self._pairs:
                 if c in pair:
                     self._windows[pair].clear()
-                    self._found[pair] = NOTHING
+                    self._found[pair], self._fitted[pair] = NOTHING, 0
+                    self._doubted[pair] = False
             self._late_s[c] = 0.0
             self._cov[c, :] = 0.0
             self._cov[:, c] = 0.0
@@ -176,11 +190,13 @@ class ClockOffsetEstimator:
     def _of(self, camera: int) -> tuple[float, float]:
         """A camera's clock error, and the sigma of that for pairing."""
         if camera not in self._known:
-            self._known[camera] = float(self._late_s[camera]), self._pairing_sigma_s(camera)
+            self._known[camera] = float(self._late_s[camera]), _pairing_sigma_s(self._cov, camera)
         return self._known[camera]
 
-    def _update_pair(self, index: int, cameras: tuple[int, int], newest_s: float) -> None:
-        """Compare the newest heights of all landmarks in two cameras, and find the clocks anew."""
+    def _update_pair(self, index: int, cameras: tuple[int, int], newest_s: float) -> bool:
+        """Compare the newest heights of all landmarks in two cameras; False if that changes nothing
+        yet.
+        """
         first, second = cameras
         focal_px = self._pairs[cameras].focal_px
         window = self._windows[cameras]
@@ -195,32 +211,44 @@ class ClockOffsetEstimator:
             self._compared_s[cameras],
         )
         if not len(errors.landmarks):
-            return
+            self._doubted[cameras] = True
+            return True
         self._moved.observe(index, newest_s, errors.landmarks, errors.heights * focal_px)
         left_px = (errors.heights - self._found[cameras].height) * focal_px
         self._residual_px2 = _running_mean(self._residual_px2, left_px)
-        bound_s = float(self._bounds_s()[[first, second]].sum())
+        bound_s = self._bound_s(first) + self._bound_s(second)
         taken = window.add(errors, shift_s, bound_s)
         self.updates += taken
         self.gated += len(errors.landmarks) - taken
+        fits = 2 * taken >= len(errors.landmarks)
+        self._doubted[cameras] |= not fits
+        unfitted = window.newest - self._fitted[cameras]
+        looks_back = window.instants > 2 * _RECENT
+        if looks_back and unfitted < _LOOK_BACK:
+            # A resting hand adds no instants: its clocks become less sure all the same.
+            return unfitted == 0
+        self._fitted[cameras] = window.newest
         found = window.fit(shift_s)
-        if window.instants > 2 * _RECENT and window.newest % _LOOK_BACK == 0:
+        self._doubted[cameras] = not fits or abs(found.shift_s) > bound_s
+        if looks_back:
             recent = window.fit(shift_s, _RECENT)
-            contradicts_s = _CONTRADICTS * np.sqrt(found.variance + recent.variance)
+            contradicts_s = _CONTRADICTS * math.sqrt(found.variance + recent.variance)
             if abs(recent.shift_s - found.shift_s) > contradicts_s:
                 window.keep(_RECENT)
                 found = recent
+                self._doubted[cameras] = True
         window.adapt_memory(found)
         self._found[cameras] = found
+        return True
 
-    def _bounds_s(self) -> Array:
-        """How far each camera's clock (C,) may be off."""
-        return np.maximum(_BOUND_SIGMAS * self._announced_s(), _BOUND_S)
+    def _bound_s(self, camera: int) -> float:
+        """How far a camera's clock may be off."""
+        return max(_BOUND_SIGMAS * self._announced_sigma_s(camera), _BOUND_S)
 
-    def _announced_s(self) -> Array:
-        """How far each camera's clock (C,) may be off by its own account."""
-        sigmas = [CLOCK_SIGMA_MAX_S if known is None else known[1] for known in self._announced]
-        return np.array(sigmas)
+    def _announced_sigma_s(self, camera: int) -> float:
+        """How far a camera's clock may be off by its own account."""
+        known = self._announced[camera]
+        return CLOCK_SIGMA_MAX_S if known is None else known[1]
 
     def _combine(self, newest_s: float) -> None:
         """The clocks that the announced offsets and all pairs' shifts make likeliest."""
@@ -232,21 +260,24 @@ class ClockOffsetEstimator:
             still_s = max(newest_s - window.moved_s, 0.0)
             variance = found.variance + _CLOCK_WALK_S**2 * still_s
             told.append((first, second, found.shift_s, variance, window.instants >= _INSTANTS))
+        cameras = range(len(self._names))
         self._late_s, self._cov = likeliest_clocks(
-            np.array(told, dtype=np.float64), self._announced_s(), self._bounds_s()
+            np.array(told, dtype=np.float64),
+            np.array([self._announced_sigma_s(camera) for camera in cameras]),
+            np.array([self._bound_s(camera) for camera in cameras]),
         )
         self._known.clear()
 
-    def _pairing_sigma_s(self, camera: int) -> float:
-        """Uncertainty of a camera's clock against the others'.
 
-        Such that two cameras' sigmas add up to that of their difference.
-        """
-        n = len(self._names)
-        weights = np.full(n, -1.0 / n)
-        weights[camera] += 1.0
-        variance = weights @ self._cov @ weights
-        return float(np.sqrt(max(variance, 0.0) * n / max(n - 1, 1)))
+@njit(cache=True)
+def _pairing_sigma_s(cov: Array, camera: int) -> float:
+    """Uncertainty of a camera's clock against the others', by the covariance (C, C) of all.
+
+    Such that two cameras' sigmas add up to that of their difference.
+    """
+    n = len(cov)
+    variance = cov[camera, camera] - 2.0 * cov[camera].mean() + cov.mean()
+    return math.sqrt(max(variance, 0.0) * n / max(n - 1, 1))
 
 
 @njit(cache=True)

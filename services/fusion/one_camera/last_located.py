@@ -10,10 +10,13 @@ unsure as hands move, in the second case as that hand lately did (distance_motio
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from rhot.kernels.packed import Layout, unowned
 from services.fusion.arrays import Bools, Ints
 from services.fusion.method import Estimates
 from services.fusion.one_camera.carried_shape import (
@@ -45,6 +48,19 @@ _TRUST_S, _BESIDE_SHAPE_S = 0.1, 0.05
 _REACH_M = 1.0
 
 
+class _Learnt(NamedTuple):
+    """What is learnt from what two cameras see."""
+
+    shapes: LocatedShapes
+    memory: ShapeMemory  # how the hands deformed lately
+    motion: DistanceMotion
+    hand: Ints  # (L,) whose each landmark is
+
+
+_LEARNT = Layout()
+_learnt_at = _LEARNT.at
+
+
 class LastLocated:
     """Where L landmarks were when two cameras saw each last, and what that tells of them now."""
 
@@ -58,9 +74,9 @@ class LastLocated:
         # reason to tell what nobody sees as the filter has it, metres off along a ray.
         self.alone_with = np.full(hand.size, -1)
         self._shapes = no_shapes(hand.size)
-        # How the hands deformed lately.
         self._memory = empty_memory(hand.size, eye_rig)
         self._motion = no_motion(hand.size)
+        self._learnt = _LEARNT.pack(_Learnt(self._shapes, self._memory, self._motion, hand))
         # An instant that is not learnt from yet, and who was located.
         self._taken: tuple[float, Bools, Estimates] | None = None
 
@@ -78,9 +94,7 @@ class LastLocated:
             time_s, located, estimates = self._taken
             self._taken = None
             places = estimates.positions_m, estimates.covariances_m2
-            spans = time_s, self._span_s
-            learnt = self._shapes, self._memory, self._motion
-            _note(learnt, self._hand, located, places, spans)
+            _note(self._learnt.address, located, *places, time_s, self._span_s)
             self.alone_with[located] = -1
 
     def tell_alone(self, time_s: float, centres_rig: Array, estimates: Estimates) -> None:
@@ -163,17 +177,15 @@ class LastLocated:
 
 @njit(cache=True, error_model="numpy")
 def _note(
-    learnt: tuple[LocatedShapes, ShapeMemory, DistanceMotion],
-    hand: Ints,
-    located: Bools,
-    places: Estimate,
-    times_s: tuple[float, float],
+    address: int, located: Bools, places: Array, covs: Array, time_s: float, span_s: float
 ) -> None:
-    """Remember the places (L, 3), (L, 3, 3) of those that two cameras see (L,).
+    """Remember the places (L, 3), (L, 3, 3) of those that two cameras see (L,) at an instant.
 
-    times_s: the instant, and from one to the next.
+    address: of _Learnt; span_s: from one instant to the next.
     """
-    (time_s, span_s), (shapes, memory, motion) = times_s, learnt
-    learn_motion(motion, located, places[0], memory.eye, time_s, span_s)
-    note_shapes(shapes, located, places[0], places[1], time_s)
-    learn_deformation(memory, hand, located, places[0], time_s, span_s)
+    learnt: _Learnt = _learnt_at(address)
+    located, places, covs = unowned((located, places, covs))
+    memory, shapes = learnt.memory, learnt.shapes
+    learn_motion(learnt.motion, located, places, memory.eye, time_s, span_s)
+    note_shapes(shapes, located, places, covs, time_s)
+    learn_deformation(memory, learnt.hand, located, places, time_s, span_s)

@@ -136,7 +136,6 @@ class PaintToBone:
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
         self._outwards = np.where(self.round[:, None], [0.0, 0.0, -1.0], normals)
-        self._hinges = np.tile(_HINGE, (len(landmarks), 1))
         sags_m = np.array(list(map(dab_sag_m, 0.5 * dabs_m, limbs_m)))
         tables = [_tables(hands[one.hand], one.name) for one in landmarks]
         self.known = KnownPaint(
@@ -162,27 +161,26 @@ class PaintToBone:
 
     def directions(self, pose: HandPose) -> Directions:
         """A solved hand's directions: of fingers, -z of each joint, and of dabs' skin."""
-        sigmas = {
-            _TIP_OF[finger.name]: _direction_sigmas(pose.wrist_sigma_rad, finger.sigma_rad)
-            for finger in pose.fingers
-        }
-        of_the_wrist = _direction_sigmas(pose.wrist_sigma_rad, 0.0)
-        rows, quaternions, sigmas_rad = [], [], []
+        sigma_of = {_TIP_OF[finger.name]: finger.sigma_rad for finger in pose.fingers}
+        rows: list[int] = []
+        numbers: list[float] = []
         for row, name, place in self._extended_of.get(pose.hand, []):
             joint = pose.joints[place]
             # A pose of another order of joints than OpenXR's tells nothing.
             told = joint.name == name and joint.source != "predicted"
             if told and 0.4 < max(map(abs, joint.orientation_wxyz)) < 1.1:
                 rows.append(row)
-                quaternions.append(joint.orientation_wxyz)
-                sigmas_rad.append(sigmas.get(name, of_the_wrist))
-        of = np.array(rows, dtype=np.int64)
-        turns = np.array(quaternions).reshape(-1, 4)
-        directions = turned_vectors(self._outwards[of], turns)
-        hinges = turned_vectors(self._hinges[: len(of)], turns)
-        spreads = np.array(sigmas_rad).reshape(-1, 2)
+                # A dab's angles are the hand's alone.
+                finger_rad = sigma_of.get(name, 0.0)
+                numbers += joint.orientation_wxyz
+                numbers.append(math.nan if finger_rad is None else finger_rad)
+        of, n = np.array(rows, dtype=np.int64), len(rows)
+        wrist_rad = math.nan if pose.wrist_sigma_rad is None else pose.wrist_sigma_rad
+        # To be filled: an array that a kernel returns costs .6 us, one that it is given .2.
+        aims = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 2))
+        turn_with_joints(np.array(numbers), wrist_rad, of, self._outwards, *aims)
         shape_sd = self._shape_sd(pose.hand, pose.model_misfit)
-        return Directions(pose.hand, pose.stamp_ns, of, directions, hinges, spreads, shape_sd)
+        return Directions(pose.hand, pose.stamp_ns, of, *aims, shape_sd)
 
     def _shape_sd(self, hand: HandName, misfit: float | None) -> float:
         """In radii, of a hand that fits its model so badly; 0 if the pose does not say."""
@@ -206,36 +204,43 @@ class PaintToBone:
 
 
 @njit(cache=True)
-def turned_vectors(vectors: Array, quaternions: Array) -> Array:
-    """Vectors (n, 3), each turned by its quaternion wxyz (n, 4) of any length; (n, 3).
+def turn_with_joints(
+    numbers: Array,
+    wrist_rad: float,
+    rows: Ints,
+    outwards: Array,
+    directions: Array,
+    hinges: Array,
+    sigmas_rad: Array,
+) -> None:
+    """Directions and hinges (n, 3) of the joints of landmarks (n,), and how sure they are (n, 2).
 
-    As rhot.geometry.transforms.rotation_from_quaternion, for all at once.
+    numbers (5 n,): of each joint its orientation, a quaternion wxyz of any length, and one standard
+    deviation of each of its digit's angles, 0 of a dab; wrist_rad: the length of the wrist's error,
+    three axes of it; NaN where the pose does not say. outwards (L, 3) of all landmarks, in their
+    joints' frames.
     """
-    turned = np.empty_like(vectors)
-    for n in range(vectors.shape[0]):
-        q = quaternions[n]
-        length = math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
-        w, x, y, z = q[0] / length, q[1] / length, q[2] / length, q[3] / length
-        a, b, c = vectors[n]
-        turned[n, 0] = (
-            (1 - 2 * (y * y + z * z)) * a + 2 * (x * y - w * z) * b + 2 * (x * z + w * y) * c
-        )
-        turned[n, 1] = (
-            2 * (x * y + w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z - w * x) * c
-        )
-        turned[n, 2] = (
-            2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c
-        )
-    return turned
+    for n in range(rows.size):
+        q, finger_rad = numbers[5 * n : 5 * n + 4], numbers[5 * n + 4]
+        turn_vector(outwards[rows[n]], q, directions[n])
+        turn_vector(_HINGE, q, hinges[n])
+        if math.isnan(wrist_rad) or math.isnan(finger_rad):
+            sigmas_rad[n] = _UNTOLD_DIRECTION_RAD
+        else:
+            of_hand = wrist_rad / math.sqrt(3.0)
+            sigmas_rad[n, 0] = math.hypot(of_hand, finger_rad)
+            sigmas_rad[n, 1] = math.hypot(of_hand, _SIDEWAYS * finger_rad)
 
 
-def _direction_sigmas(wrist_rad: float | None, finger_rad: float | None) -> tuple[float, float]:
-    """One standard deviation of a tip's direction about its hinge and sideways.
+@njit(cache=True)
+def turn_vector(vector: Array, q: Array, out: Array) -> None:
+    """A vector (3,) turned by a quaternion wxyz (4,) of any length, to out (3,).
 
-    wrist_rad is the length of the wrist's error, three axes of it; finger_rad of each of the
-    digit's angles, 0 of a dab; None if the pose does not say.
+    As rhot.geometry.transforms.rotation_from_quaternion turns it.
     """
-    if wrist_rad is None or finger_rad is None:
-        return _UNTOLD_DIRECTION_RAD, _UNTOLD_DIRECTION_RAD
-    of_hand = wrist_rad / math.sqrt(3.0)
-    return math.hypot(of_hand, finger_rad), math.hypot(of_hand, _SIDEWAYS * finger_rad)
+    length = math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    w, x, y, z = q[0] / length, q[1] / length, q[2] / length, q[3] / length
+    a, b, c = vector
+    out[0] = (1 - 2 * (y * y + z * z)) * a + 2 * (x * y - w * z) * b + 2 * (x * z + w * y) * c
+    out[1] = 2 * (x * y + w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z - w * x) * c
+    out[2] = 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c

@@ -23,7 +23,7 @@ from services.fusion.output.known_paint import (
 )
 from services.fusion.output.paint_to_bone import (
     PaintToBone,
-    turned_vectors,
+    turn_vector,
 )
 from services.fusion.output.visible_paint import dab_sag_m
 from testing.synthetic_points import SyntheticRig
@@ -296,4 +296,7 @@ def test_the_compiled_turn_agrees_with_the_plain_one():
     plain = [
         rotation_from_quaternion(q) @ vector for q, vector in zip(quaternions, vectors, strict=True)
     ]
-    np.testing.assert_allclose(turned_vectors(vectors, quaternions), plain, atol=1e-12)
+    turned = np.empty((20, 3))
+    for vector, quaternion, out in zip(vectors, quaternions, turned, strict=True):
+        turn_vector(vector, quaternion, out)
+    np.testing.assert_allclose(turned, plain, atol=1e-12)
