@@ -51,6 +51,8 @@ _INSTANTS = 20
 # by 4, noise of 3 px that lasts for some frames does so now and then. Once there are twice as many,
 # every fourth one is fitted with those before it: of .1 s more, some seconds say nearly the same.
 _RECENT, _CONTRADICTS, _LOOK_BACK = 10, 6.0, 4
+# Clocks are doubted of views that could not be compared for so long.
+_SILENT_S = 0.5
 # Share of a new squared residual in its running mean: over the last hundred or so observations.
 _NEW_RESIDUAL = 0.01
 _MAX_RESIDUAL_PX2 = 1e6
@@ -94,7 +96,9 @@ class ClockOffsetEstimator:
             for pair, place in self._pairs.items()
         }
         self._found = dict.fromkeys(self._pairs, NOTHING)
-        # By pair: the instant of its window that was fitted last, and what `doubted` says of it.
+        # By pair: when heights were compared last, the instant of its window that was fitted last,
+        # and what `doubted` says of it.
+        self._heard_s = dict.fromkeys(self._pairs, -np.inf)
         self._fitted = dict.fromkeys(self._pairs, 0)
         self._doubted = dict.fromkeys(self._pairs, False)
         # By pair: of each landmark, the instant that was compared last.
@@ -211,8 +215,9 @@ class ClockOffsetEstimator:
             self._compared_s[cameras],
         )
         if not len(errors.landmarks):
-            self._doubted[cameras] = True
+            self._doubted[cameras] |= newest_s - self._heard_s[cameras] > _SILENT_S
             return True
+        self._heard_s[cameras] = newest_s
         self._moved.observe(index, newest_s, errors.landmarks, errors.heights * focal_px)
         left_px = (errors.heights - self._found[cameras].height) * focal_px
         self._residual_px2 = _running_mean(self._residual_px2, left_px)

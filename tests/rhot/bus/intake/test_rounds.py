@@ -109,3 +109,49 @@ async def test_rounds_end_with_the_last_and_begin_again(router):
             async with asyncio.timeout(DEADLINE_S):
                 assert (await anext(subscription)).seq == 7
         await until(lambda: not rounds._running)
+
+
+class Counted:
+    """Who counts how often it is asked, and has something where `waiting` is set."""
+
+    def __init__(self) -> None:
+        self.asked, self.taken, self.waiting = 0, 0, False
+
+    def ask(self) -> object | None:
+        self.asked += 1
+        if not self.waiting:
+            return None
+        self.waiting = False
+        return object()
+
+    def take_in(self, sample: object, came_ns: int) -> None:
+        self.taken += 1
+
+    def wake(self) -> None:
+        """Nobody waits."""
+
+
+async def test_who_hears_nothing_is_asked_now_and_then_until_it_hears_something():
+    rounds, busy, idle = Rounds(), Counted(), Counted()
+    for one in (busy, idle):
+        rounds.join(one, one.ask)
+
+    async def asked(seconds: float) -> tuple[int, int]:
+        before = busy.asked, idle.asked
+        end_s = asyncio.get_running_loop().time() + seconds
+        while asyncio.get_running_loop().time() < end_s:
+            busy.waiting = True
+            await asyncio.sleep(0.001)
+        return busy.asked - before[0], idle.asked - before[1]
+
+    await asked(1.2)
+    of_busy, of_idle = await asked(0.5)
+    assert of_idle <= 26
+    assert of_busy > 4 * of_idle > 0
+    idle.waiting = True
+    of_busy, of_idle = await asked(0.5)
+    assert idle.taken == 1
+    assert of_idle > 0.5 * of_busy
+    for one in (busy, idle):
+        rounds.leave(one)
+    await until(lambda: not rounds._running)

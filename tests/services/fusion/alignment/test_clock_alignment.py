@@ -161,3 +161,21 @@ def test_a_search_waits_while_others_do_but_not_for_ever():
     assert first + 58 <= searches[always][0] <= first + 62
     for alignment in searches:
         assert alignment.corrections["right"].late_s == pytest.approx(0.137, abs=1.5e-3)
+
+
+def test_a_clock_that_is_right_is_searched_for_ever_more_seldom_until_it_is_doubted():
+    cameras = RIG.rig()
+    builder = ObservationBuilder(RIG.config(), cameras)
+    alignment = ClockAlignment(tuple(cameras.values()), enabled=True)
+    given = frames(RIG, MOTIONS["sinusoids"], 34.0)
+    searched_s = []
+    for frame in given:
+        second_s, before = (frame.stamp_ns - given[0].stamp_ns) * 1e-9, alignment.searches
+        alignment.observe(builder.build(frame), doubted=second_s > 27.0)
+        if alignment.searches > before:
+            searched_s.append(second_s)
+    # Twice as long each time, up to four times two seconds; doubted, two seconds again.
+    waits_s = np.diff(searched_s)
+    assert waits_s[:3] == pytest.approx([4.0, 8.0, 8.0], abs=0.1)
+    assert waits_s[-2:] == pytest.approx([2.0, 2.0], abs=0.1)
+    assert alignment.corrections == {}

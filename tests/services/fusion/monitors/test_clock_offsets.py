@@ -77,6 +77,25 @@ def _replace(frame, **fields):
     return msgspec.structs.replace(frame, **fields)
 
 
+@pytest.mark.parametrize("late_s", [0.02, 0.137, -0.05])
+def test_clocks_are_doubted_once_heights_contradict_what_was_learned(late_s):
+    setup = SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4)
+    right = frames(setup, MovingHand(), 16.0)
+    cameras, builder = setup.rig(), ObservationBuilder(setup.config(), setup.rig())
+    estimator = ClockOffsetEstimator(tuple(cameras.values()), 6, np.full(2, 1 / FPS), enabled=True)
+    late = with_clock_error(right, "right", late_s)
+    doubted: list[tuple[float, bool]] = []
+    for frame in [*right[: len(right) // 2], *late[len(late) // 2 :]]:
+        view = builder.build(frame)
+        time_s = (view.instant_ns - START_NS) * 1e-9
+        estimator.observe(view, time_s + view.delay_s)
+        doubted.append((time_s, estimator.doubted))
+    # Now and then no two views can be compared.
+    before = [told for time_s, told in doubted if 1.0 < time_s < 7.9]
+    assert sum(before) < 0.05 * len(before)
+    assert any(told for time_s, told in doubted if 8.0 < time_s < 11.0)
+
+
 def test_a_still_hand_tells_nothing_about_clocks():
     estimator = estimate(
         SyntheticRig(clock_error_s=0.001, clock_sigma_s=0.001), MovingHand(speed_m_s=0.0), 4.0
