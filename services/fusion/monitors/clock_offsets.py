@@ -31,8 +31,8 @@ from services.fusion.monitors.likeliest_clocks import likeliest_clocks
 from services.fusion.monitors.moved_camera import MovedCameraMonitor
 from services.fusion.monitors.shift_regression import NOTHING
 
-# Seconds between two updates by the only pair of cameras: each costs 1 ms, and ten a second of six
-# markers reach .05 ms within a second or two. Of several pairs each is asked less often.
+# Seconds between two updates by the only pair of cameras: ten a second of six markers reach .05 ms
+# within a second or two. Of several pairs each is asked less often.
 UPDATE_S = 0.1
 # No stamp is better than this (a tenth of an exposure's jitter); keeps the filter able to follow.
 _CLOCK_FLOOR_S = 2e-5
