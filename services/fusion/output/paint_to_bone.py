@@ -68,7 +68,7 @@ _MOST_TAPER = 0.2
 # Landmark of each digit's tip.
 _TIP_OF = {digit: f"{digit}_tip" for digit in DIGITS}
 # The axis about which a joint bends, in its own frame.
-_HINGE = (1.0, 0.0, 0.0)
+_HINGE = np.array([1.0, 0.0, 0.0])
 
 
 def _taper(hand: HandModel, landmark: str) -> float:

@@ -21,10 +21,7 @@ from services.fusion.output.known_paint import (
     SIGMA_UNKNOWN,
     correct_paint,
 )
-from services.fusion.output.paint_to_bone import (
-    PaintToBone,
-    turn_vector,
-)
+from services.fusion.output.paint_to_bone import PaintToBone, turn_vector
 from services.fusion.output.visible_paint import dab_sag_m
 from testing.synthetic_points import SyntheticRig
 
