@@ -82,7 +82,7 @@ RUNS = {
     "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
     "scale": _script(
-        "scale", "--rigs 1 16 32 64 --routers 1", "--rigs 1 --fps 30 --routers 1 --seconds 2", 5
+        "scale", "--rigs 1 4 16 32 64", "--rigs 1 --fps 30 --routers 1 --seconds 2", 8
     ),
     "scenes": _script("scenes", "", "--seconds 1", 9),
     "solver": _script("solver", "", "--quick", 1.5),
