@@ -25,7 +25,7 @@ def test_a_clock_that_is_set_behind_everybodys_back_is_put_right_within_seconds(
         step.settle()
         known = step.alignment.corrections.get("right")
         learned_s = step.clocks.late_s["right"] - step.clocks.late_s["left"]
-        second = (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9
-        off_s[second] = learned_s + (known.late_s if known else 0.0) - late_s
+        time_s = (frame.stamp_ns - frame.clock_offset_ns - START_NS) * 1e-9
+        off_s[time_s] = learned_s + (known.late_s if known else 0.0) - late_s
     assert searches <= 3
-    assert max(abs(off) for second, off in off_s.items() if second > 20.0) < 1e-3
+    assert max(abs(off) for time_s, off in off_s.items() if time_s > 20.0) < 1e-3
