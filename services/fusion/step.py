@@ -77,8 +77,7 @@ class FusionStep:
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._poses: PoseFeedback[Directions] = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
-        centres = np.array([camera.centre_rig for camera in self._cameras])
-        self._hidden = HiddenPaint(centres, self._paint.round, self._paint.known)
+        self._hidden = HiddenPaint(extrinsics(self._cameras), self._paint.round, self._paint.known)
         self._messages = self._point_messages(hands)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)

@@ -30,8 +30,7 @@ PAINT = PaintToBone(LANDMARKS, dict.fromkeys(HANDS, point_hands()["right"]), CAM
 
 @pytest.fixture
 def seen() -> PaintSeen:
-    centres = np.array([camera.centre_rig for camera in CAMERAS])
-    return HiddenPaint(centres, np.zeros(4, dtype=bool), PAINT).seen
+    return HiddenPaint(extrinsics(CAMERAS), np.zeros(4, dtype=bool), PAINT).seen
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import pytest
 
 from rhot.files.config import load_rig
 from rhot.hand import landmark_point
+from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
@@ -21,6 +22,13 @@ from testing.rendered_markers import detect
 from testing.synthetic_points import START_NS
 
 CENTRES = np.array([[0.0, 0.0, 0.0], [0.075, 0.0, 0.0]])
+
+
+def looking_ahead(centres: np.ndarray) -> Extrinsics:
+    """Cameras at centres (C, 3) whose axes are the rig's."""
+    return Extrinsics(np.tile(np.eye(3), (len(centres), 1, 1)), -centres)
+
+
 # A tip, and a dab beside it.
 PLACES = np.array([[0.03, 0.0, 0.5], [0.05, 0.02, 0.52]])
 AREA = (13.0 / 527.0) ** 2
@@ -60,7 +68,7 @@ def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float, shap
 
 @pytest.fixture
 def paint() -> HiddenPaint:
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known_paint())
     paint.seen.places[:] = PLACES
     return paint
 
@@ -109,7 +117,7 @@ def test_it_is_forgotten_after_a_while(paint):
 def test_a_nearer_camera_sees_more():
     """Twice as near is four times the area, and nothing is hidden of either."""
     centres = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.25]])
-    paint = HiddenPaint(centres, np.array([True, False]), known_paint())
+    paint = HiddenPaint(looking_ahead(centres), np.array([True, False]), known_paint())
     paint.seen.places[:] = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
     paint.observe(look(1, 4.0, 4.0), 0.0)
     assert not paint.observe(look(0, 1.0, 1.0), 0.01).any()
@@ -118,7 +126,7 @@ def test_a_nearer_camera_sees_more():
 
 def test_what_is_hidden_from_all_cameras_shows_by_its_pose():
     known = known_paint()
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known)
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
     paint.seen.places[:] = PLACES
     told(known, (0.0, -1.0, 0.0), 0.1)
     for frame in range(30):
@@ -141,7 +149,7 @@ def test_what_is_hidden_from_all_cameras_shows_by_its_pose():
 
 def test_a_tip_that_turns_away_or_is_darker_for_good_is_not_hidden():
     known = known_paint()
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known)
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
     paint.seen.places[:] = PLACES
     told(known, (0.0, -1.0, 0.0), 0.1)
     paint.observe(look(0, SIDE, 1.0), 0.0)
@@ -165,7 +173,7 @@ def test_what_makes_all_tips_smaller_hides_none():
     known = known._replace(
         **{name: np.repeat(value[:1], 3, axis=0) for name, value in known._asdict().items()}
     )
-    paint = HiddenPaint(CENTRES, np.full(3, True), known)
+    paint = HiddenPaint(looking_ahead(CENTRES), np.full(3, True), known)
     paint.seen.places[:] = PLACES[0]
     rows, down, hinges = (
         np.arange(3),
@@ -188,7 +196,7 @@ def test_what_makes_all_tips_smaller_hides_none():
 def test_an_unsure_pose_or_shape_explains_a_small_area():
     for sigma_rad, shape_sd, hidden in ((0.1, 0.0, True), (1.2, 0.0, False), (0.1, 0.3, False)):
         known = known_paint()
-        paint = HiddenPaint(CENTRES, np.array([True, False]), known)
+        paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
         paint.seen.places[:] = PLACES
         told(known, (0.0, -1.0, 0.0), sigma_rad, shape_sd)
         paint.observe(look(0, SIDE, 1.0), 0.0)
@@ -197,7 +205,7 @@ def test_an_unsure_pose_or_shape_explains_a_small_area():
 
 
 def test_nothing_is_known_without_a_place():
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known_paint())
     for places in (np.full((2, 3), np.nan), np.zeros((2, 3)), np.tile(CENTRES[1], (2, 1))):
         paint.seen.places[:] = places
         paint.observe(look(0, 1.0, 1.0), 0.0)
@@ -229,7 +237,7 @@ def test_sigmas_cover_fingers_that_pass_before_each_other(repository: Path):
 
 def test_paint_that_flickers_for_one_camera_is_less_sure():
     """A piece that comes and goes, .1 of a marker 13 px wide: some tenths of a pixel."""
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known_paint())
     paint.seen.places[:] = PLACES
     told = []
     for frame in range(12):
@@ -242,7 +250,7 @@ def test_paint_that_flickers_for_one_camera_is_less_sure():
 
 def test_paint_that_turns_is_as_sure_as_ever():
     """All cameras see it grow and shrink."""
-    paint = HiddenPaint(CENTRES, np.array([True, False]), known_paint())
+    paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known_paint())
     paint.seen.places[:] = PLACES
     for frame in range(40):
         area = np.exp(0.3 * np.sin(frame / 8))
