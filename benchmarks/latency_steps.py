@@ -17,9 +17,9 @@ from services.solver.maths.chains import hand_chains
 from services.solver.step import SolverStep
 from services.solver.whole_hand.fit import fit
 from services.solver.whole_hand.landmarks import hand_landmarks, observation_arrays
-from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
 from services.solver.whole_hand.point_check import usable_points
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 
 # Of each list of times, unless it is shorter: filters and caches have settled by then.

@@ -202,7 +202,8 @@ class HandTable(Table, frozen=True, kw_only=True):
     # Empty: those whose dots there are: of 4 dots the index finger, of 8 thumb and index finger, of
     # 12 the middle finger too, of 16 all but the thumb, of 20 all.
     fingers: tuple[Literal["thumb", "index", "middle", "ring", "little"], ...] = ()
-    # Size against the average adult until `rhot calibrate hand` has measured it.
+    # Size against the average adult, about: points show the rest until `rhot calibrate hand` has
+    # measured it.
     scale: Annotated[float, msgspec.Meta(ge=0.4, le=1.6)] = 1.0
 
     @property

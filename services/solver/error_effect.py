@@ -18,7 +18,7 @@ from services.solver.maths.cholesky import factorise
 from services.solver.maths.kinematics import FUSED, DigitFrames, digit_frames
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS
 from services.solver.whole_hand.residuals import Pose, whitened
 
 # First columns of b: the hand's size (1), its bones (15), the roots of its chains (15), then the

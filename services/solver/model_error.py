@@ -35,9 +35,10 @@ from rhot.kernels.packed import Packed
 from services.solver.error_effect import EFFECT, PAINT, Effect, Errors, variances
 from services.solver.maths.chains import HandChains
 from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.hand_size import GUESS
 from services.solver.whole_hand.hand_tracker import MAX_GAP_S
 from services.solver.whole_hand.landmarks import MAX_LISTS, Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS
 
 # Time in which what an old error did to the angles is forgotten, between the motion prior's two.
 _FORGET_S = 0.4
@@ -64,10 +65,19 @@ class Spread(NamedTuple):
 # hand, two of others within a tenth, two of recorded hands that differ by more. Squared errors over
 # variances of orientation were .01-.14, .14-.20 and 1.3-4.3 without, .01-.4, .20-.25 and 1.0-1.4
 # scaled so; of points .3-.9, .4-.5 and 1.4-2.3 before, .4-1.2, .6 and 1.2-2.6.
-_TABLES = Spread(0.05, 0.06, 3e-3, (5e-4, 5e-4, 2e-3), (3e-3, 1e-3, 3e-3), 5e-3, 1.6e-3)
+_TABLES = Spread(GUESS, 0.06, 3e-3, (5e-4, 5e-4, 2e-3), (3e-3, 1e-3, 3e-3), 5e-3, 1.6e-3)
 # What `rhot calibrate hand` leaves: knuckles within 3 mm, and paint that is put on anew.
 _MEASURED = Spread(0.0, 0.02, 1e-3, (5e-4, 5e-4, 1e-3), (1e-3, 5e-4, 1e-3), 1e-3)
 _EXACT = Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+
+
+def landmark_m2(model: HandModel) -> float:
+    """What the fit is told of each landmark's place on the hand, a variance along each axis."""
+    return _spread(model).landmark_m ** 2
+
+
+def _spread(model: HandModel) -> Spread:
+    return {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
 
 
 class ErrorsAt(NamedTuple):
@@ -86,11 +96,11 @@ class ModelError:
     """The errors of one hand's model, and what they have done to its pose."""
 
     def __init__(self, model: HandModel, chains: HandChains) -> None:
-        spread = {"tables": _TABLES, "measured": _MEASURED}.get(model.origin, _EXACT)
+        spread = _spread(model)
         self._chains, self._spread = chains, spread
         # Added to each landmark's variance along each axis: it is known no better than the model
         # knows where it sits.
-        self.landmark_m2 = spread.landmark_m**2
+        self.landmark_m2 = landmark_m2(model)
         # The first column of each landmark's paint, in the order in which they were first seen:
         # most hands have paint for many more than are painted.
         self._column: dict[str, int] = {}

@@ -2,8 +2,8 @@
 
 Points that come at once have their poses all the same; a solver that is further behind skips the
 oldest. Missing points: no pose is published. A hand that was never measured is solved with the
-tables' bones at the scale of rig.toml, and health says so. Health also tells how long a pose takes.
-A new hand.<hand>.json starts it anew.
+tables' bones, at the scale of rig.toml until its points show its size; health says both, and how
+long a pose takes. A new hand.<hand>.json starts it anew.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ async def _solve_hand(
     poses: Publisher[HandPose],
 ) -> None:
     """Solve one hand's points as they come, for ever."""
-    mean_ms = 0.0
+    mean_ms, scale = 0.0, service.config.hand[hand].scale
 
     def take(message: HandPoints) -> None:
         nonlocal mean_ms
@@ -89,6 +89,9 @@ async def _solve_hand(
             poses.put(pose)
         mean_ms += _MEAN_WEIGHT * (took_ms - mean_ms)
         service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
+        size = step.size(hand)
+        if size is not None:
+            service.values[f"{hand}_size"] = round(scale * size, 3)
         if step.challenge_due(hand):
             service.tasks.create_task(_challenge(step, hand))
 

@@ -4,8 +4,9 @@ whole_hand/ finds the wrist's pose (and about how every digit is bent) from all 
 config.solver.method decides how each digit's angles are then found (finger/). None until the wrist
 and three tips were seen in one message. Late messages: the prior is blurred by the time that
 passed; a second's gap starts anew. Missing landmarks: fewer equations, and what is not measured
-says `predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml, and
-sigmas that say so (model_error.py). Absurd points are dropped (whole_hand/point_check.py).
+says `predicted`. A hand that was never measured: the tables' hand at the scale of rig.toml, which
+is learned on (whole_hand/hand_size.py), and sigmas that say so (model_error.py). Absurd points are
+dropped (whole_hand/point_check.py).
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from rhot.messages import HandPoints, HandPose, JointSource
 from services.solver.error_effect import told_misfit, variances
 from services.solver.finger.solve_fingers import DLS, solve_fingers, tips_in_wrist
 from services.solver.model_check import check_model
-from services.solver.model_error import ErrorsAt, ModelError
+from services.solver.model_error import ErrorsAt, ModelError, landmark_m2
 from services.solver.pose_message import hand_pose, joint_sources
 from services.solver.pose_numbers import dls_numbers, pose_numbers, rounded
 from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.hand_size import HandSize
 from services.solver.whole_hand.hand_tracker import MIN_LANDMARKS, RESTART_INTERVAL, HandTracker
 from services.solver.whole_hand.landmarks import Observed, hand_landmarks
 from services.solver.whole_hand.point_check import usable_points
@@ -50,12 +52,18 @@ class SolverStep:
         hand = self._hands.get(points.hand)
         return hand.step(points) if hand is not None else None
 
+    def size(self, hand: HandName) -> float | None:
+        """How large a hand that nobody measured is by now, against its model; None: measured."""
+        size = self._hands[hand].size
+        return None if size is None else size.factor
+
     def challenge_due(self, hand: HandName) -> bool:
         """Whether challenge() of that hand has something to do."""
         return self._hands[hand].tracker.challenge_due
 
     def challenge(self, hand: HandName) -> None:
-        """Look for another pose that explains the points as well, where that is due: 2 ms.
+        """Look for another pose that explains the points as well, and for another size of a hand
+        that nobody measured, where that is due: 2 ms.
 
         For when the pose is out; the next step() does it where nobody has.
         """
@@ -77,8 +85,9 @@ class _Hand:
         check_model(model)
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
+        self.size = HandSize(landmark_m2(model)) if model.origin == "tables" else None
         self.tracker = HandTracker(
-            model, self._landmarks, restart_interval(f"{config.rig.name}/{name}")
+            model, self._landmarks, restart_interval(f"{config.rig.name}/{name}"), self.size
         )
         self._model_error = ModelError(model, self.tracker.chains)
         # By the landmarks of a message, and which of them were measured.

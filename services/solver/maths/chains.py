@@ -71,6 +71,23 @@ def hand_chains(model: HandModel) -> HandChains:
 
 
 @njit(cache=True)
+def resized(chains: HandChains, factor: float) -> HandChains:
+    """A hand so many times as large; paint on tips is as long as it was."""
+    tool_m = chains.tool_m.copy()
+    tool_m[:, 2] -= (factor - 1.0) * chains.lengths_m[:, 2]
+    return HandChains(
+        chains.base_m * factor,
+        chains.base_rotation,
+        chains.metacarpal_m * factor,
+        chains.lengths_m * factor,
+        tool_m,
+        chains.limits_rad,
+        chains.coupling,
+        chains.side,
+    )
+
+
+@njit(cache=True)
 def digit_chain(chains: HandChains, row: int) -> Chain:
     """One digit of a hand, lengths in metres."""
     return Chain(

@@ -1,12 +1,11 @@
 """The whole hand from its landmarks, as one box-constrained least-squares problem.
 
 Unknowns are the wrist's pose (6) and all angles (20). Wrist and five tips measure 18 numbers; under
-RHOT's constraints the hand has 21 degrees of freedom, so the priors on posture (posture_prior.py)
-and motion (motion_prior.py) say the rest, each weighed by its standard deviation against the
-landmarks'. Levenberg-Marquardt with Marquardt's scaling; steps stay within the joint limits
-(box_qp); Huber weights keep one outlier from bending the hand. A missing landmark is simply no
-equation: its finger then follows the priors. Input that is not finite must not come here
-(point_check.py drops it).
+RHOT's constraints the hand has 21 degrees of freedom, so the priors on posture and motion (priors/)
+say the rest, each weighed by its standard deviation against the landmarks'. Levenberg-Marquardt
+with Marquardt's scaling; steps stay within the joint limits (box_qp); Huber weights keep one
+outlier from bending the hand. A missing landmark is simply no equation: its finger then follows the
+priors. Input that is not finite must not come here (point_check.py drops it).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from services.solver.maths.box_qp import Workspace, box_qp, workspace
 from services.solver.maths.chains import HandChains
 from services.solver.maths.rotation_vectors import apply_rotation_vector
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, PosePrior
 from services.solver.whole_hand.residuals import NormalEquations, Pose, normal_equations
 
 # Iterations of one update: 4 on average, 25 at worst on simulated hands; 30 are 0.2 ms.

@@ -25,7 +25,7 @@ from services.solver.maths.rotation_vectors import (
 )
 from services.solver.whole_hand.hand_estimate import HandEstimate
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS
 
 # How fast the wrist turns and a joint bends at most where no landmark moves. Tuning half of
 # benchmarks/solver_jumps.py, recordings with their own bones, eight seeds of noise, jumps: 3 with

@@ -9,6 +9,7 @@
   explains the landmarks about as well is followed as a rival (rival.py) until one of the two has
   won: so a mirrored orientation cannot last, and none is taken on the evidence of one message.
 - What fits cost says how far the hand model is to be believed (model_misfit.py).
+- Of a hand that nobody measured the size is learned, too, once a pose is out (hand_size.py).
 - What is told follows what is believed no faster than a hand moves (glide.py).
 - The hand is forgotten after a gap in the stamps of more than a second, when stamps run backwards,
   and after a second with fewer than three landmarks.
@@ -21,11 +22,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rhot.hand import TIPS, HandModel
-from services.solver.maths.chains import hand_chains
+from services.solver.maths.chains import hand_chains, resized
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.whole_hand.fit import MAX_ITERATIONS, fit
 from services.solver.whole_hand.glide import Told
 from services.solver.whole_hand.hand_estimate import HandEstimate
+from services.solver.whole_hand.hand_size import HandSize
 from services.solver.whole_hand.initialise import Hypothesis, initialise
 from services.solver.whole_hand.landmarks import (
     Landmarks,
@@ -36,8 +38,8 @@ from services.solver.whole_hand.landmarks import (
     observations_of,
 )
 from services.solver.whole_hand.model_misfit import learned_misfit
-from services.solver.whole_hand.motion_prior import UNKNOWNS, uninformed_prior
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 from services.solver.whole_hand.rival import Rival, same_pose
 from services.solver.whole_hand.update import KNOWN, Known, follow
@@ -64,10 +66,18 @@ class HandTracker:
     """Follows one hand; pure: time comes in as stamps."""
 
     def __init__(
-        self, model: HandModel, landmarks: Landmarks, restart_every: int = RESTART_INTERVAL
+        self,
+        model: HandModel,
+        landmarks: Landmarks,
+        restart_every: int = RESTART_INTERVAL,
+        size: HandSize | None = None,
     ) -> None:
-        """landmarks: those of the model (landmarks.hand_landmarks); restart_every: updates."""
+        """landmarks: those of the model (landmarks.hand_landmarks); restart_every: updates.
+
+        size: where the model's is only a guess; what is learned of it goes into chains, landmarks.
+        """
         self.chains = hand_chains(model)
+        self._guessed, self._size = hand_chains(model), size
         posture = posture_prior(model)
         # As kernels are given it.
         self.packed = KNOWN.pack(Known(self.chains, posture))
@@ -88,6 +98,8 @@ class HandTracker:
         self.whitening = np.empty((0, 3, 3))
         # An estimate that is to be compared with a restart, and what it was fitted to.
         self._to_challenge: tuple[HandEstimate, Observations] | None = None
+        # The same of a look at the size.
+        self._to_look: tuple[HandEstimate, Observed] | None = None
 
     def track(self, stamp_ns: int, observed: Mapping[str, Observation]) -> HandEstimate | None:
         """The hand at stamp_ns given its usable landmarks (point_check.usable_points).
@@ -99,6 +111,8 @@ class HandTracker:
         seconds = (stamp_ns - self._stamp_ns) * 1e-9
         if self._estimate is not None and self._is_lost(stamp_ns, seconds):
             self._estimate = None
+            if self._size is not None:
+                self._size.lost()
         if len(observed) >= MIN_LANDMARKS:
             self._located_ns = stamp_ns
         if self._estimate is None or self._told is None:
@@ -110,6 +124,9 @@ class HandTracker:
             self._estimate, self._told = self._continued(
                 self._estimate, self._told, observed, seconds
             )
+            alone = self._rival is None
+            if alone and self._size is not None and self._size.is_due(stamp_ns, observed):
+                self._to_look = self._estimate, observed
         self._stamp_ns = stamp_ns
         return self._told.estimate
 
@@ -127,13 +144,14 @@ class HandTracker:
     @property
     def challenge_due(self) -> bool:
         """Whether challenge() has something to do."""
-        return self._to_challenge is not None
+        return self._to_challenge is not None or self._to_look is not None
 
     def challenge(self) -> None:
-        """Compare the last pose with a restart, where one is due.
+        """Compare the last pose with a restart, and with other sizes, where that is due.
 
         It takes 2 ms: after the pose is out; the next track() does it where nobody has.
         """
+        self._learn_size()
         if self._to_challenge is not None:
             own, observations = self._to_challenge
             self._to_challenge = None
@@ -141,6 +159,20 @@ class HandTracker:
             own_cost = self._cost_without_history(own, observations)
             found = initialise(self.chains, self._uninformed, observations)
             self._follow_rival(own, own_cost, found)
+
+    def _learn_size(self) -> None:
+        if self._size is None or self._to_look is None:
+            return
+        own, observed = self._to_look
+        self._to_look = None
+        places = self._landmarks.places(observed.names)
+        seen = observations_of(places, observed.points_m, self._size.whitening(observed))
+        if self._size.look(self.chains, self._uninformed, seen, own):
+            new = resized(self._guessed, self._size.factor)
+            # In place: whoever has them packed sees it.
+            for name in ("base_m", "metacarpal_m", "lengths_m", "tool_m"):
+                getattr(self.chains, name)[:] = getattr(new, name)
+            self._landmarks.resize(self._size.factor)
 
     def _continued(
         self, last: HandEstimate, told: Told, observed: Observed, seconds: float

@@ -21,7 +21,7 @@ from services.solver.maths.chains import HandChains
 from services.solver.maths.kinematics import hand_frames
 from services.solver.whole_hand.fit import fit
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, PosePrior
 from services.solver.whole_hand.residuals import Pose
 
 # Postures in degrees: flexions of fingers (MCP, PIP; DIP follows) and of the thumb (CMC, MCP, IP).

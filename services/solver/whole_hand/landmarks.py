@@ -33,6 +33,11 @@ class Landmark:
     offset_m: Array  # (3,) in the joint's frame; in the wrist frame where digit is -1
     reach_m: float  # the furthest that it can be from the wrist joint
 
+    @property
+    def is_tip(self) -> bool:
+        """Whether it is the paint on the end of a digit."""
+        return self.digit >= 0 and bool(self.joint == CHAINS[self.digit, 3])
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -102,6 +107,8 @@ class Landmarks(dict[str, Landmark]):
     def __init__(self, landmarks: Mapping[str, Landmark]) -> None:
         super().__init__(landmarks)
         self._places: dict[tuple[str, ...], Packed] = {}
+        # Against the model's.
+        self._size = 1.0
 
     def places(self, names: tuple[str, ...]) -> Places:
         """Where landmarks sit."""
@@ -118,14 +125,24 @@ class Landmarks(dict[str, Landmark]):
                 self._places[names] = known
         return known
 
+    def resize(self, size: float) -> None:
+        """Have the hand so many times as large as the model from now on, for all who have places
+        of it; paint on tips is as long as it was.
+        """
+        self._size = size
+        for names, packed in self._places.items():
+            new, known = self._placed(names), packed.parts
+            known.offset_m[:], known.reach_m[:] = new.offset_m, new.reach_m
+
     def _placed(self, names: tuple[str, ...]) -> Places:
-        where = [self[name] for name in names]
+        where, size = [self[name] for name in names], self._size
+        offset_m = [one.offset_m * (1.0 if one.is_tip else size) for one in where]
         return Places(
             joint=np.array([landmark.joint for landmark in where], dtype=np.int64),
             digit=np.array([landmark.digit for landmark in where], dtype=np.int64),
             depth=np.array([landmark.depth for landmark in where], dtype=np.int64),
-            offset_m=np.array([one.offset_m for one in where], dtype=np.float64).reshape(-1, 3),
-            reach_m=np.array([landmark.reach_m for landmark in where], dtype=np.float64),
+            offset_m=np.array(offset_m, dtype=np.float64).reshape(-1, 3),
+            reach_m=np.array([size * landmark.reach_m for landmark in where], dtype=np.float64),
             tip=np.array([TIPS.index(n) if n in TIPS else -1 for n in names], dtype=np.int64),
         )
 
@@ -150,6 +167,17 @@ def observations_of(places: Places, points_m: Array, whitening: Array) -> Observ
     return Observations(
         places.joint, places.digit, places.depth, places.offset_m, points_m, whitening
     )
+
+
+@njit(cache=True)
+def resized_offsets(observations: Observations, factor: float) -> Array:
+    """Offsets (m, 3) of landmarks on a hand so many times as large, as Landmarks.resize has it."""
+    offset_m = observations.offset_m.copy()
+    for n in range(observations.joint.size):
+        row = observations.digit[n]
+        if row < 0 or observations.joint[n] != CHAINS[row, 3]:
+            offset_m[n] *= factor
+    return offset_m
 
 
 def hand_landmarks(model: HandModel) -> Landmarks:

@@ -23,7 +23,7 @@ from services.solver.maths.chains import CHAINS, HandChains
 from services.solver.maths.kinematics import FUSED, DigitFrames, digit_frames
 from services.solver.maths.rotation_vectors import turn_between, turned
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, PosePrior
 
 # Standard deviations beyond which a landmark counts linearly (Huber): a millimetre-accurate one
 # that is 5 mm off is no longer noise but may still be a bone measured short.

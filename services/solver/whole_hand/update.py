@@ -25,8 +25,8 @@ from services.solver.whole_hand.landmarks import (
     whitening,
 )
 from services.solver.whole_hand.model_misfit import learned_misfit
-from services.solver.whole_hand.motion_prior import UNKNOWNS, PosePrior, predict
-from services.solver.whole_hand.posture_prior import PosturePrior
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS, PosePrior, predict
+from services.solver.whole_hand.priors.posture_prior import PosturePrior
 from services.solver.whole_hand.residuals import Pose
 
 

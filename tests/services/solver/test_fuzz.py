@@ -32,8 +32,8 @@ from services.solver.whole_hand.landmarks import (
     hand_landmarks,
     observation_arrays,
 )
-from services.solver.whole_hand.motion_prior import uninformed_prior
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 
 MODEL = default_hand()
 CHAINS = hand_chains(MODEL)

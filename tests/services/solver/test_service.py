@@ -93,6 +93,7 @@ async def test_points_in_poses_out_with_garbage_between(
         assert service.state == "running"
         assert service.values["right_from_tables"] == 1.0
         assert service.values["right_solve_ms"] > 0.0
+        assert 0.9 < service.values["right_size"] < 1.1
 
 
 async def test_points_that_come_at_once_have_their_poses(

@@ -1,10 +1,10 @@
 """What is known of the angles of a hand that moves as it likes: a Gaussian, and soft limits. Pure.
 
-The same knowledge that the solver has (services/solver/whole_hand/posture_prior.py): fingers close
-together (Santello, Flanders & Soechting, J. Neurosci. 18(23), 1998), a last joint follows the one
-before it. But how a person holds the hand, and how much moves, is learnt from the recording with
-everything else (a mean of its own, and spreads): a prior that is sure of postures which this person
-does not have turns into wrong bones.
+The same knowledge that the solver has (services/solver/whole_hand/priors/posture_prior.py): fingers
+close together (Santello, Flanders & Soechting, J. Neurosci. 18(23), 1998), a last joint follows the
+one before it. But how a person holds the hand, and how much moves, is learnt from the recording
+with everything else (a mean of its own, and spreads): a prior that is sure of postures which this
+person does not have turns into wrong bones.
 
 The unknown angles of a frame are "own" ones: the last one of a digit is what it has beside coupling
 times the one before it.

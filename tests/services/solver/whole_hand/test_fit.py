@@ -11,8 +11,8 @@ from rhot.geometry.transforms import angle_between, rotation_from_vector
 from rhot.hand import BASIC_LANDMARKS, LANDMARKS, HandName
 from services.solver.maths.chains import hand_chains
 from services.solver.whole_hand.fit import fit
-from services.solver.whole_hand.motion_prior import PosePrior, uninformed_prior
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import PosePrior, uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 from services.solver.whole_hand.residuals import Pose
 
 FULL = (

@@ -12,7 +12,7 @@ from rhot.geometry.transforms import angle_between, rotation_from_vector
 from rhot.hand import TIPS
 from services.solver.whole_hand.hand_tracker import HandTracker
 from services.solver.whole_hand.landmarks import Observation, hand_landmarks
-from services.solver.whole_hand.motion_prior import UNKNOWNS
+from services.solver.whole_hand.priors.motion_prior import UNKNOWNS
 
 FRAME_NS = 33_333_333
 

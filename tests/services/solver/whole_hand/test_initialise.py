@@ -12,8 +12,8 @@ from rhot.hand import BASIC_LANDMARKS, HandModel, HandName
 from services.solver.maths.chains import hand_chains
 from services.solver.whole_hand.initialise import Hypothesis, initial_postures, initialise
 from services.solver.whole_hand.landmarks import Observations
-from services.solver.whole_hand.motion_prior import uninformed_prior
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 
 
 def _initialise(model: HandModel, observations: Observations) -> Hypothesis:

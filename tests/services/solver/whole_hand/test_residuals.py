@@ -11,7 +11,7 @@ from rhot.geometry.transforms import rotation_from_vector
 from rhot.hand import LANDMARKS, HandName
 from services.solver.maths.chains import hand_chains
 from services.solver.maths.rotation_vectors import apply_rotation_vector
-from services.solver.whole_hand.motion_prior import PosePrior
+from services.solver.whole_hand.priors.motion_prior import PosePrior
 from services.solver.whole_hand.residuals import NormalEquations, Pose, normal_equations
 
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from rhot.hand import HandModel, default_hand
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 
 
 def _with_coupling(model: HandModel, ratio: float, weight: float) -> HandModel:

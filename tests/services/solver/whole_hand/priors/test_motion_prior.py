@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rhot.hand import default_hand
-from services.solver.whole_hand.motion_prior import predict, uninformed_prior
-from services.solver.whole_hand.posture_prior import posture_prior
+from services.solver.whole_hand.priors.motion_prior import predict, uninformed_prior
+from services.solver.whole_hand.priors.posture_prior import posture_prior
 
 
 def _covariance(seed: int) -> np.ndarray:

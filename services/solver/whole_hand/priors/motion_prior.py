@@ -21,7 +21,7 @@ from numba import njit
 from rhot.geometry.transforms import Array
 from services.solver.maths.cholesky import spd_inverse
 from services.solver.maths.kinematics import FUSED
-from services.solver.whole_hand.posture_prior import PosturePrior
+from services.solver.whole_hand.priors.posture_prior import PosturePrior
 
 # Unknowns of a hand's pose: rotation (0..2), position (3..5) and 20 angles.
 UNKNOWNS = 26
