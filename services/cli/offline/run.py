@@ -34,6 +34,9 @@ from services.cli.progress import Progress
 from services.object_tracker.step import ObjectStep
 from services.pi_tracker.step import TrackerStep
 
+# A hand whose size is farther from what rig.toml says is noted: points tell it to 2 or 3 %.
+_OTHER_SIZE = 0.04
+
 
 def run(
     job: Job,
@@ -241,7 +244,12 @@ def _track_objects(job: Job, writer: ResultWriter) -> list[str]:
 
 
 def _pose_notes(pipeline: Pipeline, counts: dict[str, int]) -> list[str]:
-    """A note where markers gave no pose although a hand was asked for."""
+    """Notes where markers gave no pose although a hand was asked for, or a hand of another size."""
     if pipeline.hands and counts["markers"] and not counts["poses"]:
         return ["no hand pose came out: `rhot plot` shows which markers are missing"]
-    return []
+    return [
+        f"the {hand} hand was never measured, and is by its points {found:.2f} times an adult's: "
+        f"`scale = {found:.2f}` in [hand.{hand}] of rig.toml says so from the start"
+        for hand, (said, found) in pipeline.sizes.items()
+        if abs(found / said - 1.0) > _OTHER_SIZE
+    ]

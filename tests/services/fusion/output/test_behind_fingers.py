@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.intake.observations import View
 from services.fusion.output.behind_fingers import hidden_from
 from services.fusion.output.hidden_paint import HiddenPaint
 from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint
 from services.fusion.output.visible_paint import paint_tables
+from testing.view_of_areas import view_of_areas
 
 RADIUS_M, UP = 0.007, (0.0, -1.0, 0.0)
 CENTRES = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0]])
@@ -84,21 +84,6 @@ def test_directions_that_are_old_or_unsure_tell_no_side(paint):
     assert side(dab, OTHER) is None
 
 
-def look(camera: int, areas: list[float]) -> View:
-    return View(
-        camera=camera,
-        instant_ns=0,
-        landmarks=np.arange(2),
-        delay_s=np.zeros(2),
-        rays=np.zeros((2, 2)),
-        sigmas=np.full(2, 2e-4),
-        areas=np.array(areas),
-        clock_offset_ns=0,
-        clock_sigma_s=0.0,
-        ignored=0,
-    )
-
-
 def test_the_centre_of_what_a_finger_hides_is_put_back(paint):
     """A disc of which a straight edge hides a part: the middle of the rest is off by so much."""
     radius = RADIUS_M / TIP[2]
@@ -112,8 +97,8 @@ def test_the_centre_of_what_a_finger_hides_is_put_back(paint):
     hidden.seen.places[:] = TIP, OTHER
     # The other camera, farther from it, sees all of both.
     scale = (np.linalg.norm(TIP) / np.linalg.norm(TIP - CENTRES[1])) ** 2
-    hidden.observe(look(1, [scale * whole, whole]), 0.0)
-    seen = look(0, [(1.0 - share) * whole, whole])
+    hidden.observe(view_of_areas(1, whole * np.array([scale, 1.0])), 0.0)
+    seen = view_of_areas(0, whole * np.array([1.0 - share, 1.0]))
     sigmas = hidden.observe(seen, 0.016)
     # Away from the finger it was off, to which it is put back.
     assert -seen.rays[0, 0] == pytest.approx(off, rel=0.3)

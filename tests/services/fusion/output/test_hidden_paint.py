@@ -20,6 +20,7 @@ from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene
 from testing.rendered_markers import detect
 from testing.synthetic_points import START_NS
+from testing.view_of_areas import view_of_areas
 
 CENTRES = np.array([[0.0, 0.0, 0.0], [0.075, 0.0, 0.0]])
 
@@ -74,18 +75,7 @@ def paint() -> HiddenPaint:
 
 
 def look(camera: int, *areas: float) -> View:
-    return View(
-        camera=camera,
-        instant_ns=0,
-        landmarks=np.arange(2),
-        delay_s=np.zeros(2),
-        rays=np.zeros((2, 2)),
-        sigmas=np.full(2, 2e-4),
-        areas=AREA * np.array(areas),
-        clock_offset_ns=0,
-        clock_sigma_s=0.0,
-        ignored=0,
-    )
+    return view_of_areas(camera, AREA * np.array(areas))
 
 
 def test_alike_is_whole_and_less_is_hidden(paint):
