@@ -14,15 +14,13 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import NEAR_M
-from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint
+from services.fusion.output.known_paint import MOST_UNSURE_RAD, POSE_AGE_NS, KnownPaint
 
 # From the middle of a tip's paint, how far its finger goes on, and how far back it is about
 # straight; points along it.
 _ON_M, _BACK_M, _POINTS = 0.005, 0.035, 9
 # What passes a tip nearer than this share of both radii hides some of it, and it is so much nearer.
 _OVERLAP, _NEARER_M = 1.1, 0.003
-# Less sure directions say nothing of where a finger is.
-_MOST_UNSURE_RAD = 0.6
 
 
 @njit(cache=True)
@@ -46,7 +44,7 @@ def hidden_from(
     nearest, point = math.inf, np.empty(3)
     for other in range(places.shape[0]):
         told = abs(instant_ns - paint.stamps_ns[other]) <= POSE_AGE_NS
-        told &= paint.direction_sigmas[other, 0] <= _MOST_UNSURE_RAD
+        told &= paint.direction_sigmas[other, 0] <= MOST_UNSURE_RAD
         if other == row or paint.radii_m[other] == 0.0 or not told:
             continue
         reach_m = _OVERLAP * (paint.radii_m[row] + paint.radii_m[other])

@@ -41,7 +41,7 @@ _MOST_TURN_RAD_S = 20.0
 # with 1.0, 3.3 and 8.1 with .6, 3.5 and 8.7 with .45; a recorded wave 10.4, 10.4 and 10.1. Of the
 # other renderer's tuning half, RMS at lag 2 with .4, .5, .6 and .8: splay 2.69, 2.45, 2.27, 2.23,
 # flapping 2.80, 2.57, 2.50, 2.49.
-_MOST_UNSURE_RAD = 0.6
+MOST_UNSURE_RAD = 0.6
 # A stamp that is older than any.
 LONG_AGO_NS = -POSE_AGE_NS - 1
 
@@ -173,7 +173,7 @@ def _correct(
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
         is_told = abs(instant_ns - paint.stamps_ns[row]) <= POSE_AGE_NS
-        is_told &= paint.direction_sigmas[row, 0] <= _MOST_UNSURE_RAD
+        is_told &= paint.direction_sigmas[row, 0] <= MOST_UNSURE_RAD
         if is_told:
             _aim(paint, row, instant_ns, aim)
         if paint.radii_m[row] == 0.0:

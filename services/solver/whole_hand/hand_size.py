@@ -44,8 +44,9 @@ _INTERVAL_S, _UNLIKE_M, _REMEMBERED = 0.3, 5e-3, 60
 # Landmarks that show a size; and of another hand, after one was lost, so many looks are kept: it
 # may be somebody else's.
 _LANDMARKS, _KEPT = 5, 2
-# A smaller change of the size is not worth a change of the hand.
-_LEAST_CHANGE = 1e-3
+# A smaller change of the size is not worth a change of the hand; a hand that is a third larger or a
+# fourth smaller than the guess is a rig's calibration that is wrong, or points that are no hand's.
+_LEAST_CHANGE, _MOST = 1e-3, 0.3
 
 
 class HandSize:
@@ -110,7 +111,8 @@ class HandSize:
         if self._information == 0.0:
             return 0.0
         variance = _ALIKE**2 + 1.0 / (self._looks * self._information)
-        return self._pull / self._information / (1.0 + variance / GUESS**2)
+        found = self._pull / self._information / (1.0 + variance / GUESS**2)
+        return min(max(found, -_MOST), _MOST)
 
 
 @njit(cache=True)

@@ -53,6 +53,14 @@ def test_a_wrong_guess_is_corrected(world: Callable, hand: HandName, size: float
     assert abs(np.mean(errors)) < 0.04
 
 
+def test_points_that_are_no_hands_do_not_run_away_with_it(world: Callable) -> None:
+    """As of a chessboard whose squares were told wrongly; twice as large is refused elsewhere."""
+    step = SolverStep(RigConfig(), {"right": default_hand("right")})
+    for frame, points in enumerate(seen(world, 1.6, 1, 300)):
+        step.step(world("right").message(points, frame))
+    assert 1.1 < (step.size("right") or 0.0) < 1.36
+
+
 def test_a_measured_hand_keeps_its_size(world: Callable) -> None:
     for origin in ("measured", "simulated"):
         model = msgspec.structs.replace(default_hand("right"), origin=origin)
