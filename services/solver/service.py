@@ -78,7 +78,7 @@ async def _solve_hand(
     poses: Publisher[HandPose],
 ) -> None:
     """Solve one hand's points as they come, for ever."""
-    mean_ms, scale = 0.0, service.config.hand[hand].scale
+    mean_ms = 0.0
 
     def take(message: HandPoints) -> None:
         nonlocal mean_ms
@@ -91,7 +91,7 @@ async def _solve_hand(
         service.values[f"{hand}_solve_ms"] = round(mean_ms, 3)
         size = step.size(hand)
         if size is not None:
-            service.values[f"{hand}_size"] = round(scale * size, 3)
+            service.values[f"{hand}_size"] = round(size, 3)
         if step.challenge_due(hand):
             service.tasks.create_task(_challenge(step, hand))
 

@@ -53,9 +53,10 @@ class SolverStep:
         return hand.step(points) if hand is not None else None
 
     def size(self, hand: HandName) -> float | None:
-        """How large a hand that nobody measured is by now, against its model; None: measured."""
-        size = self._hands[hand].size
-        return None if size is None else size.factor
+        """How large a hand that nobody measured is by now, against the average adult's if the model
+        is the tables' at rig.toml's scale; None: measured.
+        """
+        return self._hands[hand].size
 
     def challenge_due(self, hand: HandName) -> bool:
         """Whether challenge() of that hand has something to do."""
@@ -85,14 +86,22 @@ class _Hand:
         check_model(model)
         self._settings = config.solver
         self._landmarks = hand_landmarks(model)
-        self.size = HandSize(landmark_m2(model)) if model.origin == "tables" else None
+        self._scale = config.hand[name].scale if name in config.hand else 1.0
+        self._size = HandSize(landmark_m2(model)) if model.origin == "tables" else None
         self.tracker = HandTracker(
-            model, self._landmarks, restart_interval(f"{config.rig.name}/{name}"), self.size
+            model, self._landmarks, restart_interval(f"{config.rig.name}/{name}"), self._size
         )
         self._model_error = ModelError(model, self.tracker.chains)
         # By the landmarks of a message, and which of them were measured.
         self._known_sources: dict[tuple[tuple[str, ...], bytes], list[JointSource]] = {}
-        self._radii = [rounded(radius_m) for radius_m in joint_radii_m(model)]
+        self._radii_m = joint_radii_m(model)
+        # As they go out, of a hand so many times as large as the model.
+        self._sized = 1.0, [rounded(radius_m) for radius_m in self._radii_m]
+
+    @property
+    def size(self) -> float | None:
+        """As SolverStep.size."""
+        return None if self._size is None else self._scale * self._size.factor
 
     def step(self, points: HandPoints) -> HandPose | None:
         observed = usable_points(points, self._landmarks, self._model_error.landmark_m2)
@@ -103,7 +112,14 @@ class _Hand:
         errors = self._model_error.errors(points.stamp_ns, observed.names, misfit_m2)
         numbers = self._numbers(estimate, observed, errors)
         sources = self._sources(observed)
-        return hand_pose(points, self._settings.method, numbers, self._radii, sources)
+        return hand_pose(points, self._settings.method, numbers, self._radii(), sources)
+
+    def _radii(self) -> list[float]:
+        """Of the joints' skin, m, rounded."""
+        factor = 1.0 if self._size is None else self._size.factor
+        if factor != self._sized[0]:
+            self._sized = factor, [rounded(factor * radius_m) for radius_m in self._radii_m]
+        return self._sized[1]
 
     def _numbers(self, estimate: HandEstimate, observed: Observed, errors: ErrorsAt) -> Array:
         """All numbers of the pose (32, 8), its digits by the configured method."""

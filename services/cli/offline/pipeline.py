@@ -54,7 +54,6 @@ class Pipeline:
         self._clock_sigma_ns = clock_sigma_ns
         self._cameras = cameras or {}
         self.hands: dict[HandName, HandModel] = {}
-        self._scales = {hand: table.scale for hand, table in config.hand.items()}
         self._fusion: FusionStep | None = None
         self._solver: SolverStep | None = None
         if cameras is not None:
@@ -72,16 +71,12 @@ class Pipeline:
         return {reason: count for reason, count in sorted(counts.items()) if count}
 
     @property
-    def sizes(self) -> dict[HandName, tuple[float, float]]:
-        """Of hands that nobody measured: the size that rig.toml says, and what their points do."""
+    def sizes(self) -> dict[HandName, float]:
+        """How large the hands that nobody measured are by their points, against an adult's."""
         if self._solver is None:
             return {}
         learned = {hand: self._solver.size(hand) for hand in self.hands}
-        return {
-            hand: (self._scales[hand], self._scales[hand] * size)
-            for hand, size in learned.items()
-            if size is not None
-        }
+        return {hand: size for hand, size in learned.items() if size is not None}
 
     def find(self, frame: Frame) -> MarkerFrame:
         """The markers of one frame."""

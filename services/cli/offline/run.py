@@ -78,7 +78,7 @@ def run(
             refusals=pipeline.refusals,
             complete=not unread,
             warnings=[*unread, *clocks.warnings, *dot_notes(trackers)],
-            notes=[*notes, *object_notes, *_pose_notes(pipeline, writer.counts)],
+            notes=[*notes, *object_notes, *_pose_notes(job, pipeline, writer.counts)],
             clocks=clocks.told if clocks.worth_telling else msgspec.UNSET,
             origin=job.origin,
         )
@@ -243,13 +243,13 @@ def _track_objects(job: Job, writer: ResultWriter) -> list[str]:
     return notes + [f"the registration does not hold: {text}" for text in stale]
 
 
-def _pose_notes(pipeline: Pipeline, counts: dict[str, int]) -> list[str]:
+def _pose_notes(job: Job, pipeline: Pipeline, counts: dict[str, int]) -> list[str]:
     """Notes where markers gave no pose although a hand was asked for, or a hand of another size."""
     if pipeline.hands and counts["markers"] and not counts["poses"]:
         return ["no hand pose came out: `rhot plot` shows which markers are missing"]
     return [
-        f"the {hand} hand was never measured, and is by its points {found:.2f} times an adult's: "
-        f"`scale = {found:.2f}` in [hand.{hand}] of rig.toml says so from the start"
-        for hand, (said, found) in pipeline.sizes.items()
-        if abs(found / said - 1.0) > _OTHER_SIZE
+        f"the {hand} hand was never measured, and is by its points {size:.2f} times an adult's: "
+        f"`scale = {size:.2f}` in [hand.{hand}] of rig.toml says so from the start"
+        for hand, size in pipeline.sizes.items()
+        if abs(size / job.config.hand[hand].scale - 1.0) > _OTHER_SIZE
     ]

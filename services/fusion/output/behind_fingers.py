@@ -20,6 +20,8 @@ from services.fusion.output.known_paint import MOST_UNSURE_RAD, POSE_AGE_NS, Kno
 # straight; points along it.
 _ON_M, _BACK_M, _POINTS = 0.005, 0.035, 9
 # What passes a tip nearer than this share of both radii hides some of it, and it is so much nearer.
+# (Tuning half of our own pictures, maxima at lags 0 and 2: 7 and 10 % smaller with 1.05 than with
+# .9, 8 and 9 with 1.25.)
 _OVERLAP, _NEARER_M = 1.1, 0.003
 
 

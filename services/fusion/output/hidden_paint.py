@@ -46,8 +46,8 @@ _ALIKE, _TIP_PER_RAD, _DAB_PER_RAD = 0.03, 0.6, 2.0
 # these captures were .093 of it off RMS where the logarithm was .25-.5, .232 above, .017 below .05.
 _SHIFT = 0.42
 # The same of what a tip's direction lets expect. (Tuning half of our own pictures: with .5 NEES is
-# about 4 % less. The filter is not told: that made the other renderer's hand that grabs worse
-# without lag, 4.96 -> 5.31 mm RMS, 27 -> 44 at most.)
+# about 4 % less. The filter is not told of this sigma: that made the other renderer's hand that
+# grabs worse without lag, 4.96 -> 5.31 mm RMS, 27 -> 44 at most.)
 _SHIFT_BY_POSE = 0.3
 # Where the pose has a finger before a tip, its centre is put back by so much of the root of the
 # whole's area at a share hidden of 1; what is left of what it may be off, and of that way. (The
@@ -152,7 +152,7 @@ def _compare(
 ) -> None:
     """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,).
 
-    address: of _Seen.
+    Rays (n, 2) are moved as HiddenPaint.observe says. address: of _Seen.
     """
     parts: _Seen = _seen_at(address)
     seen, centres, per_rad, paint = parts.seen, parts.centres_rig, parts.per_rad, parts.paint
@@ -179,14 +179,14 @@ def _compare(
     view = parts.cameras.R[camera], parts.cameras.t[camera]
     for n in range(landmarks.size):
         row, keep = landmarks[n], math.exp(-passed_s[n] / _MEMORY_S)
-        worst, less, most = _unlike(seen, centres, per_rad[row], camera, row, time_s)
+        worst, more, whole = _unlike(seen, centres, per_rad[row], camera, row, time_s)
         hidden = hidden_share(below[n] - usual, paint.shape_sds[row])
-        whole = math.sqrt(areas[n] / (1.0 - hidden))
-        by_pose = _SHIFT_BY_POSE * hidden * whole
-        some = less > _ALIKE or hidden > 0.0
+        width = math.sqrt(areas[n] / (1.0 - hidden))
+        by_pose = _SHIFT_BY_POSE * hidden * width
+        some = more > _ALIKE or hidden > 0.0
         if some and hidden_from(paint, seen.places, row, instant_ns, view, away):
-            share = max(1.0 - math.exp(_ALIKE - less), 0.0)
-            off = _SHIFT_AWAY * max(share * math.sqrt(most), hidden * whole)
+            share = max(1.0 - math.exp(_ALIKE - more), 0.0)
+            off = _SHIFT_AWAY * max(share * math.sqrt(whole), hidden * width)
             rays[n, 0] -= off * away[0]
             rays[n, 1] -= off * away[1]
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
@@ -243,8 +243,8 @@ def _unlike(
 ) -> tuple[float, float, float]:
     """How far a camera's look at a landmark may be off, as others see more; 0 if none does.
 
-    And the logarithm of how much more the one that sees most does, and what that makes of its area
-    here, in the rays' units.
+    And how much more the one sees that sees most, as a logarithm, and the area that it would have
+    here if this camera saw as much, in the rays' units; 0 and 0 if none sees more.
     """
     area, worst, place = seen.areas[row, camera], 0.0, seen.places[row]
     own = place - centres[camera]
@@ -260,10 +260,10 @@ def _unlike(
         if own_m * away_m > 0.0:
             cosine = min(max((own @ away) / (own_m * away_m), -1.0), 1.0)
             whole = seen.areas[row, other] * (away_m / own_m) ** 2
-            ratio = math.log(whole / area)
-            if ratio > most:
-                most, largest = ratio, whole
-            less = ratio - _ALIKE - per_rad * math.acos(cosine)
+            more = math.log(whole / area)
+            if more > most:
+                most, largest = more, whole
+            less = more - _ALIKE - per_rad * math.acos(cosine)
             if less > 0.0:
                 worst = max(worst, _SHIFT * (1.0 - math.exp(-less)) * math.sqrt(whole))
     return worst, most, largest

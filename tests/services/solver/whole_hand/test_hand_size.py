@@ -47,6 +47,9 @@ def test_a_wrong_guess_is_corrected(world: Callable, hand: HandName, size: float
         for frame, points in enumerate(seen(world, size, seed, 150, hand)):
             pose = step.step(world(hand).message(points, frame))
         table_m = default_hand(hand).lengths_m[1:]
+        # Skin goes with bones.
+        share = pose.joint("index_tip").radius_m / default_hand(hand).digits[1].radii_m[3]
+        assert share == pytest.approx(np.mean(bones_m(pose) / table_m), abs=2e-3)
         errors.append(float(np.mean(bones_m(pose) / table_m)) / size - 1.0)
     # A look at postures that habit finds unlikely is off by some percent.
     assert np.max(np.abs(errors)) < 0.07
