@@ -28,11 +28,14 @@ import numpy as np
 from held_out_score import Figures, make_fusion, misses, scores
 
 from rhot.files.rig_tables import Fusion
+from rhot.geometry.transforms import Array
 from services.fusion import step as fusion_step
+from services.fusion.intake.observations import View
 from services.fusion.kalman import hand_filter
 from services.fusion.kalman.motion.motion_models import MotionModels
-from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import SystematicError
+from services.fusion.paint.hidden_paint import HiddenPaint
+from services.fusion.paint.paint_to_bone import PaintToBone
 from services.pi_tracker.identify import group_consistency
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.marker_identity import MarkerIdentity
@@ -44,7 +47,13 @@ from testing.families.pictures import Without, detected
 
 LAGS = (0, 2)
 # Points have none of these.
-_OF_PAINT = ("finger direction", "paint to bone", "systematic error")
+_OF_PAINT = (
+    "finger direction",
+    "paint to bone",
+    "hidden paint",
+    "shape of paint",
+    "systematic error",
+)
 _MODELS = hand_filter.MODELS
 
 
@@ -58,9 +67,25 @@ class _PaintAsItIs(PaintToBone):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        nothing = np.zeros_like(self.known.radii_m)
-        tables = np.zeros_like(self.known.tables)
-        self.known = self.known._replace(radii_m=nothing, sags_m=nothing, tables=tables)
+        # In place: kernels know where these are.
+        for known in (self.known.radii_m, self.known.sags_m, self.known.areas_m2):
+            known[:] = 0.0
+
+
+class _AllShows(HiddenPaint):
+    """Paint that nothing hides."""
+
+    def observe(self, view: View, time_s: float) -> Array:  # noqa: ARG002 - as HiddenPaint's
+        return np.zeros(len(view.landmarks))
+
+
+class _ShapeOfModel(HiddenPaint):
+    """Paint that is as the model has it."""
+
+    def observe(self, view: View, time_s: float) -> Array:
+        found = super().observe(view, time_s)
+        self.paint.shape_sds[:] = 0.0
+        return found
 
 
 # Landmarks that have nothing in common but how lively they are.
@@ -126,6 +151,14 @@ PARTS: dict[str, Part] = {
     "paint to bone": Part(
         "the visible middle of paint is told as it is, its covariance too",
         _replaced((fusion_step, "PaintToBone", _PaintAsItIs)),
+    ),
+    "hidden paint": Part(
+        "areas tell nothing of what hides a marker, nor of its shape",
+        _replaced((fusion_step, "HiddenPaint", _AllShows)),
+    ),
+    "shape of paint": Part(
+        "paint is as its model has it, sigma says",
+        _replaced((fusion_step, "HiddenPaint", _ShapeOfModel)),
     ),
     "systematic error": Part(
         "all of a marker's sigma is white noise",

@@ -101,7 +101,7 @@ class Paint(msgspec.Struct, frozen=True, kw_only=True):
 
     What cameras see is skin, yet two of them locate the centre of paint all round a finger
     (radius_m > 0) on the bone axis, within .3 radii: its outline is what counts. A dab on one side
-    (radius_m = 0) lies where it is seen. See services/fusion/output/paint_to_bone.py.
+    (radius_m = 0) lies where it is seen. See services/fusion/paint/paint_to_bone.py.
     """
 
     offset_m: Vec3

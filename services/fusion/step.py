@@ -34,11 +34,11 @@ from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import hand_reach_m
 from services.fusion.output.hand_points import Corrections, PointMessages
-from services.fusion.output.hidden_paint import HiddenPaint
-from services.fusion.output.paint_to_bone import Directions, PaintToBone
 from services.fusion.output.pose_feedback import PoseFeedback
 from services.fusion.output.schedule import OutputSchedule
 from services.fusion.output.systematic_error import SystematicError
+from services.fusion.paint.hidden_paint import HiddenPaint
+from services.fusion.paint.paint_to_bone import Directions, PaintToBone
 from services.fusion.paired.estimator import PairedMethod
 
 # Reasons and cameras for which rejected frames are counted apart: a rig has four reasons for each

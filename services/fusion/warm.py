@@ -19,7 +19,7 @@ from services.fusion.alignment.height_memory import heights_by_landmark
 from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.alignment.offset_search import even_samples
 from services.fusion.monitors.shift_regression import Heights, fit_shift
-from services.fusion.output.paint_to_bone import Directions, PaintToBone, turn_with_joints
+from services.fusion.paint.paint_to_bone import Directions, PaintToBone, turn_with_joints
 from services.fusion.step import FusionStep
 
 # Enough frames of each camera for a track to start, to be filtered anew, smoothed, and for an
@@ -50,7 +50,7 @@ def warm_up(
     none, aims = np.empty((0, 3)), (np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2)))
     turn_with_joints(np.empty(0), 0.0, nobody, none, *aims)
     paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
-    paint.note(Directions(hand, 0, nobody, *aims, 0.0))
+    paint.note(Directions(hand, 0, nobody, *aims))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     even_samples(np.arange(4.0), np.zeros(4), 0.0, 0)
     heights_by_landmark(nobody, np.empty(0), np.empty((0, 2)), np.eye(3))

@@ -21,9 +21,9 @@ from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
 from services.fusion.output.hand_plausibility import coherent
-from services.fusion.output.hidden_paint import PaintSeen
-from services.fusion.output.known_paint import KnownPaint, correct_paint
 from services.fusion.output.systematic_error import Systematic, add_systematic
+from services.fusion.paint.hidden_paint import PaintSeen
+from services.fusion.paint.known_paint import KnownPaint, correct_paint
 
 # Positions and sigmas are rounded to a micrometre: a hundredth of the smallest sigma of a hand at
 # arm's length.

@@ -15,7 +15,8 @@ from services.fusion.monitors import (
     shift_regression,
 )
 from services.fusion.one_camera import carried_shape, last_located
-from services.fusion.output import hand_points, hidden_paint, known_paint, paint_to_bone
+from services.fusion.output import hand_points
+from services.fusion.paint import hidden_paint, known_paint, paint_to_bone
 from services.fusion.warm import warm_up
 from testing.synthetic_points import MovingHand, SyntheticRig, frames, point_hands
 

@@ -11,9 +11,9 @@ from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
 from services.fusion.method import Estimates
 from services.fusion.output.hand_points import Corrections, PointMessages
-from services.fusion.output.hidden_paint import HiddenPaint, PaintSeen
-from services.fusion.output.paint_to_bone import PaintToBone
 from services.fusion.output.systematic_error import Systematic
+from services.fusion.paint.hidden_paint import HiddenPaint, PaintSeen
+from services.fusion.paint.paint_to_bone import PaintToBone
 from testing.synthetic_points import SyntheticRig, point_hands
 
 CAMERAS = tuple(SyntheticRig().rig().values())

@@ -12,9 +12,9 @@ from rhot.files.config import load_rig
 from rhot.hand import landmark_point
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
-from services.fusion.output.hidden_paint import HiddenPaint
-from services.fusion.output.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
-from services.fusion.output.visible_paint import paint_tables
+from services.fusion.paint.hidden_paint import HiddenPaint
+from services.fusion.paint.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
+from services.fusion.paint.visible_paint import paint_tables
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene
@@ -52,6 +52,7 @@ def known_paint() -> KnownPaint:
         directions=np.zeros((2, 3)),
         hinges=np.zeros((2, 3)),
         direction_sigmas=np.zeros((2, 2)),
+        hands=np.zeros(2, dtype=np.int64),
         shape_sds=np.zeros(2),
         turns_rad_s=np.zeros((2, 3)),
         stamps_ns=np.full(2, LONG_AGO_NS),
@@ -59,12 +60,12 @@ def known_paint() -> KnownPaint:
     )
 
 
-def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float, shape_sd: float = 0.0):
+def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float) -> None:
     """A pose tells where the tip points, at 0 s."""
     rows, hinges = np.array([0]), np.array([[1.0, 0.0, 0.0]])
     sigmas = np.array([[sigma_rad, 0.0]])
     packed = PAINT.pack(paint)
-    note_directions(packed.address, rows, np.array([direction]), hinges, sigmas, shape_sd, 0)
+    note_directions(packed.address, rows, np.array([direction]), hinges, sigmas, 0)
 
 
 @pytest.fixture
@@ -119,12 +120,12 @@ def test_what_is_hidden_from_all_cameras_shows_by_its_pose():
     paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
     paint.seen.places[:] = PLACES
     told(known, (0.0, -1.0, 0.0), 0.1)
-    for frame in range(30):
+    for frame in range(300):
         paint.observe(look(frame % 2, SIDE, 1.0), frame / 60)
     assert not paint.seen.sigmas[1].any()
     # A third of it behind another finger, for both cameras: .3 of a third of its width.
     for camera in (0, 1):
-        paint.observe(look(camera, 0.67 * SIDE, 1.0), 0.7 + camera / 60)
+        paint.observe(look(camera, 0.67 * SIDE, 1.0), 5.2 + camera / 60)
     width_px = 527.0 * np.sqrt(SIDE * AREA)
     sigmas_px = paint.seen.sigmas[1, 0] * 527.0
     assert np.all((0.05 * width_px < sigmas_px) & (sigmas_px < 0.12 * width_px))
@@ -153,7 +154,7 @@ def test_a_tip_that_turns_away_or_is_darker_for_good_is_not_hidden():
     paint.observe(look(0, 0.6 * SIDE, 1.0), 0.06)
     assert paint.seen.sigmas[1, 0, 0] > 0.0
     for frame in range(900):
-        paint.observe(look(0, 0.6 * SIDE, 1.0), 0.09 + frame / 30)
+        paint.observe(look(0, 0.6 * SIDE, 1.0), 5.3 + frame / 30)
     assert paint.seen.sigmas[1, 0, 0] < 1e-6
 
 
@@ -171,7 +172,7 @@ def test_what_makes_all_tips_smaller_hides_none():
         np.tile((1.0, 0, 0), (3, 1)),
     )
     packed = PAINT.pack(known)
-    note_directions(packed.address, rows, down, hinges, np.full((3, 2), 0.05), 0.0, 0)
+    note_directions(packed.address, rows, down, hinges, np.full((3, 2), 0.05), 0)
 
     def seen(*areas: float) -> View:
         return look(0, 1.0, 1.0)._replace(landmarks=rows, areas=SIDE * AREA * np.array(areas))
@@ -188,8 +189,9 @@ def test_an_unsure_pose_or_shape_explains_a_small_area():
         known = known_paint()
         paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
         paint.seen.places[:] = PLACES
-        told(known, (0.0, -1.0, 0.0), sigma_rad, shape_sd)
+        told(known, (0.0, -1.0, 0.0), sigma_rad)
         paint.observe(look(0, SIDE, 1.0), 0.0)
+        known.shape_sds[:] = shape_sd
         paint.observe(look(0, 0.75 * SIDE, 1.0), 0.03)
         assert (paint.seen.sigmas[1, 0, 0] > 0.0) == hidden
 
@@ -245,3 +247,31 @@ def test_paint_that_turns_is_as_sure_as_ever():
     for frame in range(40):
         area = np.exp(0.3 * np.sin(frame / 8))
         assert not paint.observe(look(frame % 2, area, 1.0), frame / 60).any()
+
+
+def test_areas_tell_how_unlike_its_model_a_hand_is():
+    """By how they scatter over time: of paint that is larger than the model's throughout, nothing,
+    nor of what a finger hides from one camera."""
+    found = []
+    for larger, swing, hidden in (
+        (1.0, 0.0, 1.0),
+        (1.5, 0.0, 1.0),
+        (1.0, 0.3, 1.0),
+        (1.0, 0.0, 0.5),
+    ):
+        known = known_paint()
+        paint = HiddenPaint(looking_ahead(CENTRES), np.array([True, False]), known)
+        paint.seen.places[:] = PLACES
+        told(known, (0.0, -1.0, 0.0), 0.1)
+        for frame in range(300):
+            area = larger * SIDE * np.exp(swing * np.sin(frame / 20))
+            paint.observe(look(0, area, 1.0), frame / 30)
+            paint.observe(
+                look(1, area * (hidden if frame % 60 < 15 else 1.0), 1.0), frame / 30 + 0.01
+            )
+        assert known.shape_sds[0] == known.shape_sds[1]
+        found.append(known.shape_sds[0])
+    alike, large, unlike, behind = found
+    assert alike == large == 0.0
+    assert unlike > 0.12
+    assert behind == 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.fusion.output.visible_paint import dab_sag_m
+from services.fusion.paint.visible_paint import dab_sag_m
 
 
 def located_depth_m(normals, weights, places):

@@ -37,22 +37,13 @@ from rhot.hand import DIGITS, JOINT_INDEX, HandModel, HandName
 from rhot.messages import HandPose
 from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
-from services.fusion.output.visible_paint import PaintTables, dab_sag_m, paint_tables
+from services.fusion.paint.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
+from services.fusion.paint.visible_paint import PaintTables, dab_sag_m, paint_tables
 
 # How thick fingers are against the model's, by HandModel.origin, one standard deviation: measuring
 # a hand measures bones. Tuning captures' are within 8 %; with .12 their sigma is a tenth larger.
 # (How long the paint is does not matter: paint_centroid.py.)
 _RADIUS_SD = {"tables": 0.08, "measured": 0.06}
-# A hand that the tables' model fits badly has other fingers and other paint than the model, too:
-# none of that from the first of these misfits (HandPose.model_misfit) down, so many radii from the
-# second up, and no more, so that what this makes of a pose cannot grow by itself. Hands that the
-# simulator drew by the tables have medians of .1 to .4, people of other sizes .6 and .7, recorded
-# ones of ours 1.3 and 3.2; of the other renderer .5 to 5.5, three of eleven below .7. Median NEES
-# without lag of six of these with (.7, 1.2) and with (.4, .8): 5.7, 2.5, 2.1, 1.2, 1.3, 2.5 and
-# 3.2, 1.4, .9, .8, 1.1, 1.4; within three sigmas 43 to 85 % and 56 to 100 %; of our people of other
-# sizes .40, .37 and .26, .16, of the others as before (all on tuning halves).
-_MISFITS, _UNLIKE_SHAPE = (0.4, 0.8), 0.14
 # What directions were off on average when poses did not say how sure they were.
 _UNTOLD_DIRECTION_RAD = 0.12
 # Abduction alone turns a finger sideways. Against the root mean square over a digit's angles, which
@@ -99,7 +90,6 @@ class Directions(NamedTuple):
     directions: Array  # (n, 3)
     hinges: Array  # (n, 3) the axis about which a finger bends
     sigmas_rad: Array  # (n, 2) of the directions, about the hinge and sideways
-    shape_sd: float  # of the hand's paint against the model's, in radii
 
 
 class PaintToBone:
@@ -131,7 +121,6 @@ class PaintToBone:
             ]
             for hand in hands
         }
-        self._origins = {hand: model.origin for hand, model in hands.items()}
         # In its joint's frame (L, 3): the way a painted tip points, the outward normal of a dab's
         # skin; and how deep a dab's middle lies under the landmark (L,).
         normals = offsets / np.maximum(limbs_m, 1e-9)[:, None]
@@ -147,6 +136,7 @@ class PaintToBone:
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),
+            hands=np.array([list(hands).index(one.hand) for one in landmarks], dtype=np.int64),
             shape_sds=np.zeros(len(landmarks)),
             turns_rad_s=np.zeros((len(landmarks), 3)),
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
@@ -179,16 +169,7 @@ class PaintToBone:
         # To be filled: an array that a kernel returns costs .6 us, one that it is given .2.
         aims = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 2))
         turn_with_joints(np.array(numbers), wrist_rad, of, self._outwards, *aims)
-        shape_sd = self._shape_sd(pose.hand, pose.model_misfit)
-        return Directions(pose.hand, pose.stamp_ns, of, *aims, shape_sd)
-
-    def _shape_sd(self, hand: HandName, misfit: float | None) -> float:
-        """In radii, of a hand that fits its model so badly; 0 if the pose does not say."""
-        if misfit is None or self._origins.get(hand) != "tables":
-            return 0.0
-        alike, unlike = _MISFITS
-        share = (misfit - alike) / (unlike - alike)
-        return _UNLIKE_SHAPE * min(max(share, 0.0), 1.0)
+        return Directions(pose.hand, pose.stamp_ns, of, *aims)
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
@@ -198,7 +179,6 @@ class PaintToBone:
             told.directions,
             told.hinges,
             told.sigmas_rad,
-            told.shape_sd,
             told.stamp_ns,
         )
 

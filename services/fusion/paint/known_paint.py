@@ -12,7 +12,7 @@ from rhot.geometry.transforms import Array
 from rhot.kernels.packed import Layout, unowned
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.output.paint_centroid import Finger, cross, expected_shift
+from services.fusion.paint.paint_centroid import Finger, cross, expected_shift
 
 # Sigmas that are left along the viewing ray and along each axis across it, in radii of the paint,
 # from the figures above.
@@ -27,6 +27,9 @@ SIGMA_END, _END_POWER = (0.1, 0.035), (4, 2)
 # A shape that is unlike the model's counts so much more along the viewing ray than across it, as
 # what is left does (SIGMA_UNKNOWN: 1.8 times).
 _SHAPE_ALONG = 2.0
+# The outline of a dab is drawn by hand, and counts so much more beside it. (Errors of the other
+# renderer's tuning clips beside the wrist are .3 to .8 mm, told .35 to .45 with 1.)
+_SHAPE_OF_DAB = 1.7
 # Light falls on the side that cameras see: tips are located so much before their axis, in radii
 # (tuning captures: .01 to .06; without, depths are 3 % worse).
 _LIT = 0.025
@@ -57,7 +60,8 @@ class KnownPaint(NamedTuple):
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
     direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
-    shape_sds: Array  # (L,) how unlike the model's it may be, in radii
+    hands: Ints  # (L,) which hand each is of, from 0
+    shape_sds: Array  # (L,) how unlike the model's it may be, in radii (paint_shape.py)
     turns_rad_s: Array  # (L, 3) how a direction turned from the pose before that one
     stamps_ns: Ints  # (L,) of the pose that told it
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
@@ -74,12 +78,11 @@ def note_directions(
     directions: Array,
     hinges: Array,
     sigmas_rad: Array,
-    shape_sd: float,
     stamp_ns: int,
 ) -> None:
     """Remember, in KnownPaint at an address, how fingers of landmarks (n,) point and bend (n, 3).
 
-    sigmas_rad (n, 2), shape_sd: how sure that is, and the shape of their paint, in radii.
+    sigmas_rad (n, 2): how sure that is.
     """
     paint: KnownPaint = _paint_at(address)
     for n in range(rows.size):
@@ -91,7 +94,6 @@ def note_directions(
         paint.directions[row] = directions[n]
         paint.hinges[row] = hinges[n]
         paint.direction_sigmas[row] = sigmas_rad[n]
-        paint.shape_sds[row] = shape_sd
         paint.stamps_ns[row] = stamp_ns
 
 
@@ -185,7 +187,7 @@ def _correct(
             sag_m = paint.sags_m[row]
             positions[row] += sag_m * normal
             along = math.hypot(paint.radius_sds[row], _SHAPE_ALONG * shape)
-            sigmas = along * sag_m, math.hypot(sigma_rad, shape) * sag_m
+            sigmas = along * sag_m, math.hypot(sigma_rad, _SHAPE_OF_DAB * shape) * sag_m
             _add_about(normal, sigmas, covariances[row])
             continue
         along, across = SIGMA_UNKNOWN  # in radii

@@ -9,8 +9,8 @@ from rhot.geometry.transforms import Array, rotation_from_vector
 from rhot.hand import default_hand
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import correct_paint
-from services.fusion.output.paint_to_bone import Directions, PaintToBone
+from services.fusion.paint.known_paint import correct_paint
+from services.fusion.paint.paint_to_bone import Directions, PaintToBone
 from testing.synthetic_points import SyntheticRig
 
 CAMERAS = tuple(SyntheticRig().rig().values())
@@ -30,7 +30,7 @@ def note_tilt(paint: PaintToBone, angle_rad: float, stamp_ns: int) -> None:
     directions = np.array([turn @ [0.0, -1.0, 0.0], turn @ [0.0, 0.0, -1.0]])
     hinges = np.tile([1.0, 0.0, 0.0], (2, 1))
     sigmas_rad = np.full((2, 2), 0.02)
-    paint.note(Directions("right", stamp_ns, np.arange(2), directions, hinges, sigmas_rad, 0.0))
+    paint.note(Directions("right", stamp_ns, np.arange(2), directions, hinges, sigmas_rad))
 
 
 def corrected(paint: PaintToBone, instant_ns: int) -> Array:

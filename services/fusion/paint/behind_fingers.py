@@ -14,7 +14,7 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import NEAR_M
-from services.fusion.output.known_paint import MOST_UNSURE_RAD, POSE_AGE_NS, KnownPaint
+from services.fusion.paint.known_paint import MOST_UNSURE_RAD, POSE_AGE_NS, KnownPaint
 
 # From the middle of a tip's paint, how far its finger goes on, and how far back it is about
 # straight; points along it.

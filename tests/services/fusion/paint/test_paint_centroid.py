@@ -7,8 +7,8 @@ import pytest
 
 from rhot.geometry.transforms import Array
 from services.fusion.geometry.projection import Extrinsics, extrinsics
-from services.fusion.output.paint_centroid import Finger, centroid_shift, expected_shift
-from services.fusion.output.visible_paint import paint_tables
+from services.fusion.paint.paint_centroid import Finger, centroid_shift, expected_shift
+from services.fusion.paint.visible_paint import paint_tables
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M, PAINT_M = 0.0068, 0.014

@@ -31,15 +31,16 @@ _USUAL, _UNLIKE = 0.05, 1.0
 @njit(cache=True)
 def expected_areas(table: Array, angle: float, sigma_rad: float) -> tuple[float, float]:
     """The least and the most that a table (k,) of areas by angle, 0 to pi, says within a sigma."""
-    least = most = _area(table, angle)
+    least = most = area_at(table, angle)
     for side in (-sigma_rad, sigma_rad):
-        area = _area(table, angle + side)
+        area = area_at(table, angle + side)
         least, most = min(least, area), max(most, area)
     return least, most
 
 
 @njit(cache=True)
-def _area(table: Array, angle: float) -> float:
+def area_at(table: Array, angle: float) -> float:
+    """By angle, 0 to pi, between finger and viewing ray; table (k,) of areas over these."""
     place = min(max(angle, 0.0), math.pi) / math.pi * (table.size - 1)
     k = min(int(place), table.size - 2)
     return float(table[k] + (place - k) * (table[k + 1] - table[k]))

@@ -16,13 +16,13 @@ from rhot.hand import JOINTS, default_hand
 from rhot.messages import FingerAngles, FingerPose, HandJoint, HandPose, WristPose
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.observations import Landmark
-from services.fusion.output.known_paint import (
+from services.fusion.paint.known_paint import (
     SIGMA_FACING_RAD,
     SIGMA_UNKNOWN,
     correct_paint,
 )
-from services.fusion.output.paint_to_bone import PaintToBone, turn_vector
-from services.fusion.output.visible_paint import dab_sag_m
+from services.fusion.paint.paint_to_bone import PaintToBone, turn_vector
+from services.fusion.paint.visible_paint import dab_sag_m
 from testing.synthetic_points import SyntheticRig
 
 RADIUS_M = 0.0068
@@ -139,30 +139,20 @@ def test_a_dab_is_as_unsure_as_the_skin_under_it(paint):
         assert y == pytest.approx(0.08 * SAG_M, rel=1e-3)
 
 
-def shape_sigma_mm(paint, model_misfit) -> float:
-    """Of a tip, all axes, that a pose of such a misfit tells of; its direction is well known."""
-    told = msgspec.structs.replace(
-        pose(10**18, (1.0, 0.0, 0.0, 0.0), sigma_rad=0.05), model_misfit=model_misfit
-    )
-    paint.note(paint.directions(told))
-    return float(1e3 * np.sqrt(np.trace(corrected(paint, 10**18)[1][1])))
+def shape_sigmas_m(paint: PaintToBone, shape_sd: float) -> Array:
+    """Of a dab and a tip along each axis (2, 3), by paint of such a shape; directions are known."""
+    paint.note(paint.directions(pose(10**18, (1.0, 0.0, 0.0, 0.0), sigma_rad=0.05)))
+    paint.known.shape_sds[:] = shape_sd
+    return np.sqrt(corrected(paint, 10**18)[1].diagonal(axis1=1, axis2=2))
 
 
-def test_a_hand_that_is_unlike_its_model_has_other_fingers(paint):
-    """Paint of a hand that fits badly is of another shape, within limits."""
-    untold, alike, between, unlike, beyond = (
-        shape_sigma_mm(paint, misfit) for misfit in (None, 0.4, 0.6, 0.8, 1e9)
-    )
-    assert untold == alike < between < unlike == beyond
-    # .14 radii across, twice that along.
-    grown_mm = np.sqrt(unlike**2 - alike**2)
-    assert grown_mm == pytest.approx(6.8 * 0.14 * np.sqrt(6.0), rel=0.02)
-
-
-def test_a_hand_that_was_measured_is_of_its_own_shape():
-    measured = msgspec.structs.replace(default_hand("right"), origin="measured")
-    paint = PaintToBone(LANDMARKS, {"right": measured}, tuple(SyntheticRig().rig().values()))
-    assert shape_sigma_mm(paint, 1e9) == shape_sigma_mm(paint, None)
+def test_paint_that_is_unlike_its_model_has_another_middle(paint):
+    alike, unlike = shape_sigmas_m(paint, 0.0), shape_sigmas_m(paint, 0.1)
+    dab, tip = np.sqrt(unlike**2 - alike**2)
+    # A tenth of a radius across, twice that along.
+    assert np.linalg.norm(tip) == pytest.approx(0.1 * RADIUS_M * np.sqrt(6.0), rel=0.02)
+    # Beside a dab, whose normal is -y, 1.7 times as much of its depth; twice in depth.
+    np.testing.assert_allclose(dab, 0.1 * SAG_M * np.array([1.7, 2.0, 1.7]), rtol=0.02)
 
 
 def test_what_tapers_is_corrected_as_that(paint):

@@ -28,15 +28,22 @@ from rhot.kernels.packed import Layout
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
-from services.fusion.output.behind_fingers import hidden_from
-from services.fusion.output.expected_area import (
+from services.fusion.paint.behind_fingers import hidden_from
+from services.fusion.paint.expected_area import (
+    area_at,
     expected_areas,
     hidden_share,
     less_than_expected,
     usually_less,
 )
-from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint, turn_on
-from services.fusion.output.unsteady_area import unsteady_sigma
+from services.fusion.paint.known_paint import (
+    MOST_UNSURE_RAD,
+    POSE_AGE_NS,
+    KnownPaint,
+    turn_on,
+)
+from services.fusion.paint.paint_shape import LEAST_ANGLE, take_look, tell_shapes
+from services.fusion.paint.unsteady_area import unsteady_sigma
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
 # cameras' rays, of tips and of dabs. Whole ones seen by two cameras .09 to .15 rad apart: within
@@ -70,6 +77,8 @@ class PaintSeen(NamedTuple):
     sigmas: Array  # (2, L, C)
     # Mean and variance, of late, of the logarithm of an area's ratio to another camera's.
     ratios: Array  # (L, C, 2)
+    # Of an area's ratio to its model's (paint_shape.py).
+    shape_sums: Array  # (L, C, 3)
     # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
 
@@ -109,8 +118,10 @@ class HiddenPaint:
             levels=np.empty(shape),
             sigmas=np.empty((2, *shape)),
             ratios=np.empty((*shape, 2)),
+            shape_sums=np.empty((*shape, 3)),
             places=np.empty((shape[0], 3)),
         )
+        self.paint = paint
         self._packed = _SEEN.pack(_Seen(self.seen, cameras, centres_rig, per_rad, paint))
         self.reset()
 
@@ -119,6 +130,8 @@ class HiddenPaint:
         seen = self.seen
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
         seen.sigmas[:], seen.ratios[:], seen.places[:] = 0.0, np.nan, np.nan
+        seen.shape_sums[:] = 0.0
+        tell_shapes(seen.shape_sums, self.paint.hands, self.paint.shape_sds)
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,).
@@ -159,6 +172,8 @@ def _compare(
     own, shared = seen.sigmas
     # How much less of each shows than its pose lets expect, as a logarithm; NaN where none tells.
     below = np.full(landmarks.size, np.nan)
+    # Of the areas to the model's, as logarithms; NaN likewise.
+    ratios = np.full(landmarks.size, np.nan)
     passed_s = np.empty(landmarks.size)
     for n in range(landmarks.size):
         row = landmarks[n]
@@ -167,7 +182,7 @@ def _compare(
         age_ns = instant_ns - paint.stamps_ns[row]
         if paint.areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
             sigmas_rad = paint.direction_sigmas[row]
-            seen.levels[row, camera], below[n] = _against_pose(
+            seen.levels[row, camera], below[n], ratios[n] = _against_pose(
                 seen.places[row] - centres[camera],
                 paint.areas_m2[row],
                 (paint.directions[row], paint.turns_rad_s[row], 1e-9 * age_ns),
@@ -191,9 +206,12 @@ def _compare(
             rays[n, 1] -= off * away[1]
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
             by_pose *= _LEFT
+        if worst == 0.0 and not math.isnan(ratios[n]):
+            take_look(seen.shape_sums[row, camera], ratios[n], passed_s[n])
         own[row, camera] = max(worst, keep * own[row, camera])
         shared[row, camera] = max(by_pose, keep * shared[row, camera])
         out[n] = math.hypot(own[row, camera], _unsteady(seen, camera, row, passed_s[n]))
+    tell_shapes(seen.shape_sums, paint.hands, paint.shape_sds)
 
 
 @njit(cache=True)
@@ -219,8 +237,9 @@ def _against_pose(
     sigma_rad: float,
     area: float,
     before: tuple[float, float],
-) -> tuple[float, float]:
-    """A tip's level after one more look, and how much less of it shows, as a logarithm.
+) -> tuple[float, float, float]:
+    """A tip's level after one more look, how much less of it shows, as a logarithm, and its area's
+    ratio to the model's, likewise, NaN where its direction does not tell that well.
 
     ray (3,): from the camera to it, m; told: direction (3,), how it turns (3,) rad/s, how long ago,
     s; area: in the rays' units; before: the level, how long ago, s. As it was, and NaN, without a
@@ -228,13 +247,17 @@ def _against_pose(
     """
     away_m = math.sqrt(ray @ ray)
     if not (away_m > 0.0 and area > 0.0):
-        return before[0], math.nan
+        return before[0], math.nan, math.nan
     aim = np.empty(3)
     turn_on(told[0], told[1], told[2], aim)
     cosine = float(ray @ aim) / away_m
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     expected = expected_areas(table, angle, sigma_rad)
-    return less_than_expected(expected, area * away_m**2, before[0], before[1])
+    level, below = less_than_expected(expected, area * away_m**2, before[0], before[1])
+    ratio = math.nan
+    if angle > LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
+        ratio = math.log(area * away_m**2 / area_at(table, angle))
+    return level, below, ratio
 
 
 @njit(cache=True)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from services.fusion.geometry.projection import Extrinsics
-from services.fusion.output.behind_fingers import hidden_from
-from services.fusion.output.hidden_paint import HiddenPaint
-from services.fusion.output.known_paint import POSE_AGE_NS, KnownPaint
-from services.fusion.output.visible_paint import paint_tables
+from services.fusion.paint.behind_fingers import hidden_from
+from services.fusion.paint.hidden_paint import HiddenPaint
+from services.fusion.paint.known_paint import POSE_AGE_NS, KnownPaint
+from services.fusion.paint.visible_paint import paint_tables
 from testing.view_of_areas import view_of_areas
 
 RADIUS_M, UP = 0.007, (0.0, -1.0, 0.0)
@@ -37,6 +37,7 @@ def paint() -> Callable[..., KnownPaint]:
             directions=np.array([UP, direction]),
             hinges=np.tile((1.0, 0.0, 0.0), (2, 1)),
             direction_sigmas=np.full((2, 2), sigma_rad),
+            hands=np.zeros(2, dtype=np.int64),
             shape_sds=np.zeros(2),
             turns_rad_s=np.zeros((2, 3)),
             stamps_ns=np.zeros(2, dtype=np.int64),
