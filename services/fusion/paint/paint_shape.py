@@ -35,7 +35,7 @@ _GUESS, _GUESS_S = 0.1, 2.0
 # (Chosen on both tuning halves, whose likelihood of errors without lag and at two frames was .96,
 # 1.41 of our pictures and -2.30, -1.91 of the other renderer's with model_misfit for the scatter,
 # and is 1.13, 1.70 and -2.08, -1.81 with this.)
-_USUAL, _WORTH, _MOST = 0.08, 1.4, 0.13
+_USUAL, _WORTH, _MOST = 0.08, 1.4, 0.11
 # Nearer to the ray that comes along the finger the area changes fast with the angle.
 LEAST_ANGLE = math.radians(70.0)
 
