@@ -17,6 +17,8 @@ import numpy as np
 from numba import njit
 
 from rhot.geometry.transforms import Array
+from services.fusion.paint.known_paint import MOST_UNSURE_RAD, turn_on
+from services.fusion.paint.paint_shape import LEAST_ANGLE
 
 # The level's times upwards and downwards. (NEES of tuning captures is the same within 3 % with 3
 # and with 30 s downwards.)
@@ -29,17 +31,48 @@ _USUAL, _UNLIKE = 0.05, 1.0
 
 
 @njit(cache=True)
-def expected_areas(table: Array, angle: float, sigma_rad: float) -> tuple[float, float]:
+def against_pose(
+    ray: Array,
+    table: Array,
+    told: tuple[Array, Array, float],
+    sigma_rad: float,
+    area: float,
+    before: tuple[float, float],
+) -> tuple[float, float, float]:
+    """A tip's level after one more look, how much less of it shows, as a logarithm, and its area's
+    ratio to the model's, likewise, NaN where its direction does not tell that well.
+
+    ray (3,): from the camera to it, m; told: direction (3,), how it turns (3,) rad/s, how long ago,
+    s; area: in the rays' units; before: the level, how long ago, s. As it was, and NaN, without a
+    place, which is NaN, or without a distance.
+    """
+    away_m = math.sqrt(ray @ ray)
+    if not (away_m > 0.0 and area > 0.0):
+        return before[0], math.nan, math.nan
+    aim = np.empty(3)
+    turn_on(told[0], told[1], told[2], aim)
+    cosine = float(ray @ aim) / away_m
+    angle = math.acos(min(max(cosine, -1.0), 1.0))
+    expected = _expected_areas(table, angle, sigma_rad)
+    level, below = _less_than_expected(expected, area * away_m**2, before[0], before[1])
+    ratio = math.nan
+    if angle > LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
+        ratio = math.log(area * away_m**2 / _area(table, angle))
+    return level, below, ratio
+
+
+@njit(cache=True)
+def _expected_areas(table: Array, angle: float, sigma_rad: float) -> tuple[float, float]:
     """The least and the most that a table (k,) of areas by angle, 0 to pi, says within a sigma."""
-    least = most = area_at(table, angle)
+    least = most = _area(table, angle)
     for side in (-sigma_rad, sigma_rad):
-        area = area_at(table, angle + side)
+        area = _area(table, angle + side)
         least, most = min(least, area), max(most, area)
     return least, most
 
 
 @njit(cache=True)
-def area_at(table: Array, angle: float) -> float:
+def _area(table: Array, angle: float) -> float:
     """By angle, 0 to pi, between finger and viewing ray; table (k,) of areas over these."""
     place = min(max(angle, 0.0), math.pi) / math.pi * (table.size - 1)
     k = min(int(place), table.size - 2)
@@ -47,12 +80,12 @@ def area_at(table: Array, angle: float) -> float:
 
 
 @njit(cache=True)
-def less_than_expected(
+def _less_than_expected(
     expected: tuple[float, float], area: float, level: float, passed_s: float
 ) -> tuple[float, float]:
     """The level after one more look at paint; how much less of it shows, as a logarithm.
 
-    expected: the least and the most of expected_areas; area: as it is seen, in the same units;
+    expected: the least and the most of _expected_areas; area: as it is seen, in the same units;
     level: before, passed_s ago, NaN at first.
     """
     least, most = expected
@@ -71,7 +104,7 @@ def less_than_expected(
 def usually_less(less: Array) -> float:
     """By how much all tips of a look are smaller at once, as blur and dim light make them.
 
-    less (n,): of less_than_expected, NaN where nothing is known. 0 of fewer than three tips.
+    less (n,): of against_pose, NaN where nothing is known. 0 of fewer than three tips.
     """
     known = less[~np.isnan(less)]
     return max(float(np.median(known)), 0.0) if known.size >= 3 else 0.0

@@ -29,20 +29,9 @@ from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.paint.behind_fingers import hidden_from
-from services.fusion.paint.expected_area import (
-    area_at,
-    expected_areas,
-    hidden_share,
-    less_than_expected,
-    usually_less,
-)
-from services.fusion.paint.known_paint import (
-    MOST_UNSURE_RAD,
-    POSE_AGE_NS,
-    KnownPaint,
-    turn_on,
-)
-from services.fusion.paint.paint_shape import LEAST_ANGLE, take_look, tell_shapes
+from services.fusion.paint.expected_area import against_pose, hidden_share, usually_less
+from services.fusion.paint.known_paint import POSE_AGE_NS, KnownPaint
+from services.fusion.paint.paint_shape import take_look, tell_shapes
 from services.fusion.paint.unsteady_area import unsteady_sigma
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
@@ -170,26 +159,14 @@ def _compare(
     parts: _Seen = _seen_at(address)
     seen, centres, per_rad, paint = parts.seen, parts.centres_rig, parts.per_rad, parts.paint
     own, shared = seen.sigmas
-    # How much less of each shows than its pose lets expect, as a logarithm; NaN where none tells.
-    below = np.full(landmarks.size, np.nan)
-    # Of the areas to the model's, as logarithms; NaN likewise.
-    ratios = np.full(landmarks.size, np.nan)
-    passed_s = np.empty(landmarks.size)
+    # How much less of each shows than its pose lets expect, and its area to the model's, as
+    # logarithms; NaN where none tells. And the time since the look before, s.
+    below, ratios, passed_s = np.full((3, landmarks.size), np.nan)
     for n in range(landmarks.size):
         row = landmarks[n]
         passed_s[n] = max(time_s - seen.seen_s[row, camera], 0.0)
         seen.areas[row, camera], seen.seen_s[row, camera] = areas[n], time_s
-        age_ns = instant_ns - paint.stamps_ns[row]
-        if paint.areas_m2[row].any() and abs(age_ns) <= POSE_AGE_NS:
-            sigmas_rad = paint.direction_sigmas[row]
-            seen.levels[row, camera], below[n], ratios[n] = _against_pose(
-                seen.places[row] - centres[camera],
-                paint.areas_m2[row],
-                (paint.directions[row], paint.turns_rad_s[row], 1e-9 * age_ns),
-                math.hypot(sigmas_rad[0], sigmas_rad[1]),
-                areas[n],
-                (seen.levels[row, camera], passed_s[n]),
-            )
+        below[n], ratios[n] = _take_area(parts, camera, row, instant_ns, passed_s[n])
     usual, away = usually_less(below), np.empty(2)
     view = parts.cameras.R[camera], parts.cameras.t[camera]
     for n in range(landmarks.size):
@@ -215,6 +192,29 @@ def _compare(
 
 
 @njit(cache=True)
+def _take_area(
+    parts: _Seen, camera: int, row: int, instant_ns: int, passed_s: float
+) -> tuple[float, float]:
+    """How much less of a tip shows to a camera than its pose lets expect, and its area's ratio to
+    the model's, as logarithms; NaN where no pose tells. Its level is taken on.
+    """
+    seen, paint = parts.seen, parts.paint
+    age_ns = instant_ns - paint.stamps_ns[row]
+    if not paint.areas_m2[row].any() or abs(age_ns) > POSE_AGE_NS:
+        return math.nan, math.nan
+    sigmas_rad = paint.direction_sigmas[row]
+    seen.levels[row, camera], below, ratio = against_pose(
+        seen.places[row] - parts.centres_rig[camera],
+        paint.areas_m2[row],
+        (paint.directions[row], paint.turns_rad_s[row], 1e-9 * age_ns),
+        math.hypot(sigmas_rad[0], sigmas_rad[1]),
+        seen.areas[row, camera],
+        (seen.levels[row, camera], passed_s),
+    )
+    return below, ratio
+
+
+@njit(cache=True)
 def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
     """How far a look may be off in the rays' units, as its area flickers against another's."""
     seen_s, latest = seen.seen_s[row], -1
@@ -227,37 +227,6 @@ def _unsteady(seen: PaintSeen, camera: int, row: int, passed_s: float) -> float:
         return 0.0
     ratio = area / seen.areas[row, latest]
     return math.sqrt(area) * unsteady_sigma(seen.ratios[row, camera], ratio, passed_s)
-
-
-@njit(cache=True)
-def _against_pose(
-    ray: Array,
-    table: Array,
-    told: tuple[Array, Array, float],
-    sigma_rad: float,
-    area: float,
-    before: tuple[float, float],
-) -> tuple[float, float, float]:
-    """A tip's level after one more look, how much less of it shows, as a logarithm, and its area's
-    ratio to the model's, likewise, NaN where its direction does not tell that well.
-
-    ray (3,): from the camera to it, m; told: direction (3,), how it turns (3,) rad/s, how long ago,
-    s; area: in the rays' units; before: the level, how long ago, s. As it was, and NaN, without a
-    place, which is NaN, or without a distance.
-    """
-    away_m = math.sqrt(ray @ ray)
-    if not (away_m > 0.0 and area > 0.0):
-        return before[0], math.nan, math.nan
-    aim = np.empty(3)
-    turn_on(told[0], told[1], told[2], aim)
-    cosine = float(ray @ aim) / away_m
-    angle = math.acos(min(max(cosine, -1.0), 1.0))
-    expected = expected_areas(table, angle, sigma_rad)
-    level, below = less_than_expected(expected, area * away_m**2, before[0], before[1])
-    ratio = math.nan
-    if angle > LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
-        ratio = math.log(area * away_m**2 / area_at(table, angle))
-    return level, below, ratio
 
 
 @njit(cache=True)
