@@ -68,6 +68,7 @@ class PaintSeen(NamedTuple):
     ratios: Array  # (L, C, 2)
     # Of an area's ratio to its model's (paint_shape.py).
     shape_sums: Array  # (L, C, 3)
+    usual_ratios: Array  # (L, 2)
     # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
 
@@ -108,6 +109,7 @@ class HiddenPaint:
             sigmas=np.empty((2, *shape)),
             ratios=np.empty((*shape, 2)),
             shape_sums=np.empty((*shape, 3)),
+            usual_ratios=np.empty((shape[0], 2)),
             places=np.empty((shape[0], 3)),
         )
         self.paint = paint
@@ -120,7 +122,8 @@ class HiddenPaint:
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
         seen.sigmas[:], seen.ratios[:], seen.places[:] = 0.0, np.nan, np.nan
         seen.shape_sums[:] = 0.0
-        tell_shapes(seen.shape_sums, self.paint.hands, self.paint.shape_sds)
+        paint = self.paint
+        tell_shapes(seen.shape_sums, paint.hands, seen.usual_ratios, paint.shape_sds)
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,).
@@ -184,11 +187,12 @@ def _compare(
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
             by_pose *= _LEFT
         if worst == 0.0 and not math.isnan(ratios[n]):
-            take_look(seen.shape_sums[row, camera], ratios[n], passed_s[n])
+            sums = seen.shape_sums[row, camera]
+            take_look(sums, seen.usual_ratios[row], ratios[n], passed_s[n])
         own[row, camera] = max(worst, keep * own[row, camera])
         shared[row, camera] = max(by_pose, keep * shared[row, camera])
         out[n] = math.hypot(own[row, camera], _unsteady(seen, camera, row, passed_s[n]))
-    tell_shapes(seen.shape_sums, paint.hands, paint.shape_sds)
+    tell_shapes(seen.shape_sums, paint.hands, seen.usual_ratios, paint.shape_sds)
 
 
 @njit(cache=True)

@@ -13,11 +13,13 @@ FRAME_S = 1 / 30
 
 def shapes(ratios: Array, hands: Array) -> Array:
     """Of L landmarks, whose ratios (n, L) one camera saw, as logarithms."""
-    sums, shape_sds = np.zeros((ratios.shape[1], 1, 3)), np.full(ratios.shape[1], np.nan)
+    count = ratios.shape[1]
+    sums, usual, shape_sds = np.zeros((count, 1, 3)), np.empty((count, 2)), np.full(count, np.nan)
+    tell_shapes(sums, hands, usual, shape_sds)
     for n, looks in enumerate(ratios):
         for row, ratio in enumerate(looks):
-            take_look(sums[row, 0], ratio, FRAME_S if n else np.inf)
-    tell_shapes(sums, hands, shape_sds)
+            take_look(sums[row, 0], usual[row], ratio, FRAME_S if n else np.inf)
+        tell_shapes(sums, hands, usual, shape_sds)
     return shape_sds
 
 
@@ -36,7 +38,7 @@ def test_it_is_the_scatter_above_what_the_models_own_hands_have(scatter):
     ):
         shape_sd = shapes(ratios, np.zeros(4, dtype=np.int64))
         assert np.ptp(shape_sd) == 0.0
-        wanted = min(1.4 * np.sqrt(max(scatter**2 - 0.08**2, 0.0)), 0.11)
+        wanted = min(1.4 * np.sqrt(max(scatter**2 - 0.075**2, 0.0)), 0.11)
         assert shape_sd[0] == pytest.approx(wanted, abs=0.015)
 
 
@@ -53,3 +55,10 @@ def test_what_was_long_ago_is_forgotten():
     hands = np.zeros(2, dtype=np.int64)
     assert shapes(ratios[:150], hands)[0] == 0.11
     assert shapes(ratios, hands)[0] == 0.0
+
+
+def test_a_tip_that_is_hidden_now_and_then_says_little():
+    """From all cameras alike, a fifth of the time and by two thirds of it."""
+    ratios = np.random.default_rng(4).normal(0.0, 0.04, (600, 5))
+    ratios[np.arange(600) % 100 < 20, 0] -= 1.1
+    assert shapes(ratios, np.zeros(5, dtype=np.int64))[0] < 0.06
