@@ -121,7 +121,7 @@ class HiddenPaint:
         seen = self.seen
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
         seen.sigmas[:], seen.ratios[:], seen.places[:] = 0.0, np.nan, np.nan
-        seen.shape_sums[:] = 0.0
+        seen.shape_sums[:], seen.usual_ratios[:] = 0.0, np.nan
         paint = self.paint
         tell_shapes(seen.shape_sums, paint.hands, seen.usual_ratios, paint.shape_sds)
 

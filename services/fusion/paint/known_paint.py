@@ -60,7 +60,7 @@ class KnownPaint(NamedTuple):
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
     direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
-    hands: Ints  # (L,) which hand each is of, from 0
+    hands: Ints  # (L,) which hand each is of, from 0; -1: its paint is as the model has it
     shape_sds: Array  # (L,) how unlike the model's it may be, in radii (paint_shape.py)
     turns_rad_s: Array  # (L, 3) how a direction turned from the pose before that one
     stamps_ns: Ints  # (L,) of the pose that told it

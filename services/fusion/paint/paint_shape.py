@@ -62,7 +62,7 @@ def take_look(sums: Array, usual: Array, ratio: float, passed_s: float) -> None:
 
 @njit(cache=True)
 def tell_shapes(sums: Array, hands: Ints, usual: Array, shape_sds: Array) -> None:
-    """What the sums (L, C, 3) of all looks at L tips say of each one's hand (L,).
+    """What the sums (L, C, 3) of all looks at L tips say of each one's hand (L,); nothing of -1.
 
     To usual (L, 2) the mean of its ratios, NaN without any, and their deviation; to shape_sds (L,)
     how unlike its model it is, in radii of paint.

@@ -81,6 +81,17 @@ def _tables(hand: HandModel, landmark: str) -> PaintTables:
     return paint_tables(paint.radius_m, paint.extent_m, _taper(hand, landmark))
 
 
+def _hands_of_unknown_shape(
+    landmarks: tuple[Landmark, ...], hands: Mapping[HandName, HandModel]
+) -> Ints:
+    """Which hand each landmark is of (L,), from 0; -1 of hands that are known exactly."""
+    names = list(hands)
+    of = [
+        names.index(one.hand) if hands[one.hand].origin in _RADIUS_SD else -1 for one in landmarks
+    ]
+    return np.array(of, dtype=np.int64)
+
+
 class Directions(NamedTuple):
     """Where the fingers of a hand point, and the skin under its dabs, as a pose says."""
 
@@ -136,7 +147,7 @@ class PaintToBone:
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),
-            hands=np.array([list(hands).index(one.hand) for one in landmarks], dtype=np.int64),
+            hands=_hands_of_unknown_shape(landmarks, hands),
             shape_sds=np.zeros(len(landmarks)),
             turns_rad_s=np.zeros((len(landmarks), 3)),
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),

@@ -14,7 +14,7 @@ FRAME_S = 1 / 30
 def shapes(ratios: Array, hands: Array) -> Array:
     """Of L landmarks, whose ratios (n, L) one camera saw, as logarithms."""
     count = ratios.shape[1]
-    sums, usual, shape_sds = np.zeros((count, 1, 3)), np.empty((count, 2)), np.full(count, np.nan)
+    sums, usual, shape_sds = np.zeros((count, 1, 3)), np.full((count, 2), np.nan), np.zeros(count)
     tell_shapes(sums, hands, usual, shape_sds)
     for n, looks in enumerate(ratios):
         for row, ratio in enumerate(looks):
@@ -48,6 +48,11 @@ def test_each_hand_has_its_own_size_and_shape():
     alike, _, unlike, _ = shapes(ratios, np.array([0, 0, 1, 1]))
     assert alike == 0.0
     assert unlike == 0.11
+
+
+def test_a_hand_that_is_known_exactly_has_its_models_shape():
+    ratios = np.tile([0.0, 0.5, 0.0, 0.5], (600, 1))
+    assert shapes(ratios, np.array([0, 0, -1, -1])).tolist() == [0.11, 0.11, 0.0, 0.0]
 
 
 def test_what_was_long_ago_is_forgotten():

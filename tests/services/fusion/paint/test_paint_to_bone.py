@@ -155,6 +155,13 @@ def test_paint_that_is_unlike_its_model_has_another_middle(paint):
     np.testing.assert_allclose(dab, 0.1 * SAG_M * np.array([1.7, 2.0, 1.7]), rtol=0.02)
 
 
+@pytest.mark.parametrize(("origin", "of"), [("tables", 0), ("measured", 0), ("simulated", -1)])
+def test_paint_of_hands_that_somebody_painted_is_of_no_known_shape(origin, of):
+    hand = msgspec.structs.replace(default_hand("right"), origin=origin)
+    paint = PaintToBone(LANDMARKS, {"right": hand}, tuple(SyntheticRig().rig().values()))
+    assert paint.known.hands.tolist() == [of, of]
+
+
 def test_what_tapers_is_corrected_as_that(paint):
     """A finger that points at the cameras, tilted by half a radian, thicker at its joint or not."""
     table = default_hand("right")
