@@ -97,7 +97,7 @@ class HiddenPaint:
     def __init__(self, cameras: Extrinsics, round_paint: Bools, paint: KnownPaint) -> None:
         """round_paint (L,): painted all round, not a dab.
 
-        paint: what its owner keeps up to date with poses.
+        paint: what its owner keeps up to date with poses; its shape_sds are told here.
         """
         per_rad = np.where(round_paint, _TIP_PER_RAD, _DAB_PER_RAD)
         shape = (len(per_rad), len(cameras.t))
@@ -157,7 +157,8 @@ def _compare(
 ) -> None:
     """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,).
 
-    Rays (n, 2) are moved as HiddenPaint.observe says. address: of _Seen.
+    Rays (n, 2) are moved as HiddenPaint.observe says. address: of _Seen. What areas say of a hand's
+    paint goes to its KnownPaint.
     """
     parts: _Seen = _seen_at(address)
     seen, centres, per_rad, paint = parts.seen, parts.centres_rig, parts.per_rad, parts.paint
