@@ -33,9 +33,9 @@ _GUESS, _GUESS_S = 0.1, 2.0
 # hands of the model have of it says nothing, and what is above is worth so much, up to a limit.
 # (Chosen on both tuning halves: the mean log likelihood of their points' errors, without lag and at
 # two frames, .97 and 1.41 of our pictures, -2.30 and -1.91 of the other renderer's while
-# model_misfit stood for the scatter, is 1.14, 1.69, -1.93 and -1.67. From one set of points, without
-# _FAR: a limit of .09 is as likely, .14 is .07 to .09 less on the latter; with .1 for .075 one of
-# its clips is told 2.8 times too surely.)
+# model_misfit stood for the scatter, is 1.14, 1.69, -1.93 and -1.67. From one set of points,
+# without _FAR: a limit of .09 is as likely, .14 is .07 to .09 less on the latter; with .1 for .075
+# one of its clips is told 2.8 times too surely.)
 _USUAL, _WORTH, _MOST = 0.075, 1.4, 0.11
 # A look that is off by more than so many deviations counts as one that is off by that: it is rather
 # of a tip that something hides from all cameras. (Without, our own tuning pictures in dim light had
