@@ -18,7 +18,6 @@ from numba import njit
 
 from rhot.geometry.transforms import Array
 from services.fusion.paint.known_paint import MOST_UNSURE_RAD, turn_on
-from services.fusion.paint.paint_shape import LEAST_ANGLE
 
 # The level's times upwards and downwards. (NEES of tuning captures is the same within 3 % with 3
 # and with 30 s downwards.)
@@ -28,6 +27,9 @@ _RISE_S, _FALL_S = 0.5, 10.0
 # by the likelihood of errors: with .08 it is .015 nats a point less without lag on the latter, and
 # the same otherwise.)
 _USUAL, _UNLIKE = 0.05, 1.0
+# Nearer to the ray that comes along the finger the area changes fast with the angle, and its ratio
+# to the model's tells nothing of paint.
+_LEAST_ANGLE = math.radians(70.0)
 
 
 @njit(cache=True)
@@ -56,7 +58,7 @@ def against_pose(
     expected = _expected_areas(table, angle, sigma_rad)
     level, below = _less_than_expected(expected, area * away_m**2, before[0], before[1])
     ratio = math.nan
-    if angle > LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
+    if angle > _LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
         ratio = math.log(area * away_m**2 / _area(table, angle))
     return level, below, ratio
 

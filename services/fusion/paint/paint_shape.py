@@ -41,8 +41,6 @@ _USUAL, _WORTH, _MOST = 0.075, 1.4, 0.11
 # of a tip that something hides from all cameras. (Without, our own tuning pictures in dim light had
 # .11 by a few such.)
 _FAR = 2.0
-# Nearer to the ray that comes along the finger the area changes fast with the angle.
-LEAST_ANGLE = math.radians(70.0)
 
 
 @njit(cache=True)
