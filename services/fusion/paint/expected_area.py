@@ -12,6 +12,7 @@ tables' to 11 to 26 %).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -32,6 +33,15 @@ _USUAL, _UNLIKE = 0.05, 1.0
 _LEAST_ANGLE = math.radians(70.0)
 
 
+class AreaLook(NamedTuple):
+    """A tip's area against its pose. Logarithms; NaN where its direction does not tell."""
+
+    level: float  # of area over expected area of paint that shows whole, learned
+    below: float  # how much less shows than that
+    ratio: float  # of the area to the model's; also NaN where that changes fast with the angle
+    by_direction: float  # standard deviation of that ratio, as the direction is unsure
+
+
 @njit(cache=True)
 def against_pose(
     ray: Array,
@@ -40,9 +50,8 @@ def against_pose(
     sigma_rad: float,
     area: float,
     before: tuple[float, float],
-) -> tuple[float, float, float]:
-    """A tip's level after one more look, how much less of it shows, as a logarithm, and its area's
-    ratio to the model's, likewise, NaN where its direction does not tell that well.
+) -> AreaLook:
+    """A tip after one more look.
 
     ray (3,): from the camera to it, m; told: direction (3,), how it turns (3,) rad/s, how long ago,
     s; area: in the rays' units; before: the level, how long ago, s. As it was, and NaN, without a
@@ -50,17 +59,20 @@ def against_pose(
     """
     away_m = math.sqrt(ray @ ray)
     if not (away_m > 0.0 and area > 0.0):
-        return before[0], math.nan, math.nan
+        return AreaLook(before[0], math.nan, math.nan, math.nan)
     aim = np.empty(3)
     turn_on(told[0], told[1], told[2], aim)
     cosine = float(ray @ aim) / away_m
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     expected = _expected_areas(table, angle, sigma_rad)
     level, below = _less_than_expected(expected, area * away_m**2, before[0], before[1])
-    ratio = math.nan
+    ratio, by_direction = math.nan, math.nan
     if angle > _LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
         ratio = math.log(area * away_m**2 / _area(table, angle))
-    return level, below, ratio
+        # About one of its two axes.
+        turn = sigma_rad / math.sqrt(2.0)
+        by_direction = 0.5 * math.log(_area(table, angle + turn) / _area(table, angle - turn))
+    return AreaLook(level, below, ratio, by_direction)
 
 
 @njit(cache=True)

@@ -28,10 +28,15 @@ from rhot.kernels.packed import Layout
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
+from services.fusion.paint.area_scatter import judge_hands, take_look
 from services.fusion.paint.behind_fingers import hidden_from
-from services.fusion.paint.expected_area import against_pose, hidden_share, usually_less
+from services.fusion.paint.expected_area import (
+    AreaLook,
+    against_pose,
+    hidden_share,
+    usually_less,
+)
 from services.fusion.paint.known_paint import POSE_AGE_NS, KnownPaint
-from services.fusion.paint.paint_shape import take_look, tell_shapes
 from services.fusion.paint.unsteady_area import unsteady_sigma
 
 # Logarithm of the ratio of areas that says nothing: on any rig, and for each radian between the
@@ -66,8 +71,8 @@ class PaintSeen(NamedTuple):
     sigmas: Array  # (2, L, C)
     # Mean and variance, of late, of the logarithm of an area's ratio to another camera's.
     ratios: Array  # (L, C, 2)
-    # Of an area's ratio to its model's (paint_shape.py).
-    shape_sums: Array  # (L, C, 3)
+    # Of an area's ratio to its model's (area_scatter.py).
+    ratio_sums: Array  # (L, C, 4)
     usual_ratios: Array  # (L, 2)
     # Where each landmark is, rig frame, m: written by who tells points; NaN where unknown.
     places: Array  # (L, 3)
@@ -97,7 +102,8 @@ class HiddenPaint:
     def __init__(self, cameras: Extrinsics, round_paint: Bools, paint: KnownPaint) -> None:
         """round_paint (L,): painted all round, not a dab.
 
-        paint: what its owner keeps up to date with poses; its shape_sds are told here.
+        paint: what its owner keeps up to date with poses; its direction_shares and
+        shape_sds are told here.
         """
         per_rad = np.where(round_paint, _TIP_PER_RAD, _DAB_PER_RAD)
         shape = (len(per_rad), len(cameras.t))
@@ -108,7 +114,7 @@ class HiddenPaint:
             levels=np.empty(shape),
             sigmas=np.empty((2, *shape)),
             ratios=np.empty((*shape, 2)),
-            shape_sums=np.empty((*shape, 3)),
+            ratio_sums=np.empty((*shape, 4)),
             usual_ratios=np.empty((shape[0], 2)),
             places=np.empty((shape[0], 3)),
         )
@@ -121,9 +127,8 @@ class HiddenPaint:
         seen = self.seen
         seen.areas[:], seen.seen_s[:], seen.levels[:] = 0.0, -np.inf, np.nan
         seen.sigmas[:], seen.ratios[:], seen.places[:] = 0.0, np.nan, np.nan
-        seen.shape_sums[:], seen.usual_ratios[:] = 0.0, np.nan
-        paint = self.paint
-        tell_shapes(seen.shape_sums, paint.hands, seen.usual_ratios, paint.shape_sds)
+        seen.ratio_sums[:], seen.usual_ratios[:] = 0.0, np.nan
+        judge_hands(seen.ratio_sums, seen.usual_ratios, self.paint)
 
     def observe(self, view: View, time_s: float) -> Array:
         """What is to be added, squared, to a view's sigmas (n,).
@@ -163,14 +168,15 @@ def _compare(
     parts: _Seen = _seen_at(address)
     seen, centres, per_rad, paint = parts.seen, parts.centres_rig, parts.per_rad, parts.paint
     own, shared = seen.sigmas
-    # How much less of each shows than its pose lets expect, and its area to the model's, as
-    # logarithms; NaN where none tells. And the time since the look before, s.
-    below, ratios, passed_s = np.full((3, landmarks.size), np.nan)
+    # How much less of each shows than its pose lets expect, its area to the model's and what
+    # directions make of that (expected_area.AreaLook); the time since the look before, s.
+    below, ratios, by_direction, passed_s = np.full((4, landmarks.size), np.nan)
     for n in range(landmarks.size):
         row = landmarks[n]
         passed_s[n] = max(time_s - seen.seen_s[row, camera], 0.0)
         seen.areas[row, camera], seen.seen_s[row, camera] = areas[n], time_s
-        below[n], ratios[n] = _take_area(parts, camera, row, instant_ns, passed_s[n])
+        look = _take_area(parts, camera, row, instant_ns, passed_s[n])
+        below[n], ratios[n], by_direction[n] = look.below, look.ratio, look.by_direction
     usual, away = usually_less(below), np.empty(2)
     view = parts.cameras.R[camera], parts.cameras.t[camera]
     for n in range(landmarks.size):
@@ -188,27 +194,23 @@ def _compare(
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
             by_pose *= _LEFT
         if worst == 0.0 and not math.isnan(ratios[n]):
-            sums = seen.shape_sums[row, camera]
-            take_look(sums, seen.usual_ratios[row], ratios[n], passed_s[n])
+            sums = seen.ratio_sums[row, camera]
+            take_look(sums, seen.usual_ratios[row], ratios[n], by_direction[n], passed_s[n])
         own[row, camera] = max(worst, keep * own[row, camera])
         shared[row, camera] = max(by_pose, keep * shared[row, camera])
         out[n] = math.hypot(own[row, camera], _unsteady(seen, camera, row, passed_s[n]))
-    tell_shapes(seen.shape_sums, paint.hands, seen.usual_ratios, paint.shape_sds)
+    judge_hands(seen.ratio_sums, seen.usual_ratios, paint)
 
 
 @njit(cache=True)
-def _take_area(
-    parts: _Seen, camera: int, row: int, instant_ns: int, passed_s: float
-) -> tuple[float, float]:
-    """How much less of a tip shows to a camera than its pose lets expect, and its area's ratio to
-    the model's, as logarithms; NaN where no pose tells. Its level is taken on.
-    """
+def _take_area(parts: _Seen, camera: int, row: int, instant_ns: int, passed_s: float) -> AreaLook:
+    """A camera's look at a tip against its pose; NaN where none tells. Its level is taken on."""
     seen, paint = parts.seen, parts.paint
     age_ns = instant_ns - paint.stamps_ns[row]
     if not paint.areas_m2[row].any() or abs(age_ns) > POSE_AGE_NS:
-        return math.nan, math.nan
+        return AreaLook(math.nan, math.nan, math.nan, math.nan)
     sigmas_rad = paint.direction_sigmas[row]
-    seen.levels[row, camera], below, ratio = against_pose(
+    look = against_pose(
         seen.places[row] - parts.centres_rig[camera],
         paint.areas_m2[row],
         (paint.directions[row], paint.turns_rad_s[row], 1e-9 * age_ns),
@@ -216,7 +218,8 @@ def _take_area(
         seen.areas[row, camera],
         (seen.levels[row, camera], passed_s),
     )
-    return below, ratio
+    seen.levels[row, camera] = look.level
+    return look
 
 
 @njit(cache=True)

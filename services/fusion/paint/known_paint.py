@@ -59,9 +59,10 @@ class KnownPaint(NamedTuple):
     radius_sds: Array  # (L,) how unsure the radius of a finger or limb is, as a share
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
-    direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways
+    direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways, as the pose told
+    direction_shares: Array  # (L,) of these that are believed, as areas say (area_scatter.py)
+    shape_sds: Array  # (L,) how unlike the model's paint may be, in radii, as areas say
     hands: Ints  # (L,) which hand each is of, from 0; -1: its paint is as the model has it
-    shape_sds: Array  # (L,) how unlike the model's it may be, in radii (paint_shape.py)
     turns_rad_s: Array  # (L, 3) how a direction turned from the pose before that one
     stamps_ns: Ints  # (L,) of the pose that told it
     viewpoint_rig: Array  # (3,) the middle of the cameras, which stands for all of them
@@ -172,6 +173,7 @@ def _correct(
     positions, covariances, seen_by = unowned(located)
     shift, shift_covariance, aim = unowned(work)
     for row in range(positions.shape[0]):
+        sigmas_rad = paint.direction_shares[row] * paint.direction_sigmas[row]
         ray = positions[row] - paint.viewpoint_rig  # away
         ray /= max(math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2), 1e-9)
         is_told = abs(instant_ns - paint.stamps_ns[row]) <= POSE_AGE_NS
@@ -181,7 +183,7 @@ def _correct(
         if paint.radii_m[row] == 0.0:
             normal, sigma_rad, shape = -ray, SIGMA_FACING_RAD, 0.0
             if is_told:
-                normal, sigma_rad = aim[0], paint.direction_sigmas[row, 0]
+                normal, sigma_rad = aim[0], sigmas_rad[0]
                 shape = paint.shape_sds[row]
             # Deeper than the skin, by as much as the limb is thinner.
             sag_m = paint.sags_m[row]
@@ -193,8 +195,7 @@ def _correct(
         along, across = SIGMA_UNKNOWN  # in radii
         if is_told:
             # A tip, whose middle has no depth under it.
-            sigmas_rad, radius_sd = paint.direction_sigmas[row], paint.radius_sds[row]
-            finger = Finger(aim[0], aim[1], sigmas_rad, radius_sd)
+            finger = Finger(aim[0], aim[1], sigmas_rad, paint.radius_sds[row])
             chosen = _locating(cameras, seen_by[row])
             place, table = positions[row], paint.shifts_m[row]
             if expected_shift(table, place, finger, chosen, shift, shift_covariance):

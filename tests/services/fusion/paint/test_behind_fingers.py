@@ -12,6 +12,7 @@ from services.fusion.paint.behind_fingers import hidden_from
 from services.fusion.paint.hidden_paint import HiddenPaint
 from services.fusion.paint.known_paint import POSE_AGE_NS, KnownPaint
 from services.fusion.paint.visible_paint import paint_tables
+from testing.untold_paint import untold_paint
 from testing.view_of_areas import view_of_areas
 
 RADIUS_M, UP = 0.007, (0.0, -1.0, 0.0)
@@ -28,18 +29,14 @@ def paint() -> Callable[..., KnownPaint]:
     """Two tips, of which a pose told at 0 s where they point."""
 
     def make(direction: tuple[float, ...] = UP, sigma_rad: float = 0.2) -> KnownPaint:
-        return KnownPaint(
+        return untold_paint(
+            2,
             radii_m=np.full(2, RADIUS_M),
-            sags_m=np.zeros(2),
             shifts_m=np.array([TABLES.shifts_m] * 2),
             areas_m2=np.array([TABLES.areas_m2] * 2),
-            radius_sds=np.zeros(2),
             directions=np.array([UP, direction]),
             hinges=np.tile((1.0, 0.0, 0.0), (2, 1)),
             direction_sigmas=np.full((2, 2), sigma_rad),
-            hands=np.zeros(2, dtype=np.int64),
-            shape_sds=np.zeros(2),
-            turns_rad_s=np.zeros((2, 3)),
             stamps_ns=np.zeros(2, dtype=np.int64),
             viewpoint_rig=CENTRES.mean(axis=0),
         )

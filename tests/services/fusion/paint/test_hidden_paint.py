@@ -13,13 +13,14 @@ from rhot.hand import landmark_point
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import View
 from services.fusion.paint.hidden_paint import HiddenPaint
-from services.fusion.paint.known_paint import LONG_AGO_NS, PAINT, KnownPaint, note_directions
+from services.fusion.paint.known_paint import PAINT, KnownPaint, note_directions
 from services.fusion.paint.visible_paint import paint_tables
 from services.fusion.step import FusionStep
 from services.simulator.scene.catalog import SCENES
 from services.simulator.scene.scene import build_scene
 from testing.rendered_markers import detect
 from testing.synthetic_points import START_NS
+from testing.untold_paint import untold_paint
 from testing.view_of_areas import view_of_areas
 
 CENTRES = np.array([[0.0, 0.0, 0.0], [0.075, 0.0, 0.0]])
@@ -43,19 +44,11 @@ SIDE = float(TABLES.areas_m2[30]) / 0.5**2 / AREA
 def known_paint() -> KnownPaint:
     """Of a tip and a dab, of which no pose has told anything yet."""
     nothing = np.zeros(TABLES.shifts_m.size)
-    return KnownPaint(
+    return untold_paint(
+        2,
         radii_m=np.array([0.0068, 0.0]),
-        sags_m=np.zeros(2),
         shifts_m=np.array([TABLES.shifts_m, nothing]),
         areas_m2=np.array([TABLES.areas_m2, nothing]),
-        radius_sds=np.zeros(2),
-        directions=np.zeros((2, 3)),
-        hinges=np.zeros((2, 3)),
-        direction_sigmas=np.zeros((2, 2)),
-        hands=np.zeros(2, dtype=np.int64),
-        shape_sds=np.zeros(2),
-        turns_rad_s=np.zeros((2, 3)),
-        stamps_ns=np.full(2, LONG_AGO_NS),
         viewpoint_rig=CENTRES.mean(axis=0),
     )
 
