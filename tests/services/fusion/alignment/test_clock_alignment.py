@@ -58,6 +58,15 @@ def test_honest_clocks_are_left_to_the_tuner(name, late_s, sigma_ns, sigma_px):
     assert corrected_ms(given) == ({}, 0)
 
 
+def test_a_slow_hand_tells_too():
+    """At .15 m/s, by markers whose errors of a pixel last for some frames."""
+    given = with_correlated_errors(frames(RIG, MovingHand(speed_m_s=0.15), 9.0), 1.0)
+    assert corrected_ms(given) == ({}, 0)
+    found, changes = corrected_ms(with_clock_error(given, "right", 0.02))
+    assert changes == 1
+    assert found == {"right": pytest.approx(20.0, abs=3.0)}
+
+
 @pytest.mark.parametrize("frozen", [False, True])
 def test_wrong_markers_put_nothing_right(frozen):
     given = frames(RIG, MOTIONS["sinusoids"], 12.0)
