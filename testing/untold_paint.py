@@ -22,6 +22,7 @@ def untold_paint(count: int, **known: Any) -> KnownPaint:
         directions=np.zeros((count, 3)),
         hinges=np.zeros((count, 3)),
         direction_sigmas=np.zeros((count, 2)),
+        misfits=np.ones(count),
         direction_shares=np.ones(count),
         shape_sds=np.zeros(count),
         hands=np.zeros(count, dtype=np.int64),

@@ -50,7 +50,7 @@ def warm_up(
     none, aims = np.empty((0, 3)), (np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2)))
     turn_with_joints(np.empty(0), 0.0, nobody, none, *aims)
     paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
-    paint.note(Directions(hand, 0, nobody, *aims))
+    paint.note(Directions(hand, 0, nobody, *aims, 1.0))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     even_samples(np.arange(4.0), np.zeros(4), 0.0, 0)
     heights_by_landmark(nobody, np.empty(0), np.empty((0, 2)), np.eye(3))

@@ -60,7 +60,8 @@ class KnownPaint(NamedTuple):
     directions: Array  # (L, 3) of a tip, or of the skin under a dab
     hinges: Array  # (L, 3) the axis about which the tip bends, across its direction
     direction_sigmas: Array  # (L, 2) rad, about the hinge and sideways, as the pose told
-    direction_shares: Array  # (L,) of these that are believed, as areas say (area_scatter.py)
+    misfits: Array  # (L,) how badly that pose's hand fits its bones (HandPose.model_misfit)
+    direction_shares: Array  # (L,) of the sigmas that are believed, as areas say (area_scatter.py)
     shape_sds: Array  # (L,) how unlike the model's paint may be, in radii, as areas say
     hands: Ints  # (L,) which hand each is of, from 0; -1: its paint is as the model has it
     turns_rad_s: Array  # (L, 3) how a direction turned from the pose before that one
@@ -79,11 +80,12 @@ def note_directions(
     directions: Array,
     hinges: Array,
     sigmas_rad: Array,
+    misfit: float,
     stamp_ns: int,
 ) -> None:
     """Remember, in KnownPaint at an address, how fingers of landmarks (n,) point and bend (n, 3).
 
-    sigmas_rad (n, 2): how sure that is.
+    sigmas_rad (n, 2): how sure that is; misfit: of the pose.
     """
     paint: KnownPaint = _paint_at(address)
     for n in range(rows.size):
@@ -95,6 +97,7 @@ def note_directions(
         paint.directions[row] = directions[n]
         paint.hinges[row] = hinges[n]
         paint.direction_sigmas[row] = sigmas_rad[n]
+        paint.misfits[row] = misfit
         paint.stamps_ns[row] = stamp_ns
 
 

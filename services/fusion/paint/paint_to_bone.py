@@ -101,6 +101,7 @@ class Directions(NamedTuple):
     directions: Array  # (n, 3)
     hinges: Array  # (n, 3) the axis about which a finger bends
     sigmas_rad: Array  # (n, 2) of the directions, about the hinge and sideways
+    misfit: float  # how badly the hand fits its bones, squared; 1 is usual, or not told
 
 
 class PaintToBone:
@@ -147,6 +148,7 @@ class PaintToBone:
             directions=np.zeros((len(landmarks), 3)),
             hinges=np.zeros((len(landmarks), 3)),
             direction_sigmas=np.zeros((len(landmarks), 2)),
+            misfits=np.ones(len(landmarks)),
             direction_shares=np.ones(len(landmarks)),
             shape_sds=np.zeros(len(landmarks)),
             hands=_hands_of_unknown_shape(landmarks, hands),
@@ -181,7 +183,8 @@ class PaintToBone:
         # To be filled: an array that a kernel returns costs .6 us, one that it is given .2.
         aims = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 2))
         turn_with_joints(np.array(numbers), wrist_rad, of, self._outwards, *aims)
-        return Directions(pose.hand, pose.stamp_ns, of, *aims)
+        misfit = 1.0 if pose.model_misfit is None else pose.model_misfit
+        return Directions(pose.hand, pose.stamp_ns, of, *aims, misfit)
 
     def note(self, told: Directions) -> None:
         """Remember a solved hand's directions."""
@@ -191,6 +194,7 @@ class PaintToBone:
             told.directions,
             told.hinges,
             told.sigmas_rad,
+            told.misfit,
             told.stamp_ns,
         )
 

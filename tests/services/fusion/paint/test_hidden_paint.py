@@ -58,7 +58,7 @@ def told(paint: KnownPaint, direction: tuple[float, ...], sigma_rad: float) -> N
     rows, hinges = np.array([0]), np.array([[1.0, 0.0, 0.0]])
     sigmas = np.array([[sigma_rad, 0.0]])
     packed = PAINT.pack(paint)
-    note_directions(packed.address, rows, np.array([direction]), hinges, sigmas, 0)
+    note_directions(packed.address, rows, np.array([direction]), hinges, sigmas, 1.0, 0)
 
 
 @pytest.fixture
@@ -165,7 +165,7 @@ def test_what_makes_all_tips_smaller_hides_none():
         np.tile((1.0, 0, 0), (3, 1)),
     )
     packed = PAINT.pack(known)
-    note_directions(packed.address, rows, down, hinges, np.full((3, 2), 0.05), 0)
+    note_directions(packed.address, rows, down, hinges, np.full((3, 2), 0.05), 1.0, 0)
 
     def seen(*areas: float) -> View:
         return look(0, 1.0, 1.0)._replace(landmarks=rows, areas=SIDE * AREA * np.array(areas))

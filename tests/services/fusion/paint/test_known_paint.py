@@ -30,7 +30,7 @@ def note_tilt(paint: PaintToBone, angle_rad: float, stamp_ns: int) -> None:
     directions = np.array([turn @ [0.0, -1.0, 0.0], turn @ [0.0, 0.0, -1.0]])
     hinges = np.tile([1.0, 0.0, 0.0], (2, 1))
     sigmas_rad = np.full((2, 2), 0.02)
-    paint.note(Directions("right", stamp_ns, np.arange(2), directions, hinges, sigmas_rad))
+    paint.note(Directions("right", stamp_ns, np.arange(2), directions, hinges, sigmas_rad, 1.0))
 
 
 def corrected(paint: PaintToBone, instant_ns: int) -> Array:
