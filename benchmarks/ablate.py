@@ -4,11 +4,10 @@
 [--json FILE]`
 
 Rows are parts of fusion and of the tracker. A part is taken out from here, by replacing it for the
-run: the product has no switches for it. Columns are what the cases say without
-it: the geometric mean over all cases of RMS, 95 % and maximum without it over with it (above 1: the
-part is worth its place), the share of points, NEES (median over the cases), and how many cases
-reach every target of held_out.py. Parts of the tracker are off in pictures only, where each case is
-rendered once for all of them; lags 0 and 2.
+run: the product has no switches for it. Columns are what the cases say without it: the geometric
+mean of RMS, 95 % and maximum over those with it (above 1: the part is worth its place), the share
+of points, NEES (median over the cases), and how many cases reach every target of held_out.py. Parts
+of the tracker are off in pictures only, each rendered once for all of them; lags 0 and 2.
 """
 
 from __future__ import annotations
@@ -46,12 +45,12 @@ from testing.families.picture_catalog import recipes
 from testing.families.pictures import Without, detected
 
 LAGS = (0, 2)
-# Points have none of these.
-_OF_PAINT = (
+_OF_PAINT = (  # points have none of these
     "finger direction",
     "paint to bone",
     "hidden paint",
     "shape of paint",
+    "surer directions",
     "systematic error",
 )
 _MODELS = hand_filter.MODELS
@@ -79,13 +78,16 @@ class _AllShows(HiddenPaint):
         return np.zeros(len(view.landmarks))
 
 
-class _ShapeOfModel(HiddenPaint):
-    """Paint that is as the model has it."""
+def _told(name: str, value: float) -> type[HiddenPaint]:
+    """Paint of which areas tell nothing: a column of KnownPaint stays at a value."""
 
-    def observe(self, view: View, time_s: float) -> Array:
-        found = super().observe(view, time_s)
-        self.paint.shape_sds[:] = 0.0
-        return found
+    class Told(HiddenPaint):
+        def observe(self, view: View, time_s: float) -> Array:
+            found = super().observe(view, time_s)
+            getattr(self.paint, name)[:] = value
+            return found
+
+    return Told
 
 
 # Landmarks that have nothing in common but how lively they are.
@@ -158,7 +160,11 @@ PARTS: dict[str, Part] = {
     ),
     "shape of paint": Part(
         "paint is as its model has it, sigma says",
-        _replaced((fusion_step, "HiddenPaint", _ShapeOfModel)),
+        _replaced((fusion_step, "HiddenPaint", _told("shape_sds", 0.0))),
+    ),
+    "surer directions": Part(
+        "directions are as unsure as poses tell, whatever areas say",
+        _replaced((fusion_step, "HiddenPaint", _told("direction_shares", 1.0))),
     ),
     "systematic error": Part(
         "all of a marker's sigma is white noise",

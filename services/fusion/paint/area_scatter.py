@@ -33,25 +33,24 @@ _MEMORY_S, _LOOK_S = 10.0, 0.1
 # What scatter is expected at first, as much of it by directions, and how many seconds of one
 # camera's looks at one tip that is worth.
 _GUESS, _GUESS_S = 0.1, 2.0
-# Directions are surer than told where the hand fits its bones so well, and not at all from the
-# second on, in variances: what is wrong of all fingers alike does not scatter. (Hands of tuning
-# cases that the simulator draws have .24 to .78, and a small one 1.05; of recorded ones .74 to 4.0.
-# Found on a recorded hand of .9 to 2.2, whose areas scatter by .06 only: without, it is told 3
-# times too surely.)
+# Directions are surer than told of hands that fit their bones so well, in variances, and are not
+# from the second on: what is wrong of all fingers alike does not scatter. (Hands of tuning cases
+# that the simulator draws have .24 to .78, and a small one 1.05; recorded ones .74 to 4.0. Asked
+# for since a recorded hand of held_out.py, of .9 to 2.2, has areas that scatter by .06 only: its
+# NEES was 3.8 and 4.5 without this, 1.8 and 1.5 without shares.)
 _FITS, _UNFIT = 0.5, 1.0
 # Scatter of areas that has nothing to do with directions, and the least share of a direction's
 # variance that is believed. (Chosen with the constants below on both tuning halves by the mean log
 # likelihood of points' errors, without lag and at two frames: without shares 1.14 and 1.69 of our
-# pictures, -1.93 and -1.67 of the other renderer's; with them 1.45, 2.06, -1.94 and -1.66. With .04
+# pictures, -1.93 and -1.67 of the other renderer's; with them 1.42, 2.02, -1.94 and -1.68. With .04
 # and .15 .05 to .1 less on the former.)
 _NOISE, _LEAST_SHARE = 0.05, 0.1
 # One standard deviation of the visible middle's place, in radii of paint, from the scatter: what
-# hands of the model have of it says nothing, nor does a part of what directions make, and what is
-# above is worth so much, up to a limit. (From one set of points, likewise: a limit of .09 is as
-# likely, .14 is .07 to .09 less on the other renderer's clips; with .1 for .08 one of them is told
-# 2.8 times too surely; with all that directions make a recorded hand that grabs is told 1.8 times
-# too surely, with nothing of it hands that flap or wave are told half as surely as they are.)
-_USUAL, _BY_DIRECTION, _WORTH, _MOST = 0.08, 0.25, 1.6, 0.11
+# hands of the model have of it says nothing, and what is above is worth so much, up to a limit.
+# (Likewise. A limit of .09 is as likely, .14 is .07 to .09 less on the other renderer's clips; with
+# .1 for .08 one of them is told 2.8 times too surely. To take off what directions make of the
+# scatter changed nothing by a quarter of it; all of it tells hands that grab too surely.)
+_USUAL, _WORTH, _MOST = 0.08, 1.6, 0.11
 # A look that is off by more than so many deviations counts as one that is off by that: it is rather
 # of a tip that something hides from all cameras. (Without, our own tuning pictures in dim light had
 # .11 by a few such.)
@@ -101,8 +100,7 @@ def judge_hands(sums: Array, usual: Array, paint: KnownPaint) -> None:
         variance = (scatter + _GUESS_S * _GUESS**2) / (weight + _GUESS_S)
         told = (by_direction + _GUESS_S * _GUESS**2) / (weight + _GUESS_S)
         share = min(max((variance - _NOISE**2) / told, _LEAST_SHARE), 1.0)
-        beyond = variance - max(_USUAL**2, _NOISE**2 + _BY_DIRECTION * told)
-        shape_sd = min(_WORTH * math.sqrt(max(beyond, 0.0)), _MOST)
+        shape_sd = min(_WORTH * math.sqrt(max(variance - _USUAL**2, 0.0)), _MOST)
         for row in range(hands.size):
             if hands[row] == hand:
                 usual[row, 0], usual[row, 1] = mean, math.sqrt(variance)

@@ -24,21 +24,26 @@ def paint() -> PaintToBone:
     return PaintToBone(LANDMARKS, {"right": default_hand("right")}, CAMERAS)
 
 
-def note_tilt(paint: PaintToBone, angle_rad: float, stamp_ns: int) -> None:
+def note_tilt(paint: PaintToBone, angle_rad: float, stamp_ns: int, sigma_rad: float = 0.02) -> None:
     """A hand tilted by an angle about x: the skin of its wrist, and its index finger."""
     turn = rotation_from_vector([angle_rad, 0.0, 0.0])
     directions = np.array([turn @ [0.0, -1.0, 0.0], turn @ [0.0, 0.0, -1.0]])
     hinges = np.tile([1.0, 0.0, 0.0], (2, 1))
-    sigmas_rad = np.full((2, 2), 0.02)
+    sigmas_rad = np.full((2, 2), sigma_rad)
     paint.note(Directions("right", stamp_ns, np.arange(2), directions, hinges, sigmas_rad, 1.0))
 
 
 def corrected(paint: PaintToBone, instant_ns: int) -> Array:
     """Landmarks (2, 3) that both cameras see at an instant."""
+    return with_covariances(paint, instant_ns)[0]
+
+
+def with_covariances(paint: PaintToBone, instant_ns: int) -> tuple[Array, Array]:
+    """Such landmarks, and how sure they are (2, 3, 3)."""
     places, covariances = POSITIONS.copy(), np.tile(1e-8 * np.eye(3), (2, 1, 1))
     both = np.ones((2, 2), dtype=bool)
     correct_paint(paint.known, instant_ns, places, covariances, both, extrinsics(CAMERAS))
-    return places
+    return places, covariances
 
 
 @pytest.mark.parametrize("step_rad", [0.0, 0.1, -0.3])
@@ -69,3 +74,16 @@ def test_what_jumped_to_another_posture_does_not_turn_on(paint: PaintToBone) -> 
         note_tilt(paint, 0.1 + 0.9 * k, NOW_NS + k * FRAME_NS)
     now, later = (corrected(paint, NOW_NS + k * FRAME_NS) for k in (1, 2))
     np.testing.assert_array_equal(now, later)
+
+
+def test_directions_are_as_sure_as_areas_say(paint: PaintToBone) -> None:
+    """Half of what a pose told is as if it had told half of it."""
+    note_tilt(paint, 0.5, NOW_NS, 0.3)
+    paint.known.direction_shares[:] = 0.5
+    halved = with_covariances(paint, NOW_NS)
+    paint.reset()
+    note_tilt(paint, 0.5, NOW_NS, 0.15)
+    paint.known.direction_shares[:] = 1.0
+    told = with_covariances(paint, NOW_NS)
+    for found, wanted in zip(halved, told, strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-15)
