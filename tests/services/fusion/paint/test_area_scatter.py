@@ -94,6 +94,13 @@ def test_directions_are_as_sure_as_areas_keep_to_them():
         assert share[0] == pytest.approx(wanted, abs=0.04)
 
 
+def test_what_directions_explain_is_less_of_another_shape():
+    ratios = np.random.default_rng(6).normal(0.0, 0.12, (600, 4))
+    hands = np.zeros(4, dtype=np.int64)
+    assert judged(ratios, hands, 0.2).shape_sds[0] < 0.03
+    assert judged(ratios, hands, 0.0).shape_sds[0] > 0.1
+
+
 def test_a_hand_that_is_known_exactly_keeps_its_directions():
     ratios = np.zeros((600, 4))
     shares = judged(ratios, np.array([0, 0, -1, -1]), 0.2).direction_shares
