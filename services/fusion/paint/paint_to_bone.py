@@ -156,7 +156,6 @@ class PaintToBone:
             stamps_ns=np.full(len(landmarks), LONG_AGO_NS),
             viewpoint_rig=np.mean([camera.centre_rig for camera in cameras], axis=0),
         )
-
         self._packed = PAINT.pack(self.known)
 
     def reset(self) -> None:
