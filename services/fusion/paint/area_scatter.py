@@ -42,7 +42,7 @@ _FITS, _UNFIT = 0.5, 1.0
 # Scatter of areas that has nothing to do with directions, and the least share of a direction's
 # variance that is believed. (Chosen with the constants below on both tuning halves by the mean log
 # likelihood of points' errors, without lag and at two frames: without shares 1.14 and 1.69 of our
-# pictures, -1.93 and -1.67 of the other renderer's; with them 1.42, 2.02, -1.94 and -1.68. With .04
+# pictures, -1.93 and -1.67 of the other renderer's; with them 1.44, 2.03, -1.94 and -1.67. With .04
 # and .15 .05 to .1 less on the former.)
 _NOISE, _LEAST_SHARE = 0.05, 0.1
 # One standard deviation of the visible middle's place, in radii of paint, from the scatter: what
