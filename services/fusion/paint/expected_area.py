@@ -68,12 +68,12 @@ def against_pose(
     level, below = _less_than_expected(expected, area * away_m**2, before[0], before[1])
     ratio, by_direction = math.nan, math.nan
     if angle > _LEAST_ANGLE and sigma_rad < MOST_UNSURE_RAD:
-        # About one of its two axes.
+        # About one of the direction's two axes: the areas at less and at more of an angle.
         turn = sigma_rad / math.sqrt(2.0)
-        away, across = _area(table, angle - turn), _area(table, angle + turn)
-        if away > 0.0 and across > 0.0:
+        less, more = _area(table, angle - turn), _area(table, angle + turn)
+        if less > 0.0 and more > 0.0:
             ratio = math.log(area * away_m**2 / _area(table, angle))
-            by_direction = 0.5 * math.log(across / away)
+            by_direction = 0.5 * math.log(more / less)
     return AreaLook(level, below, ratio, by_direction)
 
 
