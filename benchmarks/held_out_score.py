@@ -50,10 +50,11 @@ def run(case: Case, fusion: FusionStep, *, feedback: bool) -> Told:
             pose = solver.step(points) if solver else None
             if pose is not None:
                 fusion.note_pose(pose)
-    return _table(messages + fusion.flush(), case)
+    return told_in(messages + fusion.flush(), case)
 
 
-def _table(messages: list[HandPoints], case: Case) -> Told:
+def told_in(messages: list[HandPoints], case: Case) -> Told:
+    """What messages say of a case's landmarks."""
     rows = [m for m in messages if WARM_S <= _seconds(m) <= case.seconds - END_S]
     points = np.full((len(rows), len(case.landmarks), 3), np.nan)
     covariances = np.full((*points.shape, 3), np.nan)
@@ -91,19 +92,23 @@ def scores(
     told = Told(np.empty(0), np.empty((0, 0, 3)), np.empty((0, 0, 3, 3)))
     for lag in lags:
         told = run(case, fusion_of(case, lag), feedback=feedback)
-        found = _figures(case, told)
+        found = figures_of(case, told)
         figures |= {f"{name}_{lag}": value for name, value in found.items()}
-    instants_s = told.instants_s
-    bound = spline_bound(case, instants_s)
-    truth, seen = case.truth(instants_s), case.seen(instants_s)
-    errors_mm = 1e3 * np.linalg.norm(bound - truth, axis=2)[seen]
-    errors_mm = errors_mm[np.isfinite(errors_mm)]
-    figures |= {f"{name}_spline": value for name, value in _spread(errors_mm).items()}
+    found = spline_figures(case, told.instants_s)
+    figures |= {f"{name}_spline": value for name, value in found.items()}
     figures["speed"] = case.top_speed_m_s()
     return {name: round(value, 3) for name, value in figures.items()}
 
 
-def _figures(case: Case, told: Told) -> Figures:
+def spline_figures(case: Case, instants_s: Array) -> Figures:
+    """The spread of the spline's errors at n instants, mm."""
+    bound, truth = spline_bound(case, instants_s), case.truth(instants_s)
+    errors_mm = 1e3 * np.linalg.norm(bound - truth, axis=2)[case.seen(instants_s)]
+    return _spread(errors_mm[np.isfinite(errors_mm)])
+
+
+def figures_of(case: Case, told: Told) -> Figures:
+    """Figures of what was told of a case, as scores() has them."""
     seen, unhidden = case.seen(told.instants_s), case.unhidden(told.instants_s)
     errors = told.points_m - case.truth(told.instants_s)
     lengths_mm = 1e3 * np.linalg.norm(errors, axis=2)

@@ -75,6 +75,7 @@ RUNS = {
         6,
     ),
     "held_out": _script("held_out", "", "--family skin", 8),
+    "hindsight": _script("hindsight", "", "--part postures", 2),
     "latency": _script("latency", "", "--seconds 2 --rates 60", 2.5),
     "objects_grasp_pictures": _script("objects_grasp_pictures", "", "--hands 1 --passes 1", 13),
     "objects_pictures": _script("objects_pictures", "", "--seeds 1", 5),

@@ -81,7 +81,7 @@ def recording(repository: Path, tmp_path: Path) -> Capture:
 
 
 async def test_live_points_are_those_of_the_files(recording: Capture, tmp_path: Path) -> None:
-    run(job_of([str(recording.folder)], None), tmp_path / "result")
+    run(job_of([str(recording.folder)], None), tmp_path / "result", as_live=True)
     offline = {p.stamp_ns: p for p in read_lines(tmp_path / "result" / "points.jsonl", HandPoints)}
     poses = [p.stamp_ns for p in read_lines(tmp_path / "result" / "poses.jsonl", HandPose)]
     assert len(poses) > 0.9 * len(offline)

@@ -29,8 +29,9 @@ from tests.integration.conftest import RunningRig
 pytestmark = [pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 
 DEADLINE_S = 240.0
-# Fewer than a person is asked for; more make it more accurate, not another thing.
-POSITIONS = 8
+# Fewer than a person is asked for; more make it more accurate, not another thing. One that is left
+# out leaves as many as a good calibration has.
+POSITIONS = 9
 # A third of the pictures measures the hand as well as all of them; with fewer, fusion loses it.
 ENOUGH_HZ = 20
 TRUTH = load_rig(sim_toml())
@@ -106,7 +107,7 @@ async def test_a_lens(page: Page) -> None:
     saved = await page.carried_out("lens", camera="left", count=POSITIONS)
     assert saved.files == ["left.lens.json"]
     made, true = load_lens(page.folder, "left"), load_lens(TRUTH.calibration_dir, "left")
-    # Of eight positions; what is left comes from corners that are off by .05 px.
+    # Of few positions; what is left comes from corners that are off by .05 px.
     assert made.matrix[0][0] == pytest.approx(true.matrix[0][0], rel=0.01)
 
 

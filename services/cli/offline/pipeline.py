@@ -1,12 +1,8 @@
-"""The whole rig without its processes: frames of all cameras in, markers, points and poses out.
-
-First the markers of every frame, then, in the order of time, what follows from them.
+"""What follows from markers without the rig's processes: points and poses of all hands.
 
 Frames come in the order of time. The step objects are the services' own; their messages pass from
 one to the next without a bus. Pure: the same frames give the same messages. With one camera,
-without a hand or without geometry there are markers only (`Pipeline.hands` is then empty). A frame
-whose size is not its lens calibration's is a CalibrationError at once, as no point could be
-computed from it.
+without a hand or without geometry there are markers only (`Pipeline.hands` is then empty).
 """
 
 from __future__ import annotations
@@ -14,6 +10,8 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+
+import msgspec
 
 from rhot.errors import CalibrationError
 from rhot.files.calibration import load_hand, load_rig_cameras
@@ -37,22 +35,15 @@ class Output:
 
 
 class Pipeline:
-    """Trackers of all cameras, fusion and solver."""
+    """Fusion and solver."""
 
     def __init__(
-        self,
-        config: RigConfig,
-        trackers: dict[str, TrackerStep],
-        clock_sigma_ns: dict[str, int],
-        cameras: dict[str, Camera] | None,
+        self, config: RigConfig, cameras: dict[str, Camera] | None, *, align_clocks: bool = True
     ) -> None:
-        """trackers and clock_sigma_ns, the uncertainty of their stamps (-1: unknown), by camera.
-
-        cameras as `geometry` returns them.
+        """cameras as `geometry` returns them; align_clocks: whether clocks that contradict the
+        markers are put right as frames come.
         """
-        self._trackers = trackers
-        self._clock_sigma_ns = clock_sigma_ns
-        self._cameras = cameras or {}
+        self._config, self._cameras, self._align_clocks = config, cameras, align_clocks
         self.hands: dict[HandName, HandModel] = {}
         self._fusion: FusionStep | None = None
         self._solver: SolverStep | None = None
@@ -62,6 +53,7 @@ class Pipeline:
                 for hand, table in config.hand.items()
             }
             self._fusion = FusionStep(config, cameras, self.hands)
+            self._fusion.alignment.enabled &= align_clocks
             self._solver = SolverStep(config, self.hands)
 
     @property
@@ -78,33 +70,22 @@ class Pipeline:
         learned = {hand: self._solver.size(hand) for hand in self.hands}
         return {hand: size for hand, size in learned.items() if size is not None}
 
-    def find(self, frame: Frame) -> MarkerFrame:
-        """The markers of one frame."""
-        camera = self._cameras.get(frame.camera)
-        if camera is not None and camera.size_px != frame.size_px:
-            raise CalibrationError(
-                f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, "
-                f"its lens was calibrated at {camera.size_px[0]} x {camera.size_px[1]}; "
-                f"use images of that size, or run `rhot calibrate lens {frame.camera}`"
-            )
-        return self._trackers[frame.camera].step(
-            frame, clock_sigma_ns=self._clock_sigma_ns[frame.camera]
-        )
+    def of_these_sizes(self) -> Pipeline:
+        """The same before its first frame, with hands of the sizes that this one ended with."""
+        hands = {
+            hand: msgspec.structs.replace(table, scale=self.sizes.get(hand, table.scale))
+            for hand, table in self._config.hand.items()
+        }
+        config = msgspec.structs.replace(self._config, hand=hands)
+        return Pipeline(config, self._cameras, align_clocks=self._align_clocks)
 
-    def believe_clocks(self) -> None:
-        """Align no clock as frames come: somebody said how far they are apart."""
-        if self._fusion is not None:
-            self._fusion.alignment.enabled = False
-
-    def fuse(self, markers: MarkerFrame) -> Output:
-        """One frame of markers through fusion and solver."""
-        points = self._fusion.step(markers) if self._fusion is not None else []
-        return Output([markers], points, self._solve(points))
-
-    def flush(self) -> Output:
-        """What was still waiting for later frames."""
+    def outputs(self, frames: Iterable[MarkerFrame]) -> Iterator[Output]:
+        """What each frame leads to, and last what was still waiting for later ones."""
+        for markers in frames:
+            points = self._fusion.step(markers) if self._fusion is not None else []
+            yield Output([markers], points, self._solve(points))
         points = self._fusion.flush() if self._fusion is not None else []
-        return Output([], points, self._solve(points))
+        yield Output([], points, self._solve(points))
 
     def _solve(self, points: list[HandPoints]) -> list[HandPose]:
         if self._solver is None or self._fusion is None:
@@ -113,6 +94,23 @@ class Pipeline:
         for pose in poses:
             self._fusion.note_pose(pose)
         return poses
+
+
+def find_markers(
+    frame: Frame, tracker: TrackerStep, clock_sigma_ns: int, camera: Camera | None
+) -> MarkerFrame:
+    """The markers of one frame, whose clock is known that well.
+
+    Raises CalibrationError if its size is not the one that the lens was calibrated at: no point
+    could be computed from it.
+    """
+    if camera is not None and camera.size_px != frame.size_px:
+        raise CalibrationError(
+            f"camera {frame.camera!r}: its images are {frame.size_px[0]} x {frame.size_px[1]}, "
+            f"its lens was calibrated at {camera.size_px[0]} x {camera.size_px[1]}; "
+            f"use images of that size, or run `rhot calibrate lens {frame.camera}`"
+        )
+    return tracker.step(frame, clock_sigma_ns=clock_sigma_ns)
 
 
 def geometry(config: RigConfig, names: list[str]) -> tuple[dict[str, Camera] | None, str]:

@@ -1,8 +1,10 @@
 """One run of `rhot track`: recordings through the pipeline, frame by frame, into a result folder.
 
 The markers of all frames come first, as the cameras' clocks are found from the whole recording
-(clocks/); then what follows from them, by clocks put right. An error leaves no result, an
-interruption .partial files (results.py).
+(clocks/); then what follows from them, by clocks put right. Nobody waits for points, so each may
+wait for frames after it; and hands that nobody measured are followed twice, the second time at the
+size that the first one found. An error leaves no result, an interruption .partial files
+(results.py).
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.offline.contacts import ContactTrack
 from services.cli.offline.inputs import Job
 from services.cli.offline.looking_back import looked_back
-from services.cli.offline.pipeline import Output, Pipeline, geometry, merged
+from services.cli.offline.pipeline import Output, Pipeline, find_markers, geometry, merged
 from services.cli.offline.results import ResultWriter
 from services.cli.offline.seeds import dot_notes, seeds_of
 from services.cli.offline.track_summary import CameraCounter, Summary
@@ -34,6 +36,8 @@ from services.cli.progress import Progress
 from services.object_tracker.step import ObjectStep
 from services.pi_tracker.step import TrackerStep
 
+# Frames that a point waits for: as many as fusion can use.
+_HINDSIGHT_FRAMES = 2
 # A hand whose size is farther from what rig.toml says is noted: points tell it to 2 or 3 %.
 _OTHER_SIZE = 0.04
 
@@ -44,11 +48,14 @@ def run(
     progress: bool | None = False,
     offsets: Sequence[str] = (),
     seeds: Sequence[str] = (),
+    *,
+    as_live: bool = False,
 ) -> Summary:
     """Track one job into the folder `out`. progress None shows it on a terminal only.
 
-    offsets: CAM=SECONDS by hand; seeds: [CAM:]LANDMARK=X,Y of dots. Raises RhotError if anything
-    needed is missing, or if no frame could be read.
+    offsets: CAM=SECONDS by hand; seeds: [CAM:]LANDMARK=X,Y of dots; as_live: no hindsight, but
+    what a running rig tells at the time. Raises RhotError if anything needed is missing, or if no
+    frame could be read.
     """
     by_hand = offsets_of(offsets, job.cameras)
     cameras, markers_only = geometry(job.config, job.cameras)
@@ -57,17 +64,18 @@ def run(
         one.camera: tracker_step(job.config, one.camera, job.colors, starts[one.camera])
         for one in job.inputs
     }
-    clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
-    pipeline = Pipeline(job.config, trackers, clock_sigma_ns, cameras)
+    config = job.config if as_live else _with_hindsight(job.config)
+    pipeline = Pipeline(config, cameras, align_clocks=not by_hand)
     with ResultWriter(out) as writer, closing(RecordedMarkers(out)) as recorded:
         # First, as it takes no time and a broken line should not come up after an hour of video.
         object_notes = _track_objects(job, writer)
         contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
-        counters = _find_markers(job, pipeline, trackers, recorded, progress)
+        counters = _find_markers(job, trackers, cameras, recorded, progress)
         clocks = _find_clocks(job, recorded, cameras, by_hand)
-        if by_hand:
-            pipeline.believe_clocks()
-        _fuse(clocks, len(recorded), pipeline, contacts, writer, progress)
+        if pipeline.sizes and not as_live:
+            pipeline = _of_right_sizes(pipeline, clocks, progress)
+        for output in _outputs(pipeline, clocks, "points and poses of", progress):
+            _write(writer, output, contacts)
         unread = [warning for one in job.inputs for warning in one.warnings]
         notes = [markers_only] if markers_only else []
         notes += [note for one in job.inputs for note in one.notes]
@@ -88,14 +96,14 @@ def run(
 
 def _find_markers(
     job: Job,
-    pipeline: Pipeline,
     trackers: Mapping[str, TrackerStep],
+    cameras: dict[str, Camera] | None,
     recorded: RecordedMarkers,
     progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """The markers of all frames; the counts by camera."""
     counters = {name: CameraCounter() for name in job.cameras}
-    found = _marker_frames(job, pipeline, progress)
+    found = _marker_frames(job, trackers, cameras or {}, progress)
     if job.markers is None and job.config.dots:
         found = looked_back(found, trackers, len(job.config.dots), recorded.folder, progress)
     for markers in found:
@@ -104,12 +112,26 @@ def _find_markers(
     return counters
 
 
-def _marker_frames(job: Job, pipeline: Pipeline, progress: bool | None) -> Iterator[MarkerFrame]:
+def _marker_frames(
+    job: Job,
+    trackers: Mapping[str, TrackerStep],
+    cameras: Mapping[str, Camera],
+    progress: bool | None,
+) -> Iterator[MarkerFrame]:
     """The markers of each frame: of pictures, or those that somebody found already."""
     shown = Progress("rhot track:", sum(one.total for one in job.inputs), progress)
+    clock_sigma_ns = {one.camera: one.clock_sigma_ns for one in job.inputs}
     found: Iterable[MarkerFrame]
     if job.markers is None:
-        found = map(pipeline.find, merged([one.frames() for one in job.inputs]))
+        found = (
+            find_markers(
+                frame,
+                trackers[frame.camera],
+                clock_sigma_ns[frame.camera],
+                cameras.get(frame.camera),
+            )
+            for frame in merged([one.frames() for one in job.inputs])
+        )
     else:
         found = _recorded_markers(job.markers, job.cameras)
     try:
@@ -149,23 +171,36 @@ def _find_clocks(
     return clocks
 
 
-def _fuse(
-    clocks: Clocks,
-    total: int,
-    pipeline: Pipeline,
-    contacts: ContactTrack,
-    writer: ResultWriter,
-    progress: bool | None,
-) -> None:
-    """All markers through fusion and solver into the result."""
-    shown = Progress("rhot track: points and poses of", total, progress)
+def _with_hindsight(config: RigConfig) -> RigConfig:
+    fusion = msgspec.structs.replace(config.fusion, lag_frames=_HINDSIGHT_FRAMES)
+    return msgspec.structs.replace(config, fusion=fusion)
+
+
+def _of_right_sizes(pipeline: Pipeline, clocks: Clocks, progress: bool | None) -> Pipeline:
+    """The pipeline with hands as large as they are by the whole recording."""
+    for _ in _outputs(pipeline, clocks, "sizes of hands in", progress):
+        pass
+    return pipeline.of_these_sizes()
+
+
+def _outputs(
+    pipeline: Pipeline, clocks: Clocks, what: str, progress: bool | None
+) -> Iterator[Output]:
+    """What follows from all markers."""
+    shown = Progress(f"rhot track: {what}", clocks.total, progress)
     try:
-        for markers in clocks.frames():
-            _write(writer, pipeline.fuse(markers), contacts)
-            shown.advance()
-        _write(writer, pipeline.flush(), contacts)
+        for output in pipeline.outputs(clocks.frames()):
+            yield output
+            shown.advance(len(output.markers))
     finally:
         shown.end()
+
+
+def _write(writer: ResultWriter, output: Output, contacts: ContactTrack) -> None:
+    writer.write("markers", output.markers)
+    writer.write("points", output.points)
+    writer.write("poses", output.poses)
+    writer.write("contacts", contacts.step(output.poses))
 
 
 def tracker_step(
@@ -200,13 +235,6 @@ def tracker_step(
         seeds=seeds,
         remembers_dots=True,
     )
-
-
-def _write(writer: ResultWriter, output: Output, contacts: ContactTrack) -> None:
-    writer.write("markers", output.markers)
-    writer.write("points", output.points)
-    writer.write("poses", output.poses)
-    writer.write("contacts", contacts.step(output.poses))
 
 
 def _track_objects(job: Job, writer: ResultWriter) -> list[str]:
@@ -248,8 +276,8 @@ def _pose_notes(job: Job, pipeline: Pipeline, counts: dict[str, int]) -> list[st
     if pipeline.hands and counts["markers"] and not counts["poses"]:
         return ["no hand pose came out: `rhot plot` shows which markers are missing"]
     return [
-        f"the {hand} hand was never measured, and is by its points {size:.2f} times an adult's: "
-        f"`scale = {size:.2f}` in [hand.{hand}] of rig.toml says so from the start"
+        f"the {hand} hand was never measured, and is by its points {size:.2f} times an adult's; "
+        f"`scale = {size:.2f}` in [hand.{hand}] of rig.toml tells it to a live rig"
         for hand, size in pipeline.sizes.items()
         if abs(size / job.config.hand[hand].scale - 1.0) > _OTHER_SIZE
     ]

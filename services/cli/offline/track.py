@@ -1,7 +1,9 @@
 """`rhot track CAPTURE --out DIR`, or CAM=VIDEO pairs or a recording's FILE.mcap instead of CAPTURE:
 the whole rig, offline.
 
-As fast as it goes, and deterministic: the same input writes the same bytes. A video that breaks off
+As fast as it goes, and deterministic: the same input writes the same bytes. Points rest on the two
+frames after them too, and hands that nobody measured are followed twice, the second time at the
+size that the first found; `--as-live` does neither. A video that breaks off
 is tracked up to there, and the summary says so; if no frame at all can be read, the command fails.
 Of a recording the markers are taken, and points and poses are computed anew.
 """
@@ -26,6 +28,14 @@ ColorOption = Annotated[
     typer.Option(
         metavar="NAME",
         help="a colour to track in a video without rig.toml; default: all calibrated ones",
+    ),
+]
+AsLiveOption = Annotated[
+    bool,
+    typer.Option(
+        "--as-live",
+        help="what a running rig tells at the time: points wait for `lag_frames` of rig.toml only, "
+        "and how large a hand is shows as it moves",
     ),
 ]
 
@@ -56,6 +66,7 @@ def track(
     ] = None,
     offset: OffsetOption = None,
     seed: SeedOption = None,
+    as_live: AsLiveOption = False,
     progress: ProgressOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON")] = False,
 ) -> None:
@@ -69,7 +80,7 @@ def track(
         job = job_of(found, config, fps or (), color or ())
         # What was asked for, not what a recording was unpacked to.
         job = replace(job, origin=origin_of(sources, config, fps or ()))
-        summary = run(job, out, progress, offset or (), seed or ())
+        summary = run(job, out, progress, offset or (), seed or (), as_live=as_live)
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary), indent=1).decode())
         return

@@ -76,6 +76,11 @@ class Clocks:
         self._moved_ns = max(0, -min(starts)) if self._lines else 0
 
     @property
+    def total(self) -> int:
+        """How many frames there are."""
+        return len(self._recorded)
+
+    @property
     def worth_telling(self) -> bool:
         """Whether any clock is not simply believed."""
         return any(one.verdict != "as stamped" for one in self.told)

@@ -54,6 +54,19 @@ def test_a_rig_has_its_lenses_before_its_places(bench: tuple[PictureSet, float])
     assert list(again.files) == ["rig.json"]
 
 
+def test_a_board_that_moved_between_the_cameras_is_left_out_and_named(
+    bench: tuple[PictureSet, float],
+) -> None:
+    pictures, _ = bench
+    moved = {name: dict(files) for name, files in pictures.files.items()}
+    key, other = list(moved["right"])[2:4]
+    moved["right"][key] = moved["right"][other]
+    found = rig_found(PictureSet(moved), BOARD, None, DATE)
+    used = {one.name: one.value for one in found.figures}["positions of the board"]
+    assert used.startswith("7 (")
+    assert f"{key} left out: the cameras disagree by " in used
+
+
 def test_too_few_pictures_are_refused(bench: tuple[PictureSet, float]) -> None:
     pictures, _ = bench
     one = dict(list(pictures.files["left"].items())[:1])

@@ -73,20 +73,6 @@ def test_videos_with_their_stamps_give_what_the_capture_gives(capture, result, t
         assert (tmp_path / "videos" / name).read_bytes() == (result / name).read_bytes()
 
 
-def test_a_hand_of_another_size_than_rig_toml_says_is_noted(capture, result, tmp_path):
-    own = json.loads((result / "summary.json").read_text())["notes"]
-    assert not any("never measured" in note for note in own)
-    guessed = shutil.copytree(capture, tmp_path / "guessed")
-    rig = guessed / "rig.toml"
-    text, own_scale = rig.read_text(), "fingers = []\nscale = 1.0\n"
-    assert own_scale in text
-    rig.write_text(text.replace(own_scale, "scale = 0.88\n"))
-    notes = track([guessed], tmp_path / "out").notes
-    assert len(notes) == len(own) + 1
-    assert "the right hand was never measured" in notes[-1]
-    assert 0.93 < float(notes[-1].split("scale = ")[1].split("`")[0]) < 1.07
-
-
 def test_one_camera_of_two_gives_markers_and_says_why_nothing_more(short_capture, tmp_path):
     summary = track(
         [f"left={short_capture / 'left.mkv'}"], tmp_path / "out", short_capture / "rig.toml"
