@@ -21,7 +21,7 @@ from services.fusion.kalman.filtering import (
     insert_frame,
     oldest_with,
 )
-from services.fusion.kalman.history import HandHistory, start_history
+from services.fusion.kalman.history import HandHistory, forget_models, start_history
 from services.fusion.kalman.motion.motion_models import MotionModels
 
 # What one camera alone has seen for longer is forgotten: by then its distance says nothing.
@@ -119,6 +119,7 @@ def take_in(
     node = history.order[index]
     history.looked[node] = False
     before = history.order[index - 1]
+    _forget_who_was_away(history, before, time_s - sights.hold_s)
     for n in range(looks.landmarks.size):
         k = looks.landmarks[n]
         history.looked[node, k] = True
@@ -148,6 +149,13 @@ def take_in(
         if not fates.used[k] or fates.back[k] or fates.astray[k]:
             return UNUSUAL
     return FITS
+
+
+@njit(cache=True, error_model="numpy")
+def _forget_who_was_away(history: HandHistory, node: int, since_s: float) -> None:
+    """How a hand moved says nothing of how it does once it is back, if nothing is newer."""
+    if history.time_s[node] < since_s:
+        forget_models(history, node)
 
 
 @njit(cache=True, error_model="numpy")

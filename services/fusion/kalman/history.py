@@ -116,7 +116,6 @@ def empty_history(landmarks: int, models: int, nodes: int) -> HandHistory:
 def start_history(history: HandHistory, time_s: float) -> None:
     """A first node to build on: nothing is known at time_s; older nodes are forgotten."""
     node = history.order[0]
-    models = history.probability.shape[1]
     history.size[0] = 1
     history.incomplete[0] = False
     history.time_s[node] = time_s
@@ -125,15 +124,24 @@ def start_history(history: HandHistory, time_s: float) -> None:
     history.looked[node] = False
     history.alive[node] = False
     history.used[node] = False
-    # The liveliest first: with equal shares the first points of a moving hand are too sure.
-    history.probability[node] = 0.01
-    history.probability[node, models - 1] = 1.0 - 0.01 * (models - 1)
-    history.behind[node] = 0
+    forget_models(history, node)
     history.strikes[node] = 0
     history.state[node] = 0.0
     history.way[node] = 0.0
     history.own[node] = 0.0
     history.cov[node] = 0.0
+
+
+@njit(cache=True)
+def forget_models(history: HandHistory, node: int) -> None:
+    """Nothing is known at a node of how the hand moves.
+
+    The liveliest first: with equal shares the first points of a moving hand are too sure.
+    """
+    models = history.probability.shape[1]
+    history.probability[node] = 0.01
+    history.probability[node, models - 1] = 1.0 - 0.01 * (models - 1)
+    history.behind[node] = 0
 
 
 @njit(cache=True)
