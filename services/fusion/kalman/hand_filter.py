@@ -56,11 +56,12 @@ MODELS = MotionModels(
 GATE = 30.0
 # Looks of this long begin a landmark; of RESTART_WINDOW_S, begin it again.
 START_WINDOW_S = 0.05
-# The next look, if it comes within so many frames, fits the motion that a landmark began with anew.
-# Rays of the first two meet decimetres off where the hand moves, and looks that are linearised
-# there bend what follows. Hands that come back into view (tuning half of points, all markers gone
-# for .3 s), in the first .1 s, two frames of lag: RMS 1.57 -> 1.01 mm, NEES 19 -> 1.1. With later
-# looks as well, hands that flap are up to .1 m off for some frames: they turn round meanwhile.
+# The next look, if it comes within so many frames, fits the motion that a hand's landmarks began
+# with anew. Rays of the first two meet decimetres off where the hand moves, and looks that are
+# linearised there bend what follows. Hands that come back into view (tuning half of points, all
+# markers gone for .3 s), in the first .1 s, two frames of lag: RMS 1.57 -> 1.01 mm, NEES 19 -> 1.1.
+# With later looks as well, hands that flap are up to .1 m off for some frames: they turn round
+# meanwhile.
 NEXT_FRAMES = 1.6
 # Looks that miss a motion by more sigmas than this are of two things.
 START_RESIDUAL = 4.0
@@ -117,10 +118,12 @@ class HandFilter:
         """Landmarks of a frame that begin, or begin again, as their fates say."""
         fates, time_s = self._fates, float(looks.times_s.mean())
         back, alive, used = fates.back.copy(), fates.alive.copy(), fates.used.copy()
+        # Of a hand that others are known of, these tell how the landmark moves.
+        of_new_hand = not (alive & ~back).any()
         for landmark in looks.landmarks[fates.astray[looks.landmarks]].tolist():
             self._begin(landmark, time_s, RESTART_WINDOW_S)
         for landmark in looks.landmarks[(back | ~alive)[looks.landmarks]].tolist():
-            if self._begin(landmark, time_s, START_WINDOW_S):
+            if self._begin(landmark, time_s, START_WINDOW_S) and of_new_hand:
                 first = oldest_with(self._history, landmark, time_s - START_WINDOW_S)[0]
                 self._young[landmark] = float(self._history.time_s[self._history.order[first]])
         for landmark in looks.landmarks[(alive & ~used)[looks.landmarks]].tolist():
