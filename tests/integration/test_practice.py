@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import time
 from collections.abc import AsyncIterator
 
 import numpy as np
@@ -79,6 +80,15 @@ class Page:
         self.rig.bus.close(points)
         return count / 2.0
 
+    async def arrivals(self, times_s: list[float]) -> None:
+        """Note when points of the hand come, until cancelled."""
+        points = self.rig.bus.every(topics.POINTS, 256)
+        try:
+            async for _ in points:
+                times_s.append(time.monotonic())
+        finally:
+            self.rig.bus.close(points)
+
     async def taken_over(self, by: str, file: str) -> None:
         """The service has started again with that file, and points of the hand come."""
         await self.rig.until(
@@ -125,9 +135,20 @@ async def test_the_places_of_the_cameras_and_the_rig_goes_on_with_them(page: Pag
 
 
 async def test_a_hand(page: Page) -> None:
+    too_slow = f"this machine does not track {ENOUGH_HZ} pictures a second at present"
     if await page.points_a_second() < ENOUGH_HZ:
-        pytest.skip(f"this machine does not track {ENOUGH_HZ} pictures a second at present")
-    saved = await page.carried_out("hand", hand="right")
+        pytest.skip(too_slow)
+    times_s: list[float] = []
+    noting = asyncio.create_task(page.arrivals(times_s))
+    try:
+        saved = await page.carried_out("hand", hand="right")
+    except AssertionError:
+        # Others may have begun to work meanwhile.
+        if len(times_s) < ENOUGH_HZ * (times_s[-1] - times_s[0]):
+            pytest.skip(too_slow)
+        raise
+    finally:
+        noting.cancel()
     assert saved.files == ["hand.right.json"]
     made, true = load_hand(page.folder, "right"), default_hand("right")
     for digit, of_truth in zip(made.digits[1:], true.digits[1:], strict=True):
