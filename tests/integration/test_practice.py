@@ -85,7 +85,7 @@ class Page:
         points = self.rig.bus.every(topics.POINTS, 256)
         try:
             async for _ in points:
-                times_s.append(time.monotonic())
+                times_s += [time.monotonic()]
         finally:
             self.rig.bus.close(points)
 
