@@ -143,8 +143,8 @@ async def test_a_hand(page: Page) -> None:
     try:
         saved = await page.carried_out("hand", hand="right")
     except AssertionError:
-        # Others may have begun to work meanwhile.
-        if len(times_s) < ENOUGH_HZ * (times_s[-1] - times_s[0]):
+        # Others may have begun to work meanwhile. Without any points it is not the machine.
+        if times_s and len(times_s) < ENOUGH_HZ * (times_s[-1] - times_s[0]):
             pytest.skip(too_slow)
         raise
     finally:

@@ -1,8 +1,9 @@
-"""What follows from markers without the rig's processes: points and poses of all hands.
+"""The rig's steps without its processes: frames to markers, markers to points and poses.
 
-Frames come in the order of time. The step objects are the services' own; their messages pass from
-one to the next without a bus. Pure: the same frames give the same messages. With one camera,
-without a hand or without geometry there are markers only (`Pipeline.hands` is then empty).
+All markers of a recording come first (find_markers), then what follows from them (Pipeline). Frames
+come in the order of time. The step objects are the services' own; their messages pass from one to
+the next without a bus. Pure: the same frames give the same messages. With one camera, without a
+hand or without geometry there are markers only (`Pipeline.hands` is then empty).
 """
 
 from __future__ import annotations

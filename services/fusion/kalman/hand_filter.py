@@ -118,7 +118,7 @@ class HandFilter:
         """Landmarks of a frame that begin, or begin again, as their fates say."""
         fates, time_s = self._fates, float(looks.times_s.mean())
         back, alive, used = fates.back.copy(), fates.alive.copy(), fates.used.copy()
-        # Of a hand that others are known of, these tell how the landmark moves.
+        # Where other landmarks of a hand are known, they tell how a new one moves.
         of_new_hand = not (alive & ~back).any()
         for landmark in looks.landmarks[fates.astray[looks.landmarks]].tolist():
             self._begin(landmark, time_s, RESTART_WINDOW_S)
