@@ -5,12 +5,17 @@ For tests of data association. Pure.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from services.pi_tracker.identify.marker_identity import MarkerIdentity
 from services.pi_tracker.image.blob import Blob, make_blob
 from services.pi_tracker.image.frame import Image
 from services.pi_tracker.image.planes import Rect
 
+FRAME_NS = 33_333_333
+START_NS = 1_700_000_000_000_000_000
 # Places of five tips in an arc and a wrist, px from the middle of the hand.
 _HAND_PX = ((-60, -20), (-30, -60), (0, -70), (30, -60), (55, -40), (0, 60))
 
@@ -34,3 +39,25 @@ def hand_blobs(x_px: float, y_px: float, side_px: int = 14) -> list[Blob]:
     return [
         square_blob(color, x_px + dx, y_px + dy, side_px) for color, (dx, dy) in enumerate(_HAND_PX)
     ]
+
+
+def nothing_known(blob: Blob) -> bool:
+    """Of the room: no blob looks like it."""
+    return False
+
+
+def associated(
+    identity: MarkerIdentity,
+    blobs: list[list[Blob]],
+    seq: int,
+    like_room: Callable[[Blob], bool] = nothing_known,
+) -> list[Blob | None]:
+    """Associate a frame's blobs, and update with what was associated; the blobs."""
+    stamp_ns = START_NS + seq * FRAME_NS
+    associations = identity.associate(blobs, stamp_ns, like_room)
+    blobs_found = [None if one is None else one.blob for one in associations]
+    for color, found in enumerate(blobs_found):
+        if found is not None:
+            area_px2 = found.area_px
+            identity.update(color, found.x_px, found.y_px, area_px2, area_px2, stamp_ns)
+    return blobs_found

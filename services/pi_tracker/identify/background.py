@@ -32,6 +32,8 @@ _MISMATCH_COST = 2
 # A cell agrees with its mean when luma, U and V are within this many of their standard deviations,
 # and a little for shadows. Five, because not one of an object's thousand cells should differ.
 _GATE: Gate = 5.0, 3.0
+# The same where means of many looks are compared, of which one alone is not.
+_MEAN_GATE: Gate = 2.5, 1.0
 # Weight of a new sighting in the mean.
 _NEW_WEIGHT = 0.2
 # A blob of which less than this share is background is a marker whose rim touches it: left as it
@@ -81,7 +83,7 @@ class BackgroundModel:
         if 2 * len(known) < blob.cells:
             return False
         mean = yuv(image, blob.rect)[blob.mask > 0].mean(axis=0)
-        return 2 * int(np.count_nonzero(agree(known, mean, noise, _GATE))) >= blob.cells
+        return 2 * int(np.count_nonzero(agree(known, mean, noise, _MEAN_GATE))) >= blob.cells
 
     def update(
         self,

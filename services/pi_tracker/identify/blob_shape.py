@@ -9,8 +9,10 @@ from services.pi_tracker.image.planes import Rect
 # this share of their box.
 _MAX_ASPECT, _MIN_FILL = 6.0, 0.3
 # A small blob at the rim of a larger one of another colour is, as a rule, that one's edge in
-# coloured light, when it is at most this share of the other's size.
-_RIM_SHARE = 0.6
+# coloured light, when it is at most this share of the other's size and so many times as long as
+# wide. (Of tips in first pictures before things of other paints' colours, where they are small
+# beside them, 75 % were known while width did not count, and 87 %; 120 simulated rooms.)
+_RIM_SHARE, _RIM_ASPECT = 0.6, 2.0
 
 
 def is_paint_shaped(blob: Blob, max_area_px: float) -> bool:
@@ -26,8 +28,11 @@ def is_paint_shaped(blob: Blob, max_area_px: float) -> bool:
 
 
 def may_be_rim(blob: Blob, other: Blob) -> bool:
-    """Whether a blob touches a larger one of another colour, and may be that one's edge."""
-    return blob.cells <= _RIM_SHARE * other.cells and touch(blob.rect, other.rect)
+    """Whether a thin blob touches a larger one of another colour, and may be that one's edge."""
+    x0, y0, x1, y1 = blob.rect
+    width, height = x1 - x0, y1 - y0
+    thin = max(width, height) >= _RIM_ASPECT * min(width, height)
+    return thin and blob.cells <= _RIM_SHARE * other.cells and touch(blob.rect, other.rect)
 
 
 def touch(a: Rect, b: Rect) -> bool:

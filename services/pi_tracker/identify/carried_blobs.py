@@ -3,6 +3,9 @@
 A thing in a room may be as near to the other markers and as large as the marker that it is taken
 for. It does not move with them. That a blob stands still says nothing by itself: a finger may lie
 on a table while the others move. It does beside another blob of the colour that is carried along.
+
+Things may be taken for most of a hand, or all of it. Then nothing that is taken for the hand moves,
+and in several colours something else does: that is the hand.
 """
 
 from __future__ import annotations
@@ -10,62 +13,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from statistics import median
-from typing import NamedTuple
 
+from services.pi_tracker.identify.followed_blob import FollowedBlob, Way
 from services.pi_tracker.identify.track import Track
 from services.pi_tracker.image.blob import Blob
 from services.pi_tracker.image.planes import Rect
 
-# Cells along x and y.
-Way = tuple[float, float]
-
-# Set by what was seen in two clips of the other renderer, all of these, not swept. So far the hand
-# must have gone along an axis while a blob was followed, cells, to tell: half a marker's width.
-_TOLD_CELLS = 6.0
-# What stands still keeps one of its two edges across each axis to so many cells, whatever the hand
-# covers or uncovers of it. (Of the axis of the hand's way alone: 11 of 984 dabs of a hard room lost
-# for specks.) Both edges of what is carried along go this share of the hand's way, or more: fingers
-# move by themselves, too.
-_STILL_CELLS, _CARRIED_SHARE = 1, 0.5
 # A blob is the one of the frame before when it is within so much of where that was, or of where the
 # hand carried it, cells and share of the hand's way.
 _SAME_CELLS, _SAME_SHARE = 4.0, 1.0
-# So many markers whose blobs leave no choice tell how the hand moved.
+# So many markers tell how the hand moved; and so many colours, where it is if it is elsewhere.
 _MARKERS = 3
+# What is smaller may be noise that seems to move, cells.
+_LEAST_CELLS = 6
 # Frames farther apart say nothing of each other, ns.
 _GAP_NS = 150_000_000
 # Factor of the prior of what stands still beside what is carried along.
 _STILL_FACTOR = 0.3
 
 
-class _Followed(NamedTuple):
-    """A blob's way: where it is, and where it and the hand were when it was first seen; cells."""
-
-    rect: Rect
-    first: Rect
-    hand_from: Way
-    carried: bool | None  # what its way said last, None: nothing yet
-
-    def next(self, rect: Rect, hand: Way) -> _Followed:
-        """The same blob a frame later."""
-        ways = hand[0] - self.hand_from[0], hand[1] - self.hand_from[1]
-        axis = 0 if abs(ways[0]) >= abs(ways[1]) else 1
-        edges = [[rect[side] - self.first[side] for side in (n, n + 2)] for n in (0, 1)]
-        stayed = all(min(map(abs, of)) <= _STILL_CELLS for of in edges)
-        carried = self.carried if stayed or self.carried else None
-        if abs(ways[axis]) >= _TOLD_CELLS:
-            if stayed:
-                carried = False
-            elif min(edge / ways[axis] for edge in edges[axis]) >= _CARRIED_SHARE:
-                carried = True
-        return _Followed(rect, self.first, self.hand_from, carried)
-
-
 class CarriedBlobs:
-    """Follows the blobs of `count` colours while there is a choice between them."""
+    """Follows the blobs of `count` colours while there is a choice between them.
+
+    mistaken: until this frame, things were taken for the hand.
+    """
 
     def __init__(self, count: int) -> None:
-        self._followed: list[list[_Followed]] = [[] for _ in range(count)]
+        self.mistaken = False
+        self._followed: list[list[FollowedBlob]] = [[] for _ in range(count)]
         self._hand: Way = (0.0, 0.0)
         self._stamp_ns = 0
 
@@ -73,10 +48,14 @@ class CarriedBlobs:
         self, blobs: Sequence[Sequence[Blob]], tracks: Sequence[Track | None], stamp_ns: int
     ) -> None:
         """Take in a frame's blobs of each colour, before they are compared."""
-        ways = [
-            (0.5 * (own[0].x_px - track.x_px), 0.5 * (own[0].y_px - track.y_px))
+        taken = [
+            _nearest(own, track) if track is not None and track.seen_ns == track.stamp_ns else None
             for own, track in zip(blobs, tracks, strict=True)
-            if len(own) == 1 and track is not None and track.seen_ns == track.stamp_ns
+        ]
+        ways = [
+            (0.5 * (own[n].x_px - track.x_px), 0.5 * (own[n].y_px - track.y_px))
+            for own, track, n in zip(blobs, tracks, taken, strict=True)
+            if track is not None and n is not None
         ]
         recent = 0 < stamp_ns - self._stamp_ns <= _GAP_NS
         self._stamp_ns = stamp_ns
@@ -89,20 +68,63 @@ class CarriedBlobs:
             [self._next(blob.rect, before, (x, y)) for blob in own]
             for own, before in zip(blobs, known, strict=True)
         ]
+        self._note_hand_elsewhere(blobs, taken)
 
     def forget(self) -> None:
         """There was no choice."""
+        self.mistaken = False
         for own in self._followed:
             own.clear()
+
+    def any_carried(self, color: int) -> bool:
+        """Whether one of a colour's blobs is carried along."""
+        return any(one.carried for one in self._followed[color])
 
     def prior_factors(self, color: int) -> list[float]:
         """Factors of the priors of a colour's blobs, in the order in which they were followed."""
         own = self._followed[color]
-        if not any(one.carried for one in own):
+        if not self.any_carried(color):
             return [1.0] * len(own)
         return [_STILL_FACTOR if one.carried is False else 1.0 for one in own]
 
-    def _next(self, rect: Rect, before: Sequence[_Followed], moved: Way) -> _Followed:
+    def _note_hand_elsewhere(
+        self, blobs: Sequence[Sequence[Blob]], taken: Sequence[int | None]
+    ) -> None:
+        """Where those taken (their index, of each colour) stand still, and others move together."""
+        self.mistaken = False
+        # Of colours whose taken blob stood still, the ways of the others, by their index.
+        others: dict[int, dict[int, Way]] = {}
+        moving = 0
+        for color, (own, followed, n) in enumerate(zip(blobs, self._followed, taken, strict=True)):
+            if n is None:
+                continue
+            moving += followed[n].way is not None
+            if followed[n].stayed:
+                ways = {k: one.way for k, one in enumerate(followed)}
+                others[color] = {
+                    k: way
+                    for k, way in ways.items()
+                    if way is not None and own[k].cells >= _LEAST_CELLS
+                }
+        found = [way for ways in others.values() for way in ways.values()]
+        if not found:
+            return
+        x, y = (median(steps) for steps in zip(*found, strict=True))
+        together = {
+            color: alike
+            for color, ways in others.items()
+            if (alike := {k for k, way in ways.items() if way[0] * x + way[1] * y > 0.0})
+        }
+        if len(together) < max(_MARKERS, moving + 1):
+            return
+        for color, alike in together.items():
+            self.mistaken |= not self.any_carried(color)
+            self._followed[color] = [
+                one._replace(carried=True if k in alike else False if one.stayed else one.carried)
+                for k, one in enumerate(self._followed[color])
+            ]
+
+    def _next(self, rect: Rect, before: Sequence[FollowedBlob], moved: Way) -> FollowedBlob:
         reach = _SAME_CELLS + _SAME_SHARE * math.hypot(*moved)
         best, least = None, reach
         for one in before:
@@ -111,5 +133,14 @@ class CarriedBlobs:
             if apart <= least:
                 best, least = one, apart
         if best is None:
-            return _Followed(rect, rect, self._hand, None)
+            return FollowedBlob(rect, rect, self._hand, None)
         return best.next(rect, self._hand)
+
+
+def _nearest(own: Sequence[Blob], track: Track) -> int | None:
+    """The index of the blob that is nearest to a track; None if there is none."""
+
+    def apart(n: int) -> float:
+        return (own[n].x_px - track.x_px) ** 2 + (own[n].y_px - track.y_px) ** 2
+
+    return min(range(len(own)), key=apart, default=None)

@@ -14,10 +14,11 @@ from collections.abc import Callable
 from statistics import median
 from typing import NamedTuple
 
-from services.pi_tracker.identify.blob_shape import may_be_rim, touch
+from services.pi_tracker.identify.blob_prior import ACCEPT_LIKENESS, blob_priors
+from services.pi_tracker.identify.blob_shape import touch
 from services.pi_tracker.identify.carried_blobs import CarriedBlobs
 from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
-from services.pi_tracker.identify.track import AREA_MEMORY, Track
+from services.pi_tracker.identify.track import AREA_MEMORY, RECENT_NS, Track
 from services.pi_tracker.image.blob import Blob
 
 # Blobs whose score is below this (a perfect one has 1) are not the marker.
@@ -34,20 +35,6 @@ _AREA_NOISE, _AREA_STEP = 0.15, 0.35
 _MAX_CANDIDATES = 16
 # Weight of a blob that is not consistent with any other marker, against 1 of one that fully is.
 _ISOLATED_WEIGHT = 0.1
-# Accept threshold: a blob as like its own track as this, and the only one of its colour, is the
-# marker without a comparison with the others.
-_ACCEPT_LIKENESS = 0.6
-# Re-acquisition prior: however unlike its track, a blob consistent with the others may be the
-# marker after all. The track may have been wrong.
-_REACQUISITION_PRIOR = 0.4
-# No marker shrinks to such a share of its size within so long; what does is noise, or something
-# pale that a dim light brings near. Its prior.
-_SHRUNK_SHARE, _SHRUNK_NS, _NOISE_PRIOR = 1.0 / 16.0, 5_000_000_000, 0.1
-# A track that stands still for so many frames may be no marker.
-_STATIONARY_FRAMES = 4
-# Factor of a prior where the blob may be the rim of another's paint, unless it is where the marker
-# itself must be by now (Track.is_at): half occluded by the other.
-_RIM_FACTOR = 0.3
 # Factor of a prior where the blob has the colour of known things beside it, and may be a part of
 # them that a hand uncovers: what is like its track is taken all the same, nothing else.
 _ROOM_FACTOR = 0.5
@@ -102,7 +89,7 @@ class MarkerIdentity:
             if len(own) != 1 or track is None:
                 return []
             (blob,) = own
-            like = track.likeness(blob, stamp_ns, self._margin_px) >= _ACCEPT_LIKENESS
+            like = track.likeness(blob, stamp_ns, self._margin_px) >= ACCEPT_LIKENESS
             if not like and not track.is_at(blob, stamp_ns):
                 return []
             found.append(Association(blob, 1.0, 1.0))
@@ -117,11 +104,28 @@ class MarkerIdentity:
         candidates = [
             self._candidates(color, blobs, stamp_ns, like_room) for color in range(len(blobs))
         ]
+        if self.mistaken:
+            self._forget_mistakes(candidates)
         best = most_consistent_set(candidates)
         return [
             None if member is None else _accepted(candidates[color], *member)
             for color, member in enumerate(best)
         ]
+
+    @property
+    def mistaken(self) -> bool:
+        """Whether it showed in this frame that things were taken for the hand."""
+        return self._carried.mistaken
+
+    def _forget_mistakes(self, candidates: list[list[Candidate]]) -> None:
+        """Of the colours that did not show where the hand is, nothing is known; in place.
+
+        The next frame has all their blobs (MarkerFinder forgets the room then).
+        """
+        for color, own in enumerate(candidates):
+            if not self._carried.any_carried(color):
+                self._tracks[color] = None
+                own.clear()
 
     def update(
         self,
@@ -146,10 +150,12 @@ class MarkerIdentity:
         track.update(x_px, y_px, area_px, found_px2, stamp_ns, area_memory)
         return missing if missing > (_AREA_NOISE if touched else _AREA_STEP) else 0.0
 
-    def predicted(self, color: int, stamp_ns: int) -> tuple[float, float] | None:
-        """Predicted place, px, of a marker seen a moment ago; else None."""
+    def predicted(
+        self, color: int, stamp_ns: int, within_ns: int = RECENT_NS
+    ) -> tuple[float, float] | None:
+        """Predicted place, px, of a marker that was seen so lately; else None."""
         track = self._tracks[color]
-        if track is None or not track.is_recent(stamp_ns):
+        if track is None or not track.is_recent(stamp_ns, within_ns):
             return None
         return track.predicted(stamp_ns)
 
@@ -221,11 +227,7 @@ class MarkerIdentity:
         """The blobs of a colour with their priors."""
         own = blobs[color]
         track = self._tracks[color]
-        priors = [self._prior(color, blob, blobs, stamp_ns) for blob in own]
-        if track is not None and len(own) > 1 and track.stationary_frames >= _STATIONARY_FRAMES:
-            # What has not moved for a while may be static background; among others it has no
-            # advantage.
-            priors = [min(prior, _REACQUISITION_PRIOR) for prior in priors]
+        priors = blob_priors(color, blobs, track, stamp_ns, self._margin_px)
         factors = self._carried.prior_factors(color)
         priors = [
             prior * factor * (_ROOM_FACTOR if like_room(blob) else 1.0)
@@ -240,28 +242,6 @@ class MarkerIdentity:
             Candidate(blob, prior, track.area_px if partly else 0.0)
             for blob, prior, partly in zip(own, priors, partly_occluded, strict=True)
         ]
-
-    def _prior(self, color: int, blob: Blob, blobs: list[list[Blob]], stamp_ns: int) -> float:
-        """How likely a blob is the marker by its track and by blobs of other colours, 0..1."""
-        track = self._tracks[color]
-        prior = 1.0
-        if track is not None:
-            likeness = track.likeness(blob, stamp_ns, self._margin_px)
-            if likeness >= _ACCEPT_LIKENESS:
-                return likeness
-            prior = max(likeness, _REACQUISITION_PRIOR)
-            if track.is_at(blob, stamp_ns):
-                return max(prior, _ACCEPT_LIKENESS)
-            recently_larger = 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS
-            if recently_larger and blob.area_px < _SHRUNK_SHARE * track.area_px:
-                return _NOISE_PRIOR
-        rim = any(
-            may_be_rim(blob, other)
-            for number, others in enumerate(blobs)
-            if number != color
-            for other in others
-        )
-        return prior * _RIM_FACTOR if rim else prior
 
 
 def _accepted(own: list[Candidate], member: Candidate, consistency: float) -> Association | None:

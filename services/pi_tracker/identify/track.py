@@ -26,7 +26,7 @@ _MAX_PREDICTION_S = 0.1
 # pixels, and so many more per second since. In the simulator's hard scene, 95 % of 427 markers half
 # occluded by another were within 21 px of it, and no mere edge of another's paint was. While it is
 # occluded the finger moves on, by so much more.
-_GATE_PX, _GATE_PX_S, _RECENT_NS = 20.0, 40.0, 300_000_000
+_GATE_PX, _GATE_PX_S, RECENT_NS = 20.0, 40.0, 300_000_000
 
 
 @dataclass(slots=True)
@@ -112,9 +112,9 @@ class Track:
         size_ratio = a / b if b > 1.0 else a
         return math.sqrt(size_ratio) / (1.0 + (dx * dx + dy * dy) / (reach_px * reach_px))
 
-    def is_recent(self, stamp_ns: int) -> bool:
-        """Whether it was seen less than _RECENT_NS ago."""
-        return 0 <= stamp_ns - self.seen_ns <= _RECENT_NS
+    def is_recent(self, stamp_ns: int, within_ns: int = RECENT_NS) -> bool:
+        """Whether it was seen so lately."""
+        return 0 <= stamp_ns - self.seen_ns <= within_ns
 
     def is_at(self, blob: Blob, stamp_ns: int) -> bool:
         """Whether a blob is within the gate about the predicted place of a recent track."""

@@ -17,15 +17,15 @@ FRAME_NS = 33_333_333
 THING, MARKER, WALL = (110, 150, 180), (160, 150, 190), (140, 128, 128)
 
 
-def shot(seq, *patches, size=(120, 90)):
-    """A wall with patches (rect in cells, Y U V), noisy."""
+def shot(seq, *patches, size=(120, 90), sigma=1.4):
+    """A wall with patches (rect in cells, Y U V), with noise of so many grey levels a cell."""
     rng = np.random.default_rng(seq)
     cells = np.empty((size[1], size[0], 3))
     cells[:] = WALL
     for (x0, y0, x1, y1), color in patches:
         cells[y0:y1, x0:x1] = color
     y, u, v = np.moveaxis(
-        np.clip(np.rint(cells + rng.normal(0, 1.4, cells.shape)), 0, 255).astype(np.uint8), 2, 0
+        np.clip(np.rint(cells + rng.normal(0, sigma, cells.shape)), 0, 255).astype(np.uint8), 2, 0
     )
     size_px = (2 * size[0], 2 * size[1])
     i420 = np.concatenate([y.repeat(2, 0).repeat(2, 1).ravel(), u.ravel(), v.ravel()]).reshape(
@@ -148,6 +148,20 @@ def test_what_has_the_colour_of_known_things_nearby_resembles_them(noise):
     assert not model.resembles(image, blob(far), noise)
     # More than the known thing could be another one.
     assert not model.resembles(image, blob((42, 2, 90, 60)), noise)
+
+
+def test_in_a_dim_room_a_marker_is_not_taken_for_the_wall_behind_it():
+    """Noise gives specks of the wall a paint's colour, and they are learnt."""
+    model, dim = BackgroundModel(), Noise(luma=6.0, chroma=6.0)
+    wall, marker = (10, 10, 60, 60), (30, 30, 39, 39)
+    for seq in range(8):
+        image = shot(seq, sigma=6.0)
+        model.update(image, (0, 0, *image.size), [blob(wall)], [], dim, (1 + seq) * FRAME_NS)
+    image = shot(50, (marker, (140, 100, 128)), sigma=6.0)
+    (found,) = model.foreground(image, [blob(marker)], dim)
+    assert found.cells >= 75
+    assert model.foreground(image, [blob((45, 30, 54, 39))], dim) == []
+    assert not model.resembles(image, blob(marker), dim)
 
 
 def test_what_passes_again_and_again_is_not_static(noise):

@@ -21,6 +21,8 @@ def test_a_rim_is_smaller_than_what_it_touches():
     large, small = filled_blob(0, (10, 10, 20, 20)), filled_blob(1, (20, 12, 22, 18))
     assert may_be_rim(small, large)
     assert not may_be_rim(large, small)
+    # As wide as long: a tip before a thing.
+    assert not may_be_rim(filled_blob(1, (20, 12, 25, 18)), large)
     assert not may_be_rim(filled_blob(1, (23, 12, 25, 18)), large)
     assert touch((0, 0, 4, 4), (5, 5, 8, 8))
     assert not touch((0, 0, 4, 4), (6, 0, 8, 4))

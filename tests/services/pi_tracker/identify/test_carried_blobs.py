@@ -1,0 +1,82 @@
+"""What moves with a hand, and what stands still beside it or was taken for it."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.pi_tracker.identify.marker_identity import MarkerIdentity
+from testing.synthetic_blobs import FRAME_NS, START_NS, associated, hand_blobs, square_blob
+
+
+@pytest.mark.parametrize(("dx_px", "dy_px"), [(8, 0), (0, -8)])
+def test_what_stands_still_is_given_up_for_what_the_hand_carries_along(dx_px, dy_px):
+    """A thing was taken for a tip from the first frame on, and looks more like itself than it."""
+    identity = MarkerIdentity(6, 40)
+    thing = square_blob(2, 260, 140, 26)
+    for seq in range(6):
+        tips = hand_blobs(300 + dx_px * seq, 250 + dy_px * seq)
+        blobs = [[tip] if tip.color != 2 or seq == 0 else [thing, tip] for tip in tips]
+        blobs[2] = [thing] if seq == 0 else blobs[2]
+        found = associated(identity, blobs, seq)[2]
+        if seq < 2:
+            assert found is thing
+    assert found is tips[2]
+
+
+def test_a_thumb_that_lies_still_stays_one_while_the_fingers_move():
+    identity = MarkerIdentity(6, 40)
+    thumb = square_blob(0, 240, 230)
+    for seq in range(12):
+        tips = hand_blobs(300, 250 - 6 * seq)
+        speck = square_blob(0, 400 + 60 * (seq % 2), 300, 8)
+        blobs = [[tip] for tip in tips]
+        blobs[0] = [thumb, speck]
+        assert associated(identity, blobs, seq)[0] is thumb
+
+
+# Things as far from one another, and as large, as a hand's markers are.
+THINGS = hand_blobs(150, 300, 16)
+
+
+def frames_of_a_hand(moves_from=8, colors=6):
+    """Frames with things alone, then with a hand beside them, of so many colours, that moves."""
+    for seq in range(20):
+        tips = hand_blobs(400, 300 - 3 * max(seq - moves_from, 0))[:colors]
+        own = [[thing] for thing in THINGS]
+        if seq > 0:
+            own[:colors] = [[tip, thing] for tip, thing in zip(tips, THINGS[:colors], strict=True)]
+        yield seq, own, tips
+
+
+def test_a_hand_that_moves_is_told_from_things_that_were_taken_for_it():
+    """From the first frame on: nothing of what was taken moves."""
+    identity, mistaken = MarkerIdentity(6, 40), []
+    for seq, blobs, tips in frames_of_a_hand():
+        found = associated(identity, blobs, seq)
+        mistaken += [seq] if identity.mistaken else []
+        assert found == (tips if mistaken else THINGS)
+    assert len(mistaken) == 1
+
+
+def test_colours_that_did_not_show_where_the_hand_is_are_looked_for_anew():
+    """The thing that was the wrist is none in that frame, and is no likelier than any other."""
+    identity, mistaken = MarkerIdentity(6, 40), []
+    for seq, blobs, tips in frames_of_a_hand(colors=5):
+        found = associated(identity, blobs, seq)
+        if identity.mistaken:
+            mistaken.append(seq)
+            assert found == [*tips, None]
+            assert identity.predicted(5, START_NS + seq * FRAME_NS) is None
+        elif not mistaken:
+            assert found == THINGS
+    assert len(mistaken) == 1
+
+
+def test_a_hand_that_rests_is_not_given_up_for_two_things_that_move():
+    identity = MarkerIdentity(6, 40)
+    for seq in range(30):
+        tips = hand_blobs(300, 300)
+        movers = [square_blob(color, 500, 60 + 60 * color + 4 * seq) for color in (1, 2)]
+        blobs = [[tip, *(one for one in movers if one.color == tip.color)] for tip in tips]
+        assert associated(identity, blobs, seq) == tips
+        assert not identity.mistaken

@@ -1,0 +1,42 @@
+"""How far a blob has gone since it was first seen."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.pi_tracker.identify.followed_blob import FollowedBlob
+
+FIRST = (20, 30, 28, 38)
+
+
+def followed(rect):
+    """A blob that was first seen at FIRST, and is here now."""
+    return FollowedBlob(FIRST, FIRST, (0.0, 0.0), None).next(rect, (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("rect", "stayed", "way"),
+    [
+        ((21, 30, 28, 39), True, None),
+        # A hand covers one of its edges, or uncovers more of it.
+        ((20, 30, 24, 38), True, None),
+        ((20, 18, 28, 38), True, None),
+        ((23, 30, 31, 38), False, None),
+        ((27, 30, 35, 38), False, (7.0, 0.0)),
+        ((20, 20, 27, 30), False, (-0.5, -9.0)),
+    ],
+)
+def test_what_a_blob_has_gone_is_told_once_both_its_edges_have(rect, stayed, way):
+    one = followed(rect)
+    assert (one.stayed, one.way) == (stayed, way)
+
+
+def test_what_goes_with_the_hand_is_carried_and_what_does_not_is_not():
+    start = FollowedBlob(FIRST, FIRST, (5.0, 5.0), None)
+    assert start.next((24, 30, 32, 38), (15.0, 5.0)).carried is None
+    carried = start.next((27, 30, 35, 38), (15.0, 5.0))
+    assert carried.carried is True
+    assert carried.next((27, 30, 35, 38), (25.0, 5.0)).carried is True
+    still = start.next((20, 30, 29, 38), (15.0, 5.0))
+    assert still.carried is False
+    assert still.next((23, 33, 31, 41), (8.0, 5.0)).carried is None
