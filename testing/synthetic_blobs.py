@@ -41,7 +41,7 @@ def hand_blobs(x_px: float, y_px: float, side_px: int = 14) -> list[Blob]:
     ]
 
 
-def nothing_known(blob: Blob) -> bool:
+def nothing_known(_blob: Blob) -> bool:
     """Of the room: no blob looks like it."""
     return False
 

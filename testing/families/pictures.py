@@ -117,7 +117,7 @@ def picture_case(name: str, recipe: Recipe) -> Case:
     frames = kept("markers", recipe, lambda: detected(recipe, scene)[""], tracker=True)
     shares = kept("visible", recipe, lambda: visible_shares(recipe, scene), tracker=False)
     clocks = scene.clocks
-    truth = _Truth(scene, recipe.hand(), tuple(scene.hands[hand].landmarks))
+    truth = PaintMiddles(scene, recipe.hand(), tuple(scene.hands[hand].landmarks))
     return Case(
         name=name,
         config=scene.config,
@@ -134,7 +134,7 @@ def picture_case(name: str, recipe: Recipe) -> Case:
 
 
 @dataclass(eq=False)
-class _Truth:
+class PaintMiddles:
     """Middles of the paint (n, L, 3) at n instants; what was asked for once is remembered."""
 
     scene: Scene
@@ -177,7 +177,7 @@ def detected(
             taken = source.take(seq, START_NS)
             if taken.image is None:
                 continue
-            frame = _frame(taken, full_range=recipe.wrong_range)
+            frame = frame_of(taken, full_range=recipe.wrong_range)
             for name, without in trackers.items():
                 with without():
                     markers = steps[name].step(frame, 0, _CLOCK_SIGMA_NS)
@@ -188,7 +188,8 @@ def detected(
     }
 
 
-def _frame(taken: TakenFrame, *, full_range: bool) -> Frame:
+def frame_of(taken: TakenFrame, *, full_range: bool = False) -> Frame:
+    """A picture as a camera hands it to the tracker; full_range: it is taken for one."""
     assert taken.image is not None
     return Frame(
         taken.camera,

@@ -38,20 +38,21 @@ def test_a_thumb_that_lies_still_stays_one_while_the_fingers_move():
 THINGS = hand_blobs(150, 300, 16)
 
 
-def frames_of_a_hand(moves_from=8, colors=6):
+def frames_of_a_hand(moves_from=8, colors=6, step_px=3):
     """Frames with things alone, then with a hand beside them, of so many colours, that moves."""
     for seq in range(20):
-        tips = hand_blobs(400, 300 - 3 * max(seq - moves_from, 0))[:colors]
+        tips = hand_blobs(400, 400 - step_px * max(seq - moves_from, 0))[:colors]
         own = [[thing] for thing in THINGS]
         if seq > 0:
             own[:colors] = [[tip, thing] for tip, thing in zip(tips, THINGS[:colors], strict=True)]
         yield seq, own, tips
 
 
-def test_a_hand_that_moves_is_told_from_things_that_were_taken_for_it():
+@pytest.mark.parametrize("step_px", [3, 25])
+def test_a_hand_that_moves_is_told_from_things_that_were_taken_for_it(step_px):
     """From the first frame on: nothing of what was taken moves."""
     identity, mistaken = MarkerIdentity(6, 40), []
-    for seq, blobs, tips in frames_of_a_hand():
+    for seq, blobs, tips in frames_of_a_hand(step_px=step_px):
         found = associated(identity, blobs, seq)
         mistaken += [seq] if identity.mistaken else []
         assert found == (tips if mistaken else THINGS)

@@ -1,0 +1,149 @@
+"""How many markers are found in rooms that nobody arranged, and what is taken for one.
+
+    python benchmarks/rooms.py [--tuning] [--rooms N] [--json FILE]
+
+Rooms by number (testing/families/rooms.py; --tuning: those that constants may be chosen on): things
+in the paints' colours, lamps from anywhere, noise, hands from 0.35 to 0.75 m away; three seconds,
+both cameras, each with ranges as somebody has them who clicks on the paint in that light. Rhot's
+tracker and the RHOT paper's look at the same pictures, which take nearly all of the time: 20
+seconds a room.
+    found    of markers of which 60 % or more are visible, the share that is told where its paint is
+    astray   of markers that are told, the share that is on something else: more than 14 px off
+    whole    of clips of a camera, the share in which 99 % are found
+    median   of clips of a camera, the share found; and the lowest
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from rhot.messages import MarkerFrame
+from services.pi_tracker.step import TrackerStep
+from services.simulator.camera.frame_source import FrameSource
+from testing.families.case import Half
+from testing.families.pictures import PaintMiddles, fitted_colors, frame_of, visible_shares
+from testing.families.rooms import FIRST, room
+from testing.synthetic_points import START_NS
+
+ROOMS = 24
+# A marker so far from its paint's middle is on something else; a tip is 8 to 30 px wide.
+ASTRAY_PX, VISIBLE = 14.0, 0.6
+# Another seed of a room has the same lamps and paint: somebody calibrated before.
+_CALIBRATED = 1_000_000
+
+
+class Count(NamedTuple):
+    """Markers of a clip of one camera."""
+
+    visible: int = 0
+    found: int = 0
+    told: int = 0
+    astray: int = 0
+
+
+def counts_in(number: int) -> dict[str, list[Count]]:
+    """Of each method, the counts of both cameras in a room."""
+    recipe = room(number)
+    scene, hand = recipe.scene(), recipe.hand()
+    landmarks = scene.hands[hand.hand].landmarks
+    shares = visible_shares(recipe, scene)
+    middles = PaintMiddles(scene, hand, tuple(landmarks))
+    counts: dict[str, list[Count]] = {"rhot": [], "paper": []}
+    for name, camera in scene.cameras.items():
+        source = FrameSource(scene, name, recorded=True)
+        colors = fitted_colors(recipe.scene(seed=recipe.seed + _CALIBRATED), name)
+        trackers = {
+            method: TrackerStep(
+                name,
+                colors,
+                msgspec.structs.replace(scene.config.tracker, method=method),
+                source.camera.size_px,
+                scene.config.colors,
+            )
+            for method in counts
+        }
+        here = dict.fromkeys(trackers, Count())
+        for seq, visible in enumerate(shares[name] >= VISIBLE):
+            taken = source.take(seq, START_NS)
+            if taken.image is None:
+                continue
+            paint_px = camera.project(middles(np.array([taken.time_s]))[0])
+            wanted = dict(zip(landmarks.values(), zip(visible, paint_px, strict=True), strict=True))
+            for method, tracker in trackers.items():
+                here[method] = _counted(here[method], tracker.step(frame_of(taken)), wanted)
+        for method, count in here.items():
+            counts[method].append(count)
+    return counts
+
+
+def _counted(
+    count: Count, frame: MarkerFrame, wanted: Mapping[str, tuple[np.bool_, Array]]
+) -> Count:
+    """With a frame more; wanted: is each colour's marker visible, and where is its paint?"""
+    told = {marker.color: marker for marker in frame.markers}
+    for color, (visible, (x_px, y_px)) in wanted.items():
+        marker = told.get(color)
+        right = marker is not None and (
+            math.hypot(marker.x_px - x_px, marker.y_px - y_px) <= ASTRAY_PX
+        )
+        count = Count(
+            count.visible + bool(visible),
+            count.found + (bool(visible) and right),
+            count.told + (marker is not None),
+            count.astray + (marker is not None and not right),
+        )
+    return count
+
+
+def figures_of(clips: Sequence[Count]) -> dict[str, float]:
+    """The keys of the JSON file, of a method's clips."""
+    visible, found, told, astray = (sum(column) for column in zip(*clips, strict=True))
+    shares = [clip.found / max(clip.visible, 1) for clip in clips]
+    return {
+        "markers": visible,
+        "found": found / visible,
+        "astray": astray / max(told, 1),
+        "whole": float(np.mean(np.array(shares) >= 0.99)),
+        "median": float(np.median(shares)),
+        "lowest": min(shares),
+    }
+
+
+def main() -> None:
+    """Print a table; with --json, write it too."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--tuning", action="store_true", help="rooms that constants are chosen on")
+    parser.add_argument("--rooms", type=int, default=ROOMS, help=f"how many; {ROOMS}")
+    parser.add_argument("--json", type=Path, help="also write the figures here")
+    arguments = parser.parse_args()
+    half: Half = "tuning" if arguments.tuning else "held_out"
+    clips: dict[str, list[Count]] = {}
+    for number in range(FIRST[half], FIRST[half] + arguments.rooms):
+        for method, counts in counts_in(number).items():
+            clips.setdefault(method, []).extend(counts)
+            parts = (f"{c.found / max(c.visible, 1):7.1%} ({c.astray:3} astray)" for c in counts)
+            print(f"room {number:5}  {method:6}", *parts, flush=True)
+    figures = {method: figures_of(counts) for method, counts in clips.items()}
+    print(f"{'':8}{'markers':>9}{'found':>9}{'astray':>9}{'whole':>8}{'median':>9}{'lowest':>9}")
+    for method, row in figures.items():
+        print(
+            f"{method:8}{row['markers']:9.0f}{row['found']:9.2%}{row['astray']:9.2%}"
+            f"{row['whole']:8.0%}{row['median']:9.2%}{row['lowest']:9.2%}"
+        )
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
