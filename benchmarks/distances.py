@@ -79,7 +79,14 @@ def tracker(config: RigConfig, source: FrameSource) -> TrackerStep:
     """A new tracker of that camera."""
     name = source.camera.name
     colors = load_colors(config.calibration_dir, name)
-    return TrackerStep(name, colors, config.tracker, source.camera.size_px, config.colors)
+    return TrackerStep(
+        name,
+        colors,
+        config.tracker,
+        source.camera.size_px,
+        config.colors,
+        landmarks=config.landmarks,
+    )
 
 
 def counted(

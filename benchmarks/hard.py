@@ -96,7 +96,14 @@ def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str
     """Track `count` frames of one camera."""
     source = FrameSource(load_scene(config, SCENE, seed), camera)
     colors = load_colors(config.calibration_dir, camera)
-    step = TrackerStep(camera, colors, config.tracker, source.camera.size_px, config.colors)
+    step = TrackerStep(
+        camera,
+        colors,
+        config.tracker,
+        source.camera.size_px,
+        config.colors,
+        landmarks=config.landmarks,
+    )
     landmarks = {
         color: landmark
         for table in config.hand.values()

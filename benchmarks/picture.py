@@ -97,7 +97,9 @@ class Film:
         for name in scene.cameras:
             colors = load_colors(config.calibration_dir, name)
             size_px = scene.cameras[name].size_px
-            tracker = TrackerStep(name, colors, config.tracker, size_px, config.colors)
+            tracker = TrackerStep(
+                name, colors, config.tracker, size_px, config.colors, landmarks=config.landmarks
+            )
             found += [
                 (taken.time_s, tracker.step(self._frame(taken), 0, CLOCK_SIGMA_NS))
                 for taken in self._pictures(scene, name, seconds)

@@ -68,6 +68,7 @@ def counts_in(number: int) -> dict[str, list[Count]]:
                 msgspec.structs.replace(scene.config.tracker, method=method),
                 source.camera.size_px,
                 scene.config.colors,
+                landmarks=scene.config.landmarks,
             )
             for method in counts
         }

@@ -24,7 +24,14 @@ def detect(config: RigConfig, scene: Scene, seconds: float) -> list[MarkerFrame]
     for name in scene.cameras:
         source = FrameSource(scene, name, recorded=True)
         colors = load_colors(config.calibration_dir, name)
-        tracker = TrackerStep(name, colors, config.tracker, source.camera.size_px, config.colors)
+        tracker = TrackerStep(
+            name,
+            colors,
+            config.tracker,
+            source.camera.size_px,
+            config.colors,
+            landmarks=config.landmarks,
+        )
         for seq in range(int(seconds * config.camera_named(name).fps)):
             taken = source.take(seq, START_NS)
             if taken.image is not None:

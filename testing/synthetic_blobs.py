@@ -16,6 +16,8 @@ from services.pi_tracker.image.planes import Rect
 
 FRAME_NS = 33_333_333
 START_NS = 1_700_000_000_000_000_000
+# What the markers of hand_blobs() are painted with, in their order.
+COLORS = ("magenta", "blue", "cyan", "green", "lime", "violet")
 # Places of five tips in an arc and a wrist, px from the middle of the hand.
 _HAND_PX = ((-60, -20), (-30, -60), (0, -70), (30, -60), (55, -40), (0, 60))
 

@@ -110,6 +110,16 @@ class RigConfig(Table, frozen=True, kw_only=True):
                     found.setdefault(table.markers[landmark], {})[landmark] = name
         return found
 
+    @property
+    def landmarks(self) -> dict[str, tuple[str, str]]:
+        """Of each colour that marks one landmark, its hand and the landmark."""
+        return {
+            color: (hand, landmark)
+            for hand, table in self.hand.items()
+            for landmark, color in table.markers.items()
+            if color not in self.dots
+        }
+
     def color_of(self, marker: str) -> str:
         """The colour of a marker of that name: its own name, but of dots that share a colour."""
         for color, names in self.dots.items():

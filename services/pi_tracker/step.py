@@ -21,6 +21,7 @@ from services.pi_tracker.detect.marker_finder import MarkerFinder
 from services.pi_tracker.detect.near_colors import near_colors
 from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.dots.finder import DotFinder, dot_markers
+from services.pi_tracker.identify.hand_layout import NO_LANDMARKS, Landmarks
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.rectify import Rectifier
 
@@ -35,7 +36,8 @@ class TrackerStep:
     clock, if given, is read at the end of each stage, for times_ms. With a lens, frames are
     undistorted first (image/rectify.py). dots are colours that several landmarks share, with the
     names of their markers by landmark (RigConfig.dots); seeds are where landmarks are in the first
-    picture, px; remembers_dots keeps what looked_back() needs.
+    picture, px; remembers_dots keeps what looked_back() needs. landmarks are what colours mark
+    (RigConfig.landmarks): a hand is then told by its layout, too.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class TrackerStep:
         seeds: Mapping[str, tuple[float, float]] | None = None,
         *,
         remembers_dots: bool = False,
+        landmarks: Landmarks = NO_LANDMARKS,
     ) -> None:
         # More OpenCV threads gain nothing on images this small, and cost the other cores.
         cv2.setNumThreads(1)
@@ -66,6 +69,7 @@ class TrackerStep:
         self._names = {color: wanted[color] for color in self._color_names if color in wanted}
         self._seeds = seeds or {}
         self._remembers_dots = remembers_dots
+        self._landmarks = landmarks
         self._dots: dict[str, DotFinder] = {}
         # Duration of each stage of the last step in ms; empty without a clock.
         self.times_ms: dict[str, float] = {}
@@ -87,7 +91,9 @@ class TrackerStep:
         else:
             own = compile_colors(colors, single, path) if self._names else table
             near = compile_colors(near_colors(colors), single, path)
-            self._finder = MarkerFinder(own, near, self._settings, self._time_stage)
+            self._finder = MarkerFinder(
+                own, near, self._settings, self._time_stage, self._landmarks
+            )
 
     @property
     def notes(self) -> list[str]:

@@ -61,6 +61,7 @@ class CameraTracker:
             self.colors_path,
             lens,
             config.dots,
+            landmarks=config.landmarks,
         )
 
     def use(self, colors: Colors, step: TrackerStep) -> None:

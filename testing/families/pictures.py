@@ -169,7 +169,12 @@ def detected(
         colors = fitted_colors(calibration, camera)
         steps = {
             name: TrackerStep(
-                camera, colors, scene.config.tracker, source.camera.size_px, scene.config.colors
+                camera,
+                colors,
+                scene.config.tracker,
+                source.camera.size_px,
+                scene.config.colors,
+                landmarks=scene.config.landmarks,
             )
             for name in trackers
         }

@@ -94,7 +94,9 @@ def detected(clip: Clip, shots: Film) -> list[MarkerFrame]:
     found = []
     for name in ("left", "right"):
         colors = fitted_colors(clip, shots, name)
-        step = TrackerStep(name, colors, config.tracker, SIZE_PX, config.colors)
+        step = TrackerStep(
+            name, colors, config.tracker, SIZE_PX, config.colors, landmarks=config.landmarks
+        )
         skew_s = (clip.rig.skew_s + clip.rig.clock_error_s) * (name == "right")
         for k, at_s in enumerate(shots.times_s[name].tolist()):
             markers = step.step(

@@ -234,6 +234,7 @@ def tracker_step(
         dots=config.dots,
         seeds=seeds,
         remembers_dots=True,
+        landmarks=config.landmarks,
     )
 
 

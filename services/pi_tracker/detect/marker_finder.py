@@ -17,6 +17,7 @@ from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
 from services.pi_tracker.identify.background import BackgroundModel
 from services.pi_tracker.identify.blob_shape import is_paint_shaped
+from services.pi_tracker.identify.hand_layout import Landmarks
 from services.pi_tracker.identify.marker_identity import Association, MarkerIdentity
 from services.pi_tracker.identify.pieces import joined
 from services.pi_tracker.image.blob import Blob
@@ -58,7 +59,12 @@ class MarkerFinder:
     """Finds the markers of one camera, frame after frame."""
 
     def __init__(
-        self, table: ColorTable, near: ColorTable, settings: Tracker, on_stage: OnStage
+        self,
+        table: ColorTable,
+        near: ColorTable,
+        settings: Tracker,
+        on_stage: OnStage,
+        landmarks: Landmarks,
     ) -> None:
         self._names = table.names
         self._settings = settings
@@ -71,7 +77,7 @@ class MarkerFinder:
         self._on_stage = on_stage
         self._noise = Noise()
         self._frame_count = 0
-        self._identity = MarkerIdentity(len(table.names), settings.roi_margin_px)
+        self._identity = MarkerIdentity(table.names, settings.roi_margin_px, landmarks)
         self._background = BackgroundModel()
         # All blobs of this frame, background among them, and the rectangle they were searched in.
         self._all_blobs: list[Blob] = []

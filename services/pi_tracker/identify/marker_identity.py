@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from statistics import median
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from services.pi_tracker.identify.blob_prior import ACCEPT_LIKENESS, blob_priors
 from services.pi_tracker.identify.blob_shape import touch
 from services.pi_tracker.identify.carried_blobs import CarriedBlobs
 from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
+from services.pi_tracker.identify.hand_layout import NO_LANDMARKS, HandLayout, Landmarks
 from services.pi_tracker.identify.track import AREA_MEMORY, RECENT_NS, Track
 from services.pi_tracker.image.blob import Blob
 
@@ -53,13 +54,17 @@ class Association(NamedTuple):
 
 
 class MarkerIdentity:
-    """The tracks of `count` colours.
+    """The tracks of colours, of which the layout may be known.
 
     Each frame: associate() blobs with colours, then update() each associated colour with its
     measured position.
     """
 
-    def __init__(self, count: int, margin_px: float) -> None:
+    def __init__(
+        self, colors: Sequence[str], margin_px: float, landmarks: Landmarks = NO_LANDMARKS
+    ) -> None:
+        count = len(colors)
+        self._layout = HandLayout(colors, landmarks)
         self._margin_px = margin_px
         self._tracks: list[Track | None] = [None] * count
         # Which of the markers associated last have another's paint beside them.
@@ -106,7 +111,7 @@ class MarkerIdentity:
         ]
         if self.mistaken:
             self._forget_mistakes(candidates)
-        best = most_consistent_set(candidates)
+        best = most_consistent_set(candidates, self._layout)
         return [
             None if member is None else _accepted(candidates[color], *member)
             for color, member in enumerate(best)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from services.pi_tracker.identify.marker_identity import MarkerIdentity
-from testing.synthetic_blobs import FRAME_NS, START_NS, associated, hand_blobs, square_blob
+from testing.synthetic_blobs import COLORS, FRAME_NS, START_NS, associated, hand_blobs, square_blob
 
 
 @pytest.mark.parametrize(("dx_px", "dy_px"), [(8, 0), (0, -8)])
 def test_what_stands_still_is_given_up_for_what_the_hand_carries_along(dx_px, dy_px):
     """A thing was taken for a tip from the first frame on, and looks more like itself than it."""
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     thing = square_blob(2, 260, 140, 26)
     for seq in range(6):
         tips = hand_blobs(300 + dx_px * seq, 250 + dy_px * seq)
@@ -24,7 +24,7 @@ def test_what_stands_still_is_given_up_for_what_the_hand_carries_along(dx_px, dy
 
 
 def test_a_thumb_that_lies_still_stays_one_while_the_fingers_move():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     thumb = square_blob(0, 240, 230)
     for seq in range(12):
         tips = hand_blobs(300, 250 - 6 * seq)
@@ -51,7 +51,7 @@ def frames_of_a_hand(moves_from=8, colors=6, step_px=3):
 @pytest.mark.parametrize("step_px", [3, 25])
 def test_a_hand_that_moves_is_told_from_things_that_were_taken_for_it(step_px):
     """From the first frame on: nothing of what was taken moves."""
-    identity, mistaken = MarkerIdentity(6, 40), []
+    identity, mistaken = MarkerIdentity(COLORS, 40), []
     for seq, blobs, tips in frames_of_a_hand(step_px=step_px):
         found = associated(identity, blobs, seq)
         mistaken += [seq] if identity.mistaken else []
@@ -61,7 +61,7 @@ def test_a_hand_that_moves_is_told_from_things_that_were_taken_for_it(step_px):
 
 def test_colours_that_did_not_show_where_the_hand_is_are_looked_for_anew():
     """The thing that was the wrist is none in that frame, and is no likelier than any other."""
-    identity, mistaken = MarkerIdentity(6, 40), []
+    identity, mistaken = MarkerIdentity(COLORS, 40), []
     for seq, blobs, tips in frames_of_a_hand(colors=5):
         found = associated(identity, blobs, seq)
         if identity.mistaken:
@@ -74,7 +74,7 @@ def test_colours_that_did_not_show_where_the_hand_is_are_looked_for_anew():
 
 
 def test_a_hand_that_rests_is_not_given_up_for_two_things_that_move():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     for seq in range(30):
         tips = hand_blobs(300, 300)
         movers = [square_blob(color, 500, 60 + 60 * color + 4 * seq) for color in (1, 2)]

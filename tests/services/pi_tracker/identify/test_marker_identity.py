@@ -8,6 +8,7 @@ import pytest
 from services.pi_tracker.identify import group_consistency
 from services.pi_tracker.identify.marker_identity import MarkerIdentity
 from testing.synthetic_blobs import (
+    COLORS,
     FRAME_NS,
     START_NS,
     associated,
@@ -37,19 +38,19 @@ def test_a_hand_is_preferred_to_larger_things_in_the_background():
         square_blob(5, 80, 240, 44),
     ]
     blobs = [[one for one in things + tips if one.color == color] for color in range(6)]
-    assert associated(MarkerIdentity(6, 40), blobs, 0) == tips
+    assert associated(MarkerIdentity(COLORS, 40), blobs, 0) == tips
 
 
 def test_a_hand_is_told_from_things_that_are_consistent_too():
     tips = hand_blobs(430, 250)
     things = [square_blob(color, 80 + 15 * color, 100 + 60 * (color % 3), 36) for color in range(4)]
     blobs = [[one for one in things + tips if one.color == color] for color in range(6)]
-    assert associated(MarkerIdentity(6, 40), blobs, 0) == tips
+    assert associated(MarkerIdentity(COLORS, 40), blobs, 0) == tips
 
 
 def test_a_marker_half_occluded_by_another_is_known_by_its_place():
     """A few cells beside a larger blob are its rim as a rule, but not where the marker must be."""
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     for seq in range(5):
         tips = hand_blobs(300 + 9 * seq, 250)
         associated(identity, [[tip] for tip in tips], seq)
@@ -72,7 +73,7 @@ def test_a_marker_half_occluded_by_another_is_known_by_its_place():
 
 
 def test_an_occluded_marker_coasts_with_the_hand():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     for seq in range(3):
         associated(identity, [[tip] for tip in hand_blobs(200 + 20 * seq, 250)], seq)
     for seq in range(3, 8):
@@ -87,7 +88,7 @@ def test_an_occluded_marker_coasts_with_the_hand():
 
 
 def test_the_occluded_fraction_of_a_marker_is_told():
-    identity = MarkerIdentity(2, 40)
+    identity = MarkerIdentity(COLORS[:2], 40)
     left, right = square_blob(0, 100, 100), square_blob(1, 160, 100)
     for seq in range(4):
         associated(identity, [[left], [right]], seq)
@@ -106,7 +107,7 @@ def test_the_occluded_fraction_of_a_marker_is_told():
 
 
 def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     for seq in range(5):
         associated(identity, [[tip] for tip in hand_blobs(300, 250)], seq)
     for seq in range(5, 40):
@@ -116,7 +117,7 @@ def test_a_lost_marker_is_found_again_in_the_next_frame_that_shows_it():
 
 
 def test_a_wrong_first_association_is_corrected():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     thing = square_blob(5, 80, 240, 40)
     tips = hand_blobs(400, 250)
     associated(identity, [[], [], [], [], [], [thing]], 0)
@@ -127,7 +128,7 @@ def test_a_wrong_first_association_is_corrected():
 
 
 def test_a_single_colour_takes_the_blob_like_its_last():
-    identity = MarkerIdentity(1, 40)
+    identity = MarkerIdentity(COLORS[:1], 40)
     first = square_blob(0, 100, 100, 20)
     assert associated(identity, [[first]], 0) == [first]
     near, far = square_blob(0, 112, 100, 18), square_blob(0, 400, 300, 40)
@@ -135,7 +136,7 @@ def test_a_single_colour_takes_the_blob_like_its_last():
 
 
 def test_a_speck_far_away_is_not_the_marker_that_left_a_moment_ago():
-    identity = MarkerIdentity(1, 40)
+    identity = MarkerIdentity(COLORS[:1], 40)
     for seq in range(4):
         associated(identity, [[square_blob(0, 300 + 40 * seq, 200, 60)]], seq)
     speck = square_blob(0, 60, 60, 8)
@@ -145,7 +146,7 @@ def test_a_speck_far_away_is_not_the_marker_that_left_a_moment_ago():
 
 
 def test_two_alike_are_ambiguous():
-    identity = MarkerIdentity(1, 40)
+    identity = MarkerIdentity(COLORS[:1], 40)
     associated(identity, [[square_blob(0, 100, 100)]], 0)
     stamp_ns = START_NS + FRAME_NS
     (alone,) = identity.associate([[square_blob(0, 100, 100)]], stamp_ns, nothing_known)
@@ -166,7 +167,7 @@ def test_of_a_room_full_of_colour_only_the_likeliest_are_compared(monkeypatch):
         "_pair_consistency",
         lambda a, b, fit=group_consistency._pair_consistency: compared.append(a) or fit(a, b),
     )
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     tips = hand_blobs(300, 250)
     for seq in range(3):
         associated(identity, [[tip] for tip in tips], seq)
@@ -182,13 +183,13 @@ def test_at_first_the_largest_of_many_are_compared():
     Expected: a hand among 400 specks of each colour that are smaller than it is found.
     """
     tips = hand_blobs(300, 250)
-    assert associated(MarkerIdentity(6, 40), among_specks(tips, 4, seed=5), 0) == tips
+    assert associated(MarkerIdentity(COLORS, 40), among_specks(tips, 4, seed=5), 0) == tips
 
 
 def test_what_looks_like_the_room_is_not_the_marker_that_hides():
     """A tip is hidden, and a piece of a thing of its colour appears beside the hand."""
     for like_room, found in ((lambda blob: blob.color == 2, None), (nothing_known, "piece")):
-        identity = MarkerIdentity(6, 40)
+        identity = MarkerIdentity(COLORS, 40)
         for seq in range(5):
             associated(identity, [[tip] for tip in hand_blobs(300, 250)], seq)
         piece = square_blob(2, 300, 140, 8)
@@ -198,7 +199,7 @@ def test_what_looks_like_the_room_is_not_the_marker_that_hides():
 
 
 def test_a_marker_that_looks_like_the_room_goes_on_being_followed():
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     for seq in range(5):
         associated(identity, [[tip] for tip in hand_blobs(300 + 5 * seq, 250)], seq)
     tips, speck = hand_blobs(325, 250), square_blob(2, 500, 60, 8)
@@ -208,7 +209,7 @@ def test_a_marker_that_looks_like_the_room_goes_on_being_followed():
 
 def test_specks_are_no_rivals_of_a_marker_that_lies_still():
     """Noise makes them in every picture of a dim room, whose walls look like the marker."""
-    identity = MarkerIdentity(6, 40)
+    identity = MarkerIdentity(COLORS, 40)
     thumb = square_blob(0, 240, 230)
     for seq in range(12):
         blobs = [[tip] for tip in hand_blobs(300, 250)]
