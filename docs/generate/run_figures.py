@@ -83,6 +83,7 @@ RUNS = {
     "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
     "returns": _script("returns", "", None, 0.5),
+    "rooms": _script("rooms", "", "--rooms 1", 6),
     "scale": _script(
         "scale", "--rigs 1 4 16 32 64", "--rigs 1 --fps 30 --routers 1 --seconds 2", 8
     ),

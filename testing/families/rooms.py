@@ -18,8 +18,9 @@ from testing.families.people import PaintJob, Person
 from testing.families.picture_motions import Moves
 from testing.families.pictures import Recipe
 
-# The first number of each half.
-FIRST: dict[Half, int] = {"tuning": 0, "held_out": 1000}
+# The first number of each half. (Those from 1000 on were looked at twice while the layout of a hand
+# was made to count.)
+FIRST: dict[Half, int] = {"tuning": 0, "held_out": 2000}
 _GESTURES = ("random", "grab", "fist", "piano", "pinch", "still")
 _PATHS = ("", "", "roll", "flap", "stop_and_go")
 _DARK, _PALE = np.array([0.17, 0.085, 0.055]), np.array([0.74, 0.50, 0.41])

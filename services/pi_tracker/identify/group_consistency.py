@@ -12,9 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+from rhot.geometry.transforms import Array
 from services.pi_tracker.identify.hand_layout import HandLayout
 from services.pi_tracker.image.blob import Blob
 
+Ints = npt.NDArray[np.int64]
 # Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm
 # wide: markers lie within 14 patch widths, mostly within 10.
 _REACH_WIDTHS = 14.0
@@ -53,64 +58,87 @@ def most_consistent_set(
 
     None where a colour has no candidate; consistency is 0..1, and 1 if alone. Each candidate in
     turn is the anchor of a set, which takes of every other colour the candidate most consistent
-    with the anchor. The set of the largest score wins.
+    with the anchor. The set of the largest score wins: the sum of pairwise weights, each times both
+    priors, and a little of each prior.
     """
-    best: list[Candidate | None] = [
-        max(own, key=lambda c: c.prior, default=None) for own in candidates
+    flat = [candidate for own in candidates for candidate in own]
+    if not flat:
+        return [None] * len(candidates)
+    blobs, priors = [one.whole for one in flat], np.array([one.prior for one in flat])
+    pairs = _pairs(blobs)
+    weights = _weights(pairs, np.array([blob.color for blob in blobs]), layout)
+    members = _members(weights * priors, [len(own) for own in candidates])  # (n, colours)
+    given = priors[members]
+    between = weights[members[:, :, None], members[:, None, :]]
+    scores = _PRIOR_WEIGHT * given.sum(axis=1)
+    scores += 0.5 * np.einsum("ni,nij,nj->n", given, between, given)
+    best = members[int(np.argmax(scores))]
+    consistencies = _consistencies(pairs)
+    found = iter(best.tolist())
+    return [
+        (flat[n := next(found)], _mean_with(consistencies, n, best)) if own else None
+        for own in candidates
     ]
-    best_score = -1.0
-    for anchor in (candidate for own in candidates for candidate in own):
-        members = [_partner(anchor, own, layout) for own in candidates]
-        score = _set_score([one for one in members if one is not None], layout)
-        if score > best_score:
-            best, best_score = members, score
-    return [None if member is None else (member, _in_set(member, best)) for member in best]
 
 
 def consistency(blob: Blob, others: Sequence[Blob]) -> float:
     """Mean pairwise consistency of a blob with others, 0..1; 1 if there are none."""
-    if not others:
-        return 1.0
-    return sum(_pair_consistency(blob, other) for other in others) / len(others)
+    return _mean_with(_consistencies(_pairs([blob, *others])), 0, np.arange(1 + len(others)))
 
 
-def _partner(anchor: Candidate, own: Sequence[Candidate], layout: HandLayout) -> Candidate | None:
-    """The candidate of a colour that is most consistent with the anchor; of its own, itself."""
-    if any(candidate is anchor for candidate in own):
-        return anchor
-    return max(
-        own, key=lambda c: c.prior * _pair_weight(anchor.whole, c.whole, layout), default=None
-    )
+class _Pairs(NamedTuple):
+    """Of each two of n blobs (n, n): squared distance, px^2, and the smaller and larger area."""
+
+    distance2: Array
+    smaller: Array
+    larger: Array
 
 
-def _set_score(members: Sequence[Candidate], layout: HandLayout) -> float:
-    """Sum of pairwise consistencies, each weighted with both priors, and a little of each prior."""
-    score = _PRIOR_WEIGHT * sum(member.prior for member in members)
-    for i, a in enumerate(members):
-        for b in members[:i]:
-            score += _pair_weight(a.whole, b.whole, layout) * a.prior * b.prior
-    return score
+def _pairs(blobs: Sequence[Blob]) -> _Pairs:
+    x, y, area = np.array([(one.x_px, one.y_px, max(one.area_px, 1.0)) for one in blobs]).T
+    distance2 = np.subtract.outer(x, x) ** 2 + np.subtract.outer(y, y) ** 2
+    return _Pairs(distance2, np.minimum.outer(area, area), np.maximum.outer(area, area))
 
 
-def _in_set(member: Candidate, members: Sequence[Candidate | None]) -> float:
-    others = [other for other in members if other is not None and other is not member]
-    return consistency(member.whole, [other.whole for other in others])
+def _members(likings: Array, counts: Sequence[int]) -> Ints:
+    """Of each anchor (a row) and each colour that has candidates the one it likes most; (n, c).
+
+    Of its own colour it likes itself.
+    """
+    columns, first = [], 0
+    for count in counts:
+        if count:
+            column = first + np.argmax(likings[:, first : first + count], axis=1)
+            column[first : first + count] = np.arange(first, first + count)
+            columns.append(column)
+        first += count
+    return np.stack(columns, axis=1)
 
 
-def _pair_consistency(a: Blob, b: Blob) -> float:
-    """How well distance and size of two blobs are those of markers on one hand, 0..1."""
-    area_a, area_b = a.area_px, b.area_px
-    smaller, larger = (area_a, area_b) if area_a < area_b else (area_b, area_a)
-    distance2 = (a.x_px - b.x_px) ** 2 + (a.y_px - b.y_px) ** 2
+def _mean_with(consistencies: Array, n: int, members: Ints) -> float:
+    """Mean of one's consistency with the other members; 1 if there are none."""
+    others = members[members != n]
+    return float(consistencies[n, others].mean()) if len(others) else 1.0
+
+
+def _consistencies(pairs: _Pairs) -> Array:
+    """How well distances and sizes are those of markers on one hand, 0..1; (n, n)."""
     # Of two sizes the smaller one is less often wrong: background and blur make blobs large.
-    nearness = 1.0 / (1.0 + (distance2 / (_REACH_WIDTHS**2 * smaller)) ** 2)
-    return nearness * min(1.0, _SIZE_RATIO * smaller / larger)
+    nearness = 1.0 / (1.0 + (pairs.distance2 / (_REACH_WIDTHS**2 * pairs.smaller)) ** 2)
+    return nearness * np.minimum(1.0, _SIZE_RATIO * pairs.smaller / pairs.larger)
 
 
-def _pair_weight(a: Blob, b: Blob, layout: HandLayout) -> float:
-    """Their consistency, more of those of like sizes: to choose between sets, not to judge one."""
-    smaller, larger = sorted((a.area_px, b.area_px))
-    likeness, nearness = smaller / max(larger, 1.0), layout.nearness(a, b)
-    if nearness is None:
-        return _pair_consistency(a, b) * likeness**_LIKE_SIZE
-    return nearness * likeness**_LIKE_SIZE_LAID_OUT
+def _weights(pairs: _Pairs, colors: Ints, layout: HandLayout) -> Array:
+    """Consistencies, more of those of like sizes: to choose between sets, not to judge one; (n, n).
+
+    Nothing of a blob and itself.
+    """
+    likeness = pairs.smaller / pairs.larger
+    nearness = layout.nearness(colors, pairs.distance2, np.sqrt(pairs.smaller * pairs.larger))
+    weights = np.where(
+        np.isnan(nearness),
+        _consistencies(pairs) * likeness**_LIKE_SIZE,
+        nearness * likeness**_LIKE_SIZE_LAID_OUT,
+    )
+    np.fill_diagonal(weights, 0.0)
+    return weights

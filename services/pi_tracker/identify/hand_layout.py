@@ -6,11 +6,15 @@ apart, a tip and the wrist's dab many. Six things in a room have some other layo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+import numpy as np
+import numpy.typing as npt
+
+from rhot.geometry.transforms import Array
 from rhot.hand import BASIC_LANDMARKS, TIPS
-from services.pi_tracker.image.blob import Blob
 
 # Colour -> hand and landmark.
 Landmarks = Mapping[str, tuple[str, str]]
@@ -24,6 +28,7 @@ _FINGERS_APART = {1: 9.0, 2: 12.0, 3: 14.0}
 _THUMB_APART = (12.0, 14.0, 15.0, 16.0)
 # The wrist's dab and the tips, from the thumb's on.
 _WRIST_LEAST, _WRIST_APART = 4.0, (17.0, 20.0, 20.0, 20.0, 18.0)
+_UNKNOWN = math.nan, math.nan
 _WRIST = BASIC_LANDMARKS[0]
 # Beyond these a pair counts less with this power of its squared distance.
 _POWER = 4
@@ -34,33 +39,34 @@ class HandLayout:
 
     def __init__(self, colors: Sequence[str], landmarks: Landmarks) -> None:
         known = [landmarks.get(color) for color in colors]
-        self._spans = [[_span(a, b) for b in known] for a in known]
+        spans = np.array([[_span(a, b) for b in known] for a in known]).reshape(
+            len(colors), len(colors), 2
+        )
+        self._least, self._most = spans[:, :, 0], spans[:, :, 1]
 
-    def nearness(self, a: Blob, b: Blob) -> float | None:
-        """How well two blobs' distance is that of the landmarks they would be, 0..1.
+    def nearness(self, colors: npt.NDArray[np.int64], distance2: Array, areas_px: Array) -> Array:
+        """How well distances of n blobs are those of the landmarks they would be, 0..1; (n, n).
 
-        None where nothing is known of that: they are not of one hand, or mark other joints.
+        colors (n,) by their index; distance2 (n, n), px^2; areas_px (n, n), a mean of both. NaN
+        where nothing is known: they are not of one hand, are of one colour, or mark other joints.
         """
-        span = self._spans[a.color][b.color]
-        if span is None:
-            return None
-        least, most = span
-        distance2 = (a.x_px - b.x_px) ** 2 + (a.y_px - b.y_px) ** 2
-        widths2 = max(distance2, 1.0) / (a.area_px * b.area_px) ** 0.5
-        too_far, too_near = (widths2 / most**2) ** _POWER, (least**2 / widths2) ** _POWER
+        pairs = np.ix_(colors, colors)
+        least2, most2 = self._least[pairs] ** 2, self._most[pairs] ** 2
+        widths2 = np.maximum(distance2, 1.0) / areas_px
+        too_far, too_near = (widths2 / most2) ** _POWER, (least2 / widths2) ** _POWER
         return 1.0 / ((1.0 + too_far) * (1.0 + too_near))
 
 
-def _span(a: tuple[str, str] | None, b: tuple[str, str] | None) -> tuple[float, float] | None:
-    """Least and most that two landmarks of a hand are apart, None if nothing is known."""
+def _span(a: tuple[str, str] | None, b: tuple[str, str] | None) -> tuple[float, float]:
+    """Least and most that two landmarks of a hand are apart, NaN if nothing is known."""
     if a is None or b is None or a[0] != b[0]:
-        return None
+        return _UNKNOWN
     names = {a[1], b[1]}
     tips = sorted(TIPS.index(name) for name in names & set(TIPS))
     if len(names) == 2 and _WRIST in names and tips:
         return _WRIST_LEAST, _WRIST_APART[tips[0]]
     if len(tips) != 2:
-        return None
+        return _UNKNOWN
     first, second = tips
     if first == 0:
         return 0.0, _THUMB_APART[second - 1]

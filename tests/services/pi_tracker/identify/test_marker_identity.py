@@ -164,17 +164,16 @@ def test_of_a_room_full_of_colour_only_the_likeliest_are_compared(monkeypatch):
     compared = []
     monkeypatch.setattr(
         group_consistency,
-        "_pair_consistency",
-        lambda a, b, fit=group_consistency._pair_consistency: compared.append(a) or fit(a, b),
+        "_pairs",
+        lambda blobs, pairs=group_consistency._pairs: compared.append(len(blobs)) or pairs(blobs),
     )
     identity = MarkerIdentity(COLORS, 40)
     tips = hand_blobs(300, 250)
     for seq in range(3):
         associated(identity, [[tip] for tip in tips], seq)
     assert associated(identity, among_specks(tips, 6, seed=4), 3) == tips
-    # Each of 96 anchors is compared with 80 candidates, and 15 pairs of its set are summed; of all
-    # specks it would be 6 million.
-    assert 0 < len(compared) < 10_000
+    # Each of 96 with each, where it would be each of 2406 specks.
+    assert compared[-1] == 96
 
 
 def test_at_first_the_largest_of_many_are_compared():
