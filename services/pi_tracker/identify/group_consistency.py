@@ -27,7 +27,7 @@ _REACH_WIDTHS = 14.0
 _SIZE_RATIO = 4.0
 # Within that, those of one size are likelier to be one hand's: power of the ratio of areas, where
 # their layout is known and where it is not. (First pictures of 120 simulated rooms with things in
-# the paints' colours, of 1387 tips: 91.1 % right with .2 and no layout, 90.9 with .5, 90.6 with 1;
+# the paints' colours, of 1387 tips: 89.3 % right with .2 and no layout, 90.9 with .5, 90.6 with 1;
 # with the layout 96.5, 96.0 and 94.9 with .25, .5 and 1.)
 _LIKE_SIZE, _LIKE_SIZE_LAID_OUT = 0.5, 0.25
 # Weight of the priors beside the pairs' consistency, so that lone markers count.
