@@ -27,7 +27,7 @@ from services.pi_tracker.image.planes import Rect
 from services.pi_tracker.image.yuv_planes import Picture, picture
 from services.pi_tracker.measure.fastest import centroids
 from services.pi_tracker.measure.grown_blob import Growth, NearPaint, limit
-from services.pi_tracker.measure.occluded_marker import marker_of
+from services.pi_tracker.measure.occluded_marker import doubts_px, marker_of
 
 # Every so many frames the whole image is searched although nothing is lost, so that a mistake does
 # not last; and in the first ones, to learn the static background.
@@ -256,8 +256,18 @@ class MarkerFinder:
         ]
         growth = Growth(self._near, limits) if any(most for most, _ in limits) else None
         measured = centroids(image, blobs, self._noise, growth)
+        doubts = doubts_px(
+            [
+                identity.departure_px(color, one.x_px, one.y_px, stamp_ns)
+                for color, one in zip(associated, measured, strict=True)
+            ],
+            [one.area_px for one in measured],
+            [identity.whole_px2(color) for color in associated],
+        )
         markers = []
-        for (color, association), centroid in zip(associated.items(), measured, strict=True):
+        for (color, association), centroid, doubt_px in zip(
+            associated.items(), measured, doubts, strict=True
+        ):
             occluded = identity.update(
                 color,
                 centroid.x_px,
@@ -267,7 +277,9 @@ class MarkerFinder:
                 0.0 if color in self._only_nearly else association.blob.area_px,
                 stamp_ns,
             )
-            markers.append(marker_of(self._names[color], centroid, association.certainty, occluded))
+            markers.append(
+                marker_of(self._names[color], centroid, association.certainty, occluded, doubt_px)
+            )
         return markers
 
 

@@ -164,6 +164,11 @@ class MarkerIdentity:
             return None
         return track.predicted(stamp_ns)
 
+    def departure_px(self, color: int, x_px: float, y_px: float, stamp_ns: int) -> float:
+        """How far a place is from where a marker was predicted; 0 if it was not seen lately."""
+        predicted = self.predicted(color, stamp_ns)
+        return 0.0 if predicted is None else math.dist(predicted, (x_px, y_px))
+
     def area_px2(self, color: int) -> float:
         """How large a marker was when it was seen, 0 if it never was."""
         track = self._tracks[color]
