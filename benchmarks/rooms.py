@@ -5,7 +5,7 @@
 Rooms by number (testing/families/rooms.py; --tuning: those that constants may be chosen on): things
 in the paints' colours, lamps from anywhere, noise, hands from 0.35 to 0.75 m away; three seconds,
 both cameras, each with ranges as somebody has them who clicks on the paint in that light. Rhot's
-tracker and the RHOT paper's look at the same pictures, which take nearly all of the time: 20
+tracker and the RHOT paper's look at the same pictures, which take nearly all of the time: 10
 seconds a room.
     found    of markers of which 60 % or more are visible, the share that is told where its paint is
     astray   of markers that are told, the share that is on something else: more than 14 px off

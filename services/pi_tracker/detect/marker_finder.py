@@ -47,7 +47,7 @@ _NEARLY_SHARES = 0.3, 1.1
 # Cells around a marker in which no background is learnt: its own rim, in the colours of blur and of
 # light from the side; and more around what is smaller than the hand's markers are, a piece of one.
 _MARKER_MARGIN = 4
-# So long nor where a marker must be that is not found: what stays there may be it. (Eighteen rooms
+# So long nor where a marker must be that is not found: what stays there may be it. (Seventeen rooms
 # with things in the paints' colours, both cameras, tips found: 87.1 % without, 90.2 with one second
 # and with two. A dim hand at rest lost one tip after the other, 26 and 93 %.)
 _UNLEARNT_NS = 1_000_000_000

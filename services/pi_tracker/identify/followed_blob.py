@@ -19,8 +19,6 @@ _TOLD_CELLS = 6.0
 # for specks.) Both edges of what is carried along go this share of the hand's way, or more: fingers
 # move by themselves, too.
 _STILL_CELLS, _CARRIED_SHARE = 1, 0.5
-
-
 # A blob is the one of the frame before when it is within so much of where that was, or of where the
 # hand carried it, cells and share of the hand's way.
 _SAME_CELLS, _SAME_SHARE = 4.0, 1.0
