@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from rhot.geometry.transforms import Array
-from services.pi_tracker.identify.hand_layout import HandLayout
+from services.pi_tracker.identify.hand_layout import HandLayout, Ints
 from services.pi_tracker.image.blob import Blob
 
-Ints = npt.NDArray[np.int64]
 # Wrist to finger tip is 180 mm, thumb to little finger spread 200 mm; paint patches are 12 to 16 mm
 # wide: markers lie within 14 patch widths, mostly within 10.
 _REACH_WIDTHS = 14.0
@@ -79,11 +77,6 @@ def most_consistent_set(
         (flat[n := next(found)], _mean_with(consistencies, n, best)) if own else None
         for own in candidates
     ]
-
-
-def consistency(blob: Blob, others: Sequence[Blob]) -> float:
-    """Mean pairwise consistency of a blob with others, 0..1; 1 if there are none."""
-    return _mean_with(_consistencies(_pairs([blob, *others])), 0, np.arange(1 + len(others)))
 
 
 class _Pairs(NamedTuple):

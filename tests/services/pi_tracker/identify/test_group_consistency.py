@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from services.pi_tracker.identify.group_consistency import (
-    Candidate,
-    consistency,
-    most_consistent_set,
-)
+from services.pi_tracker.identify.group_consistency import Candidate, most_consistent_set
 from services.pi_tracker.identify.hand_layout import HandLayout
 from testing.synthetic_blobs import COLORS, hand_blobs, square_blob
 
 UNKNOWN = HandLayout(COLORS, {})
+
+
+def consistency(blob, others):
+    """Of a blob with others, one of each colour."""
+    blobs = [*others, blob]
+    return most_consistent_set([[Candidate(one, 1.0)] for one in blobs], UNKNOWN)[-1][1]
 
 
 def test_consistent_markers_are_near_and_of_one_size():
