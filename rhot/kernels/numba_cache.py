@@ -3,8 +3,8 @@ older one.
 
 numba looks only at the file a kernel is written in: one that calls into a changed file goes on with
 the old callee. So the folder's name carries a digest of all files with kernels. Services that
-compile call `use_cache` in their package, before numba is imported. Another version of rhot with
-the same kernels need not compile them: `adopt` takes them over.
+compile call `use_cache` in their package, before numba is imported. Another version or place of
+rhot with the same kernels need not compile them, some minutes on two cores: it takes them over.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import hashlib
 import os
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 _FOLDER = "RHOT_CACHE"
@@ -58,6 +59,8 @@ def use_cache(package: Path) -> Path | None:
         return None
     try:
         folder = cache_folder(package)
+        if not folder.is_dir():
+            adopt(package)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / _PLACE).write_text(str(package.absolute()))
     except (OSError, RuntimeError):  # RuntimeError: a user without a home
@@ -69,12 +72,21 @@ def use_cache(package: Path) -> Path | None:
 
 
 def clear_old(package: Path) -> None:
-    """Remove the folders of earlier states of the same package's sources."""
+    """Remove the folders of earlier states of the same package's sources, and of packages that are
+    gone.
+    """
     current = cache_folder(package)
     place = current.name.rsplit("-", 1)[0]
-    for folder in cache_root().glob(f"{place}-*"):
-        if folder != current:
+    for folder in cache_root().glob(f"{_PREFIX}*"):
+        if folder != current and (folder.name.startswith(f"{place}-") or _is_left(folder)):
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_left(folder: Path) -> bool:
+    """Whether the package whose kernels a folder holds is gone."""
+    with contextlib.suppress(OSError):
+        return not Path((folder / _PLACE).read_text()).exists()
+    return False
 
 
 def adopt(package: Path) -> Path | None:
@@ -82,21 +94,35 @@ def adopt(package: Path) -> Path | None:
     rhot); returns the folder they came from, None if there are none, or it has its own already.
     """
     folder = cache_folder(package)
-    if any(folder.rglob("*.nbc")):
+    if _count(folder):
         return None
     digest = folder.name.rpartition("-")[2]
-    for other in sorted(cache_root().glob(f"{_PREFIX}*-{digest}")):
+    # Of one that is compiling right now there are few.
+    for other in sorted(cache_root().glob(f"{_PREFIX}*-{digest}"), key=_count, reverse=True):
         with contextlib.suppress(OSError):
-            before = Path((other / _PLACE).read_text())
-            if other == folder or not any(other.rglob("*.nbc")):
-                continue
-            for room in [package, *sorted(package.rglob("*/"))]:
-                old = other / _subfolder(before / room.relative_to(package))
-                if old.is_dir():
-                    new = folder / _subfolder(room.absolute())
-                    shutil.copytree(old, new, dirs_exist_ok=True)
-            return other
+            if _count(other):
+                _take_over(package, folder, other)
+                return other
     return None
+
+
+def _count(folder: Path) -> int:
+    """How many kernels a folder holds."""
+    return sum(1 for _ in folder.rglob("*.nbc"))
+
+
+def _take_over(package: Path, folder: Path, other: Path) -> None:
+    """Copy kernels to `folder`, each subfolder at once: other services may start meanwhile."""
+    before = Path((other / _PLACE).read_text())
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as copies:
+        for room in [package, *sorted(package.rglob("*/"))]:
+            old = other / _subfolder(before / room.relative_to(package))
+            if old.is_dir():
+                new = _subfolder(room.absolute())
+                copy = shutil.copytree(old, Path(copies) / new)
+                with contextlib.suppress(OSError):  # another one was faster
+                    copy.rename(folder / new)
 
 
 def _subfolder(room: Path) -> str:

@@ -1,7 +1,8 @@
 """A whole rig on hosts of its own: a master and two Pis, installed by deploy/install.sh.
 
 What takes minutes is kept in build/hosts/ for the next run, where install.sh finds it as an earlier
-installation: the environments if the wheels are the same, compiled kernels always.
+installation: the environments if the wheels are the same, compiled kernels always. At first those
+are lent that this checkout has.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from rhot.kernels.numba_cache import cache_folder
 from testing.hosts.commands import run
 from testing.hosts.container import Container, copy_in
 from testing.hosts.network import Network, lan
@@ -60,6 +62,7 @@ class HostedRig:
             _restore(host, self._kept(name))
             if name == MASTER:
                 _restore(host, _KEPT / "kernels.tar")
+                _lend_kernels(host)
             host.boot()
         config = write_rig(self._folder)
         self._bring(MASTER, config, config.parent / "calibration")
@@ -151,6 +154,13 @@ def _digest_of(wheels: Path) -> str:
 def _restore(host: Container, kept: Path) -> None:
     if kept.exists():
         run(["tar", "-C", host.disk, "-x", "-f", kept, "--numeric-owner", "-p"])
+
+
+def _lend_kernels(host: Container) -> None:
+    """As if an earlier version of rhot on the host had compiled what this checkout did."""
+    here = cache_folder(ROOT / "services")
+    if here.is_dir():
+        shutil.copytree(here, host.disk / _KERNELS / here.name, dirs_exist_ok=True)
 
 
 def _keep(host: Container, folder: str, kept: Path) -> None:

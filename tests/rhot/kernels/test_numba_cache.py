@@ -4,10 +4,12 @@ state.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -17,6 +19,8 @@ PACKAGE = (
     "from pathlib import Path\n\nfrom rhot.kernels.numba_cache import use_cache\n\n"
     "use_cache(Path(__file__).parent)\n"
 )
+# numba counts what it read from its cache, for `outer` itself.
+HITS = "from kernels.outer import outer; outer(1); print(sum(outer.stats.cache_hits.values()))"
 KERNEL = "from numba import njit\n\n\n@njit(cache=True)\ndef {name}(x):\n    return {body}\n"
 
 
@@ -38,6 +42,11 @@ def package(tmp_path, monkeypatch):
     (folder / "outer.py").write_text(outer)
     (folder / "plain.py").write_text("ANSWER = 42\n")
     return folder
+
+
+def subfolder(package) -> str:
+    """Where numba keeps the kernels of a folder's files."""
+    return f"{package.name}_{hashlib.sha1(str(package).encode()).hexdigest()}"
 
 
 def outcome(package, code="from kernels.outer import outer; print(outer(1))", **variables) -> int:
@@ -96,10 +105,19 @@ def test_kernels_of_another_version_are_taken_over(package, tmp_path):
     new = tmp_path / "new" / "kernels"
     shutil.copytree(package, new, ignore=shutil.ignore_patterns("__pycache__"))
     assert adopt(new) == cache_folder(package)
-    # numba counts what it read from its cache, for `outer` itself.
-    code = "from kernels.outer import outer; outer(1); print(sum(outer.stats.cache_hits.values()))"
-    assert outcome(new, code=code) == 1
+    assert sorted(path.name for path in cache_folder(new).iterdir()) == [subfolder(new)]
+    assert outcome(new, code=HITS) == 1
     assert adopt(new) is None
+
+
+def test_who_starts_without_its_own_kernels_takes_over_those_of_another_place(package, tmp_path):
+    """As a service of an installation in which nobody ran `rhot warm`; two start at once."""
+    assert outcome(package) == 2
+    new = tmp_path / "new" / "kernels"
+    shutil.copytree(package, new, ignore=shutil.ignore_patterns("__pycache__"))
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(lambda _: outcome(new, code=HITS), range(2))) == [1, 1]
+    assert (cache_folder(new) / "place.txt").read_text() == str(new)
 
 
 def test_other_kernels_are_not_taken_over(package, tmp_path):
@@ -108,3 +126,14 @@ def test_other_kernels_are_not_taken_over(package, tmp_path):
     shutil.copytree(package, new, ignore=shutil.ignore_patterns("__pycache__"))
     (new / "inner.py").write_text(KERNEL.format(name="inner", body="x + 10"))
     assert adopt(new) is None
+
+
+def test_kernels_of_what_is_gone_go_and_those_of_another_place_stay(package, tmp_path):
+    assert outcome(package) == 2
+    for name in ("gone", "other"):
+        shutil.copytree(package, tmp_path / name / "kernels")
+        assert outcome(tmp_path / name / "kernels") == 2
+    shutil.rmtree(tmp_path / "gone")
+    clear_old(package)
+    left = {cache_folder(package), cache_folder(tmp_path / "other" / "kernels")}
+    assert set((tmp_path / "cache").iterdir()) == left
