@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from services.pi_tracker.image.frame import Image
@@ -17,6 +18,7 @@ Gate = tuple[float, float]
 # pictures have 2.3: a camera found 26 to 100 % of visible tips without a bound, 78 to 100 % with 4,
 # 98 to 100 % with 2.5.)
 _MOST_NOISE = 2.5
+_NOTHING = 0.0, 0.0, 0.0
 
 
 def slices(rect: Rect) -> tuple[slice, slice]:
@@ -32,14 +34,20 @@ def yuv(image: Picture, rect: Rect) -> Image:
 
 
 def agree(seen: Image, known: Image, noise: Noise, gate: Gate) -> Image:
-    """Which of cells (..., 3), Y, U, V, are within a gate about what is known of them; (...)."""
-    difference = np.abs(seen - known)
+    """Which of cells (h, w, 3), Y, U, V, float32, are within a gate about what is known of them."""
+    # OpenCV's: five times as fast as numpy's on a blob's few hundred cells.
+    return cv2.inRange(cv2.absdiff(seen, known), _NOTHING, _within(noise, gate)).view(np.bool_)
+
+
+def agree_with(cells: Image, color: Image, noise: Noise, gate: Gate) -> Image:
+    """Which of cells (h, w, 3), float32, are within a gate about one Y, U, V (3,)."""
+    within = np.array(_within(noise, gate))
+    return cv2.inRange(cells, color - within, color + within).view(np.bool_)
+
+
+def _within(noise: Noise, gate: Gate) -> tuple[float, float, float]:
     sigmas, levels = gate
     luma, chroma = (
         sigmas * min(sigma, _MOST_NOISE) + levels for sigma in (noise.luma, noise.chroma)
     )
-    return (
-        (difference[..., 0] <= luma)
-        & (difference[..., 1] <= chroma)
-        & (difference[..., 2] <= chroma)
-    )
+    return luma, chroma, chroma

@@ -26,17 +26,24 @@ _GATE: Gate = 2.5, 1.0
 _MOST = 1.0
 
 
-def with_uncovered(static: Image, inside: Image, yuv: Image, noise: Noise) -> Image:
+def with_uncovered(
+    static: Image, inside: Image, yuv: Image, noise: Noise, least_cells: int
+) -> Image:
     """The static cells (h, w) of a blob, and those that look like static ones beside them.
 
-    inside: where the blob is, not 0; yuv (h, w, 3): as the cells look now.
+    inside: where the blob is, not 0; yuv (h, w, 3): as the cells look now. Where fewer than
+    least_cells are not static, no others are looked for.
     """
-    known = static & (inside > 0)
+    blob = inside > 0
+    known = static & blob
+    count, cells = np.count_nonzero(known), np.count_nonzero(blob)
+    if not count or cells - count < least_cells:
+        return known
     found = known.copy()
     for _ in range(_STEPS):
         weights = found.astype(np.float32)
         near = _sum_about(weights)
-        reached = (near > 0.5) & ~found & (inside > 0)
+        reached = (near > 0.5) & ~found & blob
         if not reached.any():
             break
         mean = _sum_about(yuv * weights[..., None]) / np.maximum(near, 1.0)[..., None]
@@ -44,8 +51,8 @@ def with_uncovered(static: Image, inside: Image, yuv: Image, noise: Noise) -> Im
         if not alike.any():
             break
         found |= alike
-    more = np.count_nonzero(found) - np.count_nonzero(known)
-    return found if more <= _MOST * np.count_nonzero(known) else known
+    more = np.count_nonzero(found) - count
+    return found if more <= _MOST * count else known
 
 
 def _sum_about(values: Image) -> Image:
