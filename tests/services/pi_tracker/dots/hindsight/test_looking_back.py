@@ -76,7 +76,7 @@ def test_names_that_were_exchanged_for_long_are_put_right(rhot_data: Path) -> No
     assert isinstance(recorded, RecordedJoints)
     dots = tuple((digit, joint) for digit in (0, 1) for joint in range(4))
     assert [finger_landmarks(DIGITS[digit])[joint] for digit, joint in dots] == list(NAMES)
-    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 35), 25)
+    frames = dot_frames(scene_of(recorded, dots, SIZE, 30.0, 35), 25)[:100]
     clicks = frames[0].places + np.random.default_rng(1).normal(0.0, 2.0, (8, 2))
     seeds = {name: (float(x), float(y)) for name, (x, y) in zip(NAMES, clicks, strict=True)}
     tracker = DotTracker(NAMES, SIZE, seeds)
@@ -85,5 +85,5 @@ def test_names_that_were_exchanged_for_long_are_put_right(rhot_data: Path) -> No
         pictures.append(SeenPatches(k / 30, patches_of(frame, tracker.dot_area_px2)))
         live.append(tracker.step(pictures[-1].patches, k / 30))
     told = look_back(lambda s: DotTracker(NAMES, SIZE, seeds, s, remembers=True), pictures)
-    assert _exchanged(live, frames) > 500
+    assert _exchanged(live, frames) > 300
     assert _exchanged(told, frames) < 20

@@ -17,7 +17,7 @@ from services.simulator.recorded_motion.recording import RecordedJoints
 from testing.dot_patches import NAMES, REST, SIZE, patches_at, patches_of, share_right
 from testing.synthetic_dots import dot_frames, scene_of
 
-COUNT = 60
+COUNT = 45
 RIGHT: Told = tuple(range(8))
 FINGERS: Told = (4, 5, 6, 7, 0, 1, 2, 3)
 NOTHING: Told = (-1,) * 8
@@ -32,7 +32,7 @@ def _judge() -> Judge:
     return Judge(tracker.begun, pictures, times, [RIGHT] * COUNT)
 
 
-def test_names_that_were_lost_for_good_are_found_from_where_they_wereshare_right() -> None:
+def test_names_that_were_lost_for_good_are_found_from_where_they_were_right() -> None:
     for wrong in (FINGERS, NOTHING):
         lost = [RIGHT] * 25 + [wrong] * (COUNT - 25)
         assert resumed(_judge(), lost, lambda: None) == [RIGHT] * COUNT
