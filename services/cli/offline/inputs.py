@@ -18,7 +18,7 @@ from rhot.files.calibration import load_colors
 from rhot.files.capture import CSV_HEADER, Capture, read_stamps
 from rhot.files.config import RigConfig, load_rig
 from rhot.files.rig_tables import CameraTable, RigTable
-from services.cli.offline.camera_input import CameraInput, StampedReader
+from services.cli.offline.frames.camera_input import CameraInput, StampedReader
 from services.cli.offline.track_summary import Origin
 from services.pi_tracker.sources.capture import CaptureReader
 from services.pi_tracker.sources.folder import FolderReader

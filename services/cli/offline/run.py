@@ -26,6 +26,7 @@ from services.cli.offline.clocks.alignment import Clocks
 from services.cli.offline.clocks.by_hand import offsets_of
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.offline.contacts import ContactTrack
+from services.cli.offline.frames.duplicate_frames import DuplicateFrames
 from services.cli.offline.inputs import Job
 from services.cli.offline.looking_back import looked_back
 from services.cli.offline.pipeline import Output, Pipeline, find_markers, geometry, merged
@@ -70,7 +71,8 @@ def run(
         # First, as it takes no time and a broken line should not come up after an hour of video.
         object_notes = _track_objects(job, writer)
         contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
-        counters = _find_markers(job, trackers, cameras, recorded, progress)
+        duplicates = {one.camera: DuplicateFrames() for one in job.inputs}
+        counters = _find_markers(job, trackers, cameras, duplicates, recorded, progress)
         clocks = _find_clocks(job, recorded, cameras, by_hand)
         if pipeline.sizes and not as_live:
             pipeline = _of_right_sizes(pipeline, clocks, progress)
@@ -79,6 +81,7 @@ def run(
         unread = [warning for one in job.inputs for warning in one.warnings]
         notes = [markers_only] if markers_only else []
         notes += [note for one in job.inputs for note in one.notes]
+        notes += [text for one in job.inputs if (text := duplicates[one.camera].text(one.camera))]
         summary = Summary(
             rig=job.config.rig.name,
             cameras={name: counter.summary() for name, counter in counters.items()},
@@ -98,12 +101,13 @@ def _find_markers(
     job: Job,
     trackers: Mapping[str, TrackerStep],
     cameras: dict[str, Camera] | None,
+    duplicates: Mapping[str, DuplicateFrames],
     recorded: RecordedMarkers,
     progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """The markers of all frames; the counts by camera."""
     counters = {name: CameraCounter() for name in job.cameras}
-    found = _marker_frames(job, trackers, cameras or {}, progress)
+    found = _marker_frames(job, trackers, cameras or {}, duplicates, progress)
     if job.markers is None and job.config.dots:
         found = looked_back(found, trackers, len(job.config.dots), recorded.folder, progress)
     for markers in found:
@@ -116,6 +120,7 @@ def _marker_frames(
     job: Job,
     trackers: Mapping[str, TrackerStep],
     cameras: Mapping[str, Camera],
+    duplicates: Mapping[str, DuplicateFrames],
     progress: bool | None,
 ) -> Iterator[MarkerFrame]:
     """The markers of each frame: of pictures, or those that somebody found already."""
@@ -130,7 +135,9 @@ def _marker_frames(
                 clock_sigma_ns[frame.camera],
                 cameras.get(frame.camera),
             )
-            for frame in merged([one.frames() for one in job.inputs])
+            for frame in merged(
+                [duplicates[one.camera].left_out(one.frames()) for one in job.inputs]
+            )
         )
     else:
         found = _recorded_markers(job.markers, job.cameras)

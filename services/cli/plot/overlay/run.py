@@ -20,7 +20,7 @@ from rhot.files.calibration import load_rig_cameras
 from rhot.files.capture import read_lines
 from rhot.geometry.camera import Camera
 from rhot.messages import HandPose, MarkerFrame
-from services.cli.offline.camera_input import CameraInput
+from services.cli.offline.frames.camera_input import CameraInput
 from services.cli.offline.inputs import Job, job_of
 from services.cli.offline.results import check_result
 from services.cli.plot.overlay.draw import Pen, draw_hand, draw_markers
