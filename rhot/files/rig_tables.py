@@ -59,6 +59,10 @@ class CameraTable(Table, frozen=True, kw_only=True):
     fps: Annotated[float, msgspec.Meta(gt=0.0, le=240.0)] = 30.0
     # Width and height. A lens calibration holds for the size that it was made at.
     size_px: tuple[Pixels, Pixels] = (640, 480)
+    # Rolling shutter: from the exposure of a picture's top row to that of its bottom row, where the
+    # source does not tell it (videos, folders of pictures, v4l2). Phones have 8 to 35. 0: all rows
+    # at once.
+    readout_ms: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] = 0.0
     # libcamera's software synchronisation (picamera2 only): one "server", the others "client", all
     # with the same fps, expose together.
     sync: Literal["off", "server", "client"] = "off"

@@ -55,6 +55,7 @@ class TrackerStep:
         *,
         remembers_dots: bool = False,
         landmarks: Landmarks = NO_LANDMARKS,
+        readout_ms: float = 0.0,
     ) -> None:
         # More OpenCV threads gain nothing on images this small, and cost the other cores.
         cv2.setNumThreads(1)
@@ -70,6 +71,7 @@ class TrackerStep:
         self._seeds = seeds or {}
         self._remembers_dots = remembers_dots
         self._landmarks = landmarks
+        self._readout_ms = readout_ms
         self._dots: dict[str, DotFinder] = {}
         # Duration of each stage of the last step in ms; empty without a clock.
         self.times_ms: dict[str, float] = {}
@@ -127,7 +129,7 @@ class TrackerStep:
             camera=self.camera_name,
             seq=frame.seq,
             stamp_ns=frame.stamp_ns,
-            row_time_ns=frame.row_time_ns,
+            row_time_ns=frame.row_time_ns or 1e6 * self._readout_ms / frame.size_px[1],
             clock_offset_ns=clock_offset_ns,
             clock_sigma_ns=clock_sigma_ns,
             size_px=frame.size_px,

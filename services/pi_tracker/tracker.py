@@ -62,6 +62,7 @@ class CameraTracker:
             lens,
             config.dots,
             landmarks=config.landmarks,
+            readout_ms=camera.readout_ms,
         )
 
     def use(self, colors: Colors, step: TrackerStep) -> None:

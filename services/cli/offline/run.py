@@ -242,6 +242,7 @@ def tracker_step(
         seeds=seeds,
         remembers_dots=True,
         landmarks=config.landmarks,
+        readout_ms=config.camera_named(name).readout_ms,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import msgspec
@@ -145,6 +146,15 @@ def test_a_frame_of_another_size_is_tracked_as_it_is(studio, tip, colors):
     message = tracker(colors).step(frame)
     assert message.size_px == (80, 90)
     assert [marker.color for marker in message.markers] == ["green"]
+
+
+def test_a_rolling_shutter_is_told_by_the_frame_or_else_by_rig_toml(studio, tip, colors):
+    (frame, _) = studio.frame([tip("green", 60.0, 60.0)], 0, "bgr", size_px=SIZE)
+    step = TrackerStep("left", colors, Tracker(), SIZE, ("green",), readout_ms=24.0)
+    for own_ns, told_ns in ((0.0, 24e6 / SIZE[1]), (30_000.0, 30_000.0)):
+        message = step.step(dataclasses.replace(frame, row_time_ns=own_ns))
+        assert message.row_time_ns == pytest.approx(told_ns)
+    assert tracker(colors).step(dataclasses.replace(frame, row_time_ns=0.0)).row_time_ns == 0.0
 
 
 def test_the_size_may_change_while_running(studio, tip, colors):
