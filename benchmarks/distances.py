@@ -26,6 +26,7 @@ from hard import VISIBLE, frame_of, on_paint
 from rhot.files.calibration import load_colors
 from rhot.files.config import RigConfig, load_rig
 from rhot.messages import MarkerFrame
+from services.pi_tracker.rig_step import step_of_rig
 from services.pi_tracker.step import TrackerStep
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.camera.visibility import sights
@@ -78,15 +79,7 @@ def watch(config: RigConfig, scene: Scene, frames: int) -> tuple[Tally, list[flo
 def tracker(config: RigConfig, source: FrameSource) -> TrackerStep:
     """A new tracker of that camera."""
     name = source.camera.name
-    colors = load_colors(config.calibration_dir, name)
-    return TrackerStep(
-        name,
-        colors,
-        config.tracker,
-        source.camera.size_px,
-        config.colors,
-        landmarks=config.landmarks,
-    )
+    return step_of_rig(config, name, load_colors(config.calibration_dir, name))
 
 
 def counted(

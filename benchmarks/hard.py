@@ -32,7 +32,7 @@ from rhot.files.calibration import load_colors
 from rhot.files.config import RigConfig, load_rig
 from rhot.messages import Marker
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.step import TrackerStep
+from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.camera.visibility import PatchVisibility, patch_visibility
 from services.simulator.scene.scene import load_scene
@@ -95,15 +95,7 @@ def on_paint(marker: Marker, paint: npt.NDArray[np.bool_]) -> bool:
 def run(config: RigConfig, camera: str, seed: int, count: int, tallies: dict[str, Tally]) -> None:
     """Track `count` frames of one camera."""
     source = FrameSource(load_scene(config, SCENE, seed), camera)
-    colors = load_colors(config.calibration_dir, camera)
-    step = TrackerStep(
-        camera,
-        colors,
-        config.tracker,
-        source.camera.size_px,
-        config.colors,
-        landmarks=config.landmarks,
-    )
+    step = step_of_rig(config, camera, load_colors(config.calibration_dir, camera))
     landmarks = {
         color: landmark
         for table in config.hand.values()

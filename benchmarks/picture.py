@@ -35,6 +35,7 @@ from rhot.files.rig_tables import Fusion, Tracker
 from rhot.files.simulator_table import Simulator
 from rhot.messages import MarkerFrame
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.rig_step import step_of_rig
 from services.pi_tracker.step import TrackerStep
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.camera.processing import processed
@@ -96,10 +97,7 @@ class Film:
         found: list[tuple[float, MarkerFrame]] = []
         for name in scene.cameras:
             colors = load_colors(config.calibration_dir, name)
-            size_px = scene.cameras[name].size_px
-            tracker = TrackerStep(
-                name, colors, config.tracker, size_px, config.colors, landmarks=config.landmarks
-            )
+            tracker = step_of_rig(config, name, colors)
             found += [
                 (taken.time_s, tracker.step(self._frame(taken), 0, CLOCK_SIGMA_NS))
                 for taken in self._pictures(scene, name, seconds)

@@ -25,9 +25,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.messages import MarkerFrame
-from services.pi_tracker.step import TrackerStep
+from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
 from testing.families.case import Half
 from testing.families.pictures import PaintMiddles, fitted_colors, frame_of, visible_shares
@@ -50,6 +51,12 @@ class Count(NamedTuple):
     astray: int = 0
 
 
+def with_method(config: RigConfig, method: str) -> RigConfig:
+    """The rig with another kind of tracker."""
+    tracker = msgspec.structs.replace(config.tracker, method=method)
+    return msgspec.structs.replace(config, tracker=tracker)
+
+
 def counts_in(number: int) -> dict[str, list[Count]]:
     """Of each method, the counts of both cameras in a room."""
     recipe = room(number)
@@ -62,14 +69,7 @@ def counts_in(number: int) -> dict[str, list[Count]]:
         source = FrameSource(scene, name, recorded=True)
         colors = fitted_colors(recipe.scene(seed=recipe.seed + _CALIBRATED), name)
         trackers = {
-            method: TrackerStep(
-                name,
-                colors,
-                msgspec.structs.replace(scene.config.tracker, method=method),
-                source.camera.size_px,
-                scene.config.colors,
-                landmarks=scene.config.landmarks,
-            )
+            method: step_of_rig(with_method(scene.config, method), name, colors)
             for method in counts
         }
         here = dict.fromkeys(trackers, Count())

@@ -6,7 +6,7 @@ from rhot.files.calibration import load_colors
 from rhot.files.config import RigConfig
 from rhot.messages import MarkerFrame
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.step import TrackerStep
+from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
 from services.simulator.scene.scene import Scene
 from testing.synthetic_points import START_NS
@@ -23,15 +23,7 @@ def detect(config: RigConfig, scene: Scene, seconds: float) -> list[MarkerFrame]
     found: list[tuple[float, MarkerFrame]] = []
     for name in scene.cameras:
         source = FrameSource(scene, name, recorded=True)
-        colors = load_colors(config.calibration_dir, name)
-        tracker = TrackerStep(
-            name,
-            colors,
-            config.tracker,
-            source.camera.size_px,
-            config.colors,
-            landmarks=config.landmarks,
-        )
+        tracker = step_of_rig(config, name, load_colors(config.calibration_dir, name))
         for seq in range(int(seconds * config.camera_named(name).fps)):
             taken = source.take(seq, START_NS)
             if taken.image is not None:

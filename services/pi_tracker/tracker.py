@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rhot.clock import Offset
-from rhot.files.calibration import Colors, load_lens
+from rhot.files.calibration import Colors
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable
 from rhot.messages import MarkerFrame
 from rhot.messages.camera import SeenInPicture
 from services.pi_tracker.colors.light_drift import Drifted, DriftMonitor
 from services.pi_tracker.image.frame import Frame
+from services.pi_tracker.rig_step import step_of_rig
 from services.pi_tracker.step import TrackerStep
 
 
@@ -49,20 +50,13 @@ class CameraTracker:
 
         Raises CalibrationError if one of them has no range, or the lens is needed and missing.
         """
-        config, camera = self._config, self.camera
-        lens = load_lens(config.calibration_dir, camera.name) if config.tracker.rectify else None
-        return TrackerStep(
-            camera.name,
+        return step_of_rig(
+            self._config,
+            self.camera.name,
             colors,
-            config.tracker,
-            camera.size_px,
             names,
-            self._clock,
-            self.colors_path,
-            lens,
-            config.dots,
-            landmarks=config.landmarks,
-            readout_ms=camera.readout_ms,
+            clock=self._clock,
+            colors_path=self.colors_path,
         )
 
     def use(self, colors: Colors, step: TrackerStep) -> None:

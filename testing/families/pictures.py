@@ -21,7 +21,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HandModel, default_hand, landmark_point
 from rhot.messages import MarkerFrame
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.step import TrackerStep
+from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource, TakenFrame
 from services.simulator.camera.visibility import patch_visibility
 from services.simulator.files.fit_colors import fit_ranges, sample_pixels
@@ -167,17 +167,7 @@ def detected(
     for camera in scene.cameras:
         source = FrameSource(scene, camera, recorded=True)
         colors = fitted_colors(calibration, camera)
-        steps = {
-            name: TrackerStep(
-                camera,
-                colors,
-                scene.config.tracker,
-                source.camera.size_px,
-                scene.config.colors,
-                landmarks=scene.config.landmarks,
-            )
-            for name in trackers
-        }
+        steps = {name: step_of_rig(scene.config, camera, colors) for name in trackers}
         for seq in range(int(recipe.seconds * scene.config.camera_named(camera).fps)):
             taken = source.take(seq, START_NS)
             if taken.image is None:

@@ -14,7 +14,7 @@ from rhot.messages import MarkerFrame
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.image.frame import Frame
-from services.pi_tracker.step import TrackerStep
+from services.pi_tracker.rig_step import step_of_rig
 from testing.second_renderer.clip import SIZE_PX, Clip
 from testing.second_renderer.motion import Array
 from testing.second_renderer.paint import COLORS
@@ -93,10 +93,7 @@ def detected(clip: Clip, shots: Film) -> list[MarkerFrame]:
     config = clip.config()
     found = []
     for name in ("left", "right"):
-        colors = fitted_colors(clip, shots, name)
-        step = TrackerStep(
-            name, colors, config.tracker, SIZE_PX, config.colors, landmarks=config.landmarks
-        )
+        step = step_of_rig(config, name, fitted_colors(clip, shots, name))
         skew_s = (clip.rig.skew_s + clip.rig.clock_error_s) * (name == "right")
         for k, at_s in enumerate(shots.times_s[name].tolist()):
             markers = step.step(

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from rhot.errors import CalibrationError, CaptureError
-from rhot.files.calibration import load_colors, load_lens, load_objects, load_rig_cameras
+from rhot.files.calibration import load_colors, load_objects, load_rig_cameras
 from rhot.files.capture import read_lines
 from rhot.files.config import RigConfig
 from rhot.geometry.camera import Camera
@@ -35,6 +35,7 @@ from services.cli.offline.seeds import dot_notes, seeds_of
 from services.cli.offline.track_summary import CameraCounter, Summary
 from services.cli.progress import Progress
 from services.object_tracker.step import ObjectStep
+from services.pi_tracker.rig_step import step_of_rig
 from services.pi_tracker.step import TrackerStep
 
 # Frames that a point waits for: as many as fusion can use.
@@ -228,21 +229,8 @@ def tracker_step(
         raise CalibrationError(
             f"{path}: has no colour; add one with `rhot calibrate colors {name}`"
         )
-    lens = load_lens(config.calibration_dir, name) if config.tracker.rectify else None
-    size_px = config.camera_named(name).size_px
-    return TrackerStep(
-        name,
-        colors,
-        config.tracker,
-        size_px,
-        wanted,
-        colors_path=path,
-        lens=lens,
-        dots=config.dots,
-        seeds=seeds,
-        remembers_dots=True,
-        landmarks=config.landmarks,
-        readout_ms=config.camera_named(name).readout_ms,
+    return step_of_rig(
+        config, name, colors, wanted, colors_path=path, seeds=seeds, remembers_dots=True
     )
 
 
