@@ -25,9 +25,10 @@ import numpy as np
 
 from services.pi_tracker.image.frame import Frame, Image
 
-# The picture is compared by the means of this many blocks a row, 8 px wide at 640; and changes are
-# means over so many that change most, what a few edges of a hand cover.
-_BLOCKS, _MOST_CHANGED = 80, 20
+# Of pictures twice as wide and more not every pixel is looked at. They are compared by the means of
+# this many blocks a row, 8 px wide at 640; and changes are means over so many that change most,
+# what a few edges of a hand cover.
+_PIXELS, _BLOCKS, _MOST_CHANGED = 640, 80, 20
 # A duplicate changes by less than this of what its neighbours do. (Of three simulated scenes, sharp
 # and blurred, and a webcam's video of a ball, with 12 % duplicates through x264 at crf 18 to 28,
 # VP9, MPEG-4 and JPEG: 92 % are found; with .45 more, and 2 of the 1004 pictures of the webcam's
@@ -60,6 +61,9 @@ class _Change(NamedTuple):
         return self.most < _SHARE * other.most and not own_noise
 
 
+_NO_CHANGE = _Change(0.0, 0.0, 0.0)
+
+
 class DuplicateFrames:
     """Leaves them out of one camera's frames, and counts them."""
 
@@ -68,7 +72,7 @@ class DuplicateFrames:
         # The last two pictures that are none, and the change between them.
         self._before: Image | None = None
         self._last: Image | None = None
-        self._change = _Change(0.0, 0.0, 0.0)
+        self._change = _NO_CHANGE
         # Half the blocks' change of the latest that are none.
         self._medians: deque[float] = deque(maxlen=_NOISE_FRAMES)
         # Frames after the last that may be duplicates: the next one tells.
@@ -93,10 +97,8 @@ class DuplicateFrames:
         )
 
     def _next(self, frame: Frame) -> Iterator[Frame]:
-        if self._last is None:
-            yield self._take(frame)
-            return
-        change = _change(self._last, _luma(frame))
+        image = _luma(frame)
+        change = self._from_last(image)
         if self._change.most > _LEAST and change.stands(self._change):
             if self._without_noise(change):
                 self.count += 1
@@ -105,22 +107,28 @@ class DuplicateFrames:
             if frame.stamp_ns - self._last_ns > _LONGEST_NS:
                 yield from self._take_waiting()
             return
-        if self._waiting and self._goes_on(frame, change):
-            self.count += len(self._waiting)
-            self._waiting.clear()
-        yield from self._take_waiting()
-        yield self._take(frame)
+        if self._waiting:
+            if self._goes_on(image, change):
+                self.count += len(self._waiting)
+                self._waiting.clear()
+            else:
+                yield from self._take_waiting()
+                change = self._from_last(image)
+        yield self._take(frame, image, change)
+
+    def _from_last(self, image: Image) -> _Change:
+        return _NO_CHANGE if self._last is None else _change(self._last, image)
 
     def _without_noise(self, change: _Change) -> bool:
         """Whether a picture lacks the noise that the ones before it had."""
         usual = min(self._medians) if len(self._medians) == _NOISE_FRAMES else 0.0
         return usual > _LEAST_NOISE and change.median < _NOISE_SHARE * usual
 
-    def _goes_on(self, frame: Frame, change: _Change) -> bool:
-        """Whether a frame continues a motion that the waiting ones interrupt."""
+    def _goes_on(self, image: Image, change: _Change) -> bool:
+        """Whether a picture continues a motion that the waiting ones interrupt."""
         if self._before is None:
             return False
-        far = _change(self._before, _luma(frame))
+        far = _change(self._before, image)
         way = self._change.moved + change.moved
         stand = all(waiting.stands(change) for _, waiting in self._waiting)
         return stand and far.moved > _ON * way
@@ -128,24 +136,26 @@ class DuplicateFrames:
     def _take_waiting(self) -> Iterator[Frame]:
         """Those waiting are none."""
         for frame, _ in self._waiting:
-            yield self._take(frame)
+            image = _luma(frame)
+            yield self._take(frame, image, self._from_last(image))
         self._waiting.clear()
 
-    def _take(self, frame: Frame) -> Frame:
-        """Remember a frame that is none."""
-        image = _luma(frame)
+    def _take(self, frame: Frame, image: Image, change: _Change) -> Frame:
+        """Remember a frame that is none, and the change from the last to it."""
         if self._last is not None:
-            self._change = _change(self._last, image)
-            self._medians.append(self._change.median)
-        self._before, self._last, self._last_ns = self._last, image, frame.stamp_ns
+            self._medians.append(change.median)
+        self._before, self._last, self._change = self._last, image, change
+        self._last_ns = frame.stamp_ns
         return frame
 
 
 def _luma(frame: Frame) -> Image:
-    """The brightness of a frame's picture, (h, w)."""
-    if frame.layout == "i420":
-        return frame.image[: frame.size_px[1]]
-    return frame.image[:, :, 1]
+    """The brightness of a frame's picture (h, w), of a large one of every so many-th pixel."""
+    width, height = frame.size_px
+    step = max(width // _PIXELS, 1)
+    whole = frame.image[:height] if frame.layout == "i420" else frame.image[:, :, 1]
+    # A copy: what is kept of a picture must not keep all of it.
+    return np.ascontiguousarray(whole[::step, ::step])
 
 
 def _change(one: Image, other: Image) -> _Change:
