@@ -17,7 +17,10 @@ from services.pi_tracker.identify.followed_blob import LEAST_CELLS, FollowedBlob
 from services.pi_tracker.identify.track import Track
 from services.pi_tracker.image.blob import Blob
 
-# So many markers tell how the hand moved; and so many colours, where it is if it is elsewhere.
+# So many markers tell how the hand moved, those whose blobs leave no choice if there are as many:
+# of several, the one that was taken may be a thing. (A tuning clip of the other renderer, flapping
+# at 1 Hz before green stripes: with all of them 63 of 240 green tips were not found in one camera,
+# and 7 on a stripe.) And so many colours, where the hand is if it is elsewhere.
 _MARKERS = 3
 # What is smaller, cells, or was followed for fewer frames, may be noise that seems to move. (A hand
 # at rest in a noisy room: 99 % of its markers found from two frames on, 91 with none.)
@@ -53,6 +56,9 @@ class CarriedBlobs:
             for own, track, n in zip(blobs, tracks, taken, strict=True)
             if track is not None and n is not None
         ]
+        sure = [own for own, n in zip(blobs, taken, strict=True) if n is not None]
+        single = [way for way, own in zip(ways, sure, strict=True) if len(own) == 1]
+        ways = single if len(single) >= _MARKERS else ways
         recent = 0 < stamp_ns - self._stamp_ns <= _GAP_NS
         self._stamp_ns = stamp_ns
         known = self._followed

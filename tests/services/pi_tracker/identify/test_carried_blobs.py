@@ -23,6 +23,26 @@ def test_what_stands_still_is_given_up_for_what_the_hand_carries_along(dx_px, dy
     assert found is tips[2]
 
 
+def test_what_was_taken_for_a_tip_does_not_tell_how_the_hand_moves():
+    """The markers that leave no choice went far enough to tell; with the thing's, half as far."""
+    identity = MarkerIdentity(COLORS, 40)
+    whole = hand_blobs(300, 250)
+    for seq in range(6):
+        # Shadows pass over it: it is not quite still.
+        thing = square_blob(2, 260 + 4 * (seq % 2), 140, 26)
+        # A hand that bends at the wrist: fingers go 20 px and more, thumb and wrist 4.
+        share = min(seq, 4) / 4
+        ways_px = [4, 22, 20, 20, 22, 4]
+        tips = [
+            square_blob(tip.color, tip.x_px, tip.y_px - share * way_px)
+            for tip, way_px in zip(whole, ways_px, strict=True)
+        ]
+        blobs = [[tip] for tip in tips]
+        blobs[2] = [thing, tips[2]] if seq else [thing]
+        found = associated(identity, blobs, seq)
+    assert found[2] is tips[2]
+
+
 def test_a_thumb_that_lies_still_stays_one_while_the_fingers_move():
     identity = MarkerIdentity(COLORS, 40)
     thumb = square_blob(0, 240, 230)
