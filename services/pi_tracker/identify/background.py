@@ -74,7 +74,7 @@ class BackgroundModel:
         touching = [self._touches(blob) for blob in blobs]
         if not any(touching):
             return list(blobs)
-        # The cells of all of them at once: one by one, thirty blobs took three times as long.
+        # The cells of all of them at once, not of each blob by itself.
         rect = _bounds([blob.rect for blob, on in zip(blobs, touching, strict=True) if on])
         seen = _Seen(image, rect, yuv(image, rect))
         static = self._sightings[slices(rect)] >= _STATIC_SIGHTINGS
