@@ -50,7 +50,7 @@ Figures = dict[str, float]
 class AllFrames(DuplicateFrames):
     """Leaves none out."""
 
-    def left_out(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+    def new_frames(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """All of them."""
         yield from frames
 

@@ -137,7 +137,7 @@ def _marker_frames(
                 cameras.get(frame.camera),
             )
             for frame in merged(
-                [duplicates[one.camera].left_out(one.frames()) for one in job.inputs]
+                [duplicates[one.camera].new_frames(one.frames()) for one in job.inputs]
             )
         )
     else:

@@ -56,8 +56,8 @@ class CarriedBlobs:
             for own, track, n in zip(blobs, tracks, taken, strict=True)
             if track is not None and n is not None
         ]
-        sure = [own for own, n in zip(blobs, taken, strict=True) if n is not None]
-        single = [way for way, own in zip(ways, sure, strict=True) if len(own) == 1]
+        choices = [len(own) for own, n in zip(blobs, taken, strict=True) if n is not None]
+        single = [way for way, count in zip(ways, choices, strict=True) if count == 1]
         ways = single if len(single) >= _MARKERS else ways
         recent = 0 < stamp_ns - self._stamp_ns <= _GAP_NS
         self._stamp_ns = stamp_ns

@@ -35,6 +35,7 @@ _PIXELS, _BLOCKS, _MOST_CHANGED = 640, 80, 20
 # own, where the ball is slow for a frame.)
 _SHARE = 0.3
 # Less is no change, in grey levels: of a hand that rests nothing can be told, nor needs to be.
+# (This one and those of time and noise below were set by what these clips show, not swept.)
 _LEAST = 2.0
 # The picture after must be as far from the one before as this share of the two steps between them;
 # a block that changes by more than so many medians is more than noise. (Of the same and a recorded
@@ -44,7 +45,8 @@ _ON, _NOISE = 0.6, 2.0
 # A hand may rest in a video without noise, but not for so short a time.
 _LONGEST_NS = 100_000_000
 # Noise stops: half the blocks change by less than this share of what they did in each of so many
-# pictures (some encoders refresh one of twelve), which was so many grey levels.
+# pictures (some encoders refresh one of twelve), which was so many grey levels. And what is less
+# than so many is no noise of a picture's own.
 _NOISE_SHARE, _NOISE_FRAMES, _LEAST_NOISE, _SOME_NOISE = 0.2, 15, 0.5, 0.25
 
 
@@ -55,7 +57,7 @@ class _Change(NamedTuple):
     median: float  # of half the picture
     moved: float  # sum of what is more than noise: grows with the way that things went
 
-    def stands(self, other: _Change) -> bool:
+    def stands_still(self, other: _Change) -> bool:
         """Whether it is that of a duplicate next to another: it has no noise of its own either."""
         own_noise = self.median > max(0.5 * other.median, _SOME_NOISE)
         return self.most < _SHARE * other.most and not own_noise
@@ -79,8 +81,8 @@ class DuplicateFrames:
         self._waiting: list[tuple[Frame, _Change]] = []
         self._last_ns = 0
 
-    def left_out(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """The frames without them, in order; one that may be one comes after the next is read."""
+    def new_frames(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """The frames that are none, in order; one that may be one comes after the next is read."""
         for frame in frames:
             self._frames += 1
             yield from self._next(frame)
@@ -99,7 +101,7 @@ class DuplicateFrames:
     def _next(self, frame: Frame) -> Iterator[Frame]:
         image = _luma(frame)
         change = self._from_last(image)
-        if self._change.most > _LEAST and change.stands(self._change):
+        if self._change.most > _LEAST and change.stands_still(self._change):
             if self._without_noise(change):
                 self.count += 1
                 return
@@ -130,7 +132,7 @@ class DuplicateFrames:
             return False
         far = _change(self._before, image)
         way = self._change.moved + change.moved
-        stand = all(waiting.stands(change) for _, waiting in self._waiting)
+        stand = all(waiting.stands_still(change) for _, waiting in self._waiting)
         return stand and far.moved > _ON * way
 
     def _take_waiting(self) -> Iterator[Frame]:

@@ -36,7 +36,7 @@ def left_out(pictures) -> list[int]:
         Frame("left", n, n * FRAME_NS, 0.0, SIZE, image, "bgr") for n, image in enumerate(pictures)
     ]
     duplicates = DuplicateFrames()
-    kept = list(duplicates.left_out(frames))
+    kept = list(duplicates.new_frames(frames))
     assert [frame.seq for frame in kept] == sorted({frame.seq for frame in kept})
     assert all(frame is frames[frame.seq] for frame in kept)
     assert duplicates.count == len(frames) - len(kept)
