@@ -27,7 +27,7 @@ import numpy as np
 
 from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
-from rhot.messages import MarkerFrame
+from rhot.messages import Marker
 from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
 from testing.families.case import Half
@@ -39,7 +39,7 @@ ROOMS = 24
 # A marker so far from its paint's middle is on something else; a tip is 8 to 30 px wide.
 ASTRAY_PX, VISIBLE = 14.0, 0.6
 # Another seed of a room has the same lamps and paint: somebody calibrated before.
-_CALIBRATED = 1_000_000
+CALIBRATED = 1_000_000
 
 
 class Count(NamedTuple):
@@ -67,7 +67,7 @@ def counts_in(number: int) -> dict[str, list[Count]]:
     counts: dict[str, list[Count]] = {"rhot": [], "paper": []}
     for name, camera in scene.cameras.items():
         source = FrameSource(scene, name, recorded=True)
-        colors = fitted_colors(recipe.scene(seed=recipe.seed + _CALIBRATED), name)
+        colors = fitted_colors(recipe.scene(seed=recipe.seed + CALIBRATED), name)
         trackers = {
             method: step_of_rig(with_method(scene.config, method), name, colors)
             for method in counts
@@ -80,17 +80,17 @@ def counts_in(number: int) -> dict[str, list[Count]]:
             paint_px = camera.project(middles(np.array([taken.time_s]))[0])
             wanted = dict(zip(landmarks.values(), zip(visible, paint_px, strict=True), strict=True))
             for method, tracker in trackers.items():
-                here[method] = _counted(here[method], tracker.step(frame_of(taken)), wanted)
+                here[method] = counted(here[method], tracker.step(frame_of(taken)).markers, wanted)
         for method, count in here.items():
             counts[method].append(count)
     return counts
 
 
-def _counted(
-    count: Count, frame: MarkerFrame, wanted: Mapping[str, tuple[np.bool_, Array]]
+def counted(
+    count: Count, markers: Sequence[Marker], wanted: Mapping[str, tuple[np.bool_, Array]]
 ) -> Count:
     """With a frame more; wanted: is each colour's marker visible, and where is its paint?"""
-    told = {marker.color: marker for marker in frame.markers}
+    told = {marker.color: marker for marker in markers}
     for color, (visible, (x_px, y_px)) in wanted.items():
         marker = told.get(color)
         right = marker is not None and (

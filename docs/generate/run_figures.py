@@ -83,6 +83,7 @@ RUNS = {
     "objects_registration": _script("objects_registration", "", "--seeds 2", 2),
     "objects_tracking": _script("objects_tracking", "", "--seconds 2", 0.7),
     "picture": _script("picture", "", "--seconds 2 --seeds 1", 2),
+    "proposed_colors": _script("proposed_colors", "", "--rooms 1", 8),
     "returns": _script("returns", "", None, 0.5),
     "rooms": _script("rooms", "", "--rooms 1", 6),
     "scale": _script(

@@ -120,9 +120,14 @@ def colors(
         typer.Option(help="with --video: frames for --box, --click and --auto, e.g. 10,200,500"),
     ] = None,
     pictures: Annotated[
-        int,
-        typer.Option(min=1, max=20, help="how many pictures to take while the hand is held still"),
-    ] = 5,
+        int | None,
+        typer.Option(
+            min=1,
+            max=20,
+            help="how many pictures to take; default: 5 of a hand that is held still, with --auto "
+            "alone 12 of one that moves",
+        ),
+    ] = None,
     out: options.OutOption = None,
     picture: Annotated[
         Path | None, typer.Option(help="write a picture of what was taken for paint")

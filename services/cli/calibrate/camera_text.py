@@ -13,8 +13,8 @@ from rhot.files.calibration import ColorRange, Colors
 from rhot.messages.camera import ExposureControl
 from services.pi_tracker.colors.exposure_advice import ExposureStatistics
 from services.pi_tracker.colors.fit import TrainingSet
-from services.pi_tracker.colors.paint_names import Suggestion
-from services.pi_tracker.colors.propose import Proposal
+from services.pi_tracker.colors.proposal.paint_names import Suggestion
+from services.pi_tracker.colors.proposal.propose import Proposal
 from services.pi_tracker.colors.report import Report
 from services.pi_tracker.detect.color_table import compile_colors
 from services.pi_tracker.image.frame import Frame, Image
@@ -62,8 +62,8 @@ def proposals_text(proposals: Sequence[Proposal], suggestions: Sequence[Suggesti
         first = one.boxes[0]
         x, y, w, h = map(round, (first.x_px, first.y_px, first.width_px, first.height_px))
         lines.append(
-            f"  {one.color:10s} hue {one.hue:5.1f}, seen in {one.pictures} picture(s), "
-            f"e.g. --box {one.color}={x},{y},{w},{h}"
+            f"  {one.color:10s} hue {one.hue:5.1f}, {'moves' if one.moves else 'stands still'}, "
+            f"seen in {one.pictures} picture(s), e.g. --box {one.color}={x},{y},{w},{h}"
         )
     free = ", ".join(f"{one.color} ({one.clearance:.0f} hues clear)" for one in suggestions)
     lines.append(

@@ -20,18 +20,18 @@ from rhot.files.calibration import ColorRange, Colors, load_colors, save
 from rhot.files.config import RigConfig
 from services.cli.calibrate import options
 from services.cli.calibrate.camera_text import overlay, proposals_text, report_text
-from services.cli.calibrate.live_pictures import next_frames
+from services.cli.calibrate.live_pictures import MOVING_PAUSE_S, STILL_PAUSE_S, next_frames
 from services.cli.calibrate.pointing_options import PointingOptions, frame_numbers
 from services.cli.recorded.frames import frame_names, frames_by_number, spread_numbers
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.colors.propose import boxes_of, propose
+from services.pi_tracker.colors.proposal.propose import boxes_of, propose
 from services.pi_tracker.colors.report import colors_file, examine
 from services.pi_tracker.image.frame import Frame, Image
 
-# Frames of a recording that --auto uses unless told otherwise.
-_AUTO_FRAMES = 6
+# Pictures that --auto uses unless told otherwise, enough to tell what moves; and others.
+AUTO_FRAMES, _STILL_FRAMES = 12, 5
 
 
 class Pictures(NamedTuple):
@@ -72,7 +72,7 @@ def from_recording(
                 "say which frames the boxes or clicks are in: --frames 10,200,500, "
                 "or --at FRAME:color=x,y,width,height"
             )
-        numbers = spread_numbers(request.camera, video, _AUTO_FRAMES)
+        numbers = spread_numbers(request.camera, video, AUTO_FRAMES)
     pointers += request.pointing.in_every_frame(range(first, len(numbers)))
     taken = frames_by_number(request.camera, video, numbers)
     inputs = {"recording": video.name, "frames": numbers}
@@ -90,12 +90,23 @@ def _known(path: Path) -> dict[str, ColorRange]:
     return load_colors(path.parent, path.name.removesuffix(".colors.json")).colors
 
 
-async def from_camera(request: Request, rig: RigConfig, endpoints: list[str], count: int) -> None:
-    """Fit to the running camera's next pictures; apply the result there, or write it to --out."""
+async def from_camera(
+    request: Request, rig: RigConfig, endpoints: list[str], wanted: int | None
+) -> None:
+    """Fit to the running camera's next pictures; apply the result there, or write it to --out.
+
+    wanted is how many, if the person says so.
+    """
+    moving = not request.pointing.places
+    count = wanted or (AUTO_FRAMES if moving else _STILL_FRAMES)
+    pause_s = MOVING_PAUSE_S if moving else STILL_PAUSE_S
+    if moving:
+        seconds = round(count * pause_s + 0.5)
+        typer.echo(f"move the hand about, fingers apart, for {seconds} s ...", err=True)
     async with router_session(rig.rig.name, endpoints) as bus:
         client = RigClient(bus)
         known = (await client.colors(request.camera)).colors
-        taken = await next_frames(bus, request.camera, count)
+        taken = await next_frames(bus, request.camera, count, pause_s)
         pointers = request.pointing.in_every_frame(range(count))
         made = await asyncio.to_thread(
             fitted, request, Pictures(taken), pointers, known, rig.colors, {"pictures": count}

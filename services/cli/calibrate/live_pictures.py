@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 # Asked again this often, a fifth of a second later, then two: a router knows of a tracker that has
 # just come up by then.
 _ATTEMPTS, _RETRY_S = 3, 0.2
-# Between two pictures of paint, so that noise, and a hand that nobody holds quite still, differ.
-_PAINT_PAUSE_S = 0.2
+# Between two pictures of paint, so that noise, and a hand that nobody holds quite still, differ;
+# and of a hand that moves, so that it is elsewhere.
+STILL_PAUSE_S, MOVING_PAUSE_S = 0.2, 0.4
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,10 @@ class LiveCameras:
         return endpoints_of(self.rig, self.connect)
 
 
-async def next_frames(bus: Bus, camera: str, count: int) -> list[Frame]:
-    """The next `count` pictures of a running camera, in colour.
+async def next_frames(
+    bus: Bus, camera: str, count: int, pause_s: float = STILL_PAUSE_S
+) -> list[Frame]:
+    """The next `count` pictures of a running camera, in colour, so far apart.
 
     Raises BusError if it sends none.
     """
@@ -61,7 +64,7 @@ async def next_frames(bus: Bus, camera: str, count: int) -> list[Frame]:
         image = decoded(camera, picture, cv2.IMREAD_COLOR)
         size_px = (image.shape[1], image.shape[0])
         frames.append(Frame(camera, len(frames), 0, 0.0, size_px, image, "bgr"))
-        await asyncio.sleep(_PAINT_PAUSE_S if len(frames) < count else 0.0)
+        await asyncio.sleep(pause_s if len(frames) < count else 0.0)
     return frames
 
 

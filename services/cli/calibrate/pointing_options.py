@@ -43,11 +43,20 @@ class PointingOptions:
         ),
     ] = None
     auto: Annotated[
-        bool, typer.Option("--auto", help="propose what stands out, named by its hue")
+        bool,
+        typer.Option(
+            "--auto",
+            help="propose what moves, and what else stands out, named by its hue",
+        ),
     ] = False
 
     def __bool__(self) -> bool:
-        return bool(self.box or self.click or self.at or self.auto)
+        return bool(self.places or self.auto)
+
+    @property
+    def places(self) -> list[str]:
+        """All that says where something is."""
+        return [*(self.box or ()), *(self.click or ()), *(self.at or ())]
 
     def in_every_frame(self, frames: Iterable[int]) -> list[Pointer]:
         """The boxes and clicks in each of several pictures: of a hand that is held still."""

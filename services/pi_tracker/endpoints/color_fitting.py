@@ -18,7 +18,7 @@ from rhot.messages.camera import FitRequest, FitResult, Patch
 from rhot.process.service import Service
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.colors.propose import boxes_of, propose
+from services.pi_tracker.colors.proposal.propose import boxes_of, propose
 from services.pi_tracker.colors.report import examine, statistics
 from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.image.frame import Frame
@@ -56,6 +56,9 @@ class ColorFitting:
             names = list(
                 dict.fromkeys([one.picture for one in request.pointed] + list(request.pictures))
             )
+            if request.auto:
+                # Large sensors have fewer of a hand in motion; the others tell enough.
+                names = [name for name in names if self._pictures.has(name)] or names[-1:]
             frames = [self._pictures.frame(name) for name in names]
             async with self._lock:
                 return await asyncio.to_thread(

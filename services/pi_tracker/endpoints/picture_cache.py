@@ -30,6 +30,10 @@ class PictureCache(Preview):
         self._recent: OrderedDict[str, Frame] = OrderedDict()
         self._used: OrderedDict[str, Frame] = OrderedDict()
 
+    def has(self, name: str) -> bool:
+        """Whether a picture is kept."""
+        return name in self._used or name in self._recent
+
     def frame(self, name: str) -> Frame:
         """The frame of a picture, which is kept longer from now on.
 

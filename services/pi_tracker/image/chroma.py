@@ -21,7 +21,7 @@ from services.pi_tracker.image.yuv_planes import Picture, picture
 Mask = npt.NDArray[np.bool_]
 
 # Below this luma (of 219) a cell counts as dark: chroma is not divided by next to nothing.
-_DARK_LUMA = 8.0
+DARK_LUMA = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Cells:
     @property
     def chromaticity(self) -> Array:
         """Chroma over luma, (..., 2), which shading does not change."""
-        scale = 1.0 / np.maximum(self.y, _DARK_LUMA)
+        scale = 1.0 / np.maximum(self.y, DARK_LUMA)
         return np.stack([self.u * scale, self.v * scale], axis=-1)
 
     def hsv(self) -> tuple[Array, Array, Array]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import datetime
 import time
+from collections import deque
 
 import viser
 
@@ -26,6 +27,8 @@ from services.viewer.live.palette import paint_rgb
 
 # Four pictures a second look live; encoding them losslessly takes a Pi 3 a fifth of its core.
 _PICTURE_S = 0.25
+# What moves is told by every so many-th of so many pictures: six of three seconds.
+_EVERY, _RECENT = 2, 12
 # A Pi 3 fits ranges to six pictures within five seconds.
 _FIT_S = 15.0
 # A browser needs this long to show a picture: a click that comes sooner belongs to the picture
@@ -49,6 +52,7 @@ class ColourStep:
         self._calibration = ColorCalibration("", [])
         # Newest last: (name, picture, when it was sent to the browsers).
         self._pictures: list[tuple[str, Image, float]] = []
+        self._recent: deque[str] = deque(maxlen=_RECENT)
         self._chosen = ""
         # Cameras whose colours were applied from here.
         self._done: set[str] = set()
@@ -72,6 +76,7 @@ class ColourStep:
             self._running.cancel()
             self._running = None
         self._pictures.clear()
+        self._recent.clear()
 
     async def _run(self) -> None:
         """Handle what the person does and fetch pictures, for ever."""
@@ -121,6 +126,7 @@ class ColourStep:
         """Another camera, or the same one again: begin with the ranges applied there."""
         self._calibration = ColorCalibration(self._controls.camera, self._service.config.colors)
         self._pictures.clear()
+        self._recent.clear()
         await self._ask_applied()
         self._chosen = self._calibration.names[0]
         self._show_chosen()
@@ -139,7 +145,9 @@ class ColourStep:
         image = await asyncio.to_thread(decoded, answers[0]) if answers else None
         if image is None:
             return
-        self._pictures = [*self._pictures[-1:], (picture_name(answers[0]), image, time.monotonic())]
+        name = picture_name(answers[0])
+        self._pictures = [*self._pictures[-1:], (name, image, time.monotonic())]
+        self._recent.append(name)
         self._draw()
 
     def _draw(self) -> None:
@@ -176,8 +184,8 @@ class ColourStep:
         return good
 
     async def _propose(self) -> None:
-        """Have everything fitted that stands out in the last pictures."""
-        names = [name for name, _, _ in self._pictures]
+        """Have everything fitted that moved in the last seconds, or else stands out."""
+        names = list(self._recent)[::-_EVERY][::-1]
         answer = await self._ask_fit(FitRequest(auto=True, pictures=names))
         self._calibration.take_proposal(answer)
         self._show_chosen()

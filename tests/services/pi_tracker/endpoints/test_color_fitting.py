@@ -97,6 +97,11 @@ async def test_pictures_are_kept_for_a_while(config, tracking, seen, monkeypatch
         assert "not kept any more" in gone.error
         used = FitRequest(pointed=[PointedAt(color="green", picture=f"{2:016x}", x_px=x, y_px=y)])
         assert (await ask(client, used)).error == ""
+        # A proposal is made of what is left.
+        auto = FitRequest(auto=True, pictures=[f"{n:016x}" for n in range(3)])
+        proposed = await ask(client, auto)
+        assert set(proposed.colors) == {"green", "blue"}
+        assert {patch.picture for patch in proposed.patches} == {f"{n:016x}" for n in (1, 2)}
         for _ in range(3):
             await client.bus.get(topics.FRAME, 5.0, camera="left")
         assert (await ask(client, used)).error == ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from services.pi_tracker.dots.assignment import assign
 from services.pi_tracker.image.chroma import Cells, Mask
 from services.pi_tracker.image.hue import Array, hue_difference
 
@@ -23,10 +24,10 @@ PAINT_HUES: dict[str, float] = {
     "violet": 134.0,
     "magenta": 161.0,
 }
-# Names that only a rig.toml gives: between two usual paints, for a seventh one.
-_RARE_HUES: dict[str, float] = {"leaf": 53.0}
-# A name is not given to a hue further from it than this.
-_MAX_NAME_DISTANCE = 16.0
+# With names that only a rig.toml gives: between two usual paints, for a seventh one.
+NAMED_HUES = PAINT_HUES | {"leaf": 53.0}
+# A name is not given to a hue further from it than this; to one that is paint for sure, than that.
+_MAX_NAME_DISTANCE, _MAX_PAINT_DISTANCE = 16.0, 21.0
 # A marker's patch is at least this saturated and this bright, and stands out from the cells around
 # it.
 _MIN_SATURATION, _MIN_VALUE = 55.0, 35.0
@@ -49,18 +50,48 @@ class Suggestion:
     clearance: float
 
 
-def paint_name(hue: float, preferred: Sequence[str], taken: set[str]) -> str:
-    """The nearest name, of the preferred ones first (rig.toml's colours).
+def paint_names(
+    hues: Sequence[float],
+    preferred: Sequence[str],
+    taken: set[str],
+    *,
+    weights: Sequence[float] = (),
+    surely_paint: bool = False,
+) -> list[str]:
+    """A name for each hue, none of them taken: of the preferred ones (rig.toml's colours) as many
+    as fit, as near as they can be, then the nearest of the others.
 
-    A hue no name is near to, or a name twice, gets its number.
+    A hue no name is near to gets its number. weights: how much each counts, 0..1, where several
+    want one name. surely_paint: coloured light may have turned it by more, towards another of the
+    preferred colours.
     """
-    hues = PAINT_HUES | _RARE_HUES
-    for names in (preferred, PAINT_HUES):
-        free = [name for name in names if name in hues and name not in taken]
-        nearest = min(free, key=lambda name: abs(hue_difference(hue, hues[name])), default="")
-        if nearest and abs(hue_difference(hue, hues[nearest])) <= _MAX_NAME_DISTANCE:
-            return nearest
-    return f"hue{round(hue) % 180}"
+    weight = np.array(weights or [1.0] * len(hues), dtype=np.float64).reshape(-1, 1)
+    found = [f"hue{round(hue) % 180}" for hue in hues]
+    rig = [name for name in preferred if name in NAMED_HUES]
+    rest = [name for name in PAINT_HUES if name not in rig]
+    from_rig, from_rest = _distances(hues, rig), _distances(hues, rest)
+    fits = from_rig <= _MAX_NAME_DISTANCE
+    if surely_paint:
+        nearest_other = from_rest.min(axis=1, initial=90.0, keepdims=True)
+        fits |= from_rig <= np.minimum(nearest_other, _MAX_PAINT_DISTANCE)
+    for names, apart, allowed in (
+        (rig, from_rig, fits),
+        (rest, from_rest, from_rest <= _MAX_NAME_DISTANCE),
+    ):
+        free = np.array([name not in taken for name in names], bool)
+        unnamed = np.array([name.startswith("hue") for name in found], bool)
+        # One name more counts more than how near they are.
+        gains = np.where(allowed & free & unnamed[:, None], weight * (60.0 - apart), 0.0)
+        for n, column in enumerate(assign(gains).tolist()):
+            if column >= 0:
+                found[n] = names[column]
+    return found
+
+
+def _distances(hues: Sequence[float], names: Sequence[str]) -> Array:
+    """Of hues (n,) from those of m names; (n, m)."""
+    rows = [[abs(hue_difference(hue, NAMED_HUES[name])) for name in names] for hue in hues]
+    return np.array(rows, dtype=np.float64).reshape(len(hues), len(names))
 
 
 def suggest(cells: Sequence[Cells], used_hues: Sequence[float]) -> list[Suggestion]:

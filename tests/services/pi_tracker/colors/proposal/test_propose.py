@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.paint_names import PAINT_HUES
-from services.pi_tracker.colors.propose import boxes_of, propose
+from services.pi_tracker.colors.proposal.paint_names import PAINT_HUES
+from services.pi_tracker.colors.proposal.propose import boxes_of, propose
 from services.pi_tracker.colors.report import examine
-from testing.synthetic_images import ROW_X_PX
+from testing.synthetic_images import PAINTS, ROW_X_PX
 
 SIZE = (240, 160)
+FEW = ["green", "blue", "violet"]
 
 
 @pytest.fixture
@@ -81,3 +82,66 @@ def test_noise_alone_proposes_nothing(studio):
     rng = np.random.default_rng(1)
     noise = np.clip(rng.normal(40.0, 12.0, (SIZE[1], SIZE[0], 3)), 0, 255).astype(np.uint8)
     assert propose([studio.of(noise)])[0] == []
+
+
+@pytest.fixture
+def before_things(studio, tip):
+    """Pictures of tips that move, far from larger things of the same paints; where the tips are."""
+
+    def make(count=6, at_rest=()):
+        frames, truths = [], []
+        for number in range(count):
+            tips = [
+                tip(
+                    color,
+                    30.0 + 20.0 * n,
+                    80.0 if color in at_rest else 30.0 + 9.0 * number,
+                    width_px=13.0,
+                    length_px=14.0,
+                )
+                for n, color in enumerate(FEW)
+            ]
+            clean, truth = studio.clean(tips, (480, 160))
+            for n, color in enumerate(FEW):
+                clean[20 + 40 * n : 50 + 40 * n, 400:430] = PAINTS[color]
+            frames.append(studio.of(studio.bgr(clean, 5.0, number), number))
+            truths.append(truth)
+        return frames, truths
+
+    return make
+
+
+def hits(proposals, truths):
+    """Of each colour, in what share of its boxes its tip is."""
+    return {
+        one.color: sum(
+            box.x_px <= truths[box.frame][one.color][0] <= box.x_px + box.width_px
+            and box.y_px <= truths[box.frame][one.color][1] <= box.y_px + box.height_px
+            for box in one.boxes
+        )
+        / len(one.boxes)
+        for one in proposals
+    }
+
+
+def test_tips_that_move_are_told_from_things_of_their_paint(before_things):
+    frames, truths = before_things()
+    proposals, _ = propose(frames, FEW)
+    assert hits(proposals, truths) == dict.fromkeys(FEW, 1.0)
+    assert all(one.moves for one in proposals)
+
+
+def test_of_a_tip_that_rests_what_is_about_the_others_is_proposed(before_things):
+    frames, truths = before_things(at_rest=("violet",))
+    proposals, _ = propose(frames, FEW)
+    assert hits(proposals, truths) == dict.fromkeys(FEW, 1.0)
+    assert {one.color: one.moves for one in proposals} == {
+        "green": True, "blue": True, "violet": False
+    }  # fmt: skip
+
+
+def test_one_picture_proposes_what_stands_out_most(before_things):
+    frames, truths = before_things(count=1)
+    proposals, _ = propose(frames, FEW)
+    assert hits(proposals, truths) == dict.fromkeys(FEW, 0.0)
+    assert not any(one.moves for one in proposals)
