@@ -150,6 +150,11 @@ class TrackerStep:
         return frames if rectifier is None else [rectifier.to_camera_pixels(f) for f in frames]
 
     @property
+    def learns_room(self) -> bool:
+        """Whether it gets to know what stands still, and nothing hangs on its first picture."""
+        return isinstance(self._finder, MarkerFinder) and not self._names
+
+    @property
     def dot_names(self) -> set[str]:
         """The markers that are dots of a shared colour."""
         return {name for names in self._names.values() for name in names.values()}

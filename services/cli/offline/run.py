@@ -26,7 +26,9 @@ from services.cli.offline.clocks.alignment import Clocks
 from services.cli.offline.clocks.by_hand import offsets_of
 from services.cli.offline.clocks.recorded_markers import RecordedMarkers
 from services.cli.offline.contacts import ContactTrack
+from services.cli.offline.frames.camera_input import CameraInput
 from services.cli.offline.frames.duplicate_frames import DuplicateFrames
+from services.cli.offline.frames.known_room import with_known_room
 from services.cli.offline.inputs import Job
 from services.cli.offline.looking_back import looked_back
 from services.cli.offline.pipeline import Output, Pipeline, find_markers, geometry, merged
@@ -35,6 +37,7 @@ from services.cli.offline.seeds import dot_notes, seeds_of
 from services.cli.offline.track_summary import CameraCounter, Summary
 from services.cli.progress import Progress
 from services.object_tracker.step import ObjectStep
+from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.rig_step import step_of_rig
 from services.pi_tracker.step import TrackerStep
 
@@ -73,7 +76,11 @@ def run(
         object_notes = _track_objects(job, writer)
         contacts = ContactTrack(job.config, writer.written("objects", ObjectPose))
         duplicates = {one.camera: DuplicateFrames() for one in job.inputs}
-        counters = _find_markers(job, trackers, cameras, duplicates, recorded, progress)
+        streams = [
+            _stream(one, duplicates[one.camera], None if as_live else trackers[one.camera])
+            for one in job.inputs
+        ]
+        counters = _find_markers(job, trackers, cameras, streams, recorded, progress)
         clocks = _find_clocks(job, recorded, cameras, by_hand)
         if pipeline.sizes and not as_live:
             pipeline = _of_right_sizes(pipeline, clocks, progress)
@@ -102,13 +109,13 @@ def _find_markers(
     job: Job,
     trackers: Mapping[str, TrackerStep],
     cameras: dict[str, Camera] | None,
-    duplicates: Mapping[str, DuplicateFrames],
+    streams: Sequence[Iterable[Frame]],
     recorded: RecordedMarkers,
     progress: bool | None,
 ) -> dict[str, CameraCounter]:
     """The markers of all frames; the counts by camera."""
     counters = {name: CameraCounter() for name in job.cameras}
-    found = _marker_frames(job, trackers, cameras or {}, duplicates, progress)
+    found = _marker_frames(job, trackers, cameras or {}, streams, progress)
     if job.markers is None and job.config.dots:
         found = looked_back(found, trackers, len(job.config.dots), recorded.folder, progress)
     for markers in found:
@@ -117,11 +124,19 @@ def _find_markers(
     return counters
 
 
+def _stream(
+    one: CameraInput, duplicates: DuplicateFrames, tracker: TrackerStep | None
+) -> Iterable[Frame]:
+    """A camera's pictures, none of them twice; a tracker, if given, sees the beginning first."""
+    frames = duplicates.new_frames(one.frames())
+    return frames if tracker is None else with_known_room(frames, tracker)
+
+
 def _marker_frames(
     job: Job,
     trackers: Mapping[str, TrackerStep],
     cameras: Mapping[str, Camera],
-    duplicates: Mapping[str, DuplicateFrames],
+    streams: Sequence[Iterable[Frame]],
     progress: bool | None,
 ) -> Iterator[MarkerFrame]:
     """The markers of each frame: of pictures, or those that somebody found already."""
@@ -136,9 +151,7 @@ def _marker_frames(
                 clock_sigma_ns[frame.camera],
                 cameras.get(frame.camera),
             )
-            for frame in merged(
-                [duplicates[one.camera].new_frames(one.frames()) for one in job.inputs]
-            )
+            for frame in merged(streams)
         )
     else:
         found = _recorded_markers(job.markers, job.cameras)

@@ -151,7 +151,9 @@ class MarkerFinder:
         whole = search_region.whole(image.size)
         self._frame_count += 1
         full_search = (
-            self._frame_count <= _FIRST_FRAMES or self._frame_count % _FULL_SEARCH_PERIOD == 0
+            self._frame_count <= _FIRST_FRAMES
+            or self._frame_count % _FULL_SEARCH_PERIOD == 0
+            or self._identity.may_be_elsewhere
         )
         if self._markers_rect is None or full_search:
             return self._detect(image, whole)

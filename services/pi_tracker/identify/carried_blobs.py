@@ -34,11 +34,12 @@ _STILL_FACTOR = 0.3
 class CarriedBlobs:
     """Follows the blobs of `count` colours while there is a choice between them.
 
-    mistaken: until this frame, things were taken for the hand.
+    mistaken: until this frame, things were taken for the hand. in_doubt: nothing that is taken for
+    it moves, and in several colours there is something else.
     """
 
     def __init__(self, count: int) -> None:
-        self.mistaken = False
+        self.mistaken = self.in_doubt = False
         self._followed: list[list[FollowedBlob]] = [[] for _ in range(count)]
         self._hand: Way = (0.0, 0.0)
         self._stamp_ns = 0
@@ -74,7 +75,7 @@ class CarriedBlobs:
 
     def forget(self) -> None:
         """There was no choice."""
-        self.mistaken = False
+        self.mistaken = self.in_doubt = False
         for own in self._followed:
             own.clear()
 
@@ -110,6 +111,8 @@ class CarriedBlobs:
                     and own[k].cells >= LEAST_CELLS
                     and ones[k].frames >= _SURE_FRAMES
                 }
+        choices = sum(len(blobs[color]) > 1 for color in others)
+        self.in_doubt = not moving and choices >= _MARKERS
         found = [way for ways in others.values() for way in ways.values()]
         if not found:
             return

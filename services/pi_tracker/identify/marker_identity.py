@@ -122,6 +122,11 @@ class MarkerIdentity:
         """Whether it showed in this frame that things were taken for the hand."""
         return self._carried.mistaken
 
+    @property
+    def may_be_elsewhere(self) -> bool:
+        """Whether a look at the whole next image may show that they are."""
+        return self._carried.in_doubt
+
     def _forget_mistakes(self, candidates: list[list[Candidate]]) -> None:
         """Of the colours that did not show where the hand is, nothing is known; in place.
 

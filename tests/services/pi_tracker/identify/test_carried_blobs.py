@@ -101,3 +101,24 @@ def test_a_hand_that_rests_is_not_given_up_for_two_things_that_move():
         blobs = [[tip, *(one for one in movers if one.color == tip.color)] for tip in tips]
         assert associated(identity, blobs, seq) == tips
         assert not identity.mistaken
+
+
+def test_while_nothing_that_was_taken_for_a_hand_moves_all_is_looked_at():
+    """Only a look at the whole of several pictures shows that something else does."""
+    identity = MarkerIdentity(COLORS, 40)
+    associated(identity, [[thing] for thing in THINGS], 0)
+    for seq in range(1, 4):
+        others = hand_blobs(400, 250)
+        associated(identity, [list(pair) for pair in zip(THINGS, others, strict=True)], seq)
+    assert identity.may_be_elsewhere
+    associated(identity, [[thing] for thing in THINGS], 4)
+    assert not identity.may_be_elsewhere
+
+
+def test_a_hand_that_moves_beside_things_is_no_reason_to_look_at_all():
+    identity = MarkerIdentity(COLORS, 40)
+    for seq in range(6):
+        tips = hand_blobs(300 + 8 * seq, 250)
+        blobs = [[tip] for tip in tips] if not seq else list(zip(tips, THINGS, strict=True))
+        associated(identity, [list(own) for own in blobs], seq)
+    assert not identity.may_be_elsewhere
