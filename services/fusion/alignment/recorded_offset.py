@@ -4,7 +4,7 @@ Two views of one instant agree in height above the baseline, whatever the depth.
 offsets and drifts (likely_lines.py) are refined by regression window by window (clock_line.py),
 which gives offset and drift with their covariance. Then the best line is held against the others
 by what each leaves of the heights: a Student's t likelihood, of which a share of wrong markers is
-no part. A hand that repeats itself has several lines nearly alike, and is refused. Pure.
+no part. A hand that repeats itself has several lines nearly alike: undecided. Pure.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ _BETTER_SHARE = 0.1
 _MOVING, _FIT, _FIT_SHARE, _MOVING_ROWS = 5.0, 4.7, 0.6, 20
 # Why it cannot be told, mostly.
 _NOTHING = "nothing moves that both see for long enough to tell"
+_REPEATS = "the motion repeats itself: two offsets fit"
 # Degrees of freedom of what is left, and the share of rows that may be of something else.
 _STUDENT, _WRONG = 4.0, 0.2
 
@@ -47,6 +48,8 @@ _STUDENT, _WRONG = 4.0, 0.2
 class RecordedOffset(NamedTuple):
     """The second camera's clock against the first's; why_not if it cannot be told.
 
+    repeats: it cannot because others fit nearly as well: where the motion is the same each time,
+    points are right by any of them.
     better is the best line's log-likelihood above the second best's; residual and second_residual,
     normalised units, what each leaves of the heights (robust RMS).
     """
@@ -57,6 +60,7 @@ class RecordedOffset(NamedTuple):
     residual: float
     second_s: float
     second_residual: float
+    repeats: bool = False
 
     @property
     def decided(self) -> bool:
@@ -143,7 +147,7 @@ def _judged(pairs: list[tuple[HeightTrack, HeightTrack]], fits: list[LineFit]) -
     elif fitting < _FIT_SHARE:
         why_not = "the views fit at no offset"
     elif better < max(_BETTER, _BETTER_SHARE * gain):
-        why_not = "the motion repeats itself: two offsets fit"
+        why_not = _REPEATS
     return RecordedOffset(
         fit,
         why_not,
@@ -151,6 +155,7 @@ def _judged(pairs: list[tuple[HeightTrack, HeightTrack]], fits: list[LineFit]) -
         scale,
         math.nan if second is None else fits[second].line.late_s(fit.line.at_s),
         math.nan if second is None else scales[second],
+        why_not == _REPEATS,
     )
 
 

@@ -1,6 +1,7 @@
 """The clocks of all cameras from the markers of a whole recording, and frames put right by them.
 
-Videos without a common clock are aligned by whatever is found. Stamps of one clock are believed as
+Videos without a common clock are aligned by whatever is found, of motion that repeats itself by the
+likeliest of what fits. Stamps of one clock are believed as
 long as they contradict the markers by no more than fusion learns by itself as it goes; beyond, the
 markers' motion outweighs them. Nothing changes in frames that are believed.
 """
@@ -165,6 +166,9 @@ class Clocks:
             self._lines[name] = (used, None)
         elif found.decided and (unknown or (beyond and tune)):
             verdict, used = "aligned" if unknown else "corrected", line
+            self._lines[name] = self._through(against, found.fit)
+        elif found.repeats and unknown:
+            verdict, used = "likeliest", line
             self._lines[name] = self._through(against, found.fit)
         elif found.decided and beyond:
             verdict = "contradicted"

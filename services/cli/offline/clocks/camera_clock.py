@@ -6,11 +6,14 @@ from typing import Literal
 
 import msgspec
 
-# aligned: without a common clock, put right by the markers' motion. by hand: by --offset. as
+# aligned: without a common clock, put right by the markers' motion; likeliest: by the likeliest of
+# several offsets that fit a motion which repeats itself. by hand: by --offset. as
 # stamped: the markers agree with the stamps, or cannot tell and the stamps are on one clock.
 # corrected: the markers contradict stamps of one clock, and put them right; contradicted: the
 # stamps are kept all the same. unknown: nothing tells.
-Verdict = Literal["aligned", "by hand", "as stamped", "corrected", "contradicted", "unknown"]
+Verdict = Literal[
+    "aligned", "likeliest", "by hand", "as stamped", "corrected", "contradicted", "unknown"
+]
 
 
 class CameraClock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -77,6 +80,13 @@ def warnings_of(one: CameraClock) -> list[str]:
             f"{one.camera}: its clock is not {one.against}'s, and the markers do not tell the "
             f"offset within +-{one.range_s:.0f} s: {_why_not(one)}. The recordings are taken to "
             "begin together, and points are off by as much as the hand moves meanwhile; film some "
+            "seconds of irregular motion that both see, or give it by hand: "
+            f"--offset {one.camera}=SECONDS"
+        )
+    if one.verdict == "likeliest":
+        told.append(
+            f"{one.camera}: its clock is not {one.against}'s, and {_why_not(one)}. The likelier is "
+            "taken, by which points are right where the motion is the same each time; film some "
             "seconds of irregular motion that both see, or give it by hand: "
             f"--offset {one.camera}=SECONDS"
         )

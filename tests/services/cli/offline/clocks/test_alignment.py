@@ -135,6 +135,26 @@ def test_what_cannot_be_told_is_said(tmp_path):
     assert "not calibrated together" in warnings_of(blind.told[0])[0]
 
 
+def test_of_a_motion_that_repeats_itself_the_likeliest_offset_is_taken_with_a_warning(tmp_path):
+    """Else the recordings would be taken to begin together, which no motion speaks for."""
+    period_s = 3.0
+
+    class Waves(MovingHand):
+        def __call__(self, times_s):
+            # To and fro, so that it does not leap.
+            return super().__call__(np.abs((times_s / period_s - 0.5) % 1.0 - 0.5) * period_s)
+
+    given = stamped({"right": 0.5}, frames(RIG, Waves(speed_m_s=0.4), 12.0))
+    clocks, frames_ = clocks_of(given, tmp_path, ["left", "right"])
+    (told,) = clocks.told
+    assert (told.verdict, told.found) == ("likeliest", False)
+    periods = (told.used_offset_s - 0.5) / period_s
+    assert periods == pytest.approx(round(periods), abs=0.003)
+    assert "repeats itself: two offsets fit" in clocks.warnings[0]
+    assert "--offset right=SECONDS" in clocks.warnings[0]
+    assert {frame.clock_offset_ns for frame in frames_ if frame.camera == "right"} != {0}
+
+
 def capture(folder, given: list[MarkerFrame]):
     """A capture of markers alone; what `rhot track` makes of it."""
     (folder / "calibration").mkdir(parents=True)
