@@ -150,10 +150,8 @@ class MarkerFinder:
         """Plausible blobs of each colour: near the last places, else in the whole image."""
         whole = search_region.whole(image.size)
         self._frame_count += 1
-        full_search = (
-            self._frame_count <= _FIRST_FRAMES
-            or self._frame_count % _FULL_SEARCH_PERIOD == 0
-            or self._identity.may_be_elsewhere
+        full_search = self._identity.may_be_elsewhere or (
+            self._frame_count <= _FIRST_FRAMES or self._frame_count % _FULL_SEARCH_PERIOD == 0
         )
         if self._markers_rect is None or full_search:
             return self._detect(image, whole)
