@@ -28,6 +28,7 @@ import dataclasses
 import importlib.util
 import json
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -45,9 +46,7 @@ _SLOW_M_S, _SLOW_MM, _FAST_MM = 0.8, 10.0, 18.0
 _LAG_0, _LAG_2, _PRESENCE, _MEDIAN, _CLOCK_MS = 2.2, 1.15, 98.0, (0.2, 1.5), 1.5
 # A marker so far from its paint is on something else: a tip is 12 to 25 px wide.
 _ASTRAY_PX = 14.0
-_WITHOUT_VTK = (
-    "benchmarks/other_renderer.py: VTK is not installed; pip install 'rhot[other-renderer]'"
-)
+_WITHOUT_VTK = "VTK is not installed; pip install 'rhot[other-renderer]'"
 
 
 def clock_left_ms(case: Case, offset_s: float) -> float:
@@ -164,10 +163,10 @@ def measure(half: Half, part: str) -> dict[str, dict[str, Figures]]:
     return results
 
 
-def main() -> int:
-    """Run, print, and write."""
+def main(measured: Callable[[Half, str], Mapping[str, object]], description: str | None) -> int:
+    """Run, print, and write what is measured of a half's clips whose name has a part."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--tuning", action="store_true", help="the half constants are chosen on")
     parser.add_argument("--clip", default="", help="only clips whose name has this part")
@@ -178,11 +177,11 @@ def main() -> int:
         return 2
     half: Half = "tuning" if options.tuning else "held_out"
     print("TUNING HALF, not evidence" if options.tuning else "held-out half")
-    found = measure(half, options.clip)
+    found = measured(half, options.clip)
     if options.json:
         options.json.write_text(json.dumps({"half": half, **found}, indent=1) + "\n", "utf-8")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(measure, __doc__))

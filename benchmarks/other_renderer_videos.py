@@ -14,7 +14,6 @@ is no evidence. Rendering takes five minutes a clip.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -25,6 +24,7 @@ from typing import TYPE_CHECKING
 
 import av
 import numpy as np
+from other_renderer import main
 
 from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
 from rhot.files.capture import read_lines
@@ -179,22 +179,5 @@ def measure(half: Half, part: str) -> dict[str, dict[str, float]]:
     return results
 
 
-def main() -> int:
-    """Run, print, and write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--tuning", action="store_true", help="the half constants are chosen on")
-    parser.add_argument("--clip", default="", help="only clips whose name has this part")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    options = parser.parse_args()
-    half: Half = "tuning" if options.tuning else "held_out"
-    print("TUNING HALF, not evidence" if options.tuning else "held-out half")
-    found = measure(half, options.clip)
-    if options.json:
-        options.json.write_text(json.dumps({"half": half, **found}, indent=1) + "\n", "utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(measure, __doc__))

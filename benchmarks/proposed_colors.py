@@ -16,14 +16,12 @@ paint. 15 seconds a room.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-from rooms import ASTRAY_PX, CALIBRATED, ROOMS, VISIBLE, Count, counted, figures_of
+from rooms import ASTRAY_PX, CALIBRATED, VISIBLE, Count, asked, counted, figures_of
 
 from rhot.files.calibration import Colors
 from rhot.files.config import RigConfig
@@ -34,9 +32,8 @@ from services.pi_tracker.colors.proposal.propose import Proposal, boxes_of, prop
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
-from testing.families.case import Half
 from testing.families.pictures import PaintMiddles, fitted_colors, frame_of, visible_shares
-from testing.families.rooms import FIRST, room
+from testing.families.rooms import room
 from testing.synthetic_points import START_NS
 
 Wanted = Mapping[str, tuple[np.bool_, Array]]
@@ -129,16 +126,9 @@ def tracked(
 
 def main() -> None:
     """Print a table; with --json, write it too."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--tuning", action="store_true", help="rooms that constants are chosen on")
-    parser.add_argument("--rooms", type=int, default=ROOMS, help=f"how many; {ROOMS}")
-    parser.add_argument("--json", type=Path, help="also write the figures here")
-    arguments = parser.parse_args()
-    half: Half = "tuning" if arguments.tuning else "held_out"
+    arguments = asked(__doc__)
     tallies = {way: Tally() for way in WAYS}
-    for number in range(FIRST[half], FIRST[half] + arguments.rooms):
+    for number in range(arguments.first, arguments.first + arguments.rooms):
         in_room(number, tallies)
     figures = {way: tally.figures() for way, tally in tallies.items()}
     keys = ("right", "wrong", "found", "astray", "whole", "median", "lowest")

@@ -124,18 +124,25 @@ def figures_of(clips: Sequence[Count]) -> dict[str, float]:
     }
 
 
-def main() -> None:
-    """Print a table; with --json, write it too."""
+def asked(description: str | None) -> argparse.Namespace:
+    """What the command line asks for: first, number of the first room; rooms; json."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        description=description, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--tuning", action="store_true", help="rooms that constants are chosen on")
     parser.add_argument("--rooms", type=int, default=ROOMS, help=f"how many; {ROOMS}")
     parser.add_argument("--json", type=Path, help="also write the figures here")
     arguments = parser.parse_args()
     half: Half = "tuning" if arguments.tuning else "held_out"
+    arguments.first = FIRST[half]
+    return arguments
+
+
+def main() -> None:
+    """Print a table; with --json, write it too."""
+    arguments = asked(__doc__)
     clips: dict[str, list[Count]] = {}
-    for number in range(FIRST[half], FIRST[half] + arguments.rooms):
+    for number in range(arguments.first, arguments.first + arguments.rooms):
         for method, counts in counts_in(number).items():
             clips.setdefault(method, []).extend(counts)
             parts = (f"{c.found / max(c.visible, 1):7.1%} ({c.astray:3} astray)" for c in counts)

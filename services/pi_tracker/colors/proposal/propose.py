@@ -74,14 +74,14 @@ def propose(
     cells = [cells_of(frame) for frame in frames]
     patches = patches_in(views_of(cells))
     moving = salient_groups([p for p in patches if p.moves], _MOVING_SHARE * len(frames))
-    name = partial(_named, len(frames), preferred_names)
-    named = name(moving, {}, surely_paint=True)
+    by_name = partial(_named, len(frames), preferred_names)
+    named = by_name(moving, {}, surely_paint=True)
     hand = {name: group for name, group in named.items() if name in preferred_names}
     missing = [name for name in preferred_names if name in NAMED_HUES and name not in hand]
     if hand and missing:
         named |= _near(cells, missing, list(hand.values()))
     rest = [p for p in patches if not p.moves and not has_hue_of(p, named.values())]
-    named |= name(salient_groups(rest, _STILL_SHARE * len(frames)), named)
+    named |= by_name(salient_groups(rest, _STILL_SHARE * len(frames)), named)
     proposals = [_proposal(name, group) for name, group in named.items()]
     return proposals, suggest(cells, [proposal.hue for proposal in proposals])
 
@@ -123,7 +123,7 @@ def _near(
             for patch in patches_about(views, NAMED_HUES[name])
             if patch.frame in boxes
             and overlap(patch.box, boxes[patch.frame])
-            and not has_hue_of(patch, hand)
+            and not has_hue_of(patch, [*hand, *found.values()])
         ]
         groups = salient_groups(near, _STILL_SHARE * len(cells), hand, _stirring)
         if groups:
