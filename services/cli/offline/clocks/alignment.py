@@ -1,9 +1,9 @@
 """The clocks of all cameras from the markers of a whole recording, and frames put right by them.
 
 Videos without a common clock are aligned by whatever is found, of motion that repeats itself by the
-likeliest of what fits. Stamps of one clock are believed as
-long as they contradict the markers by no more than fusion learns by itself as it goes; beyond, the
-markers' motion outweighs them. Nothing changes in frames that are believed.
+likeliest of what fits. Stamps of one clock are believed as long as they contradict the markers by
+no more than fusion learns by itself as it goes; beyond, the markers' motion outweighs them. Nothing
+changes in frames that are believed.
 """
 
 from __future__ import annotations

@@ -67,6 +67,7 @@ def paint_names(
     """
     weight = np.array(weights or [1.0] * len(hues), dtype=np.float64).reshape(-1, 1)
     found = [f"hue{round(hue) % 180}" for hue in hues]
+    unnamed = np.ones((len(hues), 1), bool)
     rig = [name for name in preferred if name in NAMED_HUES]
     rest = [name for name in PAINT_HUES if name not in rig]
     from_rig, from_rest = _distances(hues, rig), _distances(hues, rest)
@@ -79,12 +80,11 @@ def paint_names(
         (rest, from_rest, from_rest <= _MAX_NAME_DISTANCE),
     ):
         free = np.array([name not in taken for name in names], bool)
-        unnamed = np.array([name.startswith("hue") for name in found], bool)
         # One name more counts more than how near they are.
-        gains = np.where(allowed & free & unnamed[:, None], weight * (60.0 - apart), 0.0)
+        gains = np.where(allowed & free & unnamed, weight * (60.0 - apart), 0.0)
         for n, column in enumerate(assign(gains).tolist()):
             if column >= 0:
-                found[n] = names[column]
+                found[n], unnamed[n] = names[column], False
     return found
 
 
