@@ -1,6 +1,7 @@
 """How true fusion is on pictures of a renderer that shares nothing with the simulator.
 
-    RHOT_DATA=FOLDER python benchmarks/other_renderer.py [--tuning] [--clip PART] [--json FILE]
+    RHOT_DATA=FOLDER python benchmarks/other_renderer.py [--tuning] [--clip PART] [--drawn COUNT]
+        [--json FILE]
 
 VTK (`pip install 'rhot[other-renderer]'`) draws one smooth skin that recorded hands (a Leap
 sensor's) bend, paint with ragged edges, lamps with shadows, a room; a Bayer sensor with shot noise,
@@ -18,7 +19,8 @@ than 10 mm off, fast ones more than 18; RMS above 2.2 and 1.15 times the spline'
 presence below 98 %; a median of NEES outside .2 to 1.5; clocks 1.5 ms off or more. Beside the
 spline: what centres of markers that are seen whole jump by from picture to picture, px, and how
 many of them are on something else.
---tuning: the half that constants may be chosen on, which is no evidence.
+--tuning: the half that constants may be chosen on, which is no evidence. --drawn: so many clips
+that a number draws (testing/second_renderer/catalog/drawn.py) instead of those made by hand.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from held_out_score import LAGS, Figures, make_fusion, run, scores
@@ -38,6 +41,9 @@ from rhot.geometry.transforms import Array
 from testing.families.case import UNHIDDEN_SHARE, Case, Half
 from testing.synthetic_points import START_NS
 from testing.wrong_markers import with_clock_error
+
+if TYPE_CHECKING:
+    from testing.second_renderer.clip import Clip
 
 # Announced clock errors of the right camera, s.
 OFFSETS_S = (0.02, 0.5)
@@ -133,16 +139,13 @@ _HEAD = (
 )
 
 
-def measure(half: Half, part: str) -> dict[str, dict[str, Figures]]:
-    """Figures of all clips whose name has this part, printed as they come."""
-    from testing.second_renderer.catalog import CLIPS
+def measure(clips: Mapping[str, Clip]) -> dict[str, dict[str, Figures]]:
+    """Figures of all clips, printed as they come."""
     from testing.second_renderer.clips import clip_case
 
     print(_HEAD)
     results: dict[str, dict[str, Figures]] = {}
-    for name, clip in CLIPS[half].items():
-        if part not in name:
-            continue
+    for name, clip in clips.items():
         case = clip_case(name, clip)
         fed, alone = scores(case, feedback=True), scores(case, feedback=False)
         clocks_ms = [clock_left_ms(case, offset_s) for offset_s in OFFSETS_S]
@@ -163,13 +166,25 @@ def measure(half: Half, part: str) -> dict[str, dict[str, Figures]]:
     return results
 
 
-def main(measured: Callable[[Half, str], Mapping[str, object]], description: str | None) -> int:
-    """Run, print, and write what is measured of a half's clips whose name has a part."""
+def chosen_clips(half: Half, part: str, count: int) -> dict[str, Clip]:
+    """Clips of a half whose name has a part: those made by hand, or so many that are drawn."""
+    from testing.second_renderer.catalog import CLIPS
+    from testing.second_renderer.catalog.drawn import drawn
+
+    clips = drawn(half, count) if count else CLIPS[half]
+    return {name: clip for name, clip in clips.items() if part in name}
+
+
+def main(
+    measured: Callable[[Mapping[str, Clip]], Mapping[str, object]], description: str | None
+) -> int:
+    """Run, print, and write what is measured of the clips that are asked for."""
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--tuning", action="store_true", help="the half constants are chosen on")
     parser.add_argument("--clip", default="", help="only clips whose name has this part")
+    parser.add_argument("--drawn", type=int, default=0, help="so many clips drawn by number")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     if importlib.util.find_spec("vtkmodules") is None:
@@ -177,7 +192,7 @@ def main(measured: Callable[[Half, str], Mapping[str, object]], description: str
         return 2
     half: Half = "tuning" if options.tuning else "held_out"
     print("TUNING HALF, not evidence" if options.tuning else "held-out half")
-    found = measured(half, options.clip)
+    found = measured(chosen_clips(half, options.clip, options.drawn))
     if options.json:
         options.json.write_text(json.dumps({"half": half, **found}, indent=1) + "\n", "utf-8")
     return 0

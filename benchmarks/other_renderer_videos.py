@@ -1,6 +1,7 @@
 """What `rhot track` makes of two videos of another renderer, by the commands of its guide.
 
-    RHOT_DATA=FOLDER python benchmarks/other_renderer_videos.py [--tuning] [--clip PART] [--json F]
+    RHOT_DATA=FOLDER python benchmarks/other_renderer_videos.py [--tuning] [--clip PART]
+        [--drawn COUNT] [--json FILE]
 
 Clips of benchmarks/other_renderer.py as H.264 (crf 23), the right one begun 13 pictures later.
 Lenses and where the cameras stand are given; colours are proposed by `rhot calibrate colors
@@ -9,7 +10,8 @@ Lenses and where the cameras stand are given; colours are proposed by `rhot cali
     rms ... max  errors of those, mm
     clock        how far off the right video's clock is put right, ms
 A command that fails is told in its words. --tuning: the half that constants may be chosen on, which
-is no evidence. Rendering takes five minutes a clip.
+is no evidence. --drawn: so many clips that a number draws instead of those made by hand. Rendering
+takes five minutes a clip.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +33,6 @@ from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
 from rhot.files.capture import read_lines
 from rhot.geometry.transforms import Array
 from rhot.messages import HandPoints
-from testing.families.case import Half
 
 if TYPE_CHECKING:
     from testing.second_renderer.clip import Clip
@@ -155,16 +157,13 @@ def _shown(shots: Film, at_s: float) -> Array:
     return np.asarray(np.min(shares, axis=0))
 
 
-def measure(half: Half, part: str) -> dict[str, dict[str, float]]:
-    """Figures of all clips whose name has this part, printed as they come."""
-    from testing.second_renderer.catalog import CLIPS
+def measure(clips: Mapping[str, Clip]) -> dict[str, dict[str, float]]:
+    """Figures of all clips, printed as they come."""
     from testing.second_renderer.filming import film
 
     print(f"{'clip':28}" + "".join(f"{name:>9}" for name in _COLUMNS))
     results = {}
-    for name, clip in CLIPS[half].items():
-        if part not in name:
-            continue
+    for name, clip in clips.items():
         shots = film(clip)
         with tempfile.TemporaryDirectory() as folder:
             write_videos(clip, shots, Path(folder))

@@ -26,7 +26,7 @@ from services.cli.recorded.frames import frame_names, frames_by_number, spread_n
 from services.cli.router_session import router_session
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.colors.proposal.propose import boxes_of, propose
+from services.pi_tracker.colors.proposal.propose import boxes_of, for_markers, propose
 from services.pi_tracker.colors.report import colors_file, examine
 from services.pi_tracker.image.frame import Frame, Image
 
@@ -179,12 +179,10 @@ def _proposed(frames: Sequence[Frame], wanted: Sequence[str], *, dry_run: bool) 
             "--box or --click"
         )
     typer.echo(proposals_text(proposals, suggestions), err=True)
-    if not wanted:
-        return boxes_of(proposals)
-    missing = [color for color in wanted if color not in {one.color for one in proposals}]
+    chosen, missing = for_markers(proposals, wanted)
     if missing and not dry_run:
         raise CalibrationError(
             f"no patch was found that could be {', '.join(missing)} of rig.toml's markers; point "
             "at it with --box, or give the markers the names of what was found in rig.toml"
         )
-    return boxes_of([one for one in proposals if one.color in wanted])
+    return boxes_of(chosen)

@@ -18,7 +18,7 @@ from rhot.messages.camera import FitRequest, FitResult, Patch
 from rhot.process.service import Service
 from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.colors.proposal.propose import boxes_of, propose
+from services.pi_tracker.colors.proposal.propose import boxes_of, for_markers, propose
 from services.pi_tracker.colors.report import examine, statistics
 from services.pi_tracker.endpoints.picture_cache import PictureCache
 from services.pi_tracker.image.frame import Frame
@@ -76,17 +76,9 @@ def answer(
     current: Colors,
 ) -> FitResult:
     """The result of a request on pictures of these names; raises CalibrationError."""
-    notes = []
+    notes: list[str] = []
     if request.auto:
-        proposals, suggestions = propose(frames, wanted)
-        if not proposals:
-            raise CalibrationError("no patch of saturated colour stands out in these pictures")
-        pointers = boxes_of(proposals)
-        if suggestions:
-            notes.append(
-                "further paints that would stand out: "
-                + ", ".join(one.color for one in suggestions)
-            )
+        pointers = _proposed(frames, wanted, notes)
     else:
         pointers = [
             Pointer(p.color, names.index(p.picture), p.x_px, p.y_px, p.width_px, p.height_px)
@@ -110,3 +102,26 @@ def answer(
         warnings=list(report.warnings),
         notes=study.notes + notes,
     )
+
+
+def _proposed(frames: Sequence[Frame], wanted: Sequence[str], notes: list[str]) -> list[Pointer]:
+    """Boxes around what may be paint: a room's colours are no ranges to part the paints from.
+
+    Adds to the notes what was not found, and which paints would stand out besides.
+    """
+    proposals, suggestions = propose(frames, wanted)
+    chosen, missing = for_markers(proposals, wanted)
+    if not proposals:
+        raise CalibrationError("no patch of saturated colour stands out in these pictures")
+    if not chosen:
+        raise CalibrationError(
+            f"nothing that stands out in these pictures may be {', '.join(missing)} of rig.toml's "
+            "markers; click on them"
+        )
+    if missing:
+        notes.append(f"no patch was found that could be {', '.join(missing)}: click there")
+    if suggestions:
+        notes.append(
+            "further paints that would stand out: " + ", ".join(one.color for one in suggestions)
+        )
+    return boxes_of(chosen)

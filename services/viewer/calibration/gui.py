@@ -63,7 +63,9 @@ class CalibrationControls:
         self._color = gui.add_dropdown("colour", ("green",))
         self._to_do = gui.add_html("")
         self._clicks = gui.add_button_group(
-            "clicks", tuple(_BUTTONS), hint="the last click, every click, no clicks"
+            "clicks",
+            tuple(_BUTTONS),
+            hint="forget the last click, forget all, or find paint by what moves",
         )
         self._report = gui.add_html("")
         self._apply = gui.add_button("apply", disabled=True, color="green")

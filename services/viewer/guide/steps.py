@@ -61,7 +61,8 @@ STEPS: tuple[Step, ...] = (
         "colours",
         "Colours",
         "Hold the painted hand still before the camera. "
-        "Click the middle of each dab of paint in the picture, in the order that you are asked.",
+        "Click the middle of each dab of paint in the picture, in the order that you are asked. "
+        "Or move it about for three seconds, fingers apart, and press 'propose all'.",
         drawings.COLOURS,
         lambda config: [f"{name}.colors.json" for name in _cameras(config)],
         lambda config: f"rhot calibrate colors {_first(config)} --auto",

@@ -157,6 +157,17 @@ def _proposal(name: str, group: Group) -> Proposal:
     return Proposal(name, round(hue_of(group), 1), len(boxes), boxes, moves)
 
 
+def for_markers(
+    proposals: Sequence[Proposal], wanted: Sequence[str]
+) -> tuple[list[Proposal], list[str]]:
+    """Those of the colours that markers need, all if these are none; and colours that none has."""
+    if not wanted:
+        return list(proposals), []
+    found = {one.color for one in proposals}
+    missing = [color for color in wanted if color not in found]
+    return [one for one in proposals if one.color in wanted], missing
+
+
 def boxes_of(proposals: Sequence[Proposal]) -> list[Pointer]:
     """All pointers of several proposals."""
     return [box for proposal in proposals for box in proposal.boxes]

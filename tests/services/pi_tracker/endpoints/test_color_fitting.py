@@ -60,6 +60,28 @@ async def test_a_proposal_of_what_stands_out(config, tracking, seen, picture):
             assert top <= y <= top + height
 
 
+async def test_what_no_marker_is_painted_with_is_not_proposed(config, tracking, seen):
+    """The room has colours, too: they would part ranges that nothing has to be parted from."""
+    markers = {"index_tip": "green", "thumb_tip": "magenta"}
+    hand = msgspec.structs.replace(config.hand["right"], markers=markers)
+    async with tracking(msgspec.structs.replace(config, hand={"right": hand})) as (_, client):
+        await seen(client, "green")
+        names = [await fetch(client)]
+        result = await ask(client, FitRequest(auto=True, pictures=names))
+        assert set(result.colors) == {patch.color for patch in result.patches} == {"green"}
+        assert not any("blue" in text for text in result.warnings)
+        assert any("could be magenta: click there" in note for note in result.notes)
+
+
+async def test_nothing_that_may_be_a_marker(config, tracking, seen):
+    hand = msgspec.structs.replace(config.hand["right"], markers={"index_tip": "magenta"})
+    async with tracking(msgspec.structs.replace(config, hand={"right": hand})) as (_, client):
+        await seen(client)
+        result = await ask(client, FitRequest(auto=True, pictures=[await fetch(client)]))
+        assert "nothing that stands out in these pictures may be magenta" in result.error
+        assert result.colors == {}
+
+
 WRONG = [
     ({"x_px": 5.0, "y_px": 5.0}, "something grey"),
     ({"x_px": 5000.0, "y_px": 5.0}, "outside the picture, which is 240x160"),
