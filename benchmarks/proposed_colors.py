@@ -28,7 +28,8 @@ from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from services.cli.calibrate.colors import AUTO_FRAMES
 from services.pi_tracker.colors.fit import fit, gather
-from services.pi_tracker.colors.proposal.propose import Proposal, boxes_of, propose
+from services.pi_tracker.colors.proposal.propose import Proposal, boxes_of, for_markers, propose
+from services.pi_tracker.identify.hand_layout import Landmarks
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
@@ -73,9 +74,10 @@ def _is_right(proposal: Proposal, seen: Sequence[Wanted]) -> bool:
     return 4 * hits >= 3 * len(proposal.boxes)
 
 
-def proposed(frames: Sequence[Frame], wanted: Sequence[str]) -> tuple[list[Proposal], Colors]:
-    """What is proposed of the wanted colours, and the ranges that come of it."""
-    found = [one for one in propose(frames, wanted)[0] if one.color in wanted]
+def proposed(frames: Sequence[Frame], landmarks: Landmarks) -> tuple[list[Proposal], Colors]:
+    """What is proposed of the colours of these landmarks, and the ranges that come of it."""
+    wanted = list(landmarks)
+    found, _ = for_markers(propose(frames, wanted, landmarks)[0], wanted)
     ranges = fit(gather(frames, boxes_of(found)).samples) if found else {}
     return found, Colors(date="", tool="benchmarks", colors=ranges)
 
@@ -102,7 +104,7 @@ def in_room(number: int, tallies: Mapping[str, Tally]) -> None:
         numbers = np.linspace(0, len(frames) - 1, AUTO_FRAMES).astype(int).tolist()
         colors = {"clicks": fitted_colors(recipe.scene(seed=recipe.seed + CALIBRATED), name)}
         for way, of in (("video", numbers), ("one", numbers[:1])):
-            found, colors[way] = proposed([frames[n] for n in of], list(landmarks.values()))
+            found, colors[way] = proposed([frames[n] for n in of], scene.config.landmarks)
             tallies[way].note(found, [seen[n] for n in of])
         for way in WAYS:
             count = tracked(scene.config, name, colors[way], frames, seen)

@@ -28,6 +28,7 @@ from services.pi_tracker.colors.fit import fit, gather
 from services.pi_tracker.colors.pointer import Pointer
 from services.pi_tracker.colors.proposal.propose import boxes_of, for_markers, propose
 from services.pi_tracker.colors.report import colors_file, examine
+from services.pi_tracker.identify.hand_layout import NO_LANDMARKS
 from services.pi_tracker.image.frame import Frame, Image
 
 # Pictures that --auto uses unless told otherwise, enough to tell what moves; and others.
@@ -77,7 +78,7 @@ def from_recording(
     taken = frames_by_number(request.camera, video, numbers)
     inputs = {"recording": video.name, "frames": numbers}
     named = Pictures(taken, frame_names(request.camera, video, numbers))
-    made = fitted(request, named, pointers, _known(path), rig.colors if rig else [], inputs)
+    made = fitted(request, named, pointers, _known(path), rig, inputs)
     if not request.dry_run:
         save(path, made)
         typer.echo(f"written: {path}", err=True)
@@ -109,7 +110,7 @@ async def from_camera(
         taken = await next_frames(bus, request.camera, count, pause_s)
         pointers = request.pointing.in_every_frame(range(count))
         made = await asyncio.to_thread(
-            fitted, request, Pictures(taken), pointers, known, rig.colors, {"pictures": count}
+            fitted, request, Pictures(taken), pointers, known, rig, {"pictures": count}
         )
         if request.dry_run:
             return
@@ -129,18 +130,18 @@ def fitted(
     pictures: Pictures,
     pointers: list[Pointer],
     known: Mapping[str, ColorRange],
-    rig_colors: Sequence[str],
+    rig: RigConfig | None,
     inputs: dict[str, Any],
 ) -> Colors:
     """Fit, check, print; the file to be written.
 
-    known are the ranges there are, rig_colors those that rig.toml's markers need.
+    known are the ranges there are.
 
     Raises CalibrationError if what is pointed at, or stands out, is no paint.
     """
     if request.pointing.auto:
         given = {pointer.color for pointer in pointers}
-        proposed = _proposed(pictures.frames, rig_colors, dry_run=request.dry_run)
+        proposed = _proposed(pictures.frames, rig, dry_run=request.dry_run)
         pointers = pointers + [box for box in proposed if box.color not in given]
     study = gather(pictures.frames, pointers, pictures.names)
     ranges = fit(study.samples)
@@ -170,9 +171,10 @@ def _write_picture(path: Path, image: Image) -> None:
         )
 
 
-def _proposed(frames: Sequence[Frame], wanted: Sequence[str], *, dry_run: bool) -> list[Pointer]:
-    """Boxes around what stands out: of the wanted colours, or of all if none is."""
-    proposals, suggestions = propose(frames, wanted)
+def _proposed(frames: Sequence[Frame], rig: RigConfig | None, *, dry_run: bool) -> list[Pointer]:
+    """Boxes around what stands out: of the colours that rig.toml's markers need, or all."""
+    wanted = rig.colors if rig else []
+    proposals, suggestions = propose(frames, wanted, rig.landmarks if rig else NO_LANDMARKS)
     if not proposals:
         raise CalibrationError(
             "no patch of saturated colour stands out in these pictures; point at the markers with "

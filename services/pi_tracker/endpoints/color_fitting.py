@@ -14,6 +14,7 @@ import msgspec
 from rhot import topics
 from rhot.errors import UNDECODABLE, CalibrationError
 from rhot.files.calibration import ColorRange, Colors
+from rhot.files.config import RigConfig
 from rhot.messages.camera import FitRequest, FitResult, Patch
 from rhot.process.service import Service
 from services.pi_tracker.colors.fit import fit, gather
@@ -33,7 +34,7 @@ class ColorFitting:
 
     def __init__(self, service: Service, pictures: PictureCache, tracker: CameraTracker) -> None:
         self._pictures, self._tracker = pictures, tracker
-        self._wanted = service.config.colors
+        self._rig = service.config
         # One at a time: it takes most of a Pi's core for a second, beside the tracker.
         self._lock = asyncio.Lock()
         self._asked = 0
@@ -62,7 +63,7 @@ class ColorFitting:
             frames = [self._pictures.frame(name) for name in names]
             async with self._lock:
                 return await asyncio.to_thread(
-                    answer, request, names, frames, self._wanted, self._tracker.colors
+                    answer, request, names, frames, self._rig, self._tracker.colors
                 )
         except (*UNDECODABLE, CalibrationError) as error:
             return FitResult(error=str(error))
@@ -72,13 +73,13 @@ def answer(
     request: FitRequest,
     names: list[str],
     frames: Sequence[Frame],
-    wanted: Sequence[str],
+    rig: RigConfig,
     current: Colors,
 ) -> FitResult:
     """The result of a request on pictures of these names; raises CalibrationError."""
     notes: list[str] = []
     if request.auto:
-        pointers = _proposed(frames, wanted, notes)
+        pointers = _proposed(frames, rig, notes)
     else:
         pointers = [
             Pointer(p.color, names.index(p.picture), p.x_px, p.y_px, p.width_px, p.height_px)
@@ -104,13 +105,13 @@ def answer(
     )
 
 
-def _proposed(frames: Sequence[Frame], wanted: Sequence[str], notes: list[str]) -> list[Pointer]:
+def _proposed(frames: Sequence[Frame], rig: RigConfig, notes: list[str]) -> list[Pointer]:
     """Boxes around what may be paint: a room's colours are no ranges to part the paints from.
 
     Adds to the notes what was not found, and which paints would stand out besides.
     """
-    proposals, suggestions = propose(frames, wanted)
-    chosen, missing = for_markers(proposals, wanted)
+    proposals, suggestions = propose(frames, rig.colors, rig.landmarks)
+    chosen, missing = for_markers(proposals, rig.colors)
     if not proposals:
         raise CalibrationError("no patch of saturated colour stands out in these pictures")
     if not chosen:

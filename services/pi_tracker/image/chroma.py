@@ -97,10 +97,11 @@ def skin_mask(cells: Cells) -> Mask:
 
     Chai and Ngan, IEEE Trans. CSVT 1999.
     """
-    # Near grey every colour is a little like skin: skin has at least this much chroma.
+    # Near grey every colour is a little like skin: skin has at least this much chroma. What is
+    # dark is near grey, too, and magenta in shade would be skin; no skin is so far towards blue.
     return (
         (cells.u >= -51.0)
-        & (cells.u <= -1.0)
+        & (cells.u <= np.minimum(-1.0, -0.15 * cells.v))
         & (cells.v >= 5.0)
         & (cells.v <= 45.0)
         & (cells.chroma >= 9.0)

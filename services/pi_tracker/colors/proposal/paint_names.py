@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,9 @@ _MIN_CLEARANCE = 12.0
 _SKIN_HUES = (4.0, 12.0, 19.0)
 # Bins of the room's hues, and the share of a picture's cells that a bin must hold to count.
 _BIN_HUES, _MIN_ROOM_SHARE = 5, 0.003
+# Gains of each patch by each name (n, m), 0 where it cannot be, and the names -> each one's name by
+# its index, -1 for none.
+Choose = Callable[[Array, Sequence[str]], list[int]]
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,11 @@ class Suggestion:
     clearance: float
 
 
+def with_most_gain(gains: Array, _names: Sequence[str]) -> list[int]:
+    """Names by their hues alone."""
+    return assign(gains).tolist()
+
+
 def paint_names(
     hues: Sequence[float],
     preferred: Sequence[str],
@@ -57,13 +65,14 @@ def paint_names(
     *,
     weights: Sequence[float] = (),
     surely_paint: bool = False,
+    choose: Choose = with_most_gain,
 ) -> list[str]:
     """A name for each hue, none of them taken: of the preferred ones (rig.toml's colours) as many
     as fit, as near as they can be, then the nearest of the others.
 
     A hue no name is near to gets its number. weights: how much each counts, 0..1, where several
     want one name. surely_paint: coloured light may have turned it by more, towards another of the
-    preferred colours.
+    preferred colours. choose: who gets which name, by what it gains.
     """
     weight = np.array(weights or [1.0] * len(hues), dtype=np.float64).reshape(-1, 1)
     found = [f"hue{round(hue) % 180}" for hue in hues]
@@ -82,7 +91,7 @@ def paint_names(
         free = np.array([name not in taken for name in names], bool)
         # One name more counts more than how near they are.
         gains = np.where(allowed & free & unnamed, weight * (60.0 - apart), 0.0)
-        for n, column in enumerate(assign(gains).tolist()):
+        for n, column in enumerate(choose(gains, names)):
             if column >= 0:
                 found[n], unnamed[n] = names[column], False
     return found

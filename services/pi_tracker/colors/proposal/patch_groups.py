@@ -35,7 +35,7 @@ def salient_groups(
     patch's salience where several may be the same marker.
     """
     groups = [group for group in _grouped_by_hue(patches, weight) if len(group) >= pictures]
-    groups.sort(key=lambda group: median_of(group, weight) * _salience(group), reverse=True)
+    groups.sort(key=lambda group: importance(group, weight), reverse=True)
     largest = max(map(_salience, markers or groups), default=0.0)
     salient = [group for group in groups if _salience(group) >= _MIN_SALIENCE_SHARE * largest]
     return [
@@ -56,6 +56,11 @@ def hue_of(group: Group) -> float:
 def median_of(group: Group, weight: Callable[[Patch], float]) -> float:
     """Of its patches."""
     return float(np.median([weight(patch) for patch in group]))
+
+
+def importance(group: Group, weight: Callable[[Patch], float]) -> float:
+    """How much it stands out, by a weight of its patches."""
+    return median_of(group, weight) * _salience(group)
 
 
 def has_hue_of(patch: Patch, groups: Iterable[Group]) -> bool:

@@ -13,17 +13,21 @@ from functools import partial
 import numpy as np
 
 from services.pi_tracker.colors.pointer import Pointer
+from services.pi_tracker.colors.proposal.hand_names import fit_beside, of_a_hand
 from services.pi_tracker.colors.proposal.paint_names import (
     NAMED_HUES,
+    Choose,
     Suggestion,
     paint_names,
     suggest,
+    with_most_gain,
 )
 from services.pi_tracker.colors.proposal.patch_groups import (
     Group,
     clearness,
     has_hue_of,
     hue_of,
+    importance,
     median_of,
     overlap,
     salient_groups,
@@ -35,6 +39,7 @@ from services.pi_tracker.colors.proposal.vivid_patches import (
     patches_in,
     views_of,
 )
+from services.pi_tracker.identify.hand_layout import NO_LANDMARKS, Landmarks
 from services.pi_tracker.image.chroma import Cells, cells_of
 from services.pi_tracker.image.frame import Frame
 
@@ -63,23 +68,25 @@ class Proposal:
 
 
 def propose(
-    frames: Sequence[Frame], preferred_names: Sequence[str] = ()
+    frames: Sequence[Frame],
+    preferred_names: Sequence[str] = (),
+    landmarks: Landmarks = NO_LANDMARKS,
 ) -> tuple[list[Proposal], list[Suggestion]]:
     """Markers by what the pictures show, and further paints, clearest first.
 
     Markers: what moves, then what is about it and may be a colour that is missing, then all else,
     each most salient first. preferred_names are the colours of rig.toml: patches get their names
-    where the hues fit.
+    where the hues fit, and where they are as its landmarks are.
     """
     cells = [cells_of(frame) for frame in frames]
     patches = patches_in(views_of(cells))
     moving = salient_groups([p for p in patches if p.moves], _MOVING_SHARE * len(frames))
     by_name = partial(_named, len(frames), preferred_names)
-    named = by_name(moving, {}, surely_paint=True)
+    named = by_name(moving, {}, surely_paint=True, choose=of_a_hand(moving, landmarks))
     hand = {name: group for name, group in named.items() if name in preferred_names}
     missing = [name for name in preferred_names if name in NAMED_HUES and name not in hand]
     if hand and missing:
-        named |= _near(cells, missing, list(hand.values()))
+        named |= _near(cells, missing, hand, landmarks)
     rest = [p for p in patches if not p.moves and not has_hue_of(p, named.values())]
     named |= by_name(salient_groups(rest, _STILL_SHARE * len(frames)), named)
     proposals = [_proposal(name, group) for name, group in named.items()]
@@ -93,6 +100,7 @@ def _named(
     taken: Mapping[str, Group],
     *,
     surely_paint: bool = False,
+    choose: Choose = with_most_gain,
 ) -> dict[str, Group]:
     """Groups by names that are not taken yet."""
     names = paint_names(
@@ -104,18 +112,23 @@ def _named(
             for group in groups
         ],
         surely_paint=surely_paint,
+        choose=choose,
     )
     return dict(zip(names, groups, strict=True))
 
 
 def _near(
-    cells: Sequence[Cells], missing: Sequence[str], hand: Sequence[Group]
+    cells: Sequence[Cells],
+    missing: Sequence[str],
+    hand: Mapping[str, Group],
+    landmarks: Landmarks,
 ) -> dict[str, Group]:
     """Of colours that are missing, what may be theirs where the rest of the hand is.
 
     A wrist hardly moves in some takes.
     """
-    views, boxes = views_of(cells, smooth=True), _hand_boxes(hand)
+    markers = list(hand.values())
+    views, boxes = views_of(cells, smooth=True), _hand_boxes(markers)
     found: dict[str, Group] = {}
     for name in missing:
         near = [
@@ -123,11 +136,16 @@ def _near(
             for patch in patches_about(views, NAMED_HUES[name])
             if patch.frame in boxes
             and overlap(patch.box, boxes[patch.frame])
-            and not has_hue_of(patch, [*hand, *found.values()])
+            and not has_hue_of(patch, [*markers, *found.values()])
         ]
-        groups = salient_groups(near, _STILL_SHARE * len(cells), hand, _stirring)
+        groups = salient_groups(near, _STILL_SHARE * len(cells), markers, _stirring)
         if groups:
-            found[name] = groups[0]
+            found[name] = max(
+                groups,
+                key=lambda group: (
+                    importance(group, _stirring) * fit_beside(group, name, hand, landmarks)
+                ),
+            )
     return found
 
 

@@ -1,0 +1,107 @@
+"""Which paint each patch is, where hues alone leave it open: markers are where a hand has them.
+
+Warm light turns blue to violet and violet to magenta, and a green ball that the wrist hides now and
+then moves: what is named so must also be as far from the others as rig.toml's landmarks are. Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from services.pi_tracker.colors.proposal.paint_names import Choose
+from services.pi_tracker.colors.proposal.patch_groups import Group
+from services.pi_tracker.colors.proposal.vivid_patches import Patch
+from services.pi_tracker.identify.hand_layout import HandLayout, Landmarks
+from services.pi_tracker.image.hue import Array
+
+# What a pair of markers costs by the logarithm of how near it is to a hand's, where a name that
+# fits to the hue gains 60; and how unlikely a pair can be at most. Set by hand.
+_PER_LOG, _MOST_UNLIKELY = 5.0, 4.0
+# So many groups may be markers, those that gain most: all ways to name more take too long.
+_MOST_GROUPS = 10
+
+
+def of_a_hand(groups: Sequence[Group], landmarks: Landmarks) -> Choose:
+    """Names by hues and by where landmarks are."""
+
+    def choose(gains: Array, names: Sequence[str]) -> list[int]:
+        return _best_names(gains, _pair_gains(groups, names, landmarks))
+
+    return choose
+
+
+def fit_beside(group: Group, name: str, hand: Mapping[str, Group], landmarks: Landmarks) -> float:
+    """How well a group of that name is where a hand with these markers would have it, 0..1."""
+    pairs = _pair_gains([group, *hand.values()], [name, *hand], landmarks)
+    own = [float(pairs[0, 0, other, other]) for other in range(1, len(hand) + 1)]
+    return math.exp(sum(own) / (_PER_LOG * len(own)))
+
+
+def _pair_gains(groups: Sequence[Group], names: Sequence[str], landmarks: Landmarks) -> Array:
+    """What it is worth that two groups have two names, 0 or less: (groups, names, groups, names).
+
+    The mean over the pictures that have both, times the share of these; 0 where nothing is known.
+    """
+    count, each = len(groups), len(names)
+    total = np.zeros((count * each, count * each))
+    layout = HandLayout(names, landmarks)
+    colors = np.tile(np.arange(each), count)
+    pictures = {patch.frame for group in groups for patch in group}
+    for picture in pictures:
+        seen = [
+            next((patch for patch in group if patch.frame == picture), None) for group in groups
+        ]
+        middles_px = np.array([_middle(patch) for patch in seen])
+        areas_px2 = np.array([4.0 * patch.cells if patch else math.nan for patch in seen])
+        distance2 = np.sum((middles_px[:, None] - middles_px) ** 2, axis=2)
+        near = layout.nearness(
+            colors,
+            np.kron(distance2, np.ones((each, each))),
+            np.kron(np.sqrt(areas_px2[:, None] * areas_px2), np.ones((each, each))),
+        )
+        total += np.nan_to_num(np.maximum(np.log(np.maximum(near, 1e-9)), -_MOST_UNLIKELY))
+    gains = _PER_LOG * total / max(len(pictures), 1)
+    return gains.reshape(count, each, count, each)
+
+
+def _best_names(gains: Array, pairs: Array) -> list[int]:
+    """The name of each group that makes most of both gains, -1 for none; none is given twice.
+
+    gains (groups, names): one that is not above 0 is never taken. All choices are gone through, but
+    for those that cannot become better than the best so far.
+    """
+    most = gains.max(axis=1, initial=0.0)
+    order = np.argsort(-most, kind="stable")[:_MOST_GROUPS].tolist()
+    # What all groups from one on may still bring.
+    bounds = [float(most[order[depth:]].sum()) for depth in range(len(order) + 1)]
+    best, most_yet = [-1] * len(gains), 0.0
+    given: dict[int, int] = {}
+
+    def go_on(depth: int, gain: float) -> None:
+        nonlocal best, most_yet
+        if gain > most_yet:
+            best, most_yet = [given.get(group, -1) for group in range(len(gains))], gain
+        if gain + bounds[depth] <= most_yet or depth == len(order):
+            return
+        group = order[depth]
+        for name in np.flatnonzero(gains[group] > 0.0).tolist():
+            if name not in given.values():
+                beside = sum(float(pairs[group, name, *other]) for other in given.items())
+                given[group] = name
+                go_on(depth + 1, gain + float(gains[group, name]) + beside)
+                del given[group]
+        go_on(depth + 1, gain)
+
+    go_on(0, 0.0)
+    return best
+
+
+def _middle(patch: Patch | None) -> tuple[float, float]:
+    """Of its box, px; NaN if there is none."""
+    if patch is None:
+        return math.nan, math.nan
+    x, y, width, height = patch.box
+    return x + 0.5 * width, y + 0.5 * height
