@@ -30,8 +30,10 @@ LEAK = 0.003
 # With 8, errors on the tuning half of points are 2 to 9 % smaller, but a hand that is suddenly a
 # decimetre away has a finger begun 285 mm off.
 BEHIND_BELOW, BEHIND_FRAMES = 0.02, 15
-# So many looks of a landmark in a row that a model passes over and the likeliest uses.
-OUT = 2
+# So many looks of a landmark in a row that a model passes over and the likeliest uses; so many of
+# one camera, of whatever else it uses meanwhile. Of the latter 2, 4 and 7 were tried on tuning
+# halves: 2 makes errors of points 1 to 4 % larger, with 7 one of two wild points is left.
+OUT, OUT_OF_CAMERA = 2, 4
 # Which models a node is filtered by. Points of a frame wait for those only that were more probable
 # than this before it, and the others follow (complete_newest); for all where the squared distances
 # of its looks are more than expected by this, two a look. Tuning half of points: 1.0 to 1.7 of six
@@ -76,6 +78,7 @@ def filter_node(
         predict_model(history, (last, node, m), models, shared, dt_s, by_itself)
         begin_landmarks(history, node, m)
         history.strikes[node, m] = history.strikes[last, parent]
+        history.passed[node, m] = history.passed[last, parent]
         noise = by_itself, models.own[m]
         history.log_likelihood[node, m] = update_model(history, node, m, cameras, gate, noise)
     _weigh(history, last, node)
@@ -135,12 +138,21 @@ def _goes_on_from(history: HandHistory, last: int, m: int, likeliest: int) -> bo
 
     It has been improbable for long; or it passes looks of a landmark over again and again that the
     likeliest uses: what it then has of that landmark grows so wide that one look sends it anywhere.
+    Or it does so with one camera's, and those of another, all of which it uses, lead it off along
+    their rays: it is as probable as any then in each other frame, and decimetres off.
     """
     if history.behind[last, m] >= BEHIND_FRAMES:
         return True
-    for k in range(history.strikes.shape[2]):
+    _, _, landmarks, cameras = history.passed.shape
+    for k in range(landmarks):
         if history.strikes[last, m, k] >= OUT and history.strikes[last, likeliest, k] == 0:
             return True
+        for c in range(cameras):
+            if (
+                history.passed[last, m, k, c] >= OUT_OF_CAMERA
+                and history.passed[last, likeliest, k, c] == 0
+            ):
+                return True
     return False
 
 

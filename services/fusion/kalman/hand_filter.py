@@ -85,7 +85,8 @@ class HandFilter:
         self._cameras = cameras
         self._max_distance_m = max_distance_m
         self._counts = counts
-        self._history = empty_history(landmarks, len(MODELS.own), nodes_of(frames_per_s))
+        nodes = nodes_of(frames_per_s)
+        self._history = empty_history(landmarks, len(MODELS.own), nodes, len(cameras.t))
         self._sights = no_sights(landmarks, len(cameras.t), hold_s)
         self._fates = no_fates(landmarks)
         held = Held(self._history, self._sights, self._fates, cameras, MODELS, GATE)

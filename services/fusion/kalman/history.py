@@ -48,6 +48,7 @@ class HandHistory(NamedTuple):
     used: Bools  # (NODES, N) its observation updated the likeliest model
     used_by: Bools  # (NODES, M, N) its observation updated this model
     strikes: Ints  # (NODES, M, N) how many of its latest looks in a row this model did not use
+    passed: Ints  # (NODES, M, N, C) the same of each camera's latest looks in a row
     probability: Array  # (NODES, M) of each model
     log_likelihood: Array  # (NODES, M) of the frame's looks
     behind: Ints  # (NODES, M) how many frames it has been improbable
@@ -70,7 +71,7 @@ def nodes_of(frames_per_s: float) -> int:
     return min(max(math.ceil(_ROOM_S * frames_per_s), _FEWEST), _MOST)
 
 
-def empty_history(landmarks: int, models: int, nodes: int) -> HandHistory:
+def empty_history(landmarks: int, models: int, nodes: int, cameras: int) -> HandHistory:
     """Nothing observed yet."""
     size = 9 * landmarks + 1
     each = (nodes, landmarks)
@@ -94,6 +95,7 @@ def empty_history(landmarks: int, models: int, nodes: int) -> HandHistory:
         used=np.zeros(each, dtype=np.bool_),
         used_by=np.zeros((*by_model, landmarks), dtype=np.bool_),
         strikes=np.zeros((*by_model, landmarks), dtype=np.int64),
+        passed=np.zeros((*by_model, landmarks, cameras), dtype=np.int64),
         probability=np.full(by_model, 1.0 / models),
         log_likelihood=np.zeros(by_model),
         behind=np.zeros(by_model, dtype=np.int64),
@@ -126,6 +128,7 @@ def start_history(history: HandHistory, time_s: float) -> None:
     history.used[node] = False
     forget_models(history, node)
     history.strikes[node] = 0
+    history.passed[node] = 0
     history.state[node] = 0.0
     history.way[node] = 0.0
     history.own[node] = 0.0

@@ -149,7 +149,7 @@ def update_model(
     x, P = history.state[node, m], history.cov[node, m]
     clock = x.shape[0] - 1
     P[clock, clock] = history.clock_variance[node]
-    total = 0.0
+    total, camera = 0.0, history.camera[node]
     taken, known = np.empty((2 * history.looked.shape[1], x.shape[0])), 0
     for k in range(history.looked.shape[1]):
         history.used_by[node, m, k] = False
@@ -157,6 +157,9 @@ def update_model(
             continue
         look, innovation = look_of(history, node, k, cameras), innovation_of(history, node, m, k)
         begins, strikes = history.begins[node, k], history.strikes[node, m, k]
+        passed = history.passed[node, m, k]
+        if begins:
+            passed[:] = 0
         stray = STRAY - (0 if begins else min(strikes, 3)) * AGAIN
         far = gate if history.returns[node, k] else 0.0
         determinant = innovate(x, P, taken, known, look, far, innovation)
@@ -174,9 +177,10 @@ def update_model(
         if used:
             total += log_likelihood(innovation, determinant) - price
             known = take(x, taken, known, innovation)
-            history.strikes[node, m, k] = 0
+            history.strikes[node, m, k] = passed[camera] = 0
         else:
             total += stray
             history.strikes[node, m, k] = 1 if begins else strikes + 1
+            passed[camera] += 1
     shrink(P, taken, known)
     return total

@@ -50,6 +50,37 @@ def test_a_model_left_behind_goes_on_from_the_likeliest(one_hand):
     assert np.abs(apart).max() < 0.1
 
 
+def test_a_model_that_one_camera_leads_off_goes_on_from_the_likeliest(one_hand):
+    """Test: what a model has of a landmark is moved .2 m along the second camera's ray, so that it
+    uses all of that camera's looks and none of the first one's.
+
+    Expected: after four of those it has gone on from the likeliest, long before it has been
+    improbable for so long that it would anyway.
+    """
+    hand, model, landmark = one_hand(), 5, 1
+    hand.run(range(60))
+    hand.filter.settle()
+    history = hand.filter._history
+    newest = history.order[history.size[0] - 1]
+    assert int(np.argmax(history.probability[newest])) != model
+    at = slice(3 * landmark, 3 * landmark + 3)
+    centre = -hand.cameras.R[1].T @ hand.cameras.t[1]
+    away = history.state[newest, model, at] - centre
+    history.state[newest, model, at] += 0.2 * away / np.linalg.norm(away)
+    used, parents = [], []
+    for k in range(60, 60 + BEHIND_FRAMES):
+        hand.see(hand.frame(k))
+        hand.filter.settle()
+        newest = history.order[history.size[0] - 1]
+        used.append(bool(history.used_by[newest, model, landmark]))
+        parents.append(int(history.parent[newest, model]))
+    assert used[:8] == [False, True] * 4
+    likeliest = int(np.argmax(history.probability[newest]))
+    assert parents[:8] == [model] * 7 + [likeliest]
+    apart_m = history.state[newest, model, at] - history.state[newest, likeliest, at]
+    assert np.linalg.norm(apart_m) < 0.02
+
+
 def test_models_that_follow_later_end_as_if_filtered_at_once(one_hand):
     """Test: 40 frames, of which most wait for their leading models only.
 
@@ -63,7 +94,8 @@ def test_models_that_follow_later_end_as_if_filtered_at_once(one_hand):
         hand.filter.settle()
         assert not history.incomplete[0]
         newest = history.order[history.size[0] - 1]
-        names = ("state", "cov", "probability", "behind", "own", "strikes", "way", "used", "parent")
+        names = ("state", "cov", "probability", "behind", "own", "strikes", "passed")
+        names += ("way", "used", "parent")
         followed = {name: getattr(history, name)[newest].copy() for name in names}
         filter_again(hand.filter._held.address, history.size[0] - 1)
         for name, found in followed.items():

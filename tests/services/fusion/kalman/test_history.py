@@ -14,7 +14,7 @@ from services.fusion.kalman.history import (
 
 
 def test_nodes_are_in_order_of_time():
-    history = empty_history(2, 3, 16)
+    history = empty_history(2, 3, 16, 2)
     start_history(history, 0.0)
     for time_s in (0.3, 0.1, 0.2):
         node = history.order[make_room(history, nodes_until(history, time_s))]
@@ -25,7 +25,7 @@ def test_nodes_are_in_order_of_time():
 
 
 def test_the_oldest_is_forgotten():
-    history = empty_history(2, 3, 16)
+    history = empty_history(2, 3, 16, 2)
     start_history(history, 0.0)
     for k in range(1, 16 + 3):
         index = make_room(history, nodes_until(history, 0.1 * k))
