@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from services.pi_tracker.colors.proposal.paint_names import Choose
+from services.pi_tracker.colors.proposal.paint_names import Choose, with_most_gain
 from services.pi_tracker.colors.proposal.patch_groups import Group
 from services.pi_tracker.colors.proposal.vivid_patches import Patch
 from services.pi_tracker.identify.hand_layout import HandLayout, Landmarks
@@ -20,6 +20,10 @@ from services.pi_tracker.image.hue import Array
 # What a pair of markers costs by the logarithm of how near it is to a hand's, where a name that
 # fits to the hue gains 60; and how unlikely a pair can be at most. Set by hand.
 _PER_LOG, _MOST_UNLIKELY = 5.0, 4.0
+# What is no nearer to where a hand has a marker is not proposed for it: a colour that is missing is
+# told, one that is on a poster is not. With .1 and .3 no paint of tuning rooms or of the other
+# renderer's clips is lost that is found without.
+LEAST_FIT = 0.1
 # So many groups may be markers, those that gain most: all ways to name more take too long.
 _MOST_GROUPS = 10
 
@@ -28,43 +32,56 @@ def of_a_hand(groups: Sequence[Group], landmarks: Landmarks) -> Choose:
     """Names by hues and by where landmarks are."""
 
     def choose(gains: Array, names: Sequence[str]) -> list[int]:
-        return _best_names(gains, _pair_gains(groups, names, landmarks))
+        pairs, shares = _pairs(groups, names, landmarks)
+        return _best_names(gains, _PER_LOG * shares[:, None, :, None] * pairs)
 
     return choose
 
 
 def fit_beside(group: Group, name: str, hand: Mapping[str, Group], landmarks: Landmarks) -> float:
     """How well a group of that name is where a hand with these markers would have it, 0..1."""
-    pairs = _pair_gains([group, *hand.values()], [name, *hand], landmarks)
-    own = [float(pairs[0, 0, other, other]) for other in range(1, len(hand) + 1)]
-    return math.exp(sum(own) / (_PER_LOG * len(own)))
+    pairs, shares = _pairs([group, *hand.values()], [name, *hand], landmarks)
+    others = np.arange(1, len(hand) + 1)
+    total = float(shares[0, 1:].sum())
+    return math.exp(float(pairs[0, 0, others, others] @ shares[0, 1:]) / total) if total else 1.0
 
 
-def _pair_gains(groups: Sequence[Group], names: Sequence[str], landmarks: Landmarks) -> Array:
-    """What it is worth that two groups have two names, 0 or less: (groups, names, groups, names).
+def beside_hand(groups: Sequence[Group], hand: Mapping[str, Group], landmarks: Landmarks) -> Choose:
+    """Names by hues, of what may be where a hand with these markers has them."""
 
-    The mean over the pictures that have both, times the share of these; 0 where nothing is known.
+    def choose(gains: Array, names: Sequence[str]) -> list[int]:
+        fits = [[fit_beside(group, name, hand, landmarks) for name in names] for group in groups]
+        may_be = np.reshape(fits, gains.shape) >= LEAST_FIT
+        return with_most_gain(np.where(may_be, gains, 0.0), names)
+
+    return choose
+
+
+def _pairs(
+    groups: Sequence[Group], names: Sequence[str], landmarks: Landmarks
+) -> tuple[Array, Array]:
+    """How near pairs are to a hand's: logarithms, 0 or less, of two groups that have two names:
+    (groups, names, groups, names), the mean over pictures that have both, 0 where nothing is known;
+    and the share of these pictures of all (groups, groups).
     """
     count, each = len(groups), len(names)
-    total = np.zeros((count * each, count * each))
+    total, both = np.zeros((count * each, count * each)), np.zeros((count, count))
     layout = HandLayout(names, landmarks)
-    colors = np.tile(np.arange(each), count)
+    colors, square = np.tile(np.arange(each), count), np.ones((each, each))
     pictures = {patch.frame for group in groups for patch in group}
     for picture in pictures:
         seen = [
             next((patch for patch in group if patch.frame == picture), None) for group in groups
         ]
-        middles_px = np.array([_middle(patch) for patch in seen])
+        middles_px = np.array([_middle(patch) for patch in seen]).reshape(count, 2)
         areas_px2 = np.array([4.0 * patch.cells if patch else math.nan for patch in seen])
         distance2 = np.sum((middles_px[:, None] - middles_px) ** 2, axis=2)
-        near = layout.nearness(
-            colors,
-            np.kron(distance2, np.ones((each, each))),
-            np.kron(np.sqrt(areas_px2[:, None] * areas_px2), np.ones((each, each))),
-        )
+        area_px2 = np.sqrt(areas_px2[:, None] * areas_px2)
+        near = layout.nearness(colors, np.kron(distance2, square), np.kron(area_px2, square))
         total += np.nan_to_num(np.maximum(np.log(np.maximum(near, 1e-9)), -_MOST_UNLIKELY))
-    gains = _PER_LOG * total / max(len(pictures), 1)
-    return gains.reshape(count, each, count, each)
+        both += np.isfinite(distance2)
+    logs = total / np.maximum(np.kron(both, square), 1.0)
+    return logs.reshape(count, each, count, each), both / max(len(pictures), 1)
 
 
 def _best_names(gains: Array, pairs: Array) -> list[int]:

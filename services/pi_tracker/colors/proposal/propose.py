@@ -13,7 +13,12 @@ from functools import partial
 import numpy as np
 
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.colors.proposal.hand_names import fit_beside, of_a_hand
+from services.pi_tracker.colors.proposal.hand_names import (
+    LEAST_FIT,
+    beside_hand,
+    fit_beside,
+    of_a_hand,
+)
 from services.pi_tracker.colors.proposal.paint_names import (
     NAMED_HUES,
     Choose,
@@ -88,7 +93,8 @@ def propose(
     if hand and missing:
         named |= _near(cells, missing, hand, landmarks)
     rest = [p for p in patches if not p.moves and not has_hue_of(p, named.values())]
-    named |= by_name(salient_groups(rest, _STILL_SHARE * len(frames)), named)
+    still = salient_groups(rest, _STILL_SHARE * len(frames))
+    named |= by_name(still, named, choose=beside_hand(still, hand, landmarks))
     proposals = [_proposal(name, group) for name, group in named.items()]
     return proposals, suggest(cells, [proposal.hue for proposal in proposals])
 
@@ -139,13 +145,13 @@ def _near(
             and not has_hue_of(patch, [*markers, *found.values()])
         ]
         groups = salient_groups(near, _STILL_SHARE * len(cells), markers, _stirring)
-        if groups:
-            found[name] = max(
-                groups,
-                key=lambda group: (
-                    importance(group, _stirring) * fit_beside(group, name, hand, landmarks)
-                ),
-            )
+        of_hand = [
+            (importance(group, _stirring) * fit, group)
+            for group in groups
+            if (fit := fit_beside(group, name, hand, landmarks)) >= LEAST_FIT
+        ]
+        if of_hand:
+            found[name] = max(of_hand, key=lambda one: one[0])[1]
     return found
 
 
