@@ -140,12 +140,12 @@ class ColorCalibration:
         self.edited[color] = span
         self.saved = ""
 
-    def next_after(self, color: str) -> str:
-        """The next colour that was not clicked, else this one."""
+    def next_to_click(self, color: str) -> str:
+        """The first colour from this one on that was not clicked, else this one."""
         done = {click.color for click in self.clicks}
         names = self.names
         at = names.index(color) if color in names else 0
-        return next((name for name in names[at + 1 :] + names[:at] if name not in done), color)
+        return next((name for name in names[at:] + names[:at] if name not in done), color)
 
     def as_file(self, date: str) -> Colors:
         """What is saved."""

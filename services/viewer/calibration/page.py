@@ -171,7 +171,7 @@ class ColourStep:
             self._chosen, name, min(x * width, width - 1.0), min(y * height, height - 1.0)
         )
         if await self._fit(self._calibration.request()):
-            self._chosen = self._calibration.next_after(self._chosen)
+            self._chosen = self._calibration.next_to_click(self._chosen)
             self._show_chosen()
 
     async def _fit(self, request: FitRequest | None) -> bool:
@@ -187,7 +187,8 @@ class ColourStep:
         """Have everything fitted that moved in the last seconds, or else stands out."""
         names = list(self._recent)[::-_EVERY][::-1]
         answer = await self._ask_fit(FitRequest(auto=True, pictures=names))
-        self._calibration.take_proposal(answer)
+        if self._calibration.take_proposal(answer):
+            self._chosen = self._calibration.next_to_click(self._chosen)
         self._show_chosen()
 
     async def _ask_fit(self, request: FitRequest) -> FitResult | None:

@@ -45,11 +45,11 @@ def test_applied_ranges_give_way_to_fitted_and_those_to_edited_ones(
 
 def test_the_next_colour_is_one_nobody_pointed_at(calibration: ColorCalibration) -> None:
     click_and_fit(calibration, "blue")
-    assert calibration.next_after("blue") == "cyan"
+    assert calibration.next_to_click("blue") == "cyan"
     click_and_fit(calibration, "cyan")
-    assert calibration.next_after("cyan") == "green"
+    assert calibration.next_to_click("cyan") == "green"
     click_and_fit(calibration, "green")
-    assert calibration.next_after("green") == "green"
+    assert calibration.next_to_click("green") == "green"
 
 
 def test_a_click_that_shows_no_paint_is_forgotten(calibration: ColorCalibration) -> None:
@@ -85,6 +85,8 @@ def test_a_proposal_counts_as_pointing_at_the_rigs_colours(calibration: ColorCal
     )
     assert set(calibration.ranges) == {"green", "blue"}
     assert [click.color for click in calibration.clicks] == ["blue"]
+    # What was not found is to be clicked on.
+    assert [calibration.next_to_click(color) for color in ("blue", "green")] == ["cyan", "green"]
     assert not calibration.take_proposal(FitResult(error="nothing stands out"))
 
 
