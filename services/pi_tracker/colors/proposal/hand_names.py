@@ -50,9 +50,11 @@ def beside_hand(groups: Sequence[Group], hand: Mapping[str, Group], landmarks: L
     """Names by hues, of what may be where a hand with these markers has them."""
 
     def choose(gains: Array, names: Sequence[str]) -> list[int]:
-        fits = [[fit_beside(group, name, hand, landmarks) for name in names] for group in groups]
-        may_be = np.reshape(fits, gains.shape) >= LEAST_FIT
-        return with_most_gain(np.where(may_be, gains, 0.0), names)
+        allowed = gains.copy()
+        for group, name in np.argwhere(gains > 0.0).tolist():
+            if fit_beside(groups[group], names[name], hand, landmarks) < LEAST_FIT:
+                allowed[group, name] = 0.0
+        return with_most_gain(allowed, names)
 
     return choose
 
