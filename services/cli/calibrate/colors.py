@@ -6,7 +6,7 @@ The ranges are applied to the running camera, or written to a file.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -66,14 +66,17 @@ def from_recording(
     path = options.out_folder(request.out, rig) / f"{request.camera}.colors.json"
     numbers, pointers = request.pointing.in_single_frames()
     first = len(numbers)
-    numbers += frame_numbers(frames) if frames else []
+    more = frame_numbers(frames) if frames else []
+    if request.pointing.auto and not more:
+        # What moves is told from many, also where some colours are pointed at in one.
+        spread = spread_numbers(request.camera, video, AUTO_FRAMES)
+        more = [number for number in spread if number not in numbers]
+    numbers += more
     if not numbers:
-        if not request.pointing.auto:
-            raise CalibrationError(
-                "say which frames the boxes or clicks are in: --frames 10,200,500, "
-                "or --at FRAME:color=x,y,width,height"
-            )
-        numbers = spread_numbers(request.camera, video, AUTO_FRAMES)
+        raise CalibrationError(
+            "say which frames the boxes or clicks are in: --frames 10,200,500, "
+            "or --at FRAME:color=x,y,width,height"
+        )
     pointers += request.pointing.in_every_frame(range(first, len(numbers)))
     taken = frames_by_number(request.camera, video, numbers)
     inputs = {"recording": video.name, "frames": numbers}
@@ -141,8 +144,7 @@ def fitted(
     """
     if request.pointing.auto:
         given = {pointer.color for pointer in pointers}
-        proposed = _proposed(pictures.frames, rig, dry_run=request.dry_run)
-        pointers = pointers + [box for box in proposed if box.color not in given]
+        pointers = pointers + _proposed(pictures.frames, rig, given, dry_run=request.dry_run)
     study = gather(pictures.frames, pointers, pictures.names)
     ranges = fit(study.samples)
     others = {name: span for name, span in known.items() if name not in ranges}
@@ -171,8 +173,13 @@ def _write_picture(path: Path, image: Image) -> None:
         )
 
 
-def _proposed(frames: Sequence[Frame], rig: RigConfig | None, *, dry_run: bool) -> list[Pointer]:
-    """Boxes around what stands out: of the colours that rig.toml's markers need, or all."""
+def _proposed(
+    frames: Sequence[Frame], rig: RigConfig | None, given: Collection[str], *, dry_run: bool
+) -> list[Pointer]:
+    """Boxes around what stands out: of the colours that rig.toml's markers need, or all.
+
+    given are colours that somebody points at.
+    """
     wanted = rig.colors if rig else []
     proposals, suggestions = propose(frames, wanted, rig.landmarks if rig else NO_LANDMARKS)
     if not proposals:
@@ -182,9 +189,12 @@ def _proposed(frames: Sequence[Frame], rig: RigConfig | None, *, dry_run: bool) 
         )
     typer.echo(proposals_text(proposals, suggestions), err=True)
     chosen, missing = for_markers(proposals, wanted)
+    missing = [color for color in missing if color not in given]
     if missing and not dry_run:
         raise CalibrationError(
             f"no patch was found that could be {', '.join(missing)} of rig.toml's markers; point "
-            "at it with --box, or give the markers the names of what was found in rig.toml"
+            f"at it beside --auto, in a frame of a video with --at FRAME:{missing[0]}=x,y, else "
+            f"with --click {missing[0]}=x,y, or give the markers the names of what was found in "
+            "rig.toml"
         )
-    return boxes_of(chosen)
+    return [box for box in boxes_of(chosen) if box.color not in given]

@@ -162,6 +162,20 @@ def test_missing_colours_of_the_rig_are_not_made_up(pictures, tmp_path):
         rhot("colors", "left", "--video", pictures, "--auto", "--config", tmp_path / "rig.toml")
 
 
+def test_what_auto_misses_can_be_pointed_at_beside_it(shot, pictures, tmp_path):
+    """Test: the missing colour is pointed at in one frame, as the error says."""
+    (tmp_path / "rig.toml").write_text(RIG.replace('"blue"', '"violet"'))
+    x, y = shot[1]["blue"]
+    words = ["--auto", "--at", f"1:violet={x:.0f},{y:.0f}", "--config", tmp_path / "rig.toml"]
+    rhot("colors", "left", "--video", pictures, *words)
+    made = load_colors(tmp_path / "calibration", "left")
+    assert set(made.colors) == {"green", "violet"}
+    # What moves is told from all pictures, not from the one that was pointed at.
+    assert sorted(made.inputs["frames"]) == [0, 1, 2, 3, 4]
+    pointed_at = made.residuals["colors"]
+    assert (pointed_at["violet"]["pictures"], pointed_at["green"]["pictures"]) == (1, 5)
+
+
 @pytest.fixture
 def tracker(router, shot, tmp_path):
     """A tracker on a router, in a thread of its own, with a camera that shows the two tips.
