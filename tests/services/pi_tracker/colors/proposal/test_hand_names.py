@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from services.pi_tracker.colors.proposal.hand_names import fit_beside, of_a_hand
@@ -80,11 +82,18 @@ def test_more_groups_than_a_hand_has_are_named_in_no_time():
     assert len(set(names) & set(RIG)) >= 1
 
 
-@pytest.mark.parametrize(("place", "fits"), [((395, 225), True), ((760, 40), False)])
-def test_where_a_missing_marker_may_be(place, fits):
+@pytest.mark.parametrize(
+    ("place", "cells", "fits"), [((395, 225), 40, 1), ((760, 40), 40, 0), ((395, 225), 400, 0)]
+)
+def test_where_and_how_large_a_missing_marker_may_be(place, cells, fits):
     hand = {
         color: group(0.0, PLACES[mark]) for color, (_, mark) in MARKS.items() if color != "magenta"
     }
-    nearness = fit_beside(group(172.0, place), "magenta", hand, MARKS)
-    assert nearness > 0.7 if fits else nearness < 0.1
-    assert fit_beside(group(172.0, place), "magenta", hand, {}) == 1.0
+    found = [dataclasses.replace(patch, cells=cells) for patch in group(172.0, place)]
+    assert abs(fit_beside(found, "magenta", hand, MARKS) - fits) < 0.1
+
+
+def test_nothing_is_known_of_landmarks_without_names_or_others():
+    thumb = group(172.0, (760, 40))
+    assert fit_beside(thumb, "magenta", {"blue": group(120.0, (330, 150))}, {}) == 1.0
+    assert fit_beside(thumb, "magenta", {}, MARKS) == 1.0
