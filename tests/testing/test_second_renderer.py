@@ -9,6 +9,7 @@ from rhot.geometry.camera import Camera, pinhole
 
 pytest.importorskip("vtkmodules", reason="VTK is not installed: pip install 'rhot[other-renderer]'")
 
+from testing.second_renderer.catalog.drawn import drawn, drawn_clip
 from testing.second_renderer.motion import Array, Bones
 from testing.second_renderer.paint import LANDMARKS, Job, landmarks_at, painted
 from testing.second_renderer.pictures import Shutter, Studio
@@ -68,3 +69,17 @@ def test_paint_is_seen_about_its_landmark(hand):
     picture = as_i420(developed(taken.light, Sensor(), (1,)))
     assert picture.shape == (360, 320)
     assert picture[:240].std() > 10.0
+
+
+@pytest.mark.usefixtures("rhot_data")
+def test_clips_by_number_are_in_view_and_always_the_same():
+    clips = {number: drawn_clip(number) for number in (0, 5, 1000)}
+    assert len({repr(clip) for clip in clips.values()}) == 3
+    assert clips[5] == drawn_clip(5) == drawn("tuning", 6)["no. 5"]
+    assert clips[1000] == drawn("held_out", 1)["no. 1000"]
+    times_s = np.linspace(0.0, 8.0, 200)
+    for clip in clips.values():
+        bones = clip.play.bones(times_s)
+        for camera in clip.rig.cameras().values():
+            tips_px = camera.project(bones.joints[:, :, -1].reshape(-1, 3))
+            assert np.all((tips_px > 20.0) & (tips_px < np.array(camera.size_px) - 20.0))

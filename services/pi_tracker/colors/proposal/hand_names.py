@@ -69,9 +69,11 @@ def beside_hand(groups: Sequence[Group], hand: Mapping[str, Group], landmarks: L
 
     def choose(gains: Array, names: Sequence[str]) -> list[int]:
         allowed = gains.copy()
-        for group, name in np.argwhere(gains > 0.0).tolist():
-            if fit_beside(groups[group], names[name], hand, landmarks) < LEAST_FIT:
-                allowed[group, name] = 0.0
+        for number, column in np.argwhere(gains > 0.0).tolist():
+            group, name = groups[number], names[column]
+            # What marks no landmark is a thing of the room, and may be anywhere.
+            if name in landmarks and fit_beside(group, name, hand, landmarks) < LEAST_FIT:
+                allowed[number, column] = 0.0
         return with_most_gain(allowed, names)
 
     return choose
