@@ -158,7 +158,7 @@ class FusionStep:
         view = view._replace(sigmas=self._systematic.white_sigmas(view, hidden))
         self.method.observe(view, times_s - late_s, clock_sigma_s)
         due_ns = self._schedule.add_frame(view.camera, view.instant_ns - round(late_s * 1e9))
-        return [] if due_ns is None else self._points_at(due_ns)
+        return [points for instant_ns in due_ns for points in self._points_at(instant_ns)]
 
     def settle(self, *, behind: bool = False) -> None:
         """Do what a frame's points do not wait for: watch it, and learn the clocks from it.

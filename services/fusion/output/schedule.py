@@ -1,23 +1,38 @@
 """The output schedule: one instant for each frame of the reference camera, due when lag allows.
 
-The reference is the fastest camera that delivers; it keeps the role until it falls silent or a
-faster one appears. Lost or late frames leave out an instant; a camera that is back after a pause
-simply takes part again.
+The reference is a camera of the fastest that deliver; of these the one whose frames come soonest
+after the others': cameras that run freely may expose 4 ms one after the other, and points told at
+the earlier's frame would rest on what the later saw 29 ms before. It keeps the role until it falls
+silent, or another is clearly better. Where cameras expose together, it is chance whose frame comes
+first: an instant waits for the other's, for one frame of any camera at most. Lost or late frames
+leave out an instant; a camera that is back after a pause simply takes part again.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
 
 from rhot.geometry.transforms import Array
 
 # A reference silent for this many of its own frames hands over to whichever camera delivers next:
 # one lost frame is enough, jitter is not.
 _SILENT_FRAMES = 1.25
+# What is older than so many of its camera's frames tells of a lost frame, not of when it exposes.
+_OLDEST_FRAMES = 1.1
+# Weight of the newest frame in how old the others' usually are; and the share of a frame's time by
+# which these must be younger for another to take over. With less, networks that delay frames by a
+# third of their time (exponentially) change the lead at random, which costs instants.
+_NEWEST, _YOUNGER = 0.125, 0.3
+# Frames so near one frame's time apart are of cameras that expose together: the newer one's partner
+# is still to come.
+_TOGETHER_FRAMES = 0.15
 
 
 class OutputSchedule:
-    """The queue of instants (ns, master clock) whose points are wanted; lag_frames + 1 at most."""
+    """The queue of instants (ns, master clock) whose points are wanted; lag_frames + 2 at most."""
 
     def __init__(self, fps: Array, lag_frames: int) -> None:
         """fps (C,) of the cameras.
@@ -27,34 +42,77 @@ class OutputSchedule:
         self._fps = fps
         self._lag_frames = lag_frames
         self._reference: int | None = None
-        self._newest_ns: int | None = None
+        self._told_ns: int | None = None
         self._waiting: deque[int] = deque()
+        # Of each camera: its newest instant, ns, and how old the others' frames usually are when
+        # one of its own comes, in frames of theirs; NaN where nothing is known.
+        self._newest_ns: dict[int, int] = {}
+        self._ages = np.full(len(fps), np.nan)
 
-    def add_frame(self, camera: int, instant_ns: int) -> int | None:
-        """Note a frame; the instant whose points are due now, if any.
+    def add_frame(self, camera: int, instant_ns: int) -> list[int]:
+        """Note a frame; the instants whose points are due now: mostly one or none.
 
         Instants come in ascending order, none twice.
         """
-        if self._newest_ns is not None and instant_ns <= self._newest_ns:
-            return None
-        if not self._is_reference(camera, instant_ns):
-            return None
-        self._reference = camera
-        self._newest_ns = instant_ns
-        self._waiting.append(instant_ns)
-        return self._waiting.popleft() if len(self._waiting) > self._lag_frames else None
-
-    def _is_reference(self, camera: int, instant_ns: int) -> bool:
-        """Whether a camera is the reference, or becomes it with a frame."""
-        if self._reference is None or self._newest_ns is None or camera == self._reference:
-            return True
-        if self._fps[camera] > self._fps[self._reference]:
-            return True
-        silent_s = (instant_ns - self._newest_ns) * 1e-9
-        return silent_s > _SILENT_FRAMES / float(self._fps[self._reference])
+        self._note_age(camera, instant_ns)
+        held = False
+        if (self._told_ns is None or instant_ns > self._told_ns) and self._leads(camera):
+            self._told_ns = instant_ns
+            self._waiting.append(instant_ns)
+            held = any(
+                abs(age_frames - 1.0) < _TOGETHER_FRAMES
+                for age_frames in self._ages_frames(camera, instant_ns)
+            )
+        ready = len(self._waiting) - held - self._lag_frames
+        return [self._waiting.popleft() for _ in range(ready)]
 
     def take_waiting(self) -> list[int]:
         """The instants still waiting, which no later frame will help; none wait any more."""
         waiting = list(self._waiting)
         self._waiting.clear()
         return waiting
+
+    def _note_age(self, camera: int, instant_ns: int) -> None:
+        """How old the other cameras' frames are as one of a camera comes."""
+        self._newest_ns[camera] = max(instant_ns, self._newest_ns.get(camera, instant_ns))
+        ages = [age for age in self._ages_frames(camera, instant_ns) if age < _OLDEST_FRAMES]
+        if ages:
+            now, usual = float(np.mean(ages)), float(self._ages[camera])
+            self._ages[camera] = usual + _NEWEST * (now - usual) if np.isfinite(usual) else now
+
+    def _ages_frames(self, camera: int, instant_ns: int) -> Iterator[float]:
+        """How old each other camera's newest frame is at an instant, in frames of its own."""
+        for other, newest_ns in self._newest_ns.items():
+            if other != camera:
+                yield (instant_ns - newest_ns) * 1e-9 * float(self._fps[other])
+
+    def _leads(self, camera: int) -> bool:
+        """Whether points are told at a camera's newest frame; notes who is the reference."""
+        if self._takes_over(camera):
+            self._reference = self._freshest(camera)
+        # Where another is better, its frame comes next, less than half a frame's time from now.
+        return self._reference == camera
+
+    def _takes_over(self, camera: int) -> bool:
+        """Whether a camera is the reference, or becomes it with its newest frame."""
+        if self._reference is None or self._told_ns is None or camera == self._reference:
+            return True
+        if self._fps[camera] > self._fps[self._reference]:
+            return True
+        silent_s = (self._newest_ns[camera] - self._told_ns) * 1e-9
+        return silent_s > _SILENT_FRAMES / float(self._fps[self._reference])
+
+    def _freshest(self, camera: int) -> int:
+        """The camera as fast as one whose frames find the others' clearly younger, or itself."""
+        fps = float(self._fps[camera])
+        best = camera
+        for other, newest_ns in self._newest_ns.items():
+            since_frames = (self._newest_ns[camera] - newest_ns) * 1e-9 * fps
+            if (
+                self._fps[other] == fps
+                and since_frames < _SILENT_FRAMES
+                and self._ages[camera] - self._ages[other] > _YOUNGER
+                and self._ages[other] < self._ages[best]
+            ):
+                best = other
+        return best

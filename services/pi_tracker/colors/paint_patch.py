@@ -23,6 +23,12 @@ from services.pi_tracker.colors.region_growing import (
 from services.pi_tracker.image.chroma import Cells, Mask
 from services.pi_tracker.image.planes import Rect
 
+# Magenta runs into dark skin, whose chroma is hardly more than noise, and green into a poster: of
+# that, little is within these shares of the usual tolerance, and of paint most (.85 at .7; of one
+# click in a hundred .57). Chosen on the other renderer's tuning clips.
+_TOLERANCES = (0.7, 0.5)
+_STAYS = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class PaintPatch:
@@ -50,7 +56,10 @@ def find_patch(cells: Cells, pointer: Pointer) -> PaintPatch:
     rect = search_window(cells, pointer)
     x0, y0, x1, y1 = rect
     window = cells[y0:y1, x0:x1]
-    region = _grown(window, _start(cells, rect, pointer), pointer)
+    start = _start(cells, rect, pointer)
+    region = _grown(window, start, pointer)
+    if not pointer.is_box:
+        region = _without_leaks(window, start, pointer, region)
     if not pointer.is_box and touches_border(region, rect, cells):
         raise CalibrationError(
             f"{pointer}: that colour goes on far beyond the click; is it the background, or a "
@@ -70,7 +79,7 @@ def _start(cells: Cells, rect: Rect, pointer: Pointer) -> RegionStart:
     return start_at_click(cells[y0:y1, x0:x1], x, y)
 
 
-def _grown(window: Cells, start: RegionStart, pointer: Pointer) -> Mask:
+def _grown(window: Cells, start: RegionStart, pointer: Pointer, tolerance: float = 1.0) -> Mask:
     """The region (h, w) of a window, large enough to be a patch."""
     if start.chromaticity is None:
         reason = (
@@ -81,15 +90,29 @@ def _grown(window: Cells, start: RegionStart, pointer: Pointer) -> Mask:
         raise CalibrationError(
             f"{pointer}: {reason}; point at the paint itself, in better light if it is dark"
         )
-    region = grow_region(window, start.chromaticity, start.cells)
+    region = grow_region(window, start.chromaticity, start.cells, tolerance)
     if region.any():
         # The start's colour was one place's; the region's own is a better one.
-        region = grow_region(window, np.median(window[region].chromaticity, axis=0), region)
+        middle = np.median(window[region].chromaticity, axis=0)
+        region = grow_region(window, middle, region, tolerance)
     count = np.count_nonzero(region)
     if count < MIN_CELLS:
         raise CalibrationError(
             f"{pointer}: only {4 * count} px of one colour are there; {4 * MIN_CELLS} px are needed"
         )
+    return region
+
+
+def _without_leaks(window: Cells, start: RegionStart, pointer: Pointer, region: Mask) -> Mask:
+    """A region, grown anew from its start where it is mostly what is like it only by half."""
+    for tolerance in _TOLERANCES:
+        try:
+            closer = _grown(window, start, pointer, tolerance)
+        except CalibrationError:
+            break
+        if np.count_nonzero(closer) > _STAYS * np.count_nonzero(region):
+            break
+        region = closer
     return region
 
 

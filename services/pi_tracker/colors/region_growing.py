@@ -114,10 +114,11 @@ def _histogram(cells: Cells, weight: Array) -> Array:
     return cv2.blur(wrapped, (3, 3), borderType=cv2.BORDER_CONSTANT)[1:-1]
 
 
-def grow_region(window: Cells, chromaticity: Array, starts: Mask) -> Mask:
+def grow_region(window: Cells, chromaticity: Array, starts: Mask, tolerance: float = 1.0) -> Mask:
     """Cells (h, w) of like chromaticity (2,), connected to one another and to the starts.
 
-    Of several regions the one that holds most of the starts.
+    Of several regions the one that holds most of the starts. tolerance: how far chromaticity may
+    be off, as share of what paint's varies by.
     """
     strength = float(np.hypot(*chromaticity))
     if strength <= 0.0:
@@ -128,10 +129,13 @@ def grow_region(window: Cells, chromaticity: Array, starts: Mask) -> Mask:
     chroma_across = np.abs(window.u * across[0] + window.v * across[1])
     chroma_along = window.u * along[0] + window.v * along[1]
     expected = strength * luma
+    across_most = _MAX_ACROSS * np.maximum(chroma_along, 0.0) + _CHROMA_NOISE
+    least = (1.0 - tolerance * (1.0 - _MIN_ALONG)) * expected - tolerance * _CHROMA_NOISE
+    most = (1.0 + tolerance * (_MAX_ALONG - 1.0)) * expected + tolerance * _CHROMA_NOISE
     like = (
-        (chroma_across <= _MAX_ACROSS * np.maximum(chroma_along, 0.0) + _CHROMA_NOISE)
-        & (chroma_along >= _MIN_ALONG * expected - _CHROMA_NOISE)
-        & (chroma_along <= _MAX_ALONG * expected + _CHROMA_NOISE)
+        (chroma_across <= tolerance * across_most)
+        & (chroma_along >= least)
+        & (chroma_along <= most)
         & (window.chroma >= 0.5 * MIN_CHROMA)
     )
     _, labels = cv2.connectedComponents(like.astype(np.uint8), connectivity=4)

@@ -10,11 +10,7 @@ FRAME_NS = 33_333_333
 
 
 def drive(schedule: OutputSchedule, frames) -> list[int]:
-    return [
-        due
-        for camera, instant in frames
-        if (due := schedule.add_frame(camera, instant)) is not None
-    ]
+    return [due for camera, instant in frames for due in schedule.add_frame(camera, instant)]
 
 
 def both(frames: int, *, lost=(), phase_ns: int = FRAME_NS // 2):
@@ -80,3 +76,61 @@ def test_instants_ascend_whatever_comes():
         ),
     )
     assert due == sorted(set(due))
+
+
+def test_the_camera_that_sees_soonest_after_the_other_leads():
+    """4 ms apart: at the earlier one's frames what the other saw is 29 ms old."""
+    late_ns = 4_000_000
+    due = np.array(drive(OutputSchedule(np.array([30.0, 30.0]), 0), both(60, phase_ns=late_ns)))
+    settled = due[due > 3 * FRAME_NS]
+    assert set((settled % FRAME_NS).tolist()) == {late_ns}
+    assert np.diff(due).max() <= 1.5 * FRAME_NS
+    assert len(due) >= 59
+
+
+def test_cameras_that_drift_past_each_other_change_the_lead_once_a_round():
+    slower_ns = round(FRAME_NS * 1.002)
+    frames = 1500
+    events = sorted(
+        [(0, k * FRAME_NS) for k in range(frames)] + [(1, k * slower_ns) for k in range(frames)],
+        key=lambda event: event[1],
+    )[: 2 * frames - 10]
+    schedule = OutputSchedule(np.array([30.0, 30.0]), 0)
+    newest, leaders, ages_ns = {0: 0, 1: 0}, [], []
+    for camera, instant_ns in events:
+        newest[camera] = instant_ns
+        for due_ns in schedule.add_frame(camera, instant_ns):
+            leaders.append(due_ns % FRAME_NS == 0)
+            ages_ns.append(due_ns - min(newest.values()))
+    # Each third round of 500 frames: one change to the other and one back.
+    assert 4 <= np.count_nonzero(np.diff(leaders)) <= 7
+    assert len(leaders) >= 0.99 * frames
+    # But for some frames after each pass, until the change is sure.
+    assert np.percentile(ages_ns, 98.0) <= 0.7 * FRAME_NS
+
+
+def test_a_camera_that_fell_silent_is_not_waited_for():
+    soon = both(100, phase_ns=4_000_000)
+    events = [event for event in soon if event[0] == 0 or event[1] < 40 * FRAME_NS]
+    due = drive(OutputSchedule(np.array([30.0, 30.0]), 0), events)
+    assert np.diff(due).max() <= 2.0 * FRAME_NS
+    assert due[-1] == 99 * FRAME_NS
+
+
+def test_cameras_that_expose_together_are_told_of_once_both_have_come():
+    """Whose frame comes first is chance, and one of each thirtieth is lost."""
+    random, schedule = np.random.default_rng(3), OutputSchedule(np.array([30.0, 30.0]), 0)
+    told, waits = [], []
+    for k in range(300):
+        instants = {0: k * FRAME_NS, 1: k * FRAME_NS + 100_000}
+        for camera in random.permutation(2).tolist():
+            if random.random() < 1.0 / 30.0:
+                continue
+            due = schedule.add_frame(camera, instants[camera])
+            told += due
+            waits += [k - round(instant / FRAME_NS) for instant in due]
+    assert len(told) >= 0.96 * 300
+    assert told == sorted(set(told))
+    assert set(waits) <= {0, 1}
+    # One that waited for a lost frame is told with the next.
+    assert np.mean(waits) < 0.06

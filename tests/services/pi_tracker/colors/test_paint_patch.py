@@ -8,7 +8,7 @@ import pytest
 from rhot.errors import CalibrationError
 from services.pi_tracker.colors.paint_patch import find_patch
 from services.pi_tracker.colors.pointer import Pointer
-from services.pi_tracker.image.chroma import cells_of
+from services.pi_tracker.image.chroma import Cells, cells_of
 
 SIZE = (160, 120)
 
@@ -108,3 +108,22 @@ def test_a_coloured_wall_is_no_marker(studio, tip):
     frame, _ = studio.frame([tip("blue", 80.0, 60.0)], size_px=SIZE, wall=(90, 170, 80))
     with pytest.raises(CalibrationError, match="goes on far beyond the click"):
         find_patch(cells_of(frame), Pointer("green", 0, 20.0, 20.0))
+
+
+@pytest.mark.parametrize("beyond", [False, True], ids=["a hand", "more than a click looks at"])
+def test_magenta_does_not_run_into_dark_skin(beyond):
+    """Chroma of dark skin is hardly more than noise, and its direction near that of magenta."""
+    height, width = (480, 640) if beyond else (60, 60)
+    rows, columns = np.mgrid[: height // 2, : width // 2]
+    middle = (height // 4, width // 4)
+    paint = np.hypot(rows - middle[0], columns - middle[1]) < 6.0
+    noise = np.random.default_rng(0).normal(0.0, 0.7, (3, *paint.shape))
+    skin = Cells(*(np.array([30.0, -2.5, 6.5])[:, None, None] + noise))
+    cells = Cells(
+        np.where(paint, 55.0 + noise[0], skin.y),
+        np.where(paint, 6.0 + noise[1], skin.u),
+        np.where(paint, 26.0 + noise[2], skin.v),
+    )
+    patch = find_patch(cells, Pointer("magenta", 0, width / 2, height / 2))
+    assert np.count_nonzero(patch.mask & ~paint) <= 0.1 * np.count_nonzero(paint)
+    assert np.count_nonzero(patch.mask & paint) >= 0.9 * np.count_nonzero(paint)
