@@ -64,6 +64,7 @@ RUNS = {
         "dots_pictures", "", "--dots 8 --clips 1 --motion pinch --hindsight", 45
     ),
     "duplicate_frames": _script("duplicate_frames", "", "--clips 1", 8),
+    "exposures": _script("exposures", "", None, 2),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
     "grasp_metrology": _script("grasp_metrology", "", "--seeds 1", 0.5),

@@ -67,13 +67,14 @@ _NOISE: dict[Half, _Makers] = {
         ),
     },
 }
-# Other rigs: wider, turned in, faster, slower, three cameras.
+# Other rigs: wider, turned in, faster, slower, three cameras, or exposing soon one after the other.
 _RIG: dict[Half, _Makers] = {
     "tuning": {
         "60 fps": lazily(partial(stop_and_go, 12.0, 4), rig=SyntheticRig(fps=60.0, phase_s=0.008)),
         "three cameras": lazily(
             partial(MovingHand, seed=3), rig=SyntheticRig(cameras=3, phase_s=0.011)
         ),
+        "2 ms apart": lazily(partial(stop_and_go, 12.0, 8), rig=SyntheticRig(phase_s=0.002)),
     },
     "held_out": {
         "25 fps, 120 mm apart, turned in": lazily(
@@ -82,6 +83,9 @@ _RIG: dict[Half, _Makers] = {
         ),
         "90 fps, triggered together": lazily(
             partial(stop_and_go, 18.0, 15), rig=SyntheticRig(fps=90.0, phase_s=0.0, seed=15)
+        ),
+        "5 ms apart": lazily(
+            partial(leap_motion, "pinch"), rig=SyntheticRig(phase_s=0.005, seed=18)
         ),
     },
 }

@@ -17,18 +17,18 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 
-# A reference silent for this many of its own frames hands over to whichever camera delivers next:
-# one lost frame is enough, jitter is not.
-_SILENT_FRAMES = 1.25
+# After a silence of so many frames of the reference another's frame stands in: one lost frame is
+# enough, jitter is not. A reference that is silent for longer has lost its role.
+_SILENT_FRAMES, _ABSENT_FRAMES = 1.25, 2.0
 # What is older than so many of its camera's frames tells of a lost frame, not of when it exposes.
 _OLDEST_FRAMES = 1.1
 # Weight of the newest frame in how old the others' usually are; and the share of a frame's time by
 # which these must be younger for another to take over. With less, networks that delay frames by a
 # third of their time (exponentially) change the lead at random, which costs instants.
 _NEWEST, _YOUNGER = 0.125, 0.3
-# Frames so near one frame's time apart are of cameras that expose together: the newer one's partner
-# is still to come.
-_TOGETHER_FRAMES = 0.15
+# Frames so near whole frames' times apart are of cameras that expose together: the newer one's
+# partner is still to come. After more than two a camera is not waited for.
+_TOGETHER_FRAMES, _AWAITED = 0.15, (1, 2)
 
 
 class OutputSchedule:
@@ -60,8 +60,8 @@ class OutputSchedule:
             self._told_ns = instant_ns
             self._waiting.append(instant_ns)
             held = any(
-                abs(age_frames - 1.0) < _TOGETHER_FRAMES
-                for age_frames in self._ages_frames(camera, instant_ns)
+                round(age) in _AWAITED and abs(age - round(age)) < _TOGETHER_FRAMES
+                for age in self._ages_frames(camera, instant_ns)
             )
         ready = len(self._waiting) - held - self._lag_frames
         return [self._waiting.popleft() for _ in range(ready)]
@@ -88,19 +88,18 @@ class OutputSchedule:
 
     def _leads(self, camera: int) -> bool:
         """Whether points are told at a camera's newest frame; notes who is the reference."""
-        if self._takes_over(camera):
+        reference = self._reference
+        if reference is None or self._told_ns is None:
+            self._reference = camera
+            return True
+        fps = float(self._fps[reference])
+        newest_ns = self._newest_ns[camera]
+        silent = (newest_ns - self._told_ns) * 1e-9 * fps > _SILENT_FRAMES
+        absent = (newest_ns - self._newest_ns[reference]) * 1e-9 * fps > _ABSENT_FRAMES
+        if camera == reference or self._fps[camera] > fps or silent or absent:
             self._reference = self._freshest(camera)
         # Where another is better, its frame comes next, less than half a frame's time from now.
-        return self._reference == camera
-
-    def _takes_over(self, camera: int) -> bool:
-        """Whether a camera is the reference, or becomes it with its newest frame."""
-        if self._reference is None or self._told_ns is None or camera == self._reference:
-            return True
-        if self._fps[camera] > self._fps[self._reference]:
-            return True
-        silent_s = (self._newest_ns[camera] - self._told_ns) * 1e-9
-        return silent_s > _SILENT_FRAMES / float(self._fps[self._reference])
+        return self._reference == camera or silent
 
     def _freshest(self, camera: int) -> int:
         """The camera as fast as one whose frames find the others' clearly younger, or itself."""
@@ -110,7 +109,7 @@ class OutputSchedule:
             since_frames = (self._newest_ns[camera] - newest_ns) * 1e-9 * fps
             if (
                 self._fps[other] == fps
-                and since_frames < _SILENT_FRAMES
+                and since_frames < _ABSENT_FRAMES
                 and self._ages[camera] - self._ages[other] > _YOUNGER
                 and self._ages[other] < self._ages[best]
             ):

@@ -134,3 +134,18 @@ def test_cameras_that_expose_together_are_told_of_once_both_have_come():
     assert set(waits) <= {0, 1}
     # One that waited for a lost frame is told with the next.
     assert np.mean(waits) < 0.06
+
+
+def test_a_lost_frame_of_the_camera_that_leads_costs_no_instant():
+    """4 ms after the other: the other's next frame stands in, and the lead stays."""
+    late_ns = 4_000_000
+    lost = {20, 40, 60}
+    events = [
+        event
+        for event in both(100, phase_ns=late_ns)
+        if event[0] == 0 or event[1] // FRAME_NS not in lost
+    ]
+    due = np.array(drive(OutputSchedule(np.array([30.0, 30.0]), 0), events))
+    assert len(due) >= 99
+    assert np.diff(due).max() <= 2.0 * FRAME_NS
+    assert np.count_nonzero(due[5:] % FRAME_NS == 0) == len(lost)
