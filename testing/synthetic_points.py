@@ -9,7 +9,7 @@ its marker's own instant solved for. Everything is random by a seed, and the sam
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from rhot.files.calibration import CameraPlace, Lens, RigGeometry, save
 from rhot.files.config import RigConfig
 from rhot.files.rig_tables import CameraTable, Fusion, HandTable
 from rhot.geometry.camera import Camera, pinhole
-from rhot.geometry.transforms import Array, rotation_y, transform
+from rhot.geometry.transforms import Array, rotation_x, rotation_y, transform
 from rhot.hand import BASIC_LANDMARKS, HandModel, HandName, default_hand
 from rhot.messages import Marker, MarkerFrame
 
@@ -42,7 +42,8 @@ class SyntheticRig:
 
     skew_s and drift_ppm are what a camera's clock reads more than the master's, clock_error_s what
     its announced offset is wrong by, clock_sigma_s how far that may be off by its own account. loss
-    is the share of frames that are lost.
+    is the share of frames that are lost. Every other camera nods by tilt_rad more than its
+    calibration says.
     """
 
     cameras: int = 2
@@ -59,6 +60,7 @@ class SyntheticRig:
     clock_error_s: float = 0.0005
     clock_sigma_s: float = 0.0005
     loss: float = 0.02
+    tilt_rad: float = 0.0
     seed: int = 1
 
     @property
@@ -77,6 +79,14 @@ class SyntheticRig:
             found[name] = Camera(
                 name, SIZE_PX, pinhole(SIZE_PX, np.deg2rad(62.5)), np.array(self.distortion), T
             )
+        return found
+
+    def tilted_rig(self) -> dict[str, Camera]:
+        """The cameras as they are: tilted since they were calibrated."""
+        found, nod = self.rig(), transform(rotation_x(self.tilt_rad), (0.0, 0.0, 0.0))
+        for name in self.names[1::2]:
+            tilted = found[name].T_rig_from_camera @ nod
+            found[name] = replace(found[name], T_rig_from_camera=tilted)
         return found
 
     def save_calibration(self, folder: Path) -> None:
@@ -234,7 +244,7 @@ class RestingHand:
 def frames(setup: SyntheticRig, motion: Motion, seconds: float) -> list[MarkerFrame]:
     """All cameras' frames in order of exposure."""
     found: list[tuple[float, MarkerFrame]] = []
-    for n, camera in enumerate(setup.rig().values()):
+    for n, camera in enumerate(setup.tilted_rig().values()):
         random = np.random.default_rng((setup.seed, n))
         times_s = np.arange(0.0, seconds, 1.0 / setup.fps) + n * setup.phase_s
         pixels = _expose(camera, motion, times_s, setup.row_time_ns * 1e-9)

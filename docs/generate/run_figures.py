@@ -93,6 +93,7 @@ RUNS = {
     "scenes": _script("scenes", "", "--seconds 1", 9),
     "solver": _script("solver", "", "--quick", 1.5),
     "solver_markers": _script("solver_markers", "", None, 0.6),
+    "tilted_cameras": _script("tilted_cameras", "", None, 2),
     "tracker": _script("tracker", "", "--frames 90", 1),
     "tracker_compiled": _script("tracker_compiled", "", "--frames 90", 0.3),
     "unmeasured_posture": _script("unmeasured_posture", "", None, 0.1),

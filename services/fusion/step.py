@@ -24,6 +24,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandModel, HandName
 from rhot.messages import HandPoints, HandPose, MarkerFrame
 from services.fusion.alignment.clock_alignment import ClockAlignment, search_period_s
+from services.fusion.alignment.level_views import LevelViews
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.admission import FrameAdmission, Verdict
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
@@ -78,6 +79,7 @@ class FusionStep:
         self._poses: PoseFeedback[Directions] = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         self._hidden = HiddenPaint(extrinsics(self._cameras), self._paint.round, self._paint.known)
+        self._levels = LevelViews(self._cameras)
         self._messages = self._point_messages(hands)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
@@ -115,6 +117,7 @@ class FusionStep:
             self._systematic.known,
             self._hidden.seen,
             extrinsics(self._cameras),
+            self._levels.turns,
         )
         reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
         return PointMessages(
@@ -154,6 +157,7 @@ class FusionStep:
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.note_announced(view)
         self._unsettled.insert(0, partial(self._watch, view, times_s))
+        view = self._levels.level(view)
         hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
         view = view._replace(sigmas=self._systematic.white_sigmas(view, hidden))
         self.method.observe(view, times_s - late_s, clock_sigma_s)
@@ -181,6 +185,7 @@ class FusionStep:
         self.mirrors.observe(view)
         self.unseen_markers.observe(view)
         self.clocks.observe(view, times_s)
+        self._levels.take(self.clocks.heights)
 
     def _align(self, view: View, behind: bool) -> None:
         """Look in a frame, as announced, for clocks that are off by more."""

@@ -17,6 +17,7 @@ from rhot.hand import HandModel, HandName
 from rhot.messages import Marker, MarkerFrame
 from services.fusion.alignment.height_memory import heights_by_landmark
 from services.fusion.alignment.height_track import HeightTrack, interpolated
+from services.fusion.alignment.level_views import turned_rays
 from services.fusion.alignment.offset_search import even_samples
 from services.fusion.monitors.shift_regression import Heights, fit_shift
 from services.fusion.paint.paint_to_bone import Directions, PaintToBone, turn_with_joints
@@ -45,7 +46,7 @@ def warm_up(
             stamp_ns = 10**18 + round((seq + 0.3 * n) * 1e9 / 30.0)
             colors = config.colors[1:] if n and seq >= _ALONE_FROM else config.colors
             messages += len(step.step(_frame(camera, seq, stamp_ns, point, colors)))
-    # What only a pose that comes back, or some seconds of heights, would call.
+    # What only a pose that comes back, some seconds of heights, or a tilted camera would call.
     hand, nobody = next(iter(hands)), np.empty(0, dtype=np.int64)
     none, aims = np.empty((0, 3)), (np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2)))
     turn_with_joints(np.empty(0), 0.0, nobody, none, *aims)
@@ -54,6 +55,7 @@ def warm_up(
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
     even_samples(np.arange(4.0), np.zeros(4), 0.0, 0)
     heights_by_landmark(nobody, np.empty(0), np.empty((0, 2)), np.eye(3))
+    turned_rays(np.empty((0, 2)), np.zeros(3))
     fit_shift(Heights(nobody, nobody, *(np.empty(0) for _ in range(6))), 0.0, 1.0)
     return messages + len(step.flush())
 

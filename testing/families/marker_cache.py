@@ -28,8 +28,13 @@ _MAKERS = ("motions", "people", "picture_motions", "pictures", "recordings")
 @cache
 def code_digest(*, tracker: bool) -> str:
     """Of all code that makes pictures and, if wanted, of the tracker that finds markers in them."""
+    return digest_of(*(_HERE / f"{name}.py" for name in _MAKERS), tracker=tracker)
+
+
+def digest_of(*paths: Path, tracker: bool) -> str:
+    """Of files and all that they import, if wanted with the tracker's."""
     files: set[Path] = set()
-    found = {_HERE / f"{name}.py" for name in _MAKERS}
+    found = set(paths)
     while found:
         files |= found
         used = {path for file in found for path in uses(file)}

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
+
 from testing.families.case import Case, CaseSpec, Half
 from testing.families.motions import clapping, flapping, rolling, stop_and_go, tapping
 from testing.families.points import Gaps, Wander, lazily
@@ -111,6 +113,20 @@ _GAPS: dict[Half, _Makers] = {
         ),
     },
 }
+# Cameras that were calibrated before they tilted; deg.
+_TILT: dict[Half, _Makers] = {
+    "tuning": {
+        ".1 deg down": lazily(
+            partial(MovingHand, seed=9), rig=SyntheticRig(tilt_rad=np.deg2rad(-0.1))
+        ),
+    },
+    "held_out": {
+        ".2 deg up": lazily(
+            partial(leap_motion, "HandSplay-110fps"),
+            rig=SyntheticRig(tilt_rad=np.deg2rad(0.2), seed=19),
+        ),
+    },
+}
 # Offsets of clocks that were announced wrongly.
 _CLOCKS: dict[Half, _Makers] = {
     "tuning": {
@@ -139,6 +155,7 @@ _FAMILIES: dict[str, dict[Half, _Makers]] = {
     "noise": _NOISE,
     "rig": _RIG,
     "gaps": _GAPS,
+    "tilt": _TILT,
     "clocks": _CLOCKS,
 }
 

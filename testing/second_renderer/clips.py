@@ -6,7 +6,6 @@ where it was made before.
 
 from __future__ import annotations
 
-import hashlib
 from functools import cache
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import numpy as np
 from rhot.hand import default_hand
 from rhot.messages import MarkerFrame
 from testing.families.case import Case
-from testing.families.marker_cache import kept
+from testing.families.marker_cache import digest_of, kept
 from testing.second_renderer.clip import Clip
 from testing.second_renderer.filming import detected, film
 from testing.second_renderer.motion import Array
@@ -55,7 +54,10 @@ def _filmed(clip: Clip) -> tuple[list[MarkerFrame], dict[str, Array]]:
     return detected(clip, shots), shots.shares
 
 
+@cache
 def _code() -> str:
-    """A digest of the files that make the pictures; not of catalog/: a clip says all of itself."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+    """A digest of what makes the pictures, and of what fits colours to clicks on them.
+
+    Not of catalog/: a clip says all of itself.
+    """
+    return digest_of(*Path(__file__).parent.glob("*.py"), tracker=True)

@@ -130,6 +130,11 @@ class ClockOffsetEstimator:
         return dict(zip(self._names, self._late_s.tolist(), strict=True))
 
     @property
+    def heights(self) -> dict[tuple[int, int], float]:
+        """The constant height error of each pair of cameras, normalised units; 0 if not known."""
+        return {pair: found.height for pair, found in self._found.items()}
+
+    @property
     def heights_px(self) -> dict[str, float]:
         """The constant height error of each pair of cameras, by `first_second`: a bumped camera."""
         return {

@@ -16,6 +16,7 @@ from rhot.geometry.transforms import Array
 from rhot.hand import HandName
 from rhot.kernels.packed import Layout, unowned
 from rhot.messages import HandPoint
+from services.fusion.alignment.level_views import add_turns
 from services.fusion.arrays import Bools, Ints
 from services.fusion.geometry.projection import Extrinsics
 from services.fusion.intake.observations import Landmark
@@ -41,6 +42,7 @@ class Corrections(NamedTuple):
     systematic: Systematic
     seen: PaintSeen
     cameras: Extrinsics
+    turns: Array  # (C, 3) by which cameras are turned, rad about the rig's axes
 
 
 class _Points(NamedTuple):
@@ -152,6 +154,7 @@ def _correct_and_round(
     for k in np.flatnonzero(found):
         seen.places[k] = positions[k]
     add_systematic(known.systematic, seen.sigmas, positions, seen_by, cameras, covariances)
+    add_turns(known.turns, cameras, positions, covariances)
     usable = _usable(positions, covariances, found)
     kept = points.kept
     kept[:] = False

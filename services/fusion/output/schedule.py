@@ -23,9 +23,10 @@ _SILENT_FRAMES, _ABSENT_FRAMES = 1.25, 2.0
 # What is older than so many of its camera's frames tells of a lost frame, not of when it exposes.
 _OLDEST_FRAMES = 1.1
 # Weight of the newest frame in how old the others' usually are; and the share of a frame's time by
-# which these must be younger for another to take over. With less, networks that delay frames by a
-# third of their time (exponentially) change the lead at random, which costs instants.
-_NEWEST, _YOUNGER = 0.125, 0.3
+# which these must be younger for another to take over. Newer frames with more weight, or a share of
+# .3, are no better for cameras at any times apart, of networks that delay frames by a tenth to six
+# tenths of their time (exponentially); with both .15 and .25 the lead changes at random.
+_NEWEST, _YOUNGER = 0.05, 0.1
 # Frames so near whole frames' times apart are of cameras that expose together: the newer one's
 # partner is still to come. After more than two a camera is not waited for.
 _TOGETHER_FRAMES, _AWAITED = 0.15, (1, 2)

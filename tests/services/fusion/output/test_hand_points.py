@@ -36,7 +36,7 @@ def seen() -> PaintSeen:
 @pytest.fixture
 def messages(seen: PaintSeen) -> PointMessages:
     reach_m = {"left": 0.19, "right": 0.19}
-    known = Corrections(PAINT, NOTHING, seen, extrinsics(CAMERAS))
+    known = Corrections(PAINT, NOTHING, seen, extrinsics(CAMERAS), np.zeros((2, 3)))
     return PointMessages(LANDMARKS, reach_m, ["near", "far"], known)
 
 
