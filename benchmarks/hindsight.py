@@ -62,7 +62,7 @@ def ways(case: Case) -> Iterator[tuple[str, list[Output]]]:
     yield "live", list(Pipeline(case.config, case.cameras).outputs(case.frames))
     pipeline = Pipeline(config, case.cameras)
     yield "later", list(pipeline.outputs(case.frames))
-    yield "track", list(pipeline.of_these_sizes().outputs(case.frames))
+    yield "track", list(pipeline.again().outputs(case.frames))
 
 
 def points_of(outputs: list[Output]) -> list[HandPoints]:

@@ -79,7 +79,7 @@ class FusionStep:
         self._poses: PoseFeedback[Directions] = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         self._hidden = HiddenPaint(extrinsics(self._cameras), self._paint.round, self._paint.known)
-        self._levels = LevelViews(self._cameras)
+        self.levels = LevelViews(self._cameras)
         self._messages = self._point_messages(hands)
         periods_s = 1.0 / self._fps
         self.method = self._method(config.fusion, periods_s)
@@ -117,7 +117,7 @@ class FusionStep:
             self._systematic.known,
             self._hidden.seen,
             extrinsics(self._cameras),
-            self._levels.turns,
+            self.levels.turns,
         )
         reach_m = {hand: hand_reach_m(hands[hand]) for hand in self._rows}
         return PointMessages(
@@ -157,7 +157,7 @@ class FusionStep:
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.note_announced(view)
         self._unsettled.insert(0, partial(self._watch, view, times_s))
-        view = self._levels.level(view)
+        view = self.levels.level(view)
         hidden = self._hidden.observe(view, (view.instant_ns - self._epoch_ns) * 1e-9)
         view = view._replace(sigmas=self._systematic.white_sigmas(view, hidden))
         self.method.observe(view, times_s - late_s, clock_sigma_s)
@@ -185,7 +185,7 @@ class FusionStep:
         self.mirrors.observe(view)
         self.unseen_markers.observe(view)
         self.clocks.observe(view, times_s)
-        self._levels.take(self.clocks.heights)
+        self.levels.take(self.clocks.heights)
 
     def _align(self, view: View, behind: bool) -> None:
         """Look in a frame, as announced, for clocks that are off by more."""

@@ -71,14 +71,20 @@ class Pipeline:
         learned = {hand: self._solver.size(hand) for hand in self.hands}
         return {hand: size for hand, size in learned.items() if size is not None}
 
-    def of_these_sizes(self) -> Pipeline:
-        """The same before its first frame, with hands of the sizes that this one ended with."""
+    def again(self) -> Pipeline:
+        """The same before its first frame, with what this one learned by the end.
+
+        That is how large the hands are, and how cameras are tilted.
+        """
         hands = {
             hand: msgspec.structs.replace(table, scale=self.sizes.get(hand, table.scale))
             for hand, table in self._config.hand.items()
         }
         config = msgspec.structs.replace(self._config, hand=hands)
-        return Pipeline(config, self._cameras, align_clocks=self._align_clocks)
+        next_one = Pipeline(config, self._cameras, align_clocks=self._align_clocks)
+        if self._fusion is not None and next_one._fusion is not None:
+            next_one._fusion.levels.take(self._fusion.clocks.heights)
+        return next_one
 
     def outputs(self, frames: Iterable[MarkerFrame]) -> Iterator[Output]:
         """What each frame leads to, and last what was still waiting for later ones."""

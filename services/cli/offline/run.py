@@ -83,7 +83,7 @@ def run(
         counters = _find_markers(job, trackers, cameras, streams, recorded, progress)
         clocks = _find_clocks(job, recorded, cameras, by_hand)
         if pipeline.sizes and not as_live:
-            pipeline = _of_right_sizes(pipeline, clocks, progress)
+            pipeline = _with_all_learned(pipeline, clocks, progress)
         for output in _outputs(pipeline, clocks, "points and poses of", progress):
             _write(writer, output, contacts)
         unread = [warning for one in job.inputs for warning in one.warnings]
@@ -197,11 +197,11 @@ def _with_hindsight(config: RigConfig) -> RigConfig:
     return msgspec.structs.replace(config, fusion=fusion)
 
 
-def _of_right_sizes(pipeline: Pipeline, clocks: Clocks, progress: bool | None) -> Pipeline:
-    """The pipeline with hands as large as they are by the whole recording."""
+def _with_all_learned(pipeline: Pipeline, clocks: Clocks, progress: bool | None) -> Pipeline:
+    """The pipeline with what the whole recording tells of hands' sizes and cameras' tilts."""
     for _ in _outputs(pipeline, clocks, "sizes of hands in", progress):
         pass
-    return pipeline.of_these_sizes()
+    return pipeline.again()
 
 
 def _outputs(

@@ -44,7 +44,7 @@ class LevelViews:
             baseline = pair.R_rig_from_rectified[:, 0]
             self._share[row, first], self._share[row, second] = baseline, -baseline
         self._R_camera_from_rig = np.array([c.T_rig_from_camera[:3, :3].T for c in cameras])
-        self._heights: tuple[float, ...] = ()
+        self._heights = dict.fromkeys(self._pairs, 0.0)
         # (C, 3) in the rig's axes, kept up to date in place; and in each camera's own.
         self.turns = np.zeros((len(cameras), 3))
         self._own = self.turns.copy()
@@ -52,15 +52,16 @@ class LevelViews:
     def take(self, heights: Mapping[tuple[int, int], float]) -> None:
         """Turn cameras as their pairs' constant height differences tell (normalised units).
 
-        heights: of first cameras less of second, by the pair of indices; 0 where nothing is known.
+        heights: of first cameras less of second, by the pair of indices; of a pair without one the
+        last one stays, as a tilt outlasts what was learned of clocks.
         """
-        found = tuple(heights[pair] for pair in self._pairs)
+        found = self._heights | heights
         if found == self._heights:
             return
         self._heights = found
         wanted = [
-            _beyond(height * pair.focal_px) / pair.focal_px
-            for height, pair in zip(found, self._pairs.values(), strict=True)
+            _beyond(found[pair] * place.focal_px) / place.focal_px
+            for pair, place in self._pairs.items()
         ]
         # The least turns that explain the heights.
         share = self._share.reshape(len(wanted), -1)

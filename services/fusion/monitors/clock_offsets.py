@@ -131,8 +131,8 @@ class ClockOffsetEstimator:
 
     @property
     def heights(self) -> dict[tuple[int, int], float]:
-        """The constant height error of each pair of cameras, normalised units; 0 if not known."""
-        return {pair: found.height for pair, found in self._found.items()}
+        """The constant height error of each pair of cameras that is known; normalised units."""
+        return {pair: found.height for pair, found in self._found.items() if found.height}
 
     @property
     def heights_px(self) -> dict[str, float]:

@@ -106,3 +106,13 @@ def test_a_tilted_camera_costs_little(
 
 def rms_mm(found: PointErrors) -> float:
     return 1e3 * float(np.sqrt(np.mean(np.sum(found.errors_m**2, axis=1))))
+
+
+def test_a_tilt_outlasts_what_was_learned_of_clocks():
+    cameras = tuple(SyntheticRig().rig().values())
+    view, levels = view_of(cameras[0], 0), LevelViews(cameras)
+    levels.take({(0, 1): 2.0 / float(np.mean(cameras[0].focal_px))})
+    level = levels.level(view).rays
+    assert not np.array_equal(level, view.rays)
+    levels.take({})
+    assert np.array_equal(levels.level(view).rays, level)
