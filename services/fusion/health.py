@@ -35,8 +35,8 @@ class HealthFigures:
         values["mirrored_pairs"] = float(len(step.mirrors.mirrored))
         for camera, late_s in step.clocks.late_s.items():
             values[f"late_{camera}_ms"] = 1e3 * late_s
-        for pair, height_px in step.clocks.heights_px.items():
-            values[f"height_{pair}_px"] = height_px
+        for (first, second), height_px in step.clocks.heights_px.items():
+            values[f"height_{first}_{second}_px"] = height_px
         for name in ("gated", "late", "refused", "started", "dropped", "incoherent"):
             values[name] = float(getattr(counts, name))
         for reason, count in step.refusals.items():

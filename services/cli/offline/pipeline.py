@@ -25,6 +25,9 @@ from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.step import TrackerStep
 from services.solver.step import SolverStep
 
+# Heights of real pairs differ by a stereo RMS of .22 px as they were calibrated.
+_LEVEL_PX = 0.5
+
 
 @dataclass(frozen=True)
 class Output:
@@ -70,6 +73,17 @@ class Pipeline:
             return {}
         learned = {hand: self._solver.size(hand) for hand in self.hands}
         return {hand: size for hand, size in learned.items() if size is not None}
+
+    @property
+    def tilts(self) -> list[str]:
+        """A sentence on each pair of cameras whose views are no longer level."""
+        heights_px = self._fusion.clocks.heights_px if self._fusion is not None else {}
+        return [
+            f"the views of {first} and {second} differ by {abs(height_px):.1f} px in height: "
+            "one of them has tilted since `rhot calibrate stereo`; up to 3 px are put right"
+            for (first, second), height_px in heights_px.items()
+            if abs(height_px) > _LEVEL_PX
+        ]
 
     def again(self) -> Pipeline:
         """The same before its first frame, with what this one learned by the end.

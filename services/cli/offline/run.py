@@ -87,7 +87,7 @@ def run(
         for output in _outputs(pipeline, clocks, "points and poses of", progress):
             _write(writer, output, contacts)
         unread = [warning for one in job.inputs for warning in one.warnings]
-        notes = [markers_only] if markers_only else []
+        notes = [markers_only] if markers_only else pipeline.tilts
         notes += [note for one in job.inputs for note in one.notes]
         notes += [text for one in job.inputs if (text := duplicates[one.camera].text(one.camera))]
         summary = Summary(

@@ -135,10 +135,10 @@ class ClockOffsetEstimator:
         return {pair: found.height for pair, found in self._found.items() if found.height}
 
     @property
-    def heights_px(self) -> dict[str, float]:
-        """The constant height error of each pair of cameras, by `first_second`: a bumped camera."""
+    def heights_px(self) -> dict[tuple[str, str], float]:
+        """The constant height error of each pair of cameras, by their names: a bumped camera."""
         return {
-            f"{self._names[first]}_{self._names[second]}": (
+            (self._names[first], self._names[second]): (
                 self._found[first, second].height * pair.focal_px
             )
             for (first, second), pair in self._pairs.items()

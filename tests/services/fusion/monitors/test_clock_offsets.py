@@ -122,7 +122,7 @@ def test_a_bumped_camera_shows_as_a_constant_height():
     estimator = estimate(
         SyntheticRig(clock_error_s=0.0, clock_sigma_s=1e-4), MovingHand(), 4.0, edit=bump
     )
-    assert estimator.heights_px["left_right"] == pytest.approx(-1.5, abs=0.2)
+    assert estimator.heights_px["left", "right"] == pytest.approx(-1.5, abs=0.2)
     assert abs(disagreement_ms(estimator)) < 0.2
 
 
