@@ -92,7 +92,7 @@ def test_the_dots_own_colour_is_found_at_the_seeds(pinch, pinch_seeds):
 
 
 def test_faint_dots_are_known_by_what_is_right_under_the_clicks(pinch_options):
-    """Red on dark skin, in a shadow, blurred and compressed: no dot can be outlined by itself."""
+    """Red on dark skin, in a shadow, blurred and compressed: such patches run into the skin."""
     experiment = Experiment(SUBJECTS[4], pinch_options._replace(dots="red"), 3)
     shade = np.linspace(0.5, 1.1, 480)[None, :, None]
     finder = None
@@ -105,7 +105,6 @@ def test_faint_dots_are_known_by_what_is_right_under_the_clicks(pinch_options):
         truth.pop("index_base")
         seeds = {place: tuple(at.tolist()) for place, at in truth.items()}
         if finder is None:
-            assert color_at(frame, seeds) is None
             finder = DotJoints(frame, seeds)
         places = finder.find(frame).places
         assert len(places) == 8
