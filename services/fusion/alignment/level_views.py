@@ -55,7 +55,7 @@ class LevelViews:
         heights: of first cameras less of second, by the pair of indices; of a pair without one the
         last one stays, as a tilt outlasts what was learned of clocks.
         """
-        found = self._heights | heights
+        found = {**self._heights, **heights}
         if found == self._heights:
             return
         self._heights = found

@@ -83,16 +83,13 @@ def test_points_may_be_off_by_what_cameras_are_turned():
     assert np.sqrt(np.diag(covs[0])) * 1e3 == pytest.approx([0.0, 1.22, 0.0], abs=0.02)
 
 
-@pytest.mark.parametrize("tilt_deg", [0.1, -0.2])
-def test_a_tilted_camera_costs_little(
-    run: Callable[..., tuple[object, PointErrors]], tilt_deg: float
-):
+def test_a_tilted_camera_costs_little(run: Callable[..., tuple[object, PointErrors]]):
     """Expected: without lag at most half more than level, and .6 of that with them as calibrated.
 
     Sigma says whose tilt it was nobody knows.
     """
     lag_0 = Fusion(lag_frames=0)
-    tilt_rad = np.deg2rad(tilt_deg)
+    tilt_rad = np.deg2rad(-0.2)
     _, level = run(SyntheticRig(), MOVING, lag_0)
     _, tilted = run(SyntheticRig(tilt_rad=tilt_rad), MOVING, lag_0)
     with pytest.MonkeyPatch.context() as patched:
