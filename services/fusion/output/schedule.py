@@ -10,10 +10,8 @@ leave out an instant; a camera that is back after a pause simply takes part agai
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterator
-
-import numpy as np
 
 from rhot.geometry.transforms import Array
 
@@ -40,7 +38,8 @@ class OutputSchedule:
 
         lag_frames: frames of the reference between an instant and the output of its points.
         """
-        self._fps = fps
+        # Python's own numbers: numpy's cost five times as much, one at a time.
+        self._fps: list[float] = fps.tolist()
         self._lag_frames = lag_frames
         self._reference: int | None = None
         self._told_ns: int | None = None
@@ -48,22 +47,20 @@ class OutputSchedule:
         # Of each camera: its newest instant, ns, and how old the others' frames usually are when
         # one of its own comes, in frames of theirs; NaN where nothing is known.
         self._newest_ns: dict[int, int] = {}
-        self._ages = np.full(len(fps), np.nan)
+        self._ages = [math.nan] * len(self._fps)
 
     def add_frame(self, camera: int, instant_ns: int) -> list[int]:
         """Note a frame; the instants whose points are due now: mostly one or none.
 
         Instants come in ascending order, none twice.
         """
-        self._note_age(camera, instant_ns)
+        ages = self._ages_frames(camera, instant_ns)
+        self._note_ages(camera, ages)
         held = False
         if (self._told_ns is None or instant_ns > self._told_ns) and self._leads(camera):
             self._told_ns = instant_ns
             self._waiting.append(instant_ns)
-            held = any(
-                round(age) in _AWAITED and abs(age - round(age)) < _TOGETHER_FRAMES
-                for age in self._ages_frames(camera, instant_ns)
-            )
+            held = any(abs(age - frames) < _TOGETHER_FRAMES for age in ages for frames in _AWAITED)
         ready = len(self._waiting) - held - self._lag_frames
         return [self._waiting.popleft() for _ in range(ready)]
 
@@ -73,19 +70,22 @@ class OutputSchedule:
         self._waiting.clear()
         return waiting
 
-    def _note_age(self, camera: int, instant_ns: int) -> None:
-        """How old the other cameras' frames are as one of a camera comes."""
-        self._newest_ns[camera] = max(instant_ns, self._newest_ns.get(camera, instant_ns))
-        ages = [age for age in self._ages_frames(camera, instant_ns) if age < _OLDEST_FRAMES]
-        if ages:
-            now, usual = float(np.mean(ages)), float(self._ages[camera])
-            self._ages[camera] = usual + _NEWEST * (now - usual) if np.isfinite(usual) else now
+    def _ages_frames(self, camera: int, instant_ns: int) -> list[float]:
+        """How old each other camera's newest frame is at one of a camera, in frames of its own."""
+        newest_ns = self._newest_ns
+        newest_ns[camera] = max(instant_ns, newest_ns.get(camera, instant_ns))
+        return [
+            (instant_ns - of_ns) * 1e-9 * self._fps[other]
+            for other, of_ns in newest_ns.items()
+            if other != camera
+        ]
 
-    def _ages_frames(self, camera: int, instant_ns: int) -> Iterator[float]:
-        """How old each other camera's newest frame is at an instant, in frames of its own."""
-        for other, newest_ns in self._newest_ns.items():
-            if other != camera:
-                yield (instant_ns - newest_ns) * 1e-9 * float(self._fps[other])
+    def _note_ages(self, camera: int, ages: list[float]) -> None:
+        """How old the other cameras' frames usually are as one of a camera comes."""
+        known = [age for age in ages if age < _OLDEST_FRAMES]
+        if known:
+            now, usual = sum(known) / len(known), self._ages[camera]
+            self._ages[camera] = now if math.isnan(usual) else usual + _NEWEST * (now - usual)
 
     def _leads(self, camera: int) -> bool:
         """Whether points are told at a camera's newest frame; notes who is the reference."""
@@ -93,7 +93,7 @@ class OutputSchedule:
         if reference is None or self._told_ns is None:
             self._reference = camera
             return True
-        fps = float(self._fps[reference])
+        fps = self._fps[reference]
         newest_ns = self._newest_ns[camera]
         silent = (newest_ns - self._told_ns) * 1e-9 * fps > _SILENT_FRAMES
         absent = (newest_ns - self._newest_ns[reference]) * 1e-9 * fps > _ABSENT_FRAMES
@@ -104,7 +104,7 @@ class OutputSchedule:
 
     def _freshest(self, camera: int) -> int:
         """The camera as fast as one whose frames find the others' clearly younger, or itself."""
-        fps = float(self._fps[camera])
+        fps = self._fps[camera]
         best = camera
         for other, newest_ns in self._newest_ns.items():
             since_frames = (self._newest_ns[camera] - newest_ns) * 1e-9 * fps
