@@ -126,13 +126,18 @@ def cases_apart(half: Half, apart_ms: float) -> list[Case]:
     return [point_case(name, motion, rig) for name, motion in moved.items()]
 
 
-def main() -> None:
-    """Print a row for each way to expose, and write them."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+def half_and_file(description: str | None) -> tuple[Half, Path | None]:
+    """Which half to measure, and where to write the figures, by the command line."""
+    parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
     parser.add_argument("--tuning", action="store_true", help="the half that is no evidence")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
-    half: Half = "tuning" if options.tuning else "held_out"
+    return ("tuning" if options.tuning else "held_out"), options.json
+
+
+def main() -> None:
+    """Print a row for each way to expose, and write them."""
+    half, file = half_and_file(__doc__)
     columns = ("rms", "p95", "max", "share", "old", "waits")
     table: dict[str, dict[str, dict[str, Figures]]] = {}
     for late_ms in LATE_MS:
@@ -147,8 +152,8 @@ def main() -> None:
             rows[f"{apart_ms:g}"] = row
             values = [row[way][name] for way in ("rhot", "plain") for name in columns]
             print(f"{apart_ms:<10g}" + "".join(f"{value:8.2f}" for value in values), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    if file:
+        file.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

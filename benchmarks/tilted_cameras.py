@@ -10,19 +10,18 @@ each camera's markers that knows the future.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
-from pathlib import Path
 from unittest.mock import patch
 
 import held_out_score
 import numpy as np
+from exposures import half_and_file
 from held_out_score import figures_of, make_fusion, run, spline_figures
 from one_camera import motions
 
 from services.fusion.alignment.level_views import LevelViews
-from testing.families.case import Case, Half
+from testing.families.case import Case
 from testing.families.points import point_case
 from testing.synthetic_points import SyntheticRig
 
@@ -50,11 +49,7 @@ def spline_of(cases: list[Case]) -> Figures:
 
 def main() -> None:
     """Print a row for each tilt, and write them."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--tuning", action="store_true", help="the half that is no evidence")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    options = parser.parse_args()
-    half: Half = "tuning" if options.tuning else "held_out"
+    half, file = half_and_file(__doc__)
     # By then heights are known.
     held_out_score.WARM_S = 2.0
     print(f"{half:12}{'rhot':40}{'as calibrated':40}spline")
@@ -72,8 +67,8 @@ def main() -> None:
         values = [row[way][name] for way in ("rhot", "calibrated") for name in columns]
         values += row["spline"].values()
         print(f"{tilt_deg:<8g}" + "".join(f"{value:8.2f}" for value in values), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    if file:
+        file.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Fusion as one pure step: MarkerFrames in, HandPoints out; the same live, offline and in tests.
 
-One output per hand for each frame of the reference camera, the fastest one that delivers; if it
-falls silent another carries on. Frames that come late, twice, out of order, from an unknown camera,
+One output per hand for each frame of the reference camera (output/schedule.py); if it falls silent
+another carries on. Frames that come late, twice, out of order, from an unknown camera,
 in another size than the calibration's, or with a clock that has jumped are counted in `refusals`
 and otherwise have no effect; intake/admission.py says when time is taken to have moved for all.
 Missing cameras or markers make landmarks `predicted`, then absent; a hand of which nothing is seen
