@@ -23,7 +23,8 @@ _OLDEST_FRAMES = 1.1
 # Weight of the newest frame in how old the others' usually are; and the share of a frame's time by
 # which these must be younger for another to take over. Newer frames with more weight, or a share of
 # .3, are no better for cameras at any times apart, of networks that delay frames by a tenth to six
-# tenths of their time (exponentially); with both .15 and .25 the lead changes at random.
+# tenths of their time (exponentially); with a weight of .25 and a share of .15 the lead changes at
+# random, which costs instants.
 _NEWEST, _YOUNGER = 0.05, 0.1
 # Frames so near whole frames' times apart are of cameras that expose together: the newer one's
 # partner is still to come. After more than two a camera is not waited for.

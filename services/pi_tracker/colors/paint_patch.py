@@ -60,11 +60,11 @@ def find_patch(cells: Cells, pointer: Pointer) -> PaintPatch:
     region = _grown(window, start, pointer)
     if not pointer.is_box:
         region = _without_leaks(window, start, pointer, region)
-    if not pointer.is_box and touches_border(region, rect, cells):
-        raise CalibrationError(
-            f"{pointer}: that colour goes on far beyond the click; is it the background, or a "
-            "sleeve? Point at the paint itself"
-        )
+        if touches_border(region, rect, cells):
+            raise CalibrationError(
+                f"{pointer}: that colour goes on far beyond the click; is it the background, or a "
+                "sleeve? Point at the paint itself"
+            )
     mask = np.zeros(cells.shape, bool)
     mask[y0:y1, x0:x1] = region
     whole = mask | _beyond_box(cells, rect, region) if pointer.is_box else mask
@@ -104,7 +104,7 @@ def _grown(window: Cells, start: RegionStart, pointer: Pointer, tolerance: float
 
 
 def _without_leaks(window: Cells, start: RegionStart, pointer: Pointer, region: Mask) -> Mask:
-    """A region, grown anew from its start where it is mostly what is like it only by half."""
+    """A click's region, grown with less tolerance where most of it is only roughly like it."""
     for tolerance in _TOLERANCES:
         try:
             closer = _grown(window, start, pointer, tolerance)
