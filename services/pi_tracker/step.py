@@ -18,7 +18,7 @@ from rhot.messages import Marker, MarkerFrame
 from rhot.messages.camera import SeenInPicture
 from services.pi_tracker.detect.color_table import ColorTable, compile_colors
 from services.pi_tracker.detect.marker_finder import MarkerFinder
-from services.pi_tracker.detect.near_colors import near_colors
+from services.pi_tracker.detect.near_colors import near_tables
 from services.pi_tracker.detect.paper_finder import PaperFinder
 from services.pi_tracker.dots.finder import DotFinder, dot_markers
 from services.pi_tracker.identify.hand_layout import NO_LANDMARKS, Landmarks
@@ -92,7 +92,7 @@ class TrackerStep:
             self._finder = PaperFinder(colors, self._settings, single)
         else:
             own = compile_colors(colors, single, path) if self._names else table
-            near = compile_colors(near_colors(colors), single, path)
+            near = near_tables(colors, single, path)
             self._finder = MarkerFinder(
                 own, near, self._settings, self._time_stage, self._landmarks
             )

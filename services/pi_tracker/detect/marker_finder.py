@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import msgspec
-
 from rhot.files.rig_tables import Tracker
 from rhot.messages import Marker
 from services.pi_tracker.detect import search_region
 from services.pi_tracker.detect.blob_search import BlobDetector
 from services.pi_tracker.detect.color_table import ColorTable
+from services.pi_tracker.detect.near_colors import NearTables
+from services.pi_tracker.detect.remainders import LostMarker, Remainders
 from services.pi_tracker.identify.background import BackgroundModel
-from services.pi_tracker.identify.blob_shape import is_paint_shaped
+from services.pi_tracker.identify.blob_shape import is_paint_shaped, touch
 from services.pi_tracker.identify.hand_layout import Landmarks
 from services.pi_tracker.identify.marker_identity import Association, MarkerIdentity
 from services.pi_tracker.identify.pieces import joined
@@ -34,16 +34,6 @@ from services.pi_tracker.measure.occluded_marker import doubts_px, marker_of
 _FULL_SEARCH_PERIOD, _FIRST_FRAMES = 15, 6
 # A marker less consistent with the others than this may be something in the background.
 _MIN_CONSISTENCY = 0.3
-# About a marker's width around the place where it must be.
-_REMAINDER_MARGIN_PX = 14
-# A thin blob beside another's paint counts when it is at least this share of the marker: an
-# occluder's own edge is less. (Of the two crescents of half visible markers that the seam test took
-# in the hard scene, one had .35, the other .47 of the marker's area.)
-_MIN_THIN_SHARE = 0.25
-# What is nearly the colour of a marker of which nothing else is found counts as it with such shares
-# of its area. (A dab in shade was in no range for five frames: one clip of the other renderer, held
-# out until then, 29.8 -> 5.8 mm at most at two frames; twelve others are as they were.)
-_NEARLY_SHARES = 0.3, 1.1
 # Cells around a marker in which no background is learnt: its own rim, in the colours of blur and of
 # light from the side; and more around what is smaller than the hand's markers are, a piece of one.
 _MARKER_MARGIN = 4
@@ -61,7 +51,7 @@ class MarkerFinder:
     def __init__(
         self,
         table: ColorTable,
-        near: ColorTable,
+        near: NearTables,
         settings: Tracker,
         on_stage: OnStage,
         landmarks: Landmarks,
@@ -69,11 +59,8 @@ class MarkerFinder:
         self._names = table.names
         self._settings = settings
         self._detector = BlobDetector(table, settings)
-        self._unfiltered_detector = BlobDetector(
-            table, msgspec.structs.replace(settings, erode=0, dilate=0, gaussian_px=0)
-        )
-        self._near = NearPaint(near)
-        self._near_detector = BlobDetector(near, settings)
+        self._remainders = Remainders(table, near, settings)
+        self._near = NearPaint(near.all)
         self._on_stage = on_stage
         self._noise = Noise()
         self._frame_count = 0
@@ -137,12 +124,9 @@ class MarkerFinder:
         blobs = self._search_all_colors(image)
         self._only_nearly.clear()
         for color, own in enumerate(blobs):
-            predicted = None if len(own) == 1 else self._identity.predicted(color, stamp_ns)
-            if predicted is None:
-                continue
             if not own:
-                own += self._remainders(image, color, predicted)
-            if len(own) > 1:
+                own += self._find_remainders(image, blobs, color, stamp_ns)
+            if len(own) > 1 and self._identity.predicted(color, stamp_ns) is not None:
                 own[:] = joined(own, self._identity.whole_px2(color))
         return blobs
 
@@ -177,29 +161,36 @@ class MarkerFinder:
                 found[blob.color].append(blob)
         return found
 
-    def _remainders(
-        self, image: Picture, color: int, predicted_px: tuple[float, float]
+    def _find_remainders(
+        self, image: Picture, blobs: list[list[Blob]], color: int, stamp_ns: int
     ) -> list[Blob]:
         """What there is of a marker near its predicted place that a search has no blob of.
 
-        What mask filters took, as where another marker occludes it: ordinary blobs first; only
-        without any, thin ones beside the other's paint. Without these, what is nearly its colour.
+        Taken from the other colours' blobs where it is nearly its colour at most.
         """
-        region = search_region.around(_cell_at(predicted_px), _REMAINDER_MARGIN_PX, image.size)
-        for keep_thin in (False, True):
-            blobs = self._unfiltered_detector.detect(image, region, keep_thin)
-            least_px2 = _MIN_THIN_SHARE * self._identity.area_px2(color) if keep_thin else 0.0
-            found = self._of_color(image, color, blobs)
-            found = [blob for blob in found if blob.area_px >= least_px2]
-            if found:
-                return found
-        least_px2, most_px2 = (share * self._identity.whole_px2(color) for share in _NEARLY_SHARES)
-        blobs = self._near_detector.detect(image, region)
-        found = self._of_color(image, color, blobs)
-        found = [blob for blob in found if least_px2 <= blob.area_px <= most_px2]
-        if found:
+        identity = self._identity
+        predicted_px = identity.predicted(color, stamp_ns)
+        if predicted_px is None:
+            return []
+        others = [
+            identity.likeliest(other, own, stamp_ns) for other, own in enumerate(blobs) if own
+        ]
+        areas_px2 = identity.area_px2(color), identity.whole_px2(color)
+        lost = LostMarker(color, predicted_px, *areas_px2, [other.rect for other in others])
+        found = self._remainders.find(
+            image, lost, lambda those: self._of_color(image, color, those)
+        )
+        if found.only_nearly:
             self._only_nearly.add(color)
-        return found
+            rects = [blob.rect for blob in found.blobs]
+            for own in blobs:
+                own[:] = [
+                    blob
+                    for blob in own
+                    if any(blob is other for other in others)
+                    or not any(touch(blob.rect, rect) for rect in rects)
+                ]
+        return found.blobs
 
     def _of_color(self, image: Picture, color: int, blobs: list[Blob]) -> list[Blob]:
         """Those of a colour that may be its marker."""
@@ -219,7 +210,7 @@ class MarkerFinder:
                 _unlearnt_around(association.blob.rect, usual)
                 for association in associated.values()
             ] + [
-                _unlearnt_around(_cell_at(place_px), usual)
+                _unlearnt_around(search_region.cell_at(place_px), usual)
                 for color in range(len(self._names))
                 if color not in associated
                 and (place_px := self._identity.predicted(color, stamp_ns, _UNLEARNT_NS))
@@ -281,11 +272,6 @@ class MarkerFinder:
                 marker_of(self._names[color], centroid, association.certainty, occluded, doubt_px)
             )
         return markers
-
-
-def _cell_at(place_px: tuple[float, float]) -> Rect:
-    column, row = (int(px) // 2 for px in place_px)
-    return column, row, column + 1, row + 1
 
 
 def _unlearnt_around(rect: Rect, usual_cells: float) -> Rect:

@@ -7,9 +7,12 @@ that lies within the range it has the rest of that paint (measure/grown_blob.py)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 from rhot.files.calibration import ColorRange, Colors
+from services.pi_tracker.detect.color_table import ColorTable, compile_colors
 from services.pi_tracker.detect.hsv_range import hue_centre, hue_width
 from services.pi_tracker.image.hue import hue_difference
 
@@ -20,6 +23,31 @@ from services.pi_tracker.image.hue import hue_difference
 _HUES, _SHARE = 5, 0.85
 # Skin's hues; and of paint that is so near to them, no paler cells are taken.
 _SKIN, _SKINLIKE = ColorRange(hsv_low=(0, 0, 0), hsv_high=(20, 255, 255)), 12
+
+
+class NearTables(NamedTuple):
+    """What is nearly the colours, each cell the nearest's; and what is nearly one colour, whatever
+    else it may be, of each by its number whose hues another colour has as well.
+    """
+
+    all: ColorTable
+    alone: dict[int, ColorTable]
+
+
+def near_tables(
+    colors: Colors, names: Sequence[str], path: Path | str = "colors.json"
+) -> NearTables:
+    """The tables of the wider ranges of named colours; errors as of compile_colors."""
+    wider = near_colors(colors)
+    table = compile_colors(wider, names, path)
+    alone = {
+        number: compile_colors(wider, [name], path)
+        for number, name in enumerate(names)
+        if any(
+            _overlap(colors.colors[name], colors.colors[other]) for other in names if other != name
+        )
+    }
+    return NearTables(table, alone)
 
 
 def near_colors(colors: Colors) -> Colors:
@@ -49,3 +77,9 @@ def gap(own: ColorRange, other: ColorRange, side: int) -> int:
     if apart <= 0.0:
         return 90
     return max(round(apart - 0.5 * (hue_width(own) + hue_width(other))) - 1, 0)
+
+
+def _overlap(one: ColorRange, other: ColorRange) -> bool:
+    """Whether two ranges have hues in common."""
+    apart = abs(float(hue_difference(hue_centre(other), hue_centre(one))))
+    return apart <= 0.5 * (hue_width(one) + hue_width(other))

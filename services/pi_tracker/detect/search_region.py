@@ -36,6 +36,12 @@ def around(rect: Rect, margin_px: int, size: tuple[int, int]) -> Rect:
     )
 
 
+def cell_at(place_px: tuple[float, float]) -> Rect:
+    """The cell with a pixel."""
+    column, row = (int(px) // 2 for px in place_px)
+    return column, row, column + 1, row + 1
+
+
 def bounding_rect(rects: Iterable[Rect]) -> Rect:
     """The smallest rectangle around all, at least one.
 

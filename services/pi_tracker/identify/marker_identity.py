@@ -184,6 +184,10 @@ class MarkerIdentity:
         track = self._tracks[color]
         return 0.0 if track is None else track.whole_px2
 
+    def likeliest(self, color: int, own: list[Blob], stamp_ns: int) -> Blob:
+        """Of a colour's blobs the one most like its track, or, without a track, the largest."""
+        return own[0] if len(own) == 1 else max(own, key=self._rank(color, stamp_ns))
+
     def width_cells(self) -> float:
         """How wide the markers are that were seen, the median of them; 0 if there is none."""
         areas = [track.area_px for track in self._tracks if track is not None]
@@ -201,13 +205,13 @@ class MarkerIdentity:
         """
         if len(own) <= _MAX_CANDIDATES:
             return own
+        return sorted(own, key=self._rank(color, stamp_ns), reverse=True)[:_MAX_CANDIDATES]
+
+    def _rank(self, color: int, stamp_ns: int) -> Callable[[Blob], float]:
         track = self._tracks[color]
-        rank = (
-            (lambda blob: blob.cells)
-            if track is None
-            else (lambda blob: track.likeness(blob, stamp_ns, self._margin_px))
-        )
-        return sorted(own, key=rank, reverse=True)[:_MAX_CANDIDATES]
+        if track is None:
+            return lambda blob: blob.cells
+        return lambda blob: track.likeness(blob, stamp_ns, self._margin_px)
 
     def _note_touching(self, associated: list[Association | None]) -> None:
         self._touched = [False] * len(associated)
@@ -217,20 +221,27 @@ class MarkerIdentity:
                 self._touched[color] = self._touched[other] = True
 
     def _coast_unseen(self, associated: list[Association | None], stamp_ns: int) -> None:
-        """Move the tracks that are not seen by the median motion of those that are."""
+        """Move the tracks that are not seen with the median motion of those that are."""
         if None not in associated:
             return
-        motions = [
-            (one.blob.x_px - track.x_px, one.blob.y_px - track.y_px)
+        moved = [
+            (one.blob, track)
             for one, track in zip(associated, self._tracks, strict=True)
             if one is not None and track is not None and track.stamp_ns < stamp_ns
         ]
-        if not motions:
+        if not moved:
             return
-        dx_px, dy_px = (median(steps) for steps in zip(*motions, strict=True))
+        moved_px = (
+            median(blob.x_px - track.x_px for blob, track in moved),
+            median(blob.y_px - track.y_px for blob, track in moved),
+        )
+        before_px_s = (
+            median(track.vx_px_s for _, track in moved),
+            median(track.vy_px_s for _, track in moved),
+        )
         for one, track in zip(associated, self._tracks, strict=True):
             if one is None and track is not None:
-                track.coast(dx_px, dy_px, stamp_ns)
+                track.coast(moved_px, before_px_s, stamp_ns)
 
     def _candidates(
         self,

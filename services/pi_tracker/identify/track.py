@@ -20,6 +20,9 @@ AREA_MEMORY = 0.8
 _WHOLE_MEMORY, _SURE_TIMES = 0.98, 2.5
 # A track that moves less than this a frame stands still.
 _STATIONARY_PX = 1.0
+# What two frames tell of a marker's motion is so unsure: where the others moved less, one that is
+# lost is taken to move as they do.
+_UNSURE_PX = 3.0
 # Velocity predicts for so long; after a longer gap the old place tells nothing of it.
 _MAX_PREDICTION_S = 0.1
 # A blob is at the predicted place of a marker seen less than so long ago when it is within so many
@@ -27,6 +30,8 @@ _MAX_PREDICTION_S = 0.1
 # occluded by another were within 21 px of it, and no mere edge of another's paint was. While it is
 # occluded the finger moves on, by so much more.
 _GATE_PX, _GATE_PX_S, RECENT_NS = 20.0, 40.0, 300_000_000
+
+Vector = tuple[float, float]
 
 
 @dataclass(slots=True)
@@ -47,6 +52,8 @@ class Track:
     # Frames in a row in which it has not moved.
     stationary_frames: int = 0
     seen_ns: int = -1
+    # How much of the others' motion it had as it was seen last.
+    share: float = 1.0
     # Its area where all of it shows.
     whole_px2: float = field(init=False)
 
@@ -83,9 +90,25 @@ class Track:
         self.whole_px2 += (1.0 - memory) * (sure_px2 - self.whole_px2)
         self.seen_ns = stamp_ns
 
-    def coast(self, dx_px: float, dy_px: float, stamp_ns: int) -> None:
-        """It was not seen; the other markers moved by (dx_px, dy_px)."""
-        self._move(self.x_px + dx_px, self.y_px + dy_px, stamp_ns)
+    def coast(self, moved_px: Vector, before_px_s: Vector, stamp_ns: int) -> None:
+        """It was not seen; the other markers moved by moved_px, and at before_px_s until then.
+
+        It goes on with as much of their motion as it had: a hand that flaps turns about its wrist.
+        """
+        if self.stamp_ns == self.seen_ns:
+            self.share = self._share_of(before_px_s, stamp_ns)
+        dx_px, dy_px = moved_px
+        self._move(self.x_px + self.share * dx_px, self.y_px + self.share * dy_px, stamp_ns)
+
+    def _share_of(self, others_px_s: Vector, stamp_ns: int) -> float:
+        """How much of the others' motion its own is, 0 to 1; 1 where neither is known."""
+        vx, vy = others_px_s
+        elapsed_s = (stamp_ns - self.stamp_ns) * 1e-9
+        if elapsed_s <= 0.0 or self.vx_px_s == self.vy_px_s == 0.0:
+            return 1.0
+        unsure = (_UNSURE_PX / elapsed_s) ** 2
+        along = self.vx_px_s * vx + self.vy_px_s * vy
+        return min(max((along + unsure) / (vx * vx + vy * vy + unsure), 0.0), 1.0)
 
     def _move(self, x_px: float, y_px: float, stamp_ns: int) -> None:
         elapsed_s = (stamp_ns - self.stamp_ns) * 1e-9

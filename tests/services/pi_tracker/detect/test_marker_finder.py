@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rhot.files.calibration import ColorRange, Colors
 from rhot.files.rig_tables import Tracker
 from services.pi_tracker.step import TrackerStep
 
@@ -86,3 +87,32 @@ def test_a_marker_out_of_its_range_is_found_where_it_must_be_if_it_is_nearly_its
     assert set(found) == ({"green", "blue"} if hues == 3 else {"blue"})
     if hues == 3:
         assert found["green"].x_px == pytest.approx(69.5, abs=0.5)
+
+
+@pytest.mark.parametrize("is_blue", [False, True])
+def test_a_marker_whose_hue_is_nearer_to_another_paints_is_found_unless_it_is_that(studio, is_blue):
+    """Where two ranges have hues in common: a dab looks bluer, or goes and blue comes there."""
+    ranges = {
+        "violet": ColorRange(hsv_low=(123, 90, 30), hsv_high=(144, 255, 255)),
+        "blue": ColorRange(hsv_low=(111, 90, 30), hsv_high=(133, 255, 255)),
+    }
+    violet, both, blue = (
+        cv2.cvtColor(np.uint8([[[hue, 220, 150]]]), cv2.COLOR_HSV2BGR)[0, 0]
+        for hue in (137, 126, 118)
+    )
+
+    def shows(seq, dab, blue_x):
+        image = np.full((SIZE[1], SIZE[0], 3), 140.0, np.float32)
+        image[40:54, 60:74] = dab
+        image[40:54, blue_x : blue_x + 14] = blue
+        return studio.of(studio.bgr(image, 0.0, seq), seq)
+
+    colors = Colors(date="d", tool="t", colors=ranges)
+    step = TrackerStep("left", colors, Tracker(), SIZE, list(ranges))
+    for seq in range(6):
+        assert set(markers(step, shows(seq, violet, 120 - 10 * seq * is_blue))) == set(ranges)
+    found = markers(step, shows(6, 140.0 if is_blue else both, 60 if is_blue else 120))
+    assert set(found) == ({"blue"} if is_blue else set(ranges))
+    if not is_blue:
+        assert found["violet"].x_px == pytest.approx(66.5, abs=0.5)
+        assert found["blue"].x_px == pytest.approx(126.5, abs=0.5)

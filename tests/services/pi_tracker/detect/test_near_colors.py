@@ -6,7 +6,7 @@ import pytest
 
 from rhot.files.calibration import ColorRange, Colors
 from services.pi_tracker.detect.color_table import compile_colors
-from services.pi_tracker.detect.near_colors import gap, near_colors
+from services.pi_tracker.detect.near_colors import gap, near_colors, near_tables
 from testing import synthetic_images
 
 
@@ -58,3 +58,20 @@ def test_a_calibrations_own_cells_keep_their_class():
     for before, after in zip(own.layers, near.layers, strict=False):
         claimed = before.view("u1").reshape(-1, 4)[:, 0] > 0
         assert (after.view("u1").reshape(-1, 4)[claimed, 0] > 0).all()
+
+
+def test_colours_with_hues_in_common_have_tables_of_their_own():
+    ranges = {"violet": span(123, 144), "blue": span(111, 133), "green": span(50, 70)}
+    colors = Colors(date="d", tool="t", colors=ranges)
+    tables = near_tables(colors, ["green", "violet", "blue"])
+    assert tables.all.names == ("green", "violet", "blue")
+    assert {number: table.names for number, table in tables.alone.items()} == {
+        1: ("violet",),
+        2: ("blue",),
+    }
+    own = tables.alone[1].layers[0].view("u1").reshape(-1, 4)[:, 0] > 0
+    together = tables.all.layers[0].view("u1").reshape(-1, 4)[:, 0]
+    # All of what is nearly violet, of which blue has a part when they share.
+    assert (together[own] == 3).any()
+    assert own[together == 2].all()
+    assert not near_tables(colors, ["green", "blue"]).alone

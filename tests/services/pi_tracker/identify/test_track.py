@@ -58,7 +58,25 @@ def test_a_marker_is_no_larger_as_a_whole_than_what_is_found_of_it_lets_it_be():
 
 def test_a_coasting_track_moves_but_was_not_seen():
     track = Track(10.0, 20.0, 100.0, 100.0, 0)
-    track.coast(5.0, -2.0, FRAME_NS)
+    track.coast((5.0, -2.0), (0.0, 0.0), FRAME_NS)
     assert (track.x_px, track.y_px, track.seen_ns) == (15.0, 18.0, 0)
     assert track.is_recent(FRAME_NS)
     assert not track.is_recent(10**9)
+
+
+@pytest.mark.parametrize(
+    ("own_px", "others_px", "share"),
+    [(20.0, 20.0, 1.0), (10.0, 20.0, 0.5), (0.1, 40.0, 0.0), (-20.0, 20.0, 0.0), (0.1, 0.1, 1.0)],
+)
+def test_a_lost_marker_goes_on_with_as_much_of_the_others_motion_as_it_had(
+    own_px, others_px, share
+):
+    """A frame's motions; those of a wrist about which a hand turns are none."""
+    track = Track(10.0, 20.0, 100.0, 100.0, 0)
+    track.update(10.0 + own_px, 20.0, 100.0, 100.0, FRAME_NS)
+    at_px = track.x_px
+    # The others turn back meanwhile.
+    for frame, moved_px in enumerate((30.0, -10.0), start=2):
+        track.coast((moved_px, 0.0), (others_px * 1e9 / FRAME_NS, 0.0), frame * FRAME_NS)
+        at_px += share * moved_px
+        assert track.x_px == pytest.approx(at_px, abs=1.0)
