@@ -18,7 +18,6 @@ from rhot.messages import Marker, MarkerFrame
 from services.fusion.alignment.height_memory import heights_by_landmark
 from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.alignment.level_views import turned_rays
-from services.fusion.alignment.offset_search import even_samples
 from services.fusion.monitors.shift_regression import Heights, fit_shift
 from services.fusion.paint.paint_to_bone import Directions, PaintToBone, turn_with_joints
 from services.fusion.step import FusionStep
@@ -53,7 +52,6 @@ def warm_up(
     paint = PaintToBone(step.landmarks, hands, tuple(cameras.values()))
     paint.note(Directions(hand, 0, nobody, *aims, 1.0))
     interpolated(HeightTrack(np.arange(4.0), np.zeros(4)), np.ones(1))
-    even_samples(np.arange(4.0), np.zeros(4), 0.0, 0)
     heights_by_landmark(nobody, np.empty(0), np.empty((0, 2)), np.eye(3))
     turned_rays(np.empty((0, 2)), np.zeros(3))
     fit_shift(Heights(nobody, nobody, *(np.empty(0) for _ in range(6))), 0.0, 1.0)

@@ -21,7 +21,7 @@ from services.fusion.alignment.offset_search import Offset, find_offset
 from services.fusion.geometry.rectified_pair import rectified_pairs
 from services.fusion.intake.observations import View
 
-# A search takes 2 to 3 ms; every two seconds that would be a tenth of all that a rig costs. The
+# A search takes 5 to 10 ms; every two seconds that would be a third of all that a rig costs. The
 # first comes when there is enough to compare, and one that found something is soon followed by
 # another. After each in a row that found a camera's clock to be right the next one waits twice as
 # long, up to this many times, as long as the tuner's heights do not say that something changed.

@@ -30,7 +30,7 @@ _DRIFT_SIGMA = 50e-6
 # A line that leaves the one it was looked for from by more than this, s, is another one.
 _STRAY_S = 0.04
 # A landmark's constant height difference may be so large (a bumped camera, paint of some size).
-_CONSTANT = 4e-3
+CONSTANT = 4e-3
 # Windows beyond so many sigmas of the line have no weight.
 _TUKEY = 4.7
 # What a centre's own errors and stamps of a microsecond or so leave, s; and what errors that last
@@ -118,7 +118,7 @@ def _window_shifts(rows: Heights, begin_s: float) -> tuple[list[Shift], list[flo
     for begin, end in pairwise(edges.tolist()):
         own = slice(*np.searchsorted(numbers, [begin, end]).tolist())
         part = take(rows, own)
-        found = fit_shift(part, 0.0, _CONSTANT)
+        found = fit_shift(part, 0.0, CONSTANT)
         if math.isfinite(found.variance):
             shifts.append(found)
             weights = part.speeds**2 / part.variances + 1e-12

@@ -1,4 +1,5 @@
-"""Height differences between two cameras over a whole recording, as rows of a regression.
+"""Height differences between two cameras over a whole recording, or some seconds of one, as rows
+of a regression.
 
 At each sample of either camera, the other's height by a cubic through its four neighbours. What
 that misses where a hand turns sharply is told by how far a quintic through six is from it: such

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.fusion.alignment import height_memory, height_track, offset_search
+from services.fusion.alignment import height_memory, height_track
 from services.fusion.intake import observations, ray_interpolation
 from services.fusion.kalman import estimator, filtering, held
 from services.fusion.monitors import (
@@ -46,7 +46,6 @@ LIVE = (
     height_memory.heights_by_landmark,
     mirrored_view._order,
     height_track._interpolate,
-    offset_search.even_samples,
 )
 
 
