@@ -59,7 +59,7 @@ RUNS = {
         "rhot demo", "--no-viewer --json --seconds 30", "--no-viewer --json --seconds 3", 1
     ),
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
-    "dots": _script("dots", "", "--clips 1", 4),
+    "dots": _script("dots", "", "--clips 1", 60),
     "dots_pictures": _script(
         "dots_pictures", "", "--dots 8 --clips 1 --motion pinch --hindsight", 45
     ),
