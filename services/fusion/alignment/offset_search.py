@@ -124,7 +124,8 @@ def _scores(
         (min(track.times_s[0] for track in own), max(track.times_s[-1] for track in own))
         for own in zip(*pairs, strict=True)
     ]
-    grids = [np.arange(begin, end, STEP_S) for begin, end in ends]
+    # One instant at least, of stamps that stand still or run back, too.
+    grids = [np.arange(begin, max(end, begin + STEP_S), STEP_S) for begin, end in ends]
     a, ma = resampled([pair[0] for pair in pairs], grids[0])  # (L, N)
     b, mb = resampled([pair[1] for pair in pairs], grids[1])
     length = fast_length(a.shape[1] + b.shape[1])

@@ -25,6 +25,8 @@ _MISSED = 8.0
 _NOISE = 1e-4
 # Neighbours of a sample whose distances differ by more than this share do not give its speed.
 _UNEVEN = 0.1
+# Stamps from the network may stand still or run back: no time between two is taken to be less.
+_LEAST_S = 1e-6
 # A spike differs by so many median deviations of its neighbours and so much more (6 px at 500 px
 # of focal length): sharp turns of fast hands at 30 fps stay below half of that.
 _SPIKE_SPREADS, _SPIKE = 4.0, 0.012
@@ -86,27 +88,31 @@ def _table(
 ) -> Array:
     """Columns of rows_of (8, n) at one camera's samples."""
     times, heights = sampled.times_s, sampled.heights
-    every = max(1, round(1.0 / (rows_hz * float(np.median(np.diff(times))))))
+    period_s = max(float(np.median(np.diff(times))), _LEAST_S)
+    every = max(1, round(1.0 / (rows_hz * period_s)))
     k = np.arange(1, len(times) - 1, every)
-    span = times[k + 1] - times[k - 1]
+    span = np.maximum(times[k + 1] - times[k - 1], _LEAST_S)
     even = np.abs(times[k + 1] + times[k - 1] - 2.0 * times[k]) <= _UNEVEN * span
     cubic, inside = interpolated(there, times[k])
     quintic, further = interpolated(there, times[k], 6)
-    kept = even & inside & further
     after = np.clip(
         np.searchsorted(there.times_s, times[k], side="right"), 1, len(there.times_s) - 1
     )
     middle_s = 0.5 * (there.times_s[after - 1] + there.times_s[after])
-    between = interpolated(there, middle_s, 6)[0] - interpolated(there, middle_s)[0]
+    # Polynomials through samples of one instant are infinite, or NaN.
+    with np.errstate(invalid="ignore"):
+        missed = quintic - cubic
+        between = np.abs(interpolated(there, middle_s, 6)[0] - interpolated(there, middle_s)[0])
+    kept = even & inside & further & np.isfinite(missed) & np.isfinite(between)
     columns = [
         np.round((times[k] - begin_s) * INSTANTS_HZ),
         np.full(len(k), row),
         sign * (heights[k] - cubic),
         (heights[k + 1] - heights[k - 1]) / span,
         span,
-        quintic - cubic,
+        missed,
         heights[k] - np.median(heights),
-        np.abs(between),
+        between,
     ]
     return np.stack(columns)[:, kept]
 

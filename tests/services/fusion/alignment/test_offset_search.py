@@ -7,6 +7,7 @@ import pytest
 
 from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.alignment.offset_search import fast_length, find_offset
+from services.fusion.alignment.recorded_rows import rows_of
 from testing.families.motions import flapping, stop_and_go
 from testing.synthetic_points import Motion, MovingHand, RestingHand
 
@@ -110,3 +111,19 @@ def test_interpolation_is_exact_on_cubics_and_stops_at_gaps():
 
 def test_transforms_are_of_a_length_that_is_quick():
     assert [fast_length(n) for n in (1200, 1201, 1199, 7)] == [1200, 1215, 1200, 8]
+
+
+@pytest.mark.parametrize(
+    "times",
+    [np.zeros(12), np.linspace(1.0, 0.0, 12), np.repeat(np.arange(4.0), 3), np.arange(12.0) // 7.0],
+    ids=["none passes", "backwards", "in threes", "in sevens"],
+)
+def test_stamps_that_stand_still_or_run_back_are_survived(times):
+    """The network's, which nobody sorts."""
+    odd, usual = (
+        HeightTrack(of, np.linspace(0.0, 1.0, 12)) for of in (times, np.arange(12.0) / 30)
+    )
+    for one, other in ((odd, usual), (usual, odd), (odd, odd)):
+        assert not find_offset([one], [other], together=True).decided
+        rows = rows_of([(one, other)])
+        assert rows is None or np.isfinite(rows.heights.heights).all()
