@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from rhot.geometry.transforms import Array
+from services.fusion.alignment.height_rows import INSTANTS_HZ, ROWS_HZ, Rows, rows_of, take
 from services.fusion.alignment.height_track import HeightTrack
-from services.fusion.alignment.recorded_rows import INSTANTS_HZ, ROWS_HZ, Rows, rows_of, take
 from services.fusion.monitors.shift_regression import Heights, Shift, fit_shift
 
 # Rounds of looking again from where the last one led (the regression is linear in the shift), and

@@ -17,10 +17,10 @@ import numpy as np
 
 from rhot.geometry.transforms import Array
 from services.fusion.alignment.clock_line import ClockLine, LineFit, fit_line, rows_along
+from services.fusion.alignment.height_rows import INSTANTS_HZ, Rows, without_spikes
 from services.fusion.alignment.height_track import HeightTrack
 from services.fusion.alignment.likely_lines import APART_S, likely_lines
 from services.fusion.alignment.offset_search import usable_pairs
-from services.fusion.alignment.recorded_rows import INSTANTS_HZ, Rows, without_spikes
 
 # Videos that were started by hand begin within a minute of each other.
 RANGE_S = 60.0

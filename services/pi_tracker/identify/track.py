@@ -21,7 +21,7 @@ _WHOLE_MEMORY, _SURE_TIMES = 0.98, 2.5
 # A track that moves less than this a frame stands still.
 _STATIONARY_PX = 1.0
 # What two frames tell of a marker's motion is so unsure: where the others moved less, one that is
-# lost is taken to move as they do.
+# lost is taken to move as they do. (Not tuned: what middles of blobs jump by in blur.)
 _UNSURE_PX = 3.0
 # Velocity predicts for so long; after a longer gap the old place tells nothing of it.
 _MAX_PREDICTION_S = 0.1
@@ -53,7 +53,7 @@ class Track:
     stationary_frames: int = 0
     seen_ns: int = -1
     # How much of the others' motion it had as it was seen last.
-    share: float = 1.0
+    motion_share: float = 1.0
     # Its area where all of it shows.
     whole_px2: float = field(init=False)
 
@@ -96,9 +96,11 @@ class Track:
         It goes on with as much of their motion as it had: a hand that flaps turns about its wrist.
         """
         if self.stamp_ns == self.seen_ns:
-            self.share = self._share_of(before_px_s, stamp_ns)
+            self.motion_share = self._share_of(before_px_s, stamp_ns)
         dx_px, dy_px = moved_px
-        self._move(self.x_px + self.share * dx_px, self.y_px + self.share * dy_px, stamp_ns)
+        self._move(
+            self.x_px + self.motion_share * dx_px, self.y_px + self.motion_share * dy_px, stamp_ns
+        )
 
     def _share_of(self, others_px_s: Vector, stamp_ns: int) -> float:
         """How much of the others' motion its own is, 0 to 1; 1 where neither is known."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from services.fusion.alignment.height_rows import rows_of
 from services.fusion.alignment.height_track import HeightTrack, interpolated
 from services.fusion.alignment.offset_search import fast_length, find_offset
-from services.fusion.alignment.recorded_rows import rows_of
 from testing.families.motions import flapping, stop_and_go
 from testing.synthetic_points import Motion, MovingHand, RestingHand
 
