@@ -2,7 +2,8 @@
 
 A part of benchmarks/objects.py. The scene `registration` of the simulator (a tracker with a painted
 bead, moved and turned) is rendered, tracked by the detector of the Pis, and registered with the
-noise, outliers and lateness of benchmarks/objects_registration.py on the tracker's exact poses.
+noise, outliers and lateness of benchmarks/objects_registration.py on the tracker's exact poses,
+each recording with several draws of that noise.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from services.calibrator.objects.tracker_path import tracker_path
 from services.cli.defaults import config_dir
 from testing.synthetic_tracker import Lighthouse
 
-SECONDS, SEEDS = 20.0, 3
+SECONDS, SEEDS, DRAWS = 20.0, 3, 6
 LIGHTHOUSES: dict[str, dict[str, Any]] = {
     "exact": {"noise_m": 0.0, "noise_rad": 0.0, "outliers": 0.0},
     "white": {},
@@ -88,10 +89,11 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder:
             capture, tracked = record(Path(folder), seed)
             for name, noise in LIGHTHOUSES.items():
-                own = errors(capture, tracked, Lighthouse(seed=seed, **noise))
-                runs[name].append(own)
-                print(f"seed {seed}, {name:13s}", end="")
-                print("".join(f"  {key} {value:.3f}" for key, value in own.items()))
+                for draw in range(1, 1 + (DRAWS if name != "exact" else 1)):
+                    own = errors(capture, tracked, Lighthouse(seed=10 * seed + draw, **noise))
+                    runs[name].append(own)
+                    print(f"seed {seed}, {name:13s}", end="")
+                    print("".join(f"  {key} {value:.3f}" for key, value in own.items()))
     figures: dict[str, Any] = {}
     for name, all_of in runs.items():
         word = "registration_pictures_" + name.split()[0]

@@ -5,8 +5,9 @@ in two rolling-shutter cameras that run freely, 1 % of markers of other things, 
 and 0.2 deg of noise, 5 % of poses off by up to 250 mm and 0.5 rad, stamps late by 30 ms; two sizes
 of volume, noise that is white or lasts .5 s (first-order Gauss-Markov). The error of a run is the
 median over the volume. Beside it a plain method on the same data: nearest pose to each triangulated
-point, rigid fit, neither lever arm nor time offset. Last, a real Vive tracker against a laser
-tracker, where $RHOT_DATA has it.
+point, rigid fit, neither lever arm nor time offset. Then what is wrong with the lateness of stamps,
+by poses a second, of a hand that moves slowly. Last, a real Vive tracker against a laser tracker,
+where $RHOT_DATA has it.
 """
 
 from __future__ import annotations
@@ -44,6 +45,9 @@ VOLUMES: dict[str, dict[str, Any]] = {
 }
 NOISES = {"white": 0.0, "lasting .5 s": 0.5}
 MARKER_M = 0.045
+# Poses a second, as SteamVR is asked for them, and their white noise, of a hand that moves slowly.
+RATES_HZ, RATE_NOISES_M, RATE_SEEDS = (60.0, 90.0, 120.0, 250.0), (1e-3, 3e-3), 6
+SLOW_HZ = (0.1, 0.4)
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Run:
     mm: float
     worst_mm: float
     deg: float
-    late_ms: float
+    late_ms: float  # signed
     marker_mm: float
     # The error in units of the sigma that the result states: 1 if it is honest.
     sigmas: float
@@ -63,14 +67,12 @@ class Run:
     refused: str = ""
 
 
-def run(seed: int, volume: str, correlation_s: float) -> Run:
+def run(seed: int, motion: TrackerMotion, lighthouse: Lighthouse) -> Run:
     """One recording, registered."""
     random = np.random.default_rng((seed, 23))
     direction = random.normal(size=3)
     marker_m = MARKER_M * direction / np.linalg.norm(direction)
-    motion = TrackerMotion(seed=seed, **VOLUMES[volume])
     rig = SyntheticRig(sigma_px=0.3, seed=seed)
-    lighthouse = Lighthouse(seed=seed, correlation_s=correlation_s)
     frames = painted_frames(rig, motion, tuple(marker_m.tolist()), SECONDS)
     poses = lighthouse.poses(motion, SECONDS)
     begin_s = time.perf_counter()
@@ -90,7 +92,7 @@ def run(seed: int, volume: str, correlation_s: float) -> Run:
         mm=float(np.median(mm)),
         worst_mm=float(mm.max()),
         deg=deg,
-        late_ms=abs(1e-6 * place.time_offset_ns - 1e3 * lighthouse.late_s),
+        late_ms=1e-6 * place.time_offset_ns - 1e3 * lighthouse.late_s,
         marker_mm=1e3 * float(np.linalg.norm(place.marker_m - marker_m)),
         sigmas=_sigmas(found, T),
         plain_mm=float(np.median(plain[0])),
@@ -127,7 +129,14 @@ def _plain(seen: Sightings, path: TrackerPath) -> Array:
 def measure(seeds: int = SEEDS) -> dict[str, Any]:
     """All runs; prints a table, and returns the figures."""
     runs = {
-        (noise, volume): [run(seed, volume, NOISES[noise]) for seed in range(1, seeds + 1)]
+        (noise, volume): [
+            run(
+                seed,
+                TrackerMotion(seed=seed, **VOLUMES[volume]),
+                Lighthouse(seed=seed, correlation_s=NOISES[noise]),
+            )
+            for seed in range(1, seeds + 1)
+        ]
         for noise in NOISES
         for volume in VOLUMES
     }
@@ -148,7 +157,29 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
         figures[name], figures[f"{name}_95"], figures[f"{name}_max"] = white[name]
     figures["registration_plain_mm"] = white["plain_mm"]
     figures["registration_refused"] = white["refused"]
+    figures["by_rate"] = by_rate(min(seeds, RATE_SEEDS))
     return figures | (laser() if LASER.is_dir() else {})
+
+
+def by_rate(seeds: int) -> dict[str, dict[str, list[float]]]:
+    """How far off lateness is by poses a second and their white noise: mean and spread, ms."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for rate_hz in RATES_HZ:
+        own = found[f"{rate_hz:.0f} Hz"] = {}
+        for noise_m in RATE_NOISES_M:
+            late_ms = [
+                run(
+                    seed,
+                    TrackerMotion(seed=seed, hz=SLOW_HZ, **VOLUMES["0.3 m at 0.6 m"]),
+                    Lighthouse(seed=seed, rate_hz=rate_hz, noise_m=noise_m),
+                ).late_ms
+                for seed in range(1, seeds + 1)
+            ]
+            spread = float(np.mean(late_ms)), float(np.std(late_ms))
+            own[f"{1e3 * noise_m:.0f} mm"] = [round(value, 3) for value in spread]
+        told = "  ".join(f"{noise} {mean:6.2f} +- {sd:.2f}" for noise, (mean, sd) in own.items())
+        print(f"{rate_hz:3.0f} poses a second, late by ms: {told}")
+    return found
 
 
 def laser() -> dict[str, float]:
@@ -180,7 +211,7 @@ def _summary(runs: list[Run]) -> dict[str, Any]:
     good = [one for one in runs if not one.refused]
 
     def three(name: str) -> list[float]:
-        values = np.array([getattr(one, name) for one in good])
+        values = np.abs([getattr(one, name) for one in good])
         if not len(values):
             return [float("nan")] * 3
         return [round(float(v), 4) for v in (*np.quantile(values, (0.5, 0.95)), values.max())]

@@ -55,6 +55,15 @@ def test_noise_outliers_and_a_late_clock_leave_less_than_a_millimetre(volume):
         assert found.held_out.px < 1.2 * found.residual.px
 
 
+@pytest.mark.parametrize("rate_hz", [60.0, 90.0, 120.0, 250.0])
+def test_noise_makes_no_stamps_late_however_many_poses_there_are(rate_hz):
+    motion = TrackerMotion(hz=(0.1, 0.4))
+    lighthouse = Lighthouse(noise_m=3e-3, rate_hz=rate_hz)
+    found = register(*recorded(motion, lighthouse))
+    _, _, late_ms = errors(found, motion, lighthouse)
+    assert abs(late_ms) < 1.5
+
+
 def test_without_noise_it_is_exact():
     motion = TrackerMotion()
     lighthouse = Lighthouse(noise_m=0.0, noise_rad=0.0, outliers=0.0, late_s=-0.21)
