@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from rooms import ASTRAY_PX, CALIBRATED, VISIBLE, Count, asked, counted, figures_of
+from rooms import ASTRAY_PX, VISIBLE, Count, asked, counted, figures_of
 
 from rhot.files.calibration import Colors
 from rhot.files.config import RigConfig
@@ -33,7 +33,8 @@ from services.pi_tracker.identify.hand_layout import Landmarks
 from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
-from testing.families.pictures import PaintMiddles, fitted_colors, frame_of, visible_shares
+from testing.families.clicks import clicked_colors
+from testing.families.pictures import PaintMiddles, frame_of, visible_shares
 from testing.families.rooms import room
 from testing.synthetic_points import START_NS
 
@@ -102,7 +103,7 @@ def in_room(number: int, tallies: Mapping[str, Tally]) -> None:
             entries = zip(visible, paint_px, strict=True)
             seen.append(dict(zip(landmarks.values(), entries, strict=True)))
         numbers = np.linspace(0, len(frames) - 1, AUTO_FRAMES).astype(int).tolist()
-        colors = {"clicks": fitted_colors(recipe.scene(seed=recipe.seed + CALIBRATED), name)}
+        colors = {"clicks": clicked_colors(recipe, name)}
         for way, of in (("video", numbers), ("one", numbers[:1])):
             found, colors[way] = proposed([frames[n] for n in of], scene.config.landmarks)
             tallies[way].note(found, [seen[n] for n in of])

@@ -4,9 +4,10 @@
 
 Rooms by number (testing/families/rooms.py; --tuning: those that constants may be chosen on): things
 in the paints' colours, lamps from anywhere, noise, hands from 0.35 to 0.75 m away; three seconds,
-both cameras, each with ranges as somebody has them who clicks on the paint in that light. Rhot's
-tracker, live and as `rhot track` has it look at a recording's beginning first, and the RHOT paper's
-look at the same pictures, which take nearly all of the time: 10 seconds a room.
+both cameras, each with ranges fitted to clicks on the paint in that light
+(testing/families/clicks.py). Rhot's tracker, live and as `rhot track` has it look at a recording's
+beginning first, and the RHOT paper's look at the same pictures, which take nearly all of the time:
+10 seconds a room.
     found    of markers of which 60 % or more are visible, the share that is told where its paint is
     astray   of markers that are told, the share that is on something else: more than 14 px off
     whole    of clips of a camera, the share in which 99 % are found
@@ -33,15 +34,14 @@ from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.rig_step import step_of_rig
 from services.simulator.camera.frame_source import FrameSource
 from testing.families.case import Half
-from testing.families.pictures import PaintMiddles, fitted_colors, frame_of, visible_shares
+from testing.families.clicks import clicked_colors
+from testing.families.pictures import PaintMiddles, frame_of, visible_shares
 from testing.families.rooms import FIRST, room
 from testing.synthetic_points import START_NS
 
 ROOMS = 24
 # A marker so far from its paint's middle is on something else; a tip is 8 to 30 px wide.
 ASTRAY_PX, VISIBLE = 14.0, 0.6
-# Another seed of a room has the same lamps and paint: somebody calibrated before.
-CALIBRATED = 1_000_000
 
 
 class Count(NamedTuple):
@@ -69,7 +69,7 @@ def counts_in(number: int) -> dict[str, list[Count]]:
     counts: dict[str, list[Count]] = {"rhot": [], "recording": [], "paper": []}
     for name, camera in scene.cameras.items():
         source = FrameSource(scene, name, recorded=True)
-        colors = fitted_colors(recipe.scene(seed=recipe.seed + CALIBRATED), name)
+        colors = clicked_colors(recipe, name)
         frames: list[Frame] = []
         seen: list[dict[str, tuple[np.bool_, Array]]] = []
         for seq, visible in enumerate(shares[name] >= VISIBLE):

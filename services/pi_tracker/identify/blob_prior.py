@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from services.pi_tracker.identify.blob_shape import may_be_rim
+from services.pi_tracker.identify.group_consistency import SIZE_RATIO
 from services.pi_tracker.identify.track import Track
 from services.pi_tracker.image.blob import Blob
 
@@ -15,7 +16,8 @@ ACCEPT_LIKENESS = 0.6
 # marker after all. The track may have been wrong.
 _REACQUISITION_PRIOR = 0.4
 # No marker shrinks to such a share of its size within so long; what does is noise, or something
-# pale that a dim light brings near. Its prior.
+# pale that a dim light brings near. Its prior. But what is as large as the other markers is one:
+# the track is of another thing then, like a poster before which a tip was first seen.
 _SHRUNK_SHARE, _SHRUNK_NS, _NOISE_PRIOR = 1.0 / 16.0, 5_000_000_000, 0.1
 # A track that stands still for so many frames may be no marker.
 _STATIONARY_FRAMES = 4
@@ -32,17 +34,38 @@ def blob_priors(
     track: Track | None,
     stamp_ns: int,
     margin_px: float,
+    others_px2: float,
 ) -> list[float]:
-    """Priors, 0..1, of a colour's blobs, of those of each colour."""
+    """Priors, 0..1, of a colour's blobs, of those of each colour.
+
+    others_px2: how large the other colours' markers are, the median of them; 0 if none was seen.
+    """
     own = blobs[color]
     others = [blob for number, rest in enumerate(blobs) if number != color for blob in rest]
-    priors = [_prior(blob, others, track, stamp_ns, margin_px) for blob in own]
+    priors = [
+        _NOISE_PRIOR
+        if track is not None and _is_noise(blob, track, stamp_ns, margin_px, others_px2)
+        else _prior(blob, others, track, stamp_ns, margin_px)
+        for blob in own
+    ]
     if track is not None and track.stationary_frames >= _STATIONARY_FRAMES:
         # What has not moved for a while may be static background; among others it has no advantage.
         least_px2 = _RIVAL_SHARE * track.area_px
         if sum(blob.area_px >= least_px2 for blob in own) > 1:
             return [min(prior, _REACQUISITION_PRIOR) for prior in priors]
     return priors
+
+
+def _is_noise(blob: Blob, track: Track, stamp_ns: int, margin_px: float, others_px2: float) -> bool:
+    """Whether a blob is too small for a marker that lately was larger."""
+    if 0.0 < others_px2 <= SIZE_RATIO * blob.area_px:
+        return False
+    return (
+        blob.area_px < _SHRUNK_SHARE * track.area_px
+        and 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS
+        and track.likeness(blob, stamp_ns, margin_px) < ACCEPT_LIKENESS
+        and not track.is_at(blob, stamp_ns)
+    )
 
 
 def _prior(
@@ -56,7 +79,4 @@ def _prior(
         prior = max(likeness, _REACQUISITION_PRIOR)
         if track.is_at(blob, stamp_ns):
             return max(prior, ACCEPT_LIKENESS)
-        recently_larger = 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS
-        if recently_larger and blob.area_px < _SHRUNK_SHARE * track.area_px:
-            return _NOISE_PRIOR
     return prior * _RIM_FACTOR if any(may_be_rim(blob, other) for other in others) else prior

@@ -22,7 +22,7 @@ from services.pi_tracker.image.blob import Blob
 # wide: markers lie within 14 patch widths, mostly within 10.
 _REACH_WIDTHS = 14.0
 # Tips seen end on or half occluded and a dab on the wrist seen in full differ in area up to this.
-_SIZE_RATIO = 4.0
+SIZE_RATIO = 4.0
 # Within that, those of one size are likelier to be one hand's: power of the ratio of areas, where
 # their layout is known and where it is not. (First pictures of 120 simulated rooms with things in
 # the paints' colours, of 1387 tips: 89.3 % right with .2 and no layout, 90.9 with .5, 90.6 with 1;
@@ -118,7 +118,7 @@ def _consistencies(pairs: _Pairs) -> Array:
     """How well distances and sizes are those of markers on one hand, 0..1; (n, n)."""
     # Of two sizes the smaller one is less often wrong: background and blur make blobs large.
     nearness = 1.0 / (1.0 + (pairs.distance2 / (_REACH_WIDTHS**2 * pairs.smaller)) ** 2)
-    return nearness * np.minimum(1.0, _SIZE_RATIO * pairs.smaller / pairs.larger)
+    return nearness * np.minimum(1.0, SIZE_RATIO * pairs.smaller / pairs.larger)
 
 
 def _weights(pairs: _Pairs, colors: Ints, layout: HandLayout) -> Array:

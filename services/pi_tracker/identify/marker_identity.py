@@ -193,6 +193,12 @@ class MarkerIdentity:
         areas = [track.area_px for track in self._tracks if track is not None]
         return 0.5 * math.sqrt(median(areas)) if areas else 0.0
 
+    def _others_px2(self, color: int) -> float:
+        """How large the other colours' markers are, the median of them, 0 if none was seen."""
+        others = (track for number, track in enumerate(self._tracks) if number != color)
+        areas = [track.area_px for track in others if track is not None]
+        return median(areas) if areas else 0.0
+
     def found_px2(self, color: int) -> float:
         """How large its blobs were as they were found, 0 if it never was."""
         track = self._tracks[color]
@@ -253,7 +259,8 @@ class MarkerIdentity:
         """The blobs of a colour with their priors."""
         own = blobs[color]
         track = self._tracks[color]
-        priors = blob_priors(color, blobs, track, stamp_ns, self._margin_px)
+        others_px2 = self._others_px2(color)
+        priors = blob_priors(color, blobs, track, stamp_ns, self._margin_px, others_px2)
         factors = self._carried.prior_factors(color)
         priors = [
             prior * factor * (_ROOM_FACTOR if like_room(blob) else 1.0)
