@@ -57,7 +57,8 @@ class Run:
     mm: float
     worst_mm: float
     deg: float
-    late_ms: float  # signed
+    # By how much too late its stamps are thought to be.
+    late_ms: float
     marker_mm: float
     # The error in units of the sigma that the result states: 1 if it is honest.
     sigmas: float
@@ -162,7 +163,7 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
 
 
 def by_rate(seeds: int) -> dict[str, dict[str, list[float]]]:
-    """How far off lateness is by poses a second and their white noise: mean and spread, ms."""
+    """How far off lateness is, ms: its mean and standard deviation, by rate and white noise."""
     found: dict[str, dict[str, list[float]]] = {}
     for rate_hz in RATES_HZ:
         own = found[f"{rate_hz:.0f} Hz"] = {}
@@ -175,8 +176,8 @@ def by_rate(seeds: int) -> dict[str, dict[str, list[float]]]:
                 ).late_ms
                 for seed in range(1, seeds + 1)
             ]
-            spread = float(np.mean(late_ms)), float(np.std(late_ms))
-            own[f"{1e3 * noise_m:.0f} mm"] = [round(value, 3) for value in spread]
+            mean_and_sd = float(np.mean(late_ms)), float(np.std(late_ms))
+            own[f"{1e3 * noise_m:.0f} mm"] = [round(value, 3) for value in mean_and_sd]
         told = "  ".join(f"{noise} {mean:6.2f} +- {sd:.2f}" for noise, (mean, sd) in own.items())
         print(f"{rate_hz:3.0f} poses a second, late by ms: {told}")
     return found

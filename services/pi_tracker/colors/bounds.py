@@ -108,7 +108,7 @@ class _BoundsFit:
         stray_cells: float,
     ) -> None:
         self._hues, self._stray = hues, stray_cells
-        self._few = max(stray_cells, _FEW_SHARE * paint.y.size)
+        self._few_cells = max(stray_cells, _FEW_SHARE * paint.y.size)
         _, saturation, value = paint.hsv()
         self._pale = float(np.quantile(saturation, _PALE_TAIL))
         self._saturated = float(np.quantile(saturation, 1.0 - _TAIL))
@@ -130,7 +130,7 @@ class _BoundsFit:
         """
         low, high = self._widest
         floors = self._lower_bounds(low, high)
-        if np.count_nonzero(self._inside(low, high, *floors)) > self._few:
+        if np.count_nonzero(self._inside(low, high, *floors)) > self._few_cells:
             low, high = self._hue_bounds(*floors)
             floors = self._lower_bounds(low, high)
         saturation_high = self._upper_bound(self._saturation[self._inside(low, high, *floors)])
@@ -192,7 +192,7 @@ class _BoundsFit:
                     for step in steps
                 ]
             )
-            if inside[0] <= self._few or inside[-1] > (1.0 - _MIN_HUE_GAIN) * inside[0]:
+            if inside[0] <= self._few_cells or inside[-1] > (1.0 - _MIN_HUE_GAIN) * inside[0]:
                 found.append(widest)
                 continue
             good = inside <= self._tolerated(inside[0], inside[-1])

@@ -42,12 +42,7 @@ def blob_priors(
     """
     own = blobs[color]
     others = [blob for number, rest in enumerate(blobs) if number != color for blob in rest]
-    priors = [
-        _NOISE_PRIOR
-        if track is not None and _is_noise(blob, track, stamp_ns, margin_px, others_px2)
-        else _prior(blob, others, track, stamp_ns, margin_px)
-        for blob in own
-    ]
+    priors = [_prior(blob, others, track, stamp_ns, margin_px, others_px2) for blob in own]
     if track is not None and track.stationary_frames >= _STATIONARY_FRAMES:
         # What has not moved for a while may be static background; among others it has no advantage.
         least_px2 = _RIVAL_SHARE * track.area_px
@@ -56,20 +51,13 @@ def blob_priors(
     return priors
 
 
-def _is_noise(blob: Blob, track: Track, stamp_ns: int, margin_px: float, others_px2: float) -> bool:
-    """Whether a blob is too small for a marker that lately was larger."""
-    if 0.0 < others_px2 <= SIZE_RATIO * blob.area_px:
-        return False
-    return (
-        blob.area_px < _SHRUNK_SHARE * track.area_px
-        and 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS
-        and track.likeness(blob, stamp_ns, margin_px) < ACCEPT_LIKENESS
-        and not track.is_at(blob, stamp_ns)
-    )
-
-
 def _prior(
-    blob: Blob, others: Sequence[Blob], track: Track | None, stamp_ns: int, margin_px: float
+    blob: Blob,
+    others: Sequence[Blob],
+    track: Track | None,
+    stamp_ns: int,
+    margin_px: float,
+    others_px2: float,
 ) -> float:
     prior = 1.0
     if track is not None:
@@ -79,4 +67,8 @@ def _prior(
         prior = max(likeness, _REACQUISITION_PRIOR)
         if track.is_at(blob, stamp_ns):
             return max(prior, ACCEPT_LIKENESS)
+        recently_larger = 0 <= stamp_ns - track.seen_ns <= _SHRUNK_NS
+        like_others = 0.0 < others_px2 <= SIZE_RATIO * blob.area_px
+        if recently_larger and blob.area_px < _SHRUNK_SHARE * track.area_px and not like_others:
+            return _NOISE_PRIOR
     return prior * _RIM_FACTOR if any(may_be_rim(blob, other) for other in others) else prior
