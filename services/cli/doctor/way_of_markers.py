@@ -100,7 +100,7 @@ def _points(seen: Observations, hand: str, found: HandSeen) -> Link:
     if found.points < _MIN_MESSAGES:
         return broken(name, "no_points", "fusion publishes no points at all")
     if found.measured < _SEEN * found.points:
-        if _seen_by_two(seen):
+        if _seen_by_two(seen, hand):
             text = "cameras see the same markers, and their views do not fit together"
             action = "is a camera mirrored, moved or at another size? `rhot check` knows the sizes"
             return broken(name, "no_points", text, action)
@@ -108,10 +108,13 @@ def _points(seen: Observations, hand: str, found: HandSeen) -> Link:
     return holds(name, f"{found.measured} of {found.points} messages with a measured point")
 
 
-def _seen_by_two(seen: Observations) -> bool:
-    """Whether some colour is in many pictures of two cameras."""
+def _seen_by_two(seen: Observations, hand: str) -> bool:
+    """Whether some colour of the hand is in many pictures of two cameras."""
+    # Not an object's: its paint is seen while no hand is there.
+    table = seen.config.hand.get(hand) if seen.config is not None else None
+    own = set(table.markers.values()) if table is not None else set()
     often = [
-        {color for color, count in camera.colors.items() if count > 0.5 * camera.frames}
+        {color for color in own if camera.colors.get(color, 0) > 0.5 * camera.frames}
         for camera in seen.cameras.values()
     ]
     colors = [color for colors in often for color in colors]

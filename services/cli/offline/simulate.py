@@ -20,7 +20,7 @@ from rhot.files.config import RigConfig, load_rig
 from services.cli.defaults import sim_toml
 from services.cli.options import ProgressOption
 from services.cli.progress import Progress
-from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.catalog import ALSO, SCENES
 
 if TYPE_CHECKING:
     from services.cli.offline.simulate_motion import SimulatedMotion
@@ -189,7 +189,9 @@ def _write_motion(
 
 
 def _list(as_json: bool) -> str:
+    about = {name: spec.about for name, spec in SCENES.items()}
+    about |= {name: f"another word for {scene}" for name, scene in ALSO.items()}
     if as_json:
-        return msgspec.json.encode({name: spec.about for name, spec in SCENES.items()}).decode()
-    width = max(len(name) for name in SCENES)
-    return "\n".join(f"{name.ljust(width)}  {spec.about}" for name, spec in SCENES.items())
+        return msgspec.json.encode(about).decode()
+    width = max(len(name) for name in about)
+    return "\n".join(f"{name.ljust(width)}  {text}" for name, text in about.items())

@@ -168,7 +168,7 @@ def scene_spec(name: str) -> SceneSpec:
         near = difflib.get_close_matches(name, SCENES, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise ConfigError(
-            f"no scene {name!r}; {hint}Valid: {', '.join([*SCENES, *ALSO])}."
-            " Set it in [simulator] of rig.toml or on the command line"
+            f"no scene {name!r}; {hint}valid: {', '.join([*SCENES, *ALSO])};"
+            " set it in [simulator] of rig.toml or on the command line"
         )
     return SCENES[name]

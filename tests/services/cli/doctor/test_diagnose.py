@@ -137,6 +137,16 @@ def test_views_that_do_not_fit_are_told_from_markers_out_of_view():
     assert "do not fit together" in cause(hands=nothing).text
 
 
+def test_paint_of_an_object_is_no_marker_of_a_hand():
+    bead = {
+        name: CameraSeen(frames=120, clock_known=120, colors={"orange": 120})
+        for name in ("left", "right")
+    }
+    links = diagnose(observations(hands={"right": HandSeen(points=120)}, cameras=bead))
+    told = next(link for link in links if link.name == "points of right hand")
+    assert (told.code, told.text) == ("no_points", "no marker is seen by two cameras at once")
+
+
 def test_a_hint_does_not_hide_what_is_broken():
     hint = fault("camera_automatic", "exposure is automatic", "left")
     found = cause({"pi_tracker/left": [hint]}, cameras={"right": observations().cameras["right"]})

@@ -12,7 +12,7 @@ from rhot.files.capture import Capture, read_lines, read_stamps
 from rhot.files.config import load_rig
 from rhot.messages.simulator import Truth
 from services.cli.application import application
-from services.simulator.scene.catalog import SCENES
+from services.simulator.scene.catalog import ALSO, SCENES
 
 
 def simulate(*arguments):
@@ -48,8 +48,8 @@ def test_a_capture_is_written_at_the_wanted_rate(tmp_path):
 
 
 def test_scenes_are_listed():
-    assert all(name in simulate("--list").stdout for name in SCENES)
-    assert set(json.loads(simulate("--list", "--json").stdout)) == set(SCENES)
+    assert all(name in simulate("--list").stdout for name in (*SCENES, *ALSO))
+    assert set(json.loads(simulate("--list", "--json").stdout)) == {*SCENES, *ALSO}
 
 
 def test_an_unknown_scene_or_a_missing_folder_says_what_is_valid(tmp_path):
