@@ -9,6 +9,7 @@ import sys
 # BLAS spin: `rhot calibrate objects` took four times the processor's time, and eight times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from rhot.errors import leaves
 from rhot.plain_text import printable
 from rhot.process import logs
 from rhot.process.lifecycle import EXIT_USER, user_errors
@@ -35,6 +36,10 @@ def main() -> None:
             from services.cli.application import application
         application()()
     except Exception as error:
+        if all(isinstance(leaf, BrokenPipeError) for leaf in leaves(error)):
+            # Nobody reads on, as after `rhot top | head`: typer's own end, which knows no groups.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(1)
         errors = user_errors(error, PROGRAM)
         if not errors:
             raise

@@ -87,3 +87,14 @@ def test_once_prints_a_table_and_fails_where_something_is_missing(router: str) -
     assert ended.returncode == 1
     assert "\x1b" not in ended.stdout
     assert "solver             absent" in ended.stdout
+
+
+def test_a_reader_that_has_had_enough_ends_it_without_a_word(router: str) -> None:
+    with subprocess.Popen(
+        [*COMMAND, "--connect", router], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout.readline().startswith(b"rig sim")
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(DEADLINE_S) == 1
