@@ -21,7 +21,7 @@ from objects_registration import as_command
 
 from rhot.files.calibration import load_objects, load_rig_cameras
 from rhot.files.config import load_rig
-from rhot.geometry.transforms import angle_between, apply
+from rhot.geometry.transforms import angle_between, apply, inverse
 from rhot.messages import MarkerFrame
 from rhot.messages.objects import OpenVrPose
 from services.calibrator.objects.register import register
@@ -70,6 +70,9 @@ def errors(capture: Path, tracked: Path, lighthouse: Lighthouse) -> dict[str, fl
     T = np.array(objects.T_rig_from_lighthouse)
     # The volume: where the tracker was.
     off = apply(found.T_rig_from_lighthouse, path.positions_m) - apply(T, path.positions_m)
+    middle = np.array(found.middle_m)
+    there = apply(T, apply(inverse(found.T_rig_from_lighthouse), middle))
+    middle_mm = 1e3 * float(np.linalg.norm(there - middle))
     place, truth = found.trackers[table.serial], objects.objects[table.name].marker_m
     return {
         "mm": 1e3 * float(np.median(np.linalg.norm(off, axis=1))),
@@ -78,7 +81,8 @@ def errors(capture: Path, tracked: Path, lighthouse: Lighthouse) -> dict[str, fl
         "marker_mm": 1e3 * float(np.linalg.norm(place.marker_m - np.array(truth))),
         "residual_px": found.residual.px,
         "held_out_px": found.held_out.px,
-        "sigma_mm": 1e3 * found.sigma_m,
+        # Of the shift in the middle of the volume, which sigma is of.
+        "sigmas": middle_mm / (1e3 * found.sigma_m),
     }
 
 
@@ -97,7 +101,7 @@ def measure(seeds: int = SEEDS) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for name, all_of in runs.items():
         word = "registration_pictures_" + name.split()[0]
-        for key in ("mm", "deg", "ms"):
+        for key in ("mm", "deg", "ms", "sigmas"):
             values = [own[key] for own in all_of]
             figures[f"{word}_{key}"] = round(float(np.median(values)), 4)
             figures[f"{word}_{key}_max"] = round(max(values), 4)

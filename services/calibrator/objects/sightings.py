@@ -40,6 +40,7 @@ class Sightings:
     pixels: Array  # (n, 2)
     rays: Array  # (n, 2), undistorted, x/z and y/z
     sigma_px: Array  # (n,)
+    area_px: Array  # (n,)
 
     def __len__(self) -> int:
         return len(self.camera)
@@ -63,6 +64,7 @@ class Sightings:
             pixels=self.pixels[wanted],
             rays=self.rays[wanted],
             sigma_px=self.sigma_px[wanted],
+            area_px=self.area_px[wanted],
         )
 
 
@@ -75,7 +77,7 @@ def sightings(
     """
     names = list(cameras)
     counts = np.zeros(len(names), dtype=np.int64)
-    rows: list[tuple[int, int, float, float, float]] = []
+    rows: list[tuple[int, int, float, float, float, float]] = []
     for frame in frames:
         if frame.camera not in cameras:
             continue
@@ -90,6 +92,7 @@ def sightings(
                 marker.x_px,
                 marker.y_px,
                 max(marker.sigma_px, _MIN_SIGMA_PX),
+                marker.area_px,
             )
             for marker in frame.markers
             if marker.color == color
@@ -101,18 +104,17 @@ def _gather(
     color: str,
     cameras: tuple[Camera, ...],
     counts: Ints,
-    rows: list[tuple[int, int, float, float, float]],
+    rows: list[tuple[int, int, float, float, float, float]],
 ) -> Sightings:
     # A frame may come twice; two blobs of one colour in a frame contradict each other, and the loss
     # of the fit decides.
     rows = sorted(set(rows), key=lambda row: row[1])
     camera = np.array([row[0] for row in rows], dtype=np.int64)
     stamps_ns = np.array([row[1] for row in rows], dtype=np.int64)
-    numbers = np.array([row[2:] for row in rows], dtype=np.float64).reshape(-1, 3)
+    numbers = np.array([row[2:] for row in rows], dtype=np.float64).reshape(-1, 4)
     rays = np.full((len(rows), 2), np.nan)
     for c, one in enumerate(cameras):
         rays[camera == c] = one.rays_from_pixels(numbers[camera == c, :2])
-    found = Sightings(
-        color, cameras, counts, camera, stamps_ns, numbers[:, :2], rays, numbers[:, 2]
-    )
+    pixels, sigma_px, area_px = numbers[:, :2], numbers[:, 2], numbers[:, 3]
+    found = Sightings(color, cameras, counts, camera, stamps_ns, pixels, rays, sigma_px, area_px)
     return found.only(np.isfinite(rays).all(axis=1))

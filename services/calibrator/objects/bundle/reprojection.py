@@ -54,6 +54,7 @@ class Scene:
     tracker: Array  # (n,) int, index
     rays: Array  # (n, 2)
     sigma_px: Array  # (n,)
+    area_px: Array  # (n,) of the paint, as it is seen
     stamps_s: Array  # (n,)
     focals_px: Array  # (n,)
     R_camera_from_rig: Array  # (n, 3, 3)
@@ -63,7 +64,7 @@ class Scene:
 
     def only(self, wanted: Bools) -> Scene:
         """Those sightings."""
-        names = ("tracker", "rays", "sigma_px", "stamps_s", "focals_px")
+        names = ("tracker", "rays", "sigma_px", "area_px", "stamps_s", "focals_px")
         places = ("R_camera_from_rig", "t_camera_from_rig")
         some = {name: getattr(self, name)[wanted] for name in (*names, *places)}
         return replace(self, motion=self.motion.only(wanted), **some)
@@ -98,6 +99,7 @@ def scene(all_seen: Sequence[Sightings], motions: Sequence[Motion], late_s: Arra
         tracker=np.concatenate([np.full(len(seen), k) for k, seen in enumerate(all_seen)]),
         rays=np.concatenate([seen.rays for seen in all_seen]),
         sigma_px=np.concatenate([seen.sigma_px for seen in all_seen]),
+        area_px=np.concatenate([seen.area_px for seen in all_seen]),
         stamps_s=np.concatenate([seen.seconds_from(begin_ns) for seen in all_seen]),
         focals_px=np.concatenate([seen.focals_px for seen in all_seen]),
         R_camera_from_rig=T[:, :3, :3],

@@ -55,6 +55,22 @@ def test_noise_outliers_and_a_late_clock_leave_less_than_a_millimetre(volume):
         assert found.held_out.px < 1.2 * found.residual.px
 
 
+def test_what_light_moves_paint_by_is_told():
+    # As large as a bead of 2 cm half a metre away, lit from above: what is seen is nearer to the
+    # light by .03 of its radius along each of two axes, always.
+    motion, lighthouse, shift_m = TrackerMotion(), Lighthouse(noise_m=1e-4), (0.0, -3e-4, -3e-4)
+    lit = replace(motion, middle_m=tuple(np.add(motion.middle_m, shift_m).tolist()))
+    focal_px = float(np.mean(next(iter(RIG.rig().values())).focal_px))
+    area_px = np.pi * (0.01 * focal_px / motion.middle_m[2]) ** 2
+    seen, paths = recorded(lit, lighthouse)
+    seen[SERIAL] = replace(seen[SERIAL], area_px=np.full(len(seen[SERIAL]), area_px))
+    paths[SERIAL] = recorded(motion, lighthouse)[1][SERIAL]
+    found = register(seen, paths)
+    mm, _, _ = errors(found, motion, lighthouse)
+    assert 0.3 < mm < 2.0e3 * found.sigma_m
+    assert 0.9 * 3e-4 * 3**0.5 < found.sigma_m < 1e-3
+
+
 @pytest.mark.parametrize("rate_hz", [60.0, 90.0, 120.0, 250.0])
 def test_noise_makes_no_stamps_late_however_many_poses_there_are(rate_hz):
     motion = TrackerMotion(hz=(0.1, 0.4))
