@@ -27,6 +27,7 @@ from services.fusion.alignment.clock_alignment import ClockAlignment, search_per
 from services.fusion.alignment.level_views import LevelViews
 from services.fusion.geometry.projection import extrinsics
 from services.fusion.intake.admission import FrameAdmission, Verdict
+from services.fusion.intake.frame_pace import FramePace
 from services.fusion.intake.observations import FrameRejection, Landmark, ObservationBuilder, View
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Method
@@ -74,14 +75,14 @@ class FusionStep:
         self._rows = {
             hand: np.flatnonzero(of_hand == hand) for hand in HANDS if hand in config.hand
         }
-        self._fps = np.array([config.camera_named(name).fps for name in cameras])
         self._paint = PaintToBone(self._landmarks, hands, self._cameras)
         self._poses: PoseFeedback[Directions] = PoseFeedback()
         self._systematic = SystematicError(self._paint.extended, self._cameras)
         self._hidden = HiddenPaint(extrinsics(self._cameras), self._paint.round, self._paint.known)
         self.levels = LevelViews(self._cameras)
         self._messages = self._point_messages(hands)
-        periods_s = 1.0 / self._fps
+        self._pace = FramePace(1.0 / np.array([config.camera_named(one).fps for one in cameras]))
+        periods_s = self._pace.periods_s
         self.method = self._method(config.fusion, periods_s)
         self.clocks = ClockOffsetEstimator(
             self._cameras, len(self._landmarks), periods_s, enabled=config.fusion.tune_clocks
@@ -95,7 +96,7 @@ class FusionStep:
         self.unseen_markers = UnseenMarkerMonitor(self._cameras, self._landmarks)
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
         self._admission = FrameAdmission(len(self._cameras))
-        self._schedule = OutputSchedule(self._fps, self._lag_frames)
+        self._schedule = OutputSchedule(self._pace.shortest_s, self._lag_frames)
         # Frames that nothing was learned from, as others waited; and how many of them in a row.
         self.unlearned, self._passed_over = 0, 0
         # What of the last frame is not done yet: settle().
@@ -104,7 +105,7 @@ class FusionStep:
         self._seq = 0
 
     def _method(self, settings: Fusion, periods_s: Array) -> Method:
-        """What rig.toml asks for; periods_s (C,): the cameras' frame times."""
+        """What rig.toml asks for; periods_s (C,): of FramePace."""
         hands = list(self._rows.values())
         if settings.method == "kalman":
             return KalmanMethod(hands, self._cameras, periods_s, settings)
@@ -154,6 +155,7 @@ class FusionStep:
         self.admitted[frame.camera] += 1
         if verdict is Verdict.RESTART:
             self._restart(view.instant_ns)
+        self._pace.note(view.camera, view.instant_ns)
         times_s = (view.instant_ns - self._epoch_ns) * 1e-9 + view.delay_s  # (n,)
         late_s, clock_sigma_s = self.clocks.note_announced(view)
         self._unsettled.insert(0, partial(self._watch, view, times_s))
@@ -223,7 +225,8 @@ class FusionStep:
         Seconds count from this instant, as float64 cannot hold nanoseconds since 1970.
         """
         self._epoch_ns = instant_ns
-        self._schedule = OutputSchedule(self._fps, self._lag_frames)
+        self._schedule = OutputSchedule(self._pace.shortest_s, self._lag_frames)
+        self._pace.forget()
         self.method.reset()
         self.clocks.reset()
         self._paint.reset()

@@ -26,8 +26,6 @@ from services.fusion.kalman.motion.motion_models import MotionModels
 
 # What one camera alone has seen for longer is forgotten: by then its distance says nothing.
 ONE_CAMERA_S = 2.0
-# What one camera has seen alone for longer may be far off along its ray: three frames at 30 fps.
-ALONE_S = 0.1
 # A landmark that two cameras have seen lately and whose sigma is above both, absolutely and against
 # the median of its hand, begins again with no fewer looks: from any number, with a fifth of the
 # markers missing, it began up to 437 mm off.
@@ -50,10 +48,10 @@ class Sights(NamedTuple):
     observed_s: Array  # (N, C) any observation
     begun_s: Array  # (N,) when it began last
     returned_s: Array  # (N,) when a second camera saw it again, unsure as it was by then
-    hold_s: float  # so long a landmark stays that nobody sees
+    hold_s: Array  # (1,) so long a landmark stays that nobody sees
 
 
-def no_sights(landmarks: int, cameras: int, hold_s: float) -> Sights:
+def no_sights(landmarks: int, cameras: int, hold_s: Array) -> Sights:
     """Of landmarks that were never seen."""
     by_camera, each = (landmarks, cameras), (landmarks,)
     accepted, observed, begun, returned = (
@@ -109,6 +107,7 @@ def take_in(
     """
     complete_newest(history, cameras, filters)
     time_s = looks.times_s.mean()
+    hold_s = sights.hold_s[0]
     _no_fate(fates)
     fates.counts[0] = drop_lost(history, sights, cameras, filters, time_s)
     if history.size[0] == 0:
@@ -119,7 +118,7 @@ def take_in(
     node = history.order[index]
     history.looked[node] = False
     before = history.order[index - 1]
-    _forget_who_was_away(history, before, time_s - sights.hold_s)
+    _forget_who_was_away(history, before, time_s - hold_s)
     for n in range(looks.landmarks.size):
         k = looks.landmarks[n]
         history.looked[node, k] = True
@@ -128,9 +127,8 @@ def take_in(
         history.ray_variance[node, k] = looks.sigmas[n] ** 2
         away_s = time_s - sights.accepted_s[k, looks.camera]
         alone_s = min(alone_since(sights, k, time_s), away_s)
-        history.returns[node, k] = alone_s > ALONE_S
         unsure = _largest_variance(history, before, k) > ASTRAY_SIGMA_M**2
-        if unsure and alone_s > sights.hold_s:
+        if unsure and alone_s > hold_s:
             sights.returned_s[k] = time_s
         back_s = time_s - sights.returned_s[k]
         fates.back[k] = back_s < min(RESTART_WINDOW_S, time_s - sights.begun_s[k])
@@ -195,13 +193,13 @@ def drop_lost(
     if history.size[0] == 0:
         return 0
     newest = history.order[history.size[0] - 1]
-    lost = 0
+    hold_s, lost = sights.hold_s[0], 0
     for k in range(history.alive.shape[1]):
         shown = 0
         for seen_s in sights.observed_s[k]:
-            shown += seen_s >= now_s - sights.hold_s
-        longest_s = sights.hold_s if shown >= 2 else ONE_CAMERA_S
-        kept = now_s - sights.accepted_s[k].max() <= sights.hold_s
+            shown += seen_s >= now_s - hold_s
+        longest_s = hold_s if shown >= 2 else ONE_CAMERA_S
+        kept = now_s - sights.accepted_s[k].max() <= hold_s
         kept &= alone_since(sights, k, now_s) <= longest_s
         if history.alive[newest, k] and not kept:
             history.ends[newest, k] = True

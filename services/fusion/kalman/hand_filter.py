@@ -54,8 +54,8 @@ MODELS = MotionModels(
 # Innovations beyond this squared Mahalanobis distance (2 degrees of freedom) are taken for another
 # marker: chance exceeds 30 once in three million.
 GATE = 30.0
-# Looks of this long begin a landmark; of RESTART_WINDOW_S, begin it again.
-START_WINDOW_S = 0.05
+# Looks of so many frames of the slowest camera begin a landmark, and of so long at least.
+START_FRAMES, START_WINDOW_S = 1.4, 0.05
 # The next look, if it comes within so many frames, fits the motion that a hand's landmarks began
 # with anew. Rays of the first two meet decimetres off where the hand moves, and looks that are
 # linearised there bend what follows. Hands that come back into view (tuning half of points, all
@@ -76,12 +76,16 @@ class HandFilter:
         self,
         landmarks: int,
         cameras: Extrinsics,
-        hold_s: float,
+        hold_s: Array,
         max_distance_m: float,
         counts: Counts,
         frames_per_s: float,
+        periods_s: Array,
     ) -> None:
-        """hold_s: so long a landmark stays that nobody sees; frames_per_s: of all cameras."""
+        """hold_s (1,): so long a landmark stays that nobody sees, which others keep up to date.
+
+        frames_per_s: of all cameras, at most; periods_s (C,): their frame times, of FramePace.
+        """
         self._cameras = cameras
         self._max_distance_m = max_distance_m
         self._counts = counts
@@ -91,7 +95,7 @@ class HandFilter:
         self._fates = no_fates(landmarks)
         held = Held(self._history, self._sights, self._fates, cameras, MODELS, GATE)
         self._held = HELD.pack(held)
-        self._next_s = NEXT_FRAMES * len(cameras.t) / frames_per_s
+        self._periods_s = periods_s
         # Landmarks that began with their last look: the instant of the frame they began at.
         self._young: dict[int, float] = {}
 
@@ -118,14 +122,15 @@ class HandFilter:
     def _begin_where_due(self, looks: FrameLooks) -> None:
         """Landmarks of a frame that begin, or begin again, as their fates say."""
         fates, time_s = self._fates, float(looks.times_s.mean())
+        begin_s = max(START_WINDOW_S, START_FRAMES * float(self._periods_s.max()))
         back, alive, used = fates.back.copy(), fates.alive.copy(), fates.used.copy()
         # Where other landmarks of a hand are known, they tell how a new one moves.
         of_new_hand = not (alive & ~back).any()
         for landmark in looks.landmarks[fates.astray[looks.landmarks]].tolist():
             self._begin(landmark, time_s, RESTART_WINDOW_S)
         for landmark in looks.landmarks[(back | ~alive)[looks.landmarks]].tolist():
-            if self._begin(landmark, time_s, START_WINDOW_S) and of_new_hand:
-                first = oldest_with(self._history, landmark, time_s - START_WINDOW_S)[0]
+            if self._begin(landmark, time_s, begin_s) and of_new_hand:
+                first = oldest_with(self._history, landmark, time_s - begin_s)[0]
                 self._young[landmark] = float(self._history.time_s[self._history.order[first]])
         for landmark in looks.landmarks[(alive & ~used)[looks.landmarks]].tolist():
             self._begin_again(landmark, time_s)
@@ -133,12 +138,12 @@ class HandFilter:
     def _fit_young(self, looks: FrameLooks) -> None:
         """Fit the motions that young landmarks began with to one look more."""
         history, earliest = self._history, int(self._history.size[0])
-        now_s = float(looks.times_s.mean())
+        now_s, next_s = float(looks.times_s.mean()), NEXT_FRAMES * float(self._periods_s.mean())
         for landmark in [k for k in looks.landmarks.tolist() if k in self._young]:
             began_s = self._young.pop(landmark)
             indices = oldest_with(history, landmark, began_s - 1e-6)
             node = history.order[indices[0]]
-            if now_s - began_s > self._next_s or not history.begins[node, landmark]:
+            if now_s - began_s > next_s or not history.begins[node, landmark]:
                 continue
             motion = self._fitted(landmark, indices)
             if motion is not None:

@@ -37,7 +37,6 @@ class HandHistory(NamedTuple):
     camera: Ints  # (NODES,)
     clock_variance: Array  # (NODES,) of the camera's clock, s^2
     looked: Bools  # (NODES, N) which landmarks the frame shows
-    returns: Bools  # (NODES, N) another camera saw the landmark alone until this frame
     delay_s: Array  # (NODES, N) of each observation after the node's time
     ray: Array  # (NODES, N, 2)
     ray_variance: Array  # (NODES, N) of each ray coordinate
@@ -84,7 +83,6 @@ def empty_history(landmarks: int, models: int, nodes: int, cameras: int) -> Hand
         camera=np.full(nodes, -1),
         clock_variance=np.zeros(nodes),
         looked=np.zeros(each, dtype=np.bool_),
-        returns=np.zeros(each, dtype=np.bool_),
         delay_s=np.zeros(each),
         ray=np.zeros((*each, 2)),
         ray_variance=np.zeros(each),

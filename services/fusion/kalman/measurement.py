@@ -17,9 +17,10 @@ from services.fusion.geometry.projection import project_at
 from services.fusion.kalman.motion.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
-# A look that moves its landmark by more than this is linearised anew where that leaves it; from
-# twice a landmark's distance to it takes five rounds. Moves beyond the largest room are none.
-_NEAR_M, _FARTHEST_M, _ROUNDS = 0.02, 100.0, 8
+# A look whose ray is bent by more of its sigmas where it moves its landmark is linearised anew
+# there; from twice a landmark's distance to it takes five rounds. Moves beyond the largest room are
+# none.
+BENT, _FARTHEST_M, _ROUNDS = 1.0, 100.0, 8
 
 Shift = tuple[float, float, float]
 
@@ -71,21 +72,13 @@ def predict_ray(x: Array, look: Look, shift: Shift, out: Innovation) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def innovate(
-    x: Array, P: Array, taken: Array, known: int, look: Look, far: float, out: Innovation
-) -> float:
+def innovate(x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation) -> float:
     """The innovation of a look by a state (D,), (D, D); returns det(S).
 
     Of the frame's looks that take() took, P knows nothing yet: what they say of it are the first
     `known` rows of taken (n, D). Of the clock's error P knows its own variance only. The
     determinant is not positive, and the innovation of no use, if the landmark is not in front of
     the camera.
-
-    Within a squared distance of `far` it is linearised anew where it moves the landmark far (an
-    iterated extended Kalman filter: Bell, Cathey, IEEE Trans. Automatic Control 38(2), 1993): a
-    landmark that one camera saw alone may be decimetres off along its ray, and the other camera's
-    first look threw it as far to the other side. With 0 it is not: a landmark that both see is
-    near, and some place far off would explain a look that is of another thing.
     """
     if not predict_ray(x, look, (0.0, 0.0, 0.0), out):
         return 0.0
@@ -93,32 +86,63 @@ def innovate(
     determinant = _invert_innovation_cov(out.K, look, out)
     if determinant > 0.0:
         out.distance[0] = _squared_distance(out)
-        if out.distance[0] <= far:
-            return _linearised_where_it_leads(x, P, taken, known, look, determinant, out)
     return determinant
 
 
 @njit(cache=True, error_model="numpy")
-def _linearised_where_it_leads(
-    x: Array, P: Array, taken: Array, known: int, look: Look, determinant: float, out: Innovation
-) -> float:
-    """An innovation, linearised anew as long as it moves the landmark far; returns det(S)."""
-    shift = (0.0, 0.0, 0.0)
+def linearise_where_it_leads(
+    x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation
+) -> None:
+    """Linearise an innovation anew as long as rays are bent where it moves its landmark.
+
+    An iterated extended Kalman filter (Bell, Cathey, IEEE Trans. Automatic Control 38(2), 1993).
+    Between frames a tenth of a second apart a hand's depth is known to centimetres, and the tangent
+    of its ray is off by pixels there; a landmark that one camera saw alone is decimetres off along
+    its ray, and the other camera's first look threw it as far to the other side.
+
+    After the look was gated and weighed by what was expected: where a look is of another thing,
+    some place far off would explain it.
+    """
     for _ in range(_ROUNDS):
         moved = _shift(look, out)
-        off = (moved[0] - shift[0]) ** 2 + (moved[1] - shift[1]) ** 2 + (moved[2] - shift[2]) ** 2
-        if not _NEAR_M**2 < off < _FARTHEST_M**2:
-            break
+        far = not moved[0] ** 2 + moved[1] ** 2 + moved[2] ** 2 < _FARTHEST_M**2
+        if far or _bend(x, look, moved, out) <= BENT**2 * look.ray_variance:
+            return
         # Past the camera: half the way may be in front of it.
         while not predict_ray(x, look, moved, out):
             moved = (0.5 * moved[0], 0.5 * moved[1], 0.5 * moved[2])
-        shift = moved
         _cross_cov(P, taken, known, look, out)
-        determinant = _invert_innovation_cov(out.K, look, out)
-        if determinant <= 0.0:
-            return determinant
+        if _invert_innovation_cov(out.K, look, out) <= 0.0:
+            return
         out.distance[0] = _squared_distance(out)
-    return determinant
+
+
+@njit(cache=True, error_model="numpy")
+def _bend(x: Array, look: Look, shift: Shift, out: Innovation) -> float:
+    """How far the ray to a look's landmark, moved by so much, is off its tangent, squared.
+
+    The tangent is that of nu and H. Infinite if that is not in front of the camera.
+    """
+    axes = (x.shape[0] - 1) // 3
+    first = 3 * look.landmark
+    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
+    R, t = look.R, look.t
+    u, v, depth = t[0], t[1], t[2]
+    for i in range(3):
+        at = first + i
+        place = x[at] + delay_s * x[axes + at] + half * x[2 * axes + at] + shift[i]
+        u += R[0, i] * place
+        v += R[1, i] * place
+        depth += R[2, i] * place
+    if not depth > 0.0:
+        return math.inf
+    total = 0.0
+    for k in range(2):
+        off = (u if k == 0 else v) / depth - look.ray[k] + out.nu[k] + out.drift[k] * x[3 * axes]
+        for i in range(3):
+            off -= out.H[k, i] * shift[i]
+        total += off * off
+    return total
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,6 +14,7 @@ from services.fusion.kalman.measurement import (
     Innovation,
     Look,
     innovate,
+    linearise_where_it_leads,
     log_likelihood,
     shrink,
     take,
@@ -161,8 +162,7 @@ def update_model(
         if begins:
             passed[:] = 0
         stray = STRAY - (0 if begins else min(strikes, 3)) * AGAIN
-        far = gate if history.returns[node, k] else 0.0
-        determinant = innovate(x, P, taken, known, look, far, innovation)
+        determinant = innovate(x, P, taken, known, look, innovation)
         price = 0.0
         if determinant > 0.0 and innovation.distance[0] > LOOK_ABOVE:
             Q = by_itself[1 if history.carried[node, m, k] > 0.0 else 0]
@@ -171,11 +171,12 @@ def update_model(
                 add_own(P, k, own.density, Q)
                 history.own[node, m, k] += own.density
                 price = own.price
-                determinant = innovate(x, P, taken, known, look, 0.0, innovation)
+                determinant = innovate(x, P, taken, known, look, innovation)
         used = determinant > 0.0 and innovation.distance[0] <= gate
         history.used_by[node, m, k] = used
         if used:
             total += log_likelihood(innovation, determinant) - price
+            linearise_where_it_leads(x, P, taken, known, look, innovation)
             known = take(x, taken, known, innovation)
             history.strikes[node, m, k] = passed[camera] = 0
         else:

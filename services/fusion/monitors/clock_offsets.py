@@ -64,7 +64,7 @@ class ClockOffsetEstimator:
     def __init__(
         self, cameras: tuple[Camera, ...], landmarks: int, periods_s: Array, *, enabled: bool
     ) -> None:
-        """periods_s (C,) are the cameras' frame times.
+        """periods_s (C,) are the cameras' frame times, of FramePace.
 
         Not enabled, it passes the announced uncertainties on and watches only.
         """

@@ -1,20 +1,22 @@
 """The output schedule: one instant for each frame of the reference camera, due when lag allows.
 
-The reference is a camera of the fastest that deliver; of these the one whose frames come soonest
-after the others': cameras that run freely may expose 4 ms one after the other, and points told at
-the earlier's frame would rest on what the later saw 29 ms before. It keeps the role until it falls
-silent, or another is clearly better. Where cameras expose together, it is chance whose frame comes
-first: an instant waits for the other's, for one frame of any camera at most. Lost or late frames
-leave out an instant; a camera that is back after a pause simply takes part again.
+The reference is a camera of the fastest that deliver, whatever rig.toml says; of these the one
+whose frames come soonest after the others': cameras that run freely may expose 4 ms one after the
+other, and points told at the earlier's frame would rest on what the later saw 29 ms before. It
+keeps the role until it falls silent, or another is clearly better. Where cameras expose together,
+it is chance whose frame comes first: an instant waits for the other's, for one frame of any camera
+at most. Lost or late frames leave out an instant; a camera that is back after a pause simply takes
+part again.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
-from rhot.geometry.transforms import Array
-
+# A camera is faster than another whose frames are so many times as far apart: both waver.
+_FASTER = 1.2
 # After a silence of so many frames of the reference another's frame stands in: one lost frame is
 # enough, jitter is not. A reference that is silent for longer has lost its role.
 _SILENT_FRAMES, _ABSENT_FRAMES = 1.25, 2.0
@@ -34,13 +36,12 @@ _TOGETHER_FRAMES, _AWAITED = 0.15, (1, 2)
 class OutputSchedule:
     """The queue of instants (ns, master clock) whose points are wanted; lag_frames + 2 at most."""
 
-    def __init__(self, fps: Array, lag_frames: int) -> None:
-        """fps (C,) of the cameras.
+    def __init__(self, periods_s: Sequence[float], lag_frames: int) -> None:
+        """periods_s (C,): from a frame of each camera to its next (FramePace), kept up to date.
 
         lag_frames: frames of the reference between an instant and the output of its points.
         """
-        # Python's own numbers: numpy's cost five times as much, one at a time.
-        self._fps: list[float] = fps.tolist()
+        self._periods_s = periods_s
         self._lag_frames = lag_frames
         self._reference: int | None = None
         self._told_ns: int | None = None
@@ -48,7 +49,7 @@ class OutputSchedule:
         # Of each camera: its newest instant, ns, and how old the others' frames usually are when
         # one of its own comes, in frames of theirs; NaN where nothing is known.
         self._newest_ns: dict[int, int] = {}
-        self._ages = [math.nan] * len(self._fps)
+        self._ages = [math.nan] * len(periods_s)
 
     def add_frame(self, camera: int, instant_ns: int) -> list[int]:
         """Note a frame; the instants whose points are due now: mostly one or none.
@@ -76,7 +77,7 @@ class OutputSchedule:
         newest_ns = self._newest_ns
         newest_ns[camera] = max(instant_ns, newest_ns.get(camera, instant_ns))
         return [
-            (instant_ns - of_ns) * 1e-9 * self._fps[other]
+            (instant_ns - of_ns) * 1e-9 / self._periods_s[other]
             for other, of_ns in newest_ns.items()
             if other != camera
         ]
@@ -94,23 +95,26 @@ class OutputSchedule:
         if reference is None or self._told_ns is None:
             self._reference = camera
             return True
-        fps = self._fps[reference]
+        period_s = self._periods_s[reference]
         newest_ns = self._newest_ns[camera]
-        silent = (newest_ns - self._told_ns) * 1e-9 * fps > _SILENT_FRAMES
-        absent = (newest_ns - self._newest_ns[reference]) * 1e-9 * fps > _ABSENT_FRAMES
-        if camera == reference or self._fps[camera] > fps or silent or absent:
+        silent = (newest_ns - self._told_ns) * 1e-9 > _SILENT_FRAMES * period_s
+        absent = (newest_ns - self._newest_ns[reference]) * 1e-9 > _ABSENT_FRAMES * period_s
+        if camera == reference or self._is_faster(camera, reference) or silent or absent:
             self._reference = self._freshest(camera)
         # Where another is better, its frame comes next, less than half a frame's time from now.
         return self._reference == camera or silent
 
+    def _is_faster(self, camera: int, other: int) -> bool:
+        return self._periods_s[camera] * _FASTER < self._periods_s[other]
+
     def _freshest(self, camera: int) -> int:
         """The camera as fast as one whose frames find the others' clearly younger, or itself."""
-        fps = self._fps[camera]
         best = camera
         for other, newest_ns in self._newest_ns.items():
-            since_frames = (self._newest_ns[camera] - newest_ns) * 1e-9 * fps
+            since_frames = (self._newest_ns[camera] - newest_ns) * 1e-9 / self._periods_s[camera]
             if (
-                self._fps[other] == fps
+                not self._is_faster(camera, other)
+                and not self._is_faster(other, camera)
                 and since_frames < _ABSENT_FRAMES
                 and self._ages[camera] - self._ages[other] > _YOUNGER
                 and self._ages[other] < self._ages[best]

@@ -93,7 +93,8 @@ def test_a_reader_that_has_had_enough_ends_it_without_a_word(router: str) -> Non
     with subprocess.Popen(
         [*COMMAND, "--connect", router], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
-        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
         assert process.stdout.readline().startswith(b"rig sim")
         process.stdout.close()
         assert process.stderr.read() == b""

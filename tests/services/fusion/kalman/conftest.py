@@ -25,7 +25,9 @@ class OneHand:
         self.path: Motion = path or MovingHand(seed=seed)
         self.counts = Counts()
         self.cameras = extrinsics(tuple(SyntheticRig().rig().values()))
-        self.filter = HandFilter(6, self.cameras, 0.15, 2.0, self.counts, 60.0)
+        self.filter = HandFilter(
+            6, self.cameras, np.array([0.15]), 2.0, self.counts, 60.0, np.full(2, 1 / 30)
+        )
         self._random = np.random.default_rng(seed)
 
     def frame(self, k: int) -> tuple[int, Array, Array]:

@@ -11,6 +11,7 @@ from services.fusion.kalman.measurement import (
     Look,
     adjoint_update,
     innovate,
+    linearise_where_it_leads,
     predict_ray,
     shrink,
     take,
@@ -41,7 +42,7 @@ def state() -> tuple[np.ndarray, np.ndarray]:
 
 
 NONE_TAKEN = np.empty((0, SIZE)), 0
-HERE, GATE = (0.0, 0.0, 0.0), 30.0
+HERE = (0.0, 0.0, 0.0)
 
 
 def empty() -> Innovation:
@@ -87,7 +88,7 @@ def test_update_by_several_looks_is_the_dense_one(look, state):
     for landmark in (0, LANDMARK):
         one = look._replace(landmark=landmark)
         innovation = empty()
-        determinant = innovate(new_x, new_P, taken, known, one, GATE, innovation)
+        determinant = innovate(new_x, new_P, taken, known, one, innovation)
         known = take(new_x, taken, known, innovation)
         H = dense_jacobian(innovation, landmark)
         S = H @ P @ H.T + one.ray_variance * np.eye(2)
@@ -105,7 +106,7 @@ def test_update_by_several_looks_is_the_dense_one(look, state):
 def test_an_innovation_changes_nothing_by_itself(look, state):
     x, P = state
     new_x, new_P = x.copy(), P.copy()
-    innovate(new_x, new_P, *NONE_TAKEN, look, GATE, empty())
+    innovate(new_x, new_P, *NONE_TAKEN, look, empty())
     np.testing.assert_array_equal(new_x, x)
     np.testing.assert_array_equal(new_P, P)
 
@@ -127,30 +128,44 @@ def test_the_other_camera_s_first_look_finds_what_one_saw_alone(off_m: float):
     seen = cameras.R[1] @ place + cameras.t[1]
     look = Look(LANDMARK, 0.0, seen[:2] / seen[2], 1e-8, cameras.R[1], cameras.t[1])
     taken, innovation = np.empty((2, SIZE)), empty()
-    assert innovate(x, P, taken, 0, look, GATE, innovation) > 0.0
+    assert innovate(x, P, taken, 0, look, innovation) > 0.0
+    linearise_where_it_leads(x, P, taken, 0, look, innovation)
     take(x, taken, 0, innovation)
     assert np.linalg.norm(x[first : first + 3] - place) < 5e-3
     assert not x[axes:].any()
+
+
+def test_a_straight_ray_is_not_linearised_anew(look, state):
+    x, P = state
+    look = look._replace(ray_variance=1.0)
+    before, after = empty(), empty()
+    innovate(x, P, *NONE_TAKEN, look, before)
+    innovate(x, P, *NONE_TAKEN, look, after)
+    linearise_where_it_leads(x, P, *NONE_TAKEN, look, after)
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
 def test_a_state_that_is_no_state_ends_all_the_same(look, state, value: float):
     x, P = state
     P[3 * LANDMARK : 3 * LANDMARK + 3] = value
-    innovate(x, P, *NONE_TAKEN, look, np.inf, empty())
+    innovation = empty()
+    innovate(x, P, *NONE_TAKEN, look, innovation)
+    linearise_where_it_leads(x, P, *NONE_TAKEN, look, innovation)
 
 
 def test_what_is_behind_the_camera_gives_no_innovation(look, state):
     x, P = state
     x[3 * LANDMARK + 2] = -0.5
-    assert not innovate(x, P, *NONE_TAKEN, look, GATE, empty()) > 0.0
+    assert not innovate(x, P, *NONE_TAKEN, look, empty()) > 0.0
 
 
 def test_adjoint_is_the_dense_one(look, state):
     x, P = state
     innovation = empty()
     new_x, new_P = x.copy(), P.copy()
-    innovate(new_x, new_P, *NONE_TAKEN, look, GATE, innovation)
+    innovate(new_x, new_P, *NONE_TAKEN, look, innovation)
     take(new_x, np.empty((2, SIZE)), 0, innovation)
     H = dense_jacobian(innovation)
     random = np.random.default_rng(2)
