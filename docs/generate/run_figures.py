@@ -67,6 +67,7 @@ RUNS = {
     "exposures": _script("exposures", "", None, 2),
     "filters": _script("filters", "", "--quick", 1),
     "footprint": _script("footprint", "", "--runs 1 --seconds 1", 0.7),
+    "frame_rates": _script("frame_rates", "", None, 1),
     "grasp_metrology": _script("grasp_metrology", "", "--seeds 1", 0.5),
     "grasp_study": _script("grasp_study", "", "--people 1 --cycles 1", 3),
     "hard": _script("hard", "--seeds 2", "--frames 8 --seeds 1", 8),

@@ -128,7 +128,8 @@ class Fusion(Table, frozen=True, kw_only=True):
     # Instants a result waits for later observations, in frames of the fastest camera.
     lag_frames: Annotated[int, msgspec.Meta(ge=0, le=2)] = 0
     # A landmark that no camera sees is carried on this long, then dropped; paired methods need two
-    # cameras. What one camera sees is told as long as it does: known across its ray.
+    # cameras, and "kalman" carries it on for 4.5 frames at least of the slowest camera, as its
+    # frames come. What one camera sees is told as long as it does: known across its ray.
     hold_s: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.15
     # Working volume in front of the cameras; points outside it are mismatches. RHOT section 6: 100
     # x 100 x 100 cm.

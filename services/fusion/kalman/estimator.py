@@ -29,7 +29,7 @@ SHOW_SIGMA_M = 0.05
 SEEN_FRAMES = 1.6
 # A landmark that nobody sees is held for so many frames of the slowest camera at least: for as long
 # as `hold_s` is at 30 a second. (Tuning motions, 10 frames a second and 30 of which 60 % are lost:
-# RMS at two frames 5.9 and 8.2 mm while it was 1.6, 3.1 and 2.6 with it.)
+# RMS at two frames 4.5 and 7.6 mm while it was 1.6, 3.1 and 2.6 with it.)
 HOLD_FRAMES = 4.5
 
 
