@@ -17,11 +17,6 @@ from services.fusion.geometry.projection import project_at
 from services.fusion.kalman.motion.motion_models import FAST_SUMS
 
 _LOG_2PI = math.log(2.0 * math.pi)
-# A look whose ray is bent by more of its sigmas where it moves its landmark is linearised anew
-# there; from twice a landmark's distance to it takes five rounds. Moves beyond the largest room are
-# none.
-BENT, _FARTHEST_M, _ROUNDS = 1.0, 100.0, 8
-
 Shift = tuple[float, float, float]
 
 
@@ -82,71 +77,15 @@ def innovate(x: Array, P: Array, taken: Array, known: int, look: Look, out: Inno
     """
     if not predict_ray(x, look, (0.0, 0.0, 0.0), out):
         return 0.0
-    _cross_cov(P, taken, known, look, out)
-    determinant = _invert_innovation_cov(out.K, look, out)
+    cross_cov(P, taken, known, look, out)
+    determinant = invert_innovation_cov(out.K, look, out)
     if determinant > 0.0:
-        out.distance[0] = _squared_distance(out)
+        out.distance[0] = squared_distance(out)
     return determinant
 
 
 @njit(cache=True, error_model="numpy")
-def linearise_where_it_leads(
-    x: Array, P: Array, taken: Array, known: int, look: Look, out: Innovation
-) -> None:
-    """Linearise an innovation anew as long as rays are bent where it moves its landmark.
-
-    An iterated extended Kalman filter (Bell, Cathey, IEEE Trans. Automatic Control 38(2), 1993).
-    Between frames a tenth of a second apart a hand's depth is known to centimetres, and the tangent
-    of its ray is off by pixels there; a landmark that one camera saw alone is decimetres off along
-    its ray, and the other camera's first look threw it as far to the other side.
-
-    After the look was gated and weighed by what was expected: where a look is of another thing,
-    some place far off would explain it.
-    """
-    for _ in range(_ROUNDS):
-        moved = _shift(look, out)
-        far = not moved[0] ** 2 + moved[1] ** 2 + moved[2] ** 2 < _FARTHEST_M**2
-        if far or _bend(x, look, moved, out) <= BENT**2 * look.ray_variance:
-            return
-        # Past the camera: half the way may be in front of it.
-        while not predict_ray(x, look, moved, out):
-            moved = (0.5 * moved[0], 0.5 * moved[1], 0.5 * moved[2])
-        _cross_cov(P, taken, known, look, out)
-        if _invert_innovation_cov(out.K, look, out) <= 0.0:
-            return
-        out.distance[0] = _squared_distance(out)
-
-
-@njit(cache=True, error_model="numpy")
-def _bend(x: Array, look: Look, shift: Shift, out: Innovation) -> float:
-    """How far the ray to a look's landmark, moved by so much, is off its tangent, squared.
-
-    The tangent is that of nu and H. Infinite if that is not in front of the camera.
-    """
-    axes = (x.shape[0] - 1) // 3
-    first = 3 * look.landmark
-    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
-    R, t = look.R, look.t
-    u, v, depth = t[0], t[1], t[2]
-    for i in range(3):
-        at = first + i
-        place = x[at] + delay_s * x[axes + at] + half * x[2 * axes + at] + shift[i]
-        u += R[0, i] * place
-        v += R[1, i] * place
-        depth += R[2, i] * place
-    if not depth > 0.0:
-        return math.inf
-    total = 0.0
-    for k in range(2):
-        off = (u if k == 0 else v) / depth - look.ray[k] + out.nu[k] + out.drift[k] * x[3 * axes]
-        for i in range(3):
-            off -= out.H[k, i] * shift[i]
-        total += off * off
-    return total
-
-
-@njit(cache=True, error_model="numpy")
-def _squared_distance(innovation: Innovation) -> float:
+def squared_distance(innovation: Innovation) -> float:
     """Squared Mahalanobis distance of an innovation."""
     nu, S_inverse = innovation.nu, innovation.S_inverse
     return float(
@@ -154,25 +93,6 @@ def _squared_distance(innovation: Innovation) -> float:
         + 2.0 * nu[0] * nu[1] * S_inverse[0, 1]
         + nu[1] * nu[1] * S_inverse[1, 1]
     )
-
-
-@njit(cache=True, error_model="numpy")
-def _shift(look: Look, innovation: Innovation) -> Shift:
-    """How far (m) a look moves its landmark, as seen at its instant; K has P H^T."""
-    PHt, nu, S_inverse = innovation.K, innovation.nu, innovation.S_inverse
-    axes = (PHt.shape[1] - 1) // 3
-    delay_s, half = look.delay_s, 0.5 * look.delay_s * look.delay_s
-    by0 = S_inverse[0, 0] * nu[0] + S_inverse[0, 1] * nu[1]
-    by1 = S_inverse[1, 0] * nu[0] + S_inverse[1, 1] * nu[1]
-    p = 3 * look.landmark
-    v, a = p + axes, p + 2 * axes
-    x = by0 * (PHt[0, p] + delay_s * PHt[0, v] + half * PHt[0, a])
-    y = by0 * (PHt[0, p + 1] + delay_s * PHt[0, v + 1] + half * PHt[0, a + 1])
-    z = by0 * (PHt[0, p + 2] + delay_s * PHt[0, v + 2] + half * PHt[0, a + 2])
-    x += by1 * (PHt[1, p] + delay_s * PHt[1, v] + half * PHt[1, a])
-    y += by1 * (PHt[1, p + 1] + delay_s * PHt[1, v + 1] + half * PHt[1, a + 1])
-    z += by1 * (PHt[1, p + 2] + delay_s * PHt[1, v + 2] + half * PHt[1, a + 2])
-    return x, y, z
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
@@ -211,7 +131,7 @@ def log_likelihood(innovation: Innovation, determinant: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST_SUMS)
-def _cross_cov(P: Array, taken: Array, known: int, look: Look, innovation: Innovation) -> None:
+def cross_cov(P: Array, taken: Array, known: int, look: Look, innovation: Innovation) -> None:
     """P H^T of the whole state, transposed (2, D), to K; taken rows count, as in innovate()."""
     H, drift = innovation.H, innovation.drift
     axes = (P.shape[0] - 1) // 3
@@ -256,7 +176,7 @@ def _along(row: Array, look: Look, H: Array, drift: Array) -> tuple[float, float
 
 
 @njit(cache=True, error_model="numpy")
-def _invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
+def invert_innovation_cov(PHt: Array, look: Look, out: Innovation) -> float:
     """The inverse of S = H P H^T + noise, in place; returns det(S), not positive if singular."""
     S00, across = _along(PHt[0], look, out.H, out.drift)
     _, S11 = _along(PHt[1], look, out.H, out.drift)

@@ -14,7 +14,6 @@ from services.fusion.kalman.measurement import (
     Innovation,
     Look,
     innovate,
-    linearise_where_it_leads,
     log_likelihood,
     shrink,
     take,
@@ -38,6 +37,7 @@ from services.fusion.kalman.motion.own_motion import (
     transitions,
 )
 from services.fusion.kalman.motion.rigid_motion import body_transform
+from services.fusion.kalman.relinearise import linearise_where_it_leads
 
 # Log-likelihood of a look that a model does not use: one look in 300 is of something else, anywhere
 # in an image (rays x/z, y/z of about 1 by 1). So a model that explains five looks of a frame well

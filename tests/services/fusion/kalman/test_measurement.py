@@ -11,11 +11,11 @@ from services.fusion.kalman.measurement import (
     Look,
     adjoint_update,
     innovate,
-    linearise_where_it_leads,
     predict_ray,
     shrink,
     take,
 )
+from services.fusion.kalman.relinearise import linearise_where_it_leads
 from testing.synthetic_points import SyntheticRig
 
 LANDMARK, SIZE, DELAY_S = 1, 28, 0.004
