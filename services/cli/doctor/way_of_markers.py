@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from rhot.faults.way import CLOCK, COLORS, MARKERS, PICTURE
 from rhot.files.rig_tables import CameraTable
+from rhot.hand import HandName
 from rhot.messages.health import Fault
 from rhot.watch.rig_state import RigState
 from services.cli.doctor.links import Link, broken, holds, judged
@@ -89,13 +90,13 @@ def _markers(camera: str, frames: CameraSeen, colors: Sequence[str]) -> Link:
     return broken(name, "marker_not_seen", text, action)
 
 
-def hand_links(seen: Observations, hand: str) -> list[Link]:
+def hand_links(seen: Observations, hand: HandName) -> list[Link]:
     """Points and poses of one hand."""
     found = seen.hands.get(hand, HandSeen())
     return [_points(seen, hand, found), _poses(hand, found)]
 
 
-def _points(seen: Observations, hand: str, found: HandSeen) -> Link:
+def _points(seen: Observations, hand: HandName, found: HandSeen) -> Link:
     name = f"points of {hand} hand"
     if found.points < _MIN_MESSAGES:
         return broken(name, "no_points", "fusion publishes no points at all")
@@ -108,7 +109,7 @@ def _points(seen: Observations, hand: str, found: HandSeen) -> Link:
     return holds(name, f"{found.measured} of {found.points} messages with a measured point")
 
 
-def _seen_by_two(seen: Observations, hand: str) -> bool:
+def _seen_by_two(seen: Observations, hand: HandName) -> bool:
     """Whether some colour of the hand is in many pictures of two cameras."""
     # Not an object's: its paint is seen while no hand is there.
     table = seen.config.hand.get(hand) if seen.config is not None else None
@@ -121,7 +122,7 @@ def _seen_by_two(seen: Observations, hand: str) -> bool:
     return len(colors) > len(set(colors))
 
 
-def _poses(hand: str, found: HandSeen) -> Link:
+def _poses(hand: HandName, found: HandSeen) -> Link:
     name = f"pose of {hand} hand"
     if found.poses < _MIN_MESSAGES:
         return broken(name, "no_pose", "the solver publishes no pose")
