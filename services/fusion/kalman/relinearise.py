@@ -43,7 +43,7 @@ def linearise_where_it_leads(
     for _ in range(_ROUNDS):
         moved = _shift(look, out)
         far = not moved[0] ** 2 + moved[1] ** 2 + moved[2] ** 2 < _FARTHEST_M**2
-        if far or _bend(x, look, moved, out) <= _BENT**2 * look.ray_variance:
+        if far or _squared_bend(x, look, moved, out) <= _BENT**2 * look.ray_variance:
             return
         # Past the camera: half the way may be in front of it.
         while not predict_ray(x, look, moved, out):
@@ -55,7 +55,7 @@ def linearise_where_it_leads(
 
 
 @njit(cache=True, error_model="numpy")
-def _bend(x: Array, look: Look, shift: Shift, out: Innovation) -> float:
+def _squared_bend(x: Array, look: Look, shift: Shift, out: Innovation) -> float:
     """How far the ray to a look's landmark, moved by so much, is off its tangent, squared.
 
     The tangent is that of nu and H. Infinite if that is not in front of the camera.
