@@ -19,6 +19,7 @@ def view_of_areas(camera: int, areas: Array) -> View:
         rays=np.zeros((n, 2)),
         sigmas=np.full(n, 2e-4),
         areas=areas,
+        cut=np.zeros(n, dtype=np.bool_),
         clock_offset_ns=0,
         clock_sigma_s=0.0,
         ignored=0,

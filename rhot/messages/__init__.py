@@ -41,7 +41,9 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 class Marker(Message, frozen=True, kw_only=True):
     """One coloured blob in one image.
 
-    sigma_px is one standard deviation of each coordinate, quality 0..1.
+    sigma_px is one standard deviation of each coordinate, quality 0..1. Of a marker that the
+    picture's edge cuts, place and area are those of the whole: its middle may be outside, at most
+    by its radius.
     """
 
     color: Name

@@ -23,7 +23,7 @@ from rhot.geometry.camera import Camera
 from rhot.geometry.transforms import Array
 from rhot.hand import HANDS, HandName
 from rhot.messages import MarkerFrame
-from services.fusion.arrays import Ints
+from services.fusion.arrays import Bools, Ints
 from services.fusion.intake.undistortion import undistort_all
 
 # No blob's centre is known better than this (measured: .036 px is the best method's noise in the
@@ -61,6 +61,7 @@ class View(NamedTuple):
     rays: Array  # (n, 2) undistorted x/z, y/z
     sigmas: Array  # (n,) of each ray coordinate
     areas: Array  # (n,) of the markers, in the rays' units squared
+    cut: Bools  # (n,) the picture's edge cuts the marker, and its middle is a guess
     clock_offset_ns: int  # as announced, already taken off
     clock_sigma_s: float
     ignored: int  # markers left out
@@ -119,8 +120,8 @@ class ObservationBuilder:
 
     def _seen(
         self, frame: MarkerFrame, index: int, middle_row: float
-    ) -> tuple[Ints, Array, Array, Array, Array]:
-        """Landmarks, delays, rays, sigmas and areas as in View."""
+    ) -> tuple[Ints, Array, Array, Array, Array, Bools]:
+        """Landmarks, delays, rays, sigmas, areas and who is cut, as in View."""
         claimed: list[int] = []
         numbers: list[float] = []
         for marker in frame.markers:
@@ -137,13 +138,14 @@ class ObservationBuilder:
         n = len(claimed)
         # To be filled: an array that a kernel returns costs .6 us, one that it is given .2.
         of, delay_s, rays = np.array(claimed, dtype=np.int64), np.empty(n), np.empty((n, 2))
-        sigmas, areas = np.empty(n), np.empty(n)
+        sigmas, areas, cut = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
         kept = _observe(
             of,
             delay_s,
             rays,
             sigmas,
             areas,
+            cut,
             np.array(numbers),
             len(self.landmarks),
             *self._lenses[index],
@@ -151,8 +153,8 @@ class ObservationBuilder:
             frame.row_time_ns,
         )
         if kept < n:
-            return of[:kept], delay_s[:kept], rays[:kept], sigmas[:kept], areas[:kept]
-        return of, delay_s, rays, sigmas, areas
+            return of[:kept], delay_s[:kept], rays[:kept], sigmas[:kept], areas[:kept], cut[:kept]
+        return of, delay_s, rays, sigmas, areas, cut
 
     def _count_of_hands(self, frame: MarkerFrame) -> int:
         if not self._of_objects:
@@ -177,6 +179,7 @@ def _observe(
     rays: Array,
     sigmas: Array,
     areas: Array,
+    cut: Bools,
     numbers: Array,
     landmarks: int,
     size_px: tuple[int, int],
@@ -185,7 +188,7 @@ def _observe(
     middle_row: float,
     row_time_ns: float,
 ) -> int:
-    """Landmarks, delays, rays, sigmas and areas as in View, of the best usable marker of each.
+    """Landmarks, delays, rays, sigmas, areas and who is cut, as in View, of the best usable markers.
 
     To the front of arrays (m,), rays (m, 2), of which claimed holds the landmark that each marker
     is of; how many. numbers (5 m,): x, y, sigma, area (px) and quality of each; the camera as in
@@ -208,6 +211,7 @@ def _observe(
             delay_s[kept] = (markers[k, 1] - middle_row) * row_time_ns * 1e-9
             sigmas[kept] = min(max(markers[k, 2], SIGMA_MIN_PX), SIGMA_MAX_PX) * scale[k]
             areas[kept] = markers[k, 3] * scale[k] ** 2
+            cut[kept] = _inside_px(markers[k], size_px) < _radius_px(markers[k], size_px)
             kept += 1
     return kept
 
@@ -217,10 +221,24 @@ def _best_markers(claimed: Ints, markers: Array, landmarks: int, size_px: tuple[
     """Which marker (m, 5) is the best usable one of each landmark, ascending; as in _observe."""
     best = np.full(landmarks, -1)
     for n in range(claimed.size):
-        x, y = markers[n, 0], markers[n, 1]
-        inside = -0.5 <= x <= size_px[0] - 0.5 and -0.5 <= y <= size_px[1] - 0.5
+        # The picture's edge may cut a marker: then its middle is outside, at most by its radius.
+        inside = _inside_px(markers[n], size_px) >= -_radius_px(markers[n], size_px)
         if inside and math.isfinite(markers[n, 2]):
             k = claimed[n]
             if best[k] < 0 or markers[n, 4] > markers[best[k], 4]:
                 best[k] = n
     return best[best >= 0]
+
+
+@njit(cache=True)
+def _inside_px(marker: Array, size_px: tuple[int, int]) -> float:
+    """How far a marker (5,) is within the picture; negative outside, NaN where it is nowhere."""
+    x, y = marker[0] + 0.5, marker[1] + 0.5
+    inside = min(min(x, size_px[0] - x), min(y, size_px[1] - y))
+    return inside if math.isfinite(x) and math.isfinite(y) else math.nan
+
+
+@njit(cache=True)
+def _radius_px(marker: Array, size_px: tuple[int, int]) -> float:
+    """Of a disc as large as a marker (5,): at most an eighth of the picture's width."""
+    return min(math.sqrt(max(marker[3], 0.0) / math.pi), size_px[0] / 8.0)

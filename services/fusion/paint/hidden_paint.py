@@ -7,7 +7,7 @@ areas differ by 7 % RMS. Where they differ by more, the smaller one counts as pa
 centre as off by as much as an edge at any side of it may shift it. What hides a marker from all
 cameras alike shifts all of them nearly alike: sideways more than in depth. That shows where a tip
 is smaller than its direction lets expect (expected_area.py). What comes and goes in one camera
-scatters its looks (unsteady_area.py).
+scatters its looks (unsteady_area.py). What the picture's edge cuts is off by all of its sigma.
 
 Where the pose that points rest on has a finger before a tip (behind_fingers.py), it is known which
 side is hidden: the look is put back to where the middle of the whole would be.
@@ -143,6 +143,7 @@ class HiddenPaint:
             time_s,
             view.landmarks,
             view.areas,
+            np.where(view.cut, view.sigmas, 0.0),
             view.rays,
             found,
         )
@@ -157,12 +158,14 @@ def _compare(
     time_s: float,
     landmarks: Ints,
     areas: Array,
+    cut: Array,
     rays: Array,
     out: Array,
 ) -> None:
     """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,).
 
-    Rays (n, 2) are moved as HiddenPaint.observe says. address: of _Seen. What areas say of a hand's
+    Rays (n, 2) are moved as HiddenPaint.observe says; cut (n,): sigmas of those that the picture's
+    edge cuts, else 0. address: of _Seen. What areas say of a hand's
     paint goes to its KnownPaint.
     """
     parts: _Seen = _seen_at(address)
@@ -193,6 +196,8 @@ def _compare(
             rays[n, 1] -= off * away[1]
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
             by_pose *= _LEFT
+        # How far the whole reaches stays wrong for as long as the edge cuts it.
+        worst = max(worst, cut[n])
         if worst == 0.0 and not math.isnan(ratios[n]):
             sums = seen.ratio_sums[row, camera]
             take_look(sums, seen.usual_ratios[row], ratios[n], by_direction[n], passed_s[n])

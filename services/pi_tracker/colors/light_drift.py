@@ -140,7 +140,11 @@ def observe(frame: Frame, marker: Marker, color_range: ColorRange) -> Observatio
     image = picture(frame)
     # A patch of the same area at an aspect of 3 still lies inside.
     reach = round(marker.area_px**0.5) // 2 + 3
-    x, y = round(marker.x_px / 2.0), round(marker.y_px / 2.0)
+    # Of a marker that the picture's edge cuts the middle may be outside.
+    x, y = (
+        min(max(round(of_px / 2.0), 0), cells - 1)
+        for of_px, cells in zip((marker.x_px, marker.y_px), image.size, strict=True)
+    )
     x0, y0 = max(x - reach, 0), max(y - reach, 0)
     x1, y1 = min(x + reach + 1, image.size[0]), min(y + reach + 1, image.size[1])
     if x1 - x0 < 3 or y1 - y0 < 3:

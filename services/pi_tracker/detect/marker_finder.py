@@ -25,6 +25,7 @@ from services.pi_tracker.image.frame import Frame
 from services.pi_tracker.image.noise import Noise
 from services.pi_tracker.image.planes import Rect
 from services.pi_tracker.image.yuv_planes import Picture, picture
+from services.pi_tracker.measure.cut_marker import CutMarkers
 from services.pi_tracker.measure.fastest import centroids
 from services.pi_tracker.measure.grown_blob import Growth, NearPaint, limit
 from services.pi_tracker.measure.occluded_marker import doubts_px, marker_of
@@ -66,6 +67,7 @@ class MarkerFinder:
         self._frame_count = 0
         self._identity = MarkerIdentity(table.names, settings.roi_margin_px, landmarks)
         self._background = BackgroundModel()
+        self._cut = CutMarkers()
         # All blobs of this frame, background among them, and the rectangle they were searched in.
         self._all_blobs: list[Blob] = []
         self._searched: Rect = (0, 0, 0, 0)
@@ -247,6 +249,8 @@ class MarkerFinder:
         ]
         growth = Growth(self._near, limits) if any(most for most, _ in limits) else None
         measured = centroids(image, blobs, self._noise, growth)
+        found = dict(zip(associated, zip(blobs, measured, strict=True), strict=True))
+        measured = self._cut.restored(found, image.size, stamp_ns)
         doubts = doubts_px(
             [
                 identity.departure_px(color, one.x_px, one.y_px, stamp_ns)

@@ -6,6 +6,7 @@ The message is untrusted: what lies outside its picture is not drawn.
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Iterator
 
 from rhot.messages import Marker
@@ -64,8 +65,10 @@ class Marks:
 
 
 def _inside(marker: Marker, seen: SeenInPicture) -> bool:
+    """Whether any of it is: the picture's edge may cut a marker."""
     width, height = seen.size_px
-    return -0.5 <= marker.x_px <= width - 0.5 and -0.5 <= marker.y_px <= height - 0.5
+    out = 0.5 + min(math.sqrt(marker.area_px / math.pi), 0.1 * width)
+    return -out <= marker.x_px <= width - 1.0 + out and -out <= marker.y_px <= height - 1.0 + out
 
 
 def _region(seen: SeenInPicture) -> Iterator[str]:

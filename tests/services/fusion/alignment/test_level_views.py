@@ -26,7 +26,7 @@ def view_of(camera: Camera, index: int) -> View:
     n = len(POINTS_M)
     rays = camera.rays_from_pixels(camera.project(POINTS_M))
     nothing = np.zeros(n)
-    return View(index, 0, np.arange(n), nothing, rays, nothing, nothing, 0, 0.0, 0)
+    return View(index, 0, np.arange(n), nothing, rays, nothing, nothing, nothing > 0.0, 0, 0.0, 0)
 
 
 def heights(cameras: tuple[Camera, ...], views: list[View]) -> dict[tuple[int, int], Array]:

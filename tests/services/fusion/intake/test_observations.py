@@ -89,6 +89,23 @@ def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(builder):
     np.testing.assert_allclose(sigmas, [SIGMA_MIN_PX, SIGMA_MAX_PX], rtol=0.02)
 
 
+def test_the_middle_of_a_marker_that_the_edge_cuts_may_be_outside_by_its_radius(builder):
+    def seen(*places):
+        given = [
+            marker(color, x, y) for color, (x, y) in zip(("blue", "cyan", "lime"), places, strict=False)
+        ]
+        return builder.build(frame(*given))
+
+    # An area of 50 has a radius of 4 px.
+    view = seen((-3.0, 240.0), (320.0, 482.0), (20.0, 20.0))
+    assert len(view.landmarks) == 3
+    assert view.cut.tolist() == [True, True, False]
+    assert seen((-5.0, 240.0), (644.0, 240.0), (320.0, 484.0)).ignored == 3
+    # Nobody's marker is as large as the picture.
+    huge = msgspec.structs.replace(marker(x=-200.0), area_px=1e300)
+    assert builder.build(frame(huge)).ignored == 1
+
+
 def test_frames_of_no_use_say_why(builder):
     assert builder.build(frame(camera="door")) is FrameRejection.UNKNOWN_CAMERA
     assert builder.build(frame(size_px=(1280, 960))) is FrameRejection.WRONG_SIZE

@@ -43,6 +43,7 @@ def view(sigma_px: float, camera: int = 0) -> View:
         rays=np.zeros((2, 2)),
         sigmas=np.full(2, sigma_px / FOCAL_PX),
         areas=np.zeros(2),
+        cut=np.zeros(2, dtype=np.bool_),
         clock_offset_ns=0,
         clock_sigma_s=0.0,
         ignored=0,

@@ -87,6 +87,12 @@ def test_alike_is_whole_and_less_is_hidden(paint):
     assert not paint.seen.sigmas[1].any()
 
 
+def test_what_the_edge_cuts_is_off_by_all_of_its_sigma(paint):
+    cut = look(0, 1.0, 1.0)._replace(cut=np.array([True, False]), sigmas=np.array([2e-3, 2e-3]))
+    assert paint.observe(cut, 0.0).tolist() == [2e-3, 0.0]
+    assert paint.seen.sigmas[0, :, 0].tolist() == [2e-3, 0.0]
+
+
 def test_it_is_forgotten_after_a_while(paint):
     paint.observe(look(0, 1.0, 1.0), 0.0)
     hidden = paint.observe(look(1, 0.4, 1.0), 0.016)[0]

@@ -62,12 +62,17 @@ def test_the_whole_picture_is_no_box() -> None:
     assert "<rect" not in Marks().svg(seen(searched_px=None))
 
 
-@pytest.mark.parametrize("x", [1e308, -1e308, 640.0, -1.0])
+@pytest.mark.parametrize("x", [1e308, -1e308, 646.0, -7.0])
 def test_what_lies_outside_is_not_drawn(x: float) -> None:
     svg = Marks().svg(seen(marker("green", x), marker("blue", 10.0, sigma=1e308)))
     assert words(svg)[0] == "blue"
     assert len(svg) < 2000
     assert max(map(float, re.findall(r' r="([\d.]+)"', svg))) <= 64.0
+
+
+def test_what_the_edge_cuts_is_drawn_around_its_middle() -> None:
+    root = ElementTree.fromstring(Marks().svg(seen(marker("green", -3.0))))
+    assert {float(c.get("cx", 0)) for c in root.iter("circle")} == {-2.5}
 
 
 def test_much_is_counted() -> None:

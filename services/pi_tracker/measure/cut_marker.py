@@ -1,0 +1,142 @@
+"""Where the middle of a marker is that the picture's edge cuts, from what is left of it. Pure.
+
+Of a marker that is half outside the centre of the rest is four tenths of a radius inside: to the
+other camera, which sees it whole, that is decimetres of depth. How far the marker reached when all
+of it was seen tells how far its middle is beyond the centre of the rest.
+
+The whole counts as an ellipse: across the edge it is as a disc, whose part within a line u radii
+from its middle has part_of(u) of its area, and its centre short_by(u) radii before that middle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+from rhot.geometry.transforms import Array
+from services.pi_tracker.image.blob import Blob
+from services.pi_tracker.measure.centroid import CUT_QUALITY, CUT_SIGMA, Centroid
+
+# A marker whose middle is farther outside than this, in radii, shows too little to be measured.
+_FARTHEST = -0.8
+_LINES = np.linspace(_FARTHEST, 1.0, 181)
+# How far a marker reaches is remembered for so long: hands turn. Then others' size is as good.
+_REMEMBERED_NS = 1_000_000_000
+# How unsure it is then, as a share of itself: as remembered, and as others have it. (Pictures of six
+# of the tuning families, cut at 72 lines: .1 and .14 RMS; what is larger by a third is a tail.)
+_REMEMBERED_SIGMA, _OTHERS_SIGMA = 0.12, 0.2
+
+
+def part_of(line: Array) -> Array:
+    """The share of a disc's area that is within a line so many radii beyond its middle, -1..1."""
+    return 0.5 + (line * np.sqrt(1.0 - line**2) + np.arcsin(line)) / np.pi
+
+
+def short_by(line: Array) -> Array:
+    """How far the centre of that part is before the disc's middle, radii."""
+    return 2.0 / (3.0 * np.pi) * (1.0 - line**2) ** 1.5 / part_of(line)
+
+
+# By line: the part, how far its centre is short, and how far it is from the line.
+_PARTS, _SHORT = part_of(_LINES), short_by(_LINES)
+_TO_LINE = _LINES + _SHORT
+
+
+class _Whole(NamedTuple):
+    """A marker of which all was seen."""
+
+    blob: Blob
+    area_px2: float
+    stamp_ns: int
+
+    def reach_px(self, axis: int) -> float:
+        """How far it reaches from its middle along x (0) or y (1): an ellipse of its moments."""
+        cells = np.nonzero(self.blob.mask)[::-1]
+        # Cells are two pixels wide, which spread by 4 / 12 themselves.
+        along, across = (4.0 * float(cells[of].var()) + 1.0 / 3.0 for of in (axis, 1 - axis))
+        # 2 sqrt(along), were the mask's area the one that was measured.
+        return math.sqrt(self.area_px2 / math.pi * math.sqrt(along / across))
+
+
+class CutMarkers:
+    """Measurements of one camera's markers, those restored that the picture's edge cuts."""
+
+    def __init__(self) -> None:
+        # By colour.
+        self._wholes: dict[int, _Whole] = {}
+
+    def restored(
+        self, measured: Mapping[int, tuple[Blob, Centroid]], size: tuple[int, int], stamp_ns: int
+    ) -> list[Centroid]:
+        """Centroids in their order; size: of the picture, in cells.
+
+        A marker whose size nobody can guess, or that a corner cuts, stays as it is measured: its
+        sigma says that it may be anywhere near.
+        """
+        sides = {color: _cut_sides(blob, size) for color, (blob, _) in measured.items()}
+        for color, (blob, centroid) in measured.items():
+            if not sides[color]:
+                self._wholes[color] = _Whole(blob, centroid.area_px, stamp_ns)
+        found = []
+        for color, (_, centroid) in measured.items():
+            if len(sides[color]) == 1:
+                ((axis, ahead),) = sides[color]
+                edge_px = 2.0 * size[axis] - 0.5 if ahead > 0.0 else -0.5
+                reach = self._reach(color, axis, stamp_ns)
+                centroid = _restored(centroid, axis, ahead, edge_px, *reach)
+            found.append(centroid)
+        return found
+
+    def _reach(self, color: int, axis: int, stamp_ns: int) -> tuple[float, float]:
+        """How far a colour's marker reaches along an axis, px, and how unsure that is, as a share.
+
+        0 px if it cannot be told.
+        """
+        whole = self._wholes.get(color)
+        if whole is not None and 0 <= stamp_ns - whole.stamp_ns <= _REMEMBERED_NS:
+            return whole.reach_px(axis), _REMEMBERED_SIGMA
+        areas_px2 = [other.area_px2 for other in self._wholes.values()]
+        reach_px = math.sqrt(median(areas_px2) / math.pi) if areas_px2 else 0.0
+        return reach_px, _OTHERS_SIGMA
+
+
+def _cut_sides(blob: Blob, size: tuple[int, int]) -> list[tuple[int, float]]:
+    """The picture's edges that a blob touches: along x (0) or y (1), before or behind it."""
+    left, top, right, bottom = blob.rect
+    sides = ((0, -1.0, left <= 0), (0, 1.0, right >= size[0]))
+    sides += ((1, -1.0, top <= 0), (1, 1.0, bottom >= size[1]))
+    return [(axis, ahead) for axis, ahead, touched in sides if touched]
+
+
+def _restored(
+    part: Centroid, axis: int, ahead: float, edge_px: float, reach_px: float, unsure: float
+) -> Centroid:
+    """What is measured of a part, as of the whole; ahead: on which side of it the edge is.
+
+    What reaches farther than the marker does, for all that is unsure, is no part of it.
+    """
+    to_edge_px, most_px = ahead * (edge_px - part[axis]), (1.0 + unsure) * reach_px
+    if not reach_px * _TO_LINE[0] < to_edge_px <= most_px:
+        return part
+    line = np.interp(to_edge_px / reach_px, _TO_LINE, _LINES)
+    share, short_px = float(np.interp(line, _LINES, _PARTS)), _short_px(to_edge_px, reach_px)
+    middle = [part.x_px, part.y_px]
+    middle[axis] += ahead * short_px
+    # By two sigmas: it is bent, and what may reach farther is never sure.
+    farther_px = 0.5 * (_short_px(to_edge_px, (1.0 + 2.0 * unsure) * reach_px) - short_px)
+    uncut_px = part.sigma_px - CUT_SIGMA * math.sqrt(part.area_px)
+    return Centroid(
+        *middle,
+        part.area_px / share,
+        math.hypot(uncut_px, farther_px),
+        part.quality / CUT_QUALITY * share,
+    )
+
+
+def _short_px(to_edge_px: float, reach_px: float) -> float:
+    """How far a part's centre is before its marker's middle."""
+    return reach_px * float(np.interp(to_edge_px / reach_px, _TO_LINE, _SHORT))
