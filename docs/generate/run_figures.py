@@ -58,6 +58,7 @@ RUNS = {
     "demo": Run(
         "rhot demo", "--no-viewer --json --seconds 30", "--no-viewer --json --seconds 3", 1
     ),
+    "cut_markers": _script("cut_markers", "", "--recipes 1", 2.5),
     "distances": _script("distances", "", "--frames 2 --seeds 1", 5),
     "dots": _script("dots", "", "--clips 1", 60),
     "dots_pictures": _script(

@@ -8,7 +8,7 @@ paint and lamps. Everything but the truth comes from disk where it was made befo
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,7 +41,7 @@ from testing.synthetic_points import START_NS
 Without = Callable[[], contextlib.AbstractContextManager[None]]
 _RIG = Path(__file__).parents[2] / "config" / "sim.toml"
 # As synchronisation leaves a camera's clock, by its own account.
-_CLOCK_SIGMA_NS = 500_000
+CLOCK_SIGMA_NS = 500_000
 # Frames of which a camera's colours are calibrated, and of which visibility is computed: the others
 # have the smaller share of their neighbours.
 _CALIBRATION_FRAMES = (0, 25, 50, 75, 100)
@@ -165,34 +165,38 @@ def detected(
     found: dict[str, list[tuple[float, MarkerFrame]]] = {name: [] for name in trackers}
     calibration = recipe.scene(seed=recipe.seed + 1000)
     for camera in scene.cameras:
-        source = FrameSource(scene, camera, recorded=True)
         colors = fitted_colors(calibration, camera)
         steps = {name: step_of_rig(scene.config, camera, colors) for name in trackers}
-        for seq in range(int(recipe.seconds * scene.config.camera_named(camera).fps)):
-            taken = source.take(seq, START_NS)
-            if taken.image is None:
-                continue
-            frame = frame_of(taken, full_range=recipe.wrong_range)
+        for time_s, frame in taken(recipe, scene, camera):
             for name, without in trackers.items():
                 with without():
-                    markers = steps[name].step(frame, 0, _CLOCK_SIGMA_NS)
-                found[name].append((taken.time_s, markers))
+                    markers = steps[name].step(frame, 0, CLOCK_SIGMA_NS)
+                found[name].append((time_s, markers))
     return {
         name: [frame for _, frame in sorted(frames, key=lambda entry: entry[0])]
         for name, frames in found.items()
     }
 
 
-def frame_of(taken: TakenFrame, *, full_range: bool = False) -> Frame:
+def taken(recipe: Recipe, scene: Scene, camera: str) -> Iterator[tuple[float, Frame]]:
+    """A camera's pictures as its tracker gets them, and when they are exposed, s."""
+    source = FrameSource(scene, camera, recorded=True)
+    for seq in range(int(recipe.seconds * scene.config.camera_named(camera).fps)):
+        shot = source.take(seq, START_NS)
+        if shot.image is not None:
+            yield shot.time_s, frame_of(shot, full_range=recipe.wrong_range)
+
+
+def frame_of(shot: TakenFrame, *, full_range: bool = False) -> Frame:
     """A picture as a camera hands it to the tracker; full_range: it is taken for one."""
-    assert taken.image is not None
+    assert shot.image is not None
     return Frame(
-        taken.camera,
-        taken.seq,
-        taken.stamp_ns,
-        taken.row_time_ns,
-        taken.size_px,
-        taken.image,
+        shot.camera,
+        shot.seq,
+        shot.stamp_ns,
+        shot.row_time_ns,
+        shot.size_px,
+        shot.image,
         "i420",
         full_range,
     )

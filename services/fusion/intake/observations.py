@@ -188,7 +188,7 @@ def _observe(
     middle_row: float,
     row_time_ns: float,
 ) -> int:
-    """Landmarks, delays, rays, sigmas, areas and who is cut, as in View, of the best usable markers.
+    """Landmarks, delays, rays, sigmas, areas and cuts as in View, of the best usable markers.
 
     To the front of arrays (m,), rays (m, 2), of which claimed holds the landmark that each marker
     is of; how many. numbers (5 m,): x, y, sigma, area (px) and quality of each; the camera as in
@@ -234,7 +234,7 @@ def _best_markers(claimed: Ints, markers: Array, landmarks: int, size_px: tuple[
 def _inside_px(marker: Array, size_px: tuple[int, int]) -> float:
     """How far a marker (5,) is within the picture; negative outside, NaN where it is nowhere."""
     x, y = marker[0] + 0.5, marker[1] + 0.5
-    inside = min(min(x, size_px[0] - x), min(y, size_px[1] - y))
+    inside = min(x, size_px[0] - x, y, size_px[1] - y)
     return inside if math.isfinite(x) and math.isfinite(y) else math.nan
 
 

@@ -26,9 +26,11 @@ _FARTHEST = -0.8
 _LINES = np.linspace(_FARTHEST, 1.0, 181)
 # How far a marker reaches is remembered for so long: hands turn. Then others' size is as good.
 _REMEMBERED_NS = 1_000_000_000
-# How unsure it is then, as a share of itself: as remembered, and as others have it. (Pictures of six
-# of the tuning families, cut at 72 lines: .1 and .14 RMS; what is larger by a third is a tail.)
+# How unsure it is, as a share of itself: as remembered, and as others have it. (Pictures of six of
+# the tuning families, cut at 72 lines: .1 and .14 RMS; what is larger by a third is a tail.)
 _REMEMBERED_SIGMA, _OTHERS_SIGMA = 0.12, 0.2
+# The same of one that is taken for a disc, by the area of what is left: where no marker is whole.
+_DISC_SIGMA = 0.3
 
 
 def part_of(line: Array) -> Array:
@@ -41,9 +43,11 @@ def short_by(line: Array) -> Array:
     return 2.0 / (3.0 * np.pi) * (1.0 - line**2) ** 1.5 / part_of(line)
 
 
-# By line: the part, how far its centre is short, and how far it is from the line.
+# By line: the part, how far its centre is short, and how far that is from the line. The square of
+# the last over the part falls with what is missing, whatever the disc's size.
 _PARTS, _SHORT = part_of(_LINES), short_by(_LINES)
 _TO_LINE = _LINES + _SHORT
+_SQUARES = _TO_LINE**2 / _PARTS
 
 
 class _Whole(NamedTuple):
@@ -74,7 +78,7 @@ class CutMarkers:
     ) -> list[Centroid]:
         """Centroids in their order; size: of the picture, in cells.
 
-        A marker whose size nobody can guess, or that a corner cuts, stays as it is measured: its
+        A marker that a corner cuts, or that is larger than it can be, stays as it is measured: its
         sigma says that it may be anywhere near.
         """
         sides = {color: _cut_sides(blob, size) for color, (blob, _) in measured.items()}
@@ -86,46 +90,52 @@ class CutMarkers:
             if len(sides[color]) == 1:
                 ((axis, ahead),) = sides[color]
                 edge_px = 2.0 * size[axis] - 0.5 if ahead > 0.0 else -0.5
-                reach = self._reach(color, axis, stamp_ns)
-                centroid = _restored(centroid, axis, ahead, edge_px, *reach)
+                to_edge_px = ahead * (edge_px - centroid[axis])
+                reach = self._reach(color, axis, stamp_ns) or _reach_of_disc(centroid, to_edge_px)
+                centroid = _restored(centroid, axis, ahead, to_edge_px, *reach)
             found.append(centroid)
         return found
 
-    def _reach(self, color: int, axis: int, stamp_ns: int) -> tuple[float, float]:
+    def _reach(self, color: int, axis: int, stamp_ns: int) -> tuple[float, float] | None:
         """How far a colour's marker reaches along an axis, px, and how unsure that is, as a share.
 
-        0 px if it cannot be told.
+        None if no whole marker tells.
         """
         whole = self._wholes.get(color)
         if whole is not None and 0 <= stamp_ns - whole.stamp_ns <= _REMEMBERED_NS:
             return whole.reach_px(axis), _REMEMBERED_SIGMA
         areas_px2 = [other.area_px2 for other in self._wholes.values()]
-        reach_px = math.sqrt(median(areas_px2) / math.pi) if areas_px2 else 0.0
-        return reach_px, _OTHERS_SIGMA
+        return (math.sqrt(median(areas_px2) / math.pi), _OTHERS_SIGMA) if areas_px2 else None
+
+
+def _reach_of_disc(part: Centroid, to_edge_px: float) -> tuple[float, float]:
+    """As CutMarkers._reach, of a disc of which this part is left."""
+    line = np.interp(math.pi * to_edge_px**2 / part.area_px, _SQUARES, _LINES)
+    return to_edge_px / float(np.interp(line, _LINES, _TO_LINE)), _DISC_SIGMA
 
 
 def _cut_sides(blob: Blob, size: tuple[int, int]) -> list[tuple[int, float]]:
     """The picture's edges that a blob touches: along x (0) or y (1), before or behind it."""
     left, top, right, bottom = blob.rect
-    sides = ((0, -1.0, left <= 0), (0, 1.0, right >= size[0]))
-    sides += ((1, -1.0, top <= 0), (1, 1.0, bottom >= size[1]))
-    return [(axis, ahead) for axis, ahead, touched in sides if touched]
+    sides = [(0, -1.0)] if left <= 0 else []
+    sides += [(0, 1.0)] if right >= size[0] else []
+    sides += [(1, -1.0)] if top <= 0 else []
+    return sides + ([(1, 1.0)] if bottom >= size[1] else [])
 
 
 def _restored(
-    part: Centroid, axis: int, ahead: float, edge_px: float, reach_px: float, unsure: float
+    part: Centroid, axis: int, ahead: float, to_edge_px: float, reach_px: float, unsure: float
 ) -> Centroid:
     """What is measured of a part, as of the whole; ahead: on which side of it the edge is.
 
     What reaches farther than the marker does, for all that is unsure, is no part of it.
     """
-    to_edge_px, most_px = ahead * (edge_px - part[axis]), (1.0 + unsure) * reach_px
-    if not reach_px * _TO_LINE[0] < to_edge_px <= most_px:
+    if not reach_px * _TO_LINE[0] < to_edge_px <= (1.0 + unsure) * reach_px:
         return part
     line = np.interp(to_edge_px / reach_px, _TO_LINE, _LINES)
     share, short_px = float(np.interp(line, _LINES, _PARTS)), _short_px(to_edge_px, reach_px)
-    middle = [part.x_px, part.y_px]
-    middle[axis] += ahead * short_px
+    beyond_px = ahead * short_px
+    middle = (part.x_px + beyond_px, part.y_px) if axis == 0 else (part.x_px, part.y_px + beyond_px)
     # By two sigmas: it is bent, and what may reach farther is never sure.
     farther_px = 0.5 * (_short_px(to_edge_px, (1.0 + 2.0 * unsure) * reach_px) - short_px)
     uncut_px = part.sigma_px - CUT_SIGMA * math.sqrt(part.area_px)

@@ -91,10 +91,10 @@ def test_absurd_markers_are_left_out_and_absurd_sigmas_limited(builder):
 
 def test_the_middle_of_a_marker_that_the_edge_cuts_may_be_outside_by_its_radius(builder):
     def seen(*places):
-        given = [
-            marker(color, x, y) for color, (x, y) in zip(("blue", "cyan", "lime"), places, strict=False)
-        ]
-        return builder.build(frame(*given))
+        colors = ("blue", "cyan", "lime")
+        return builder.build(
+            frame(*(marker(one, *at) for one, at in zip(colors, places, strict=True)))
+        )
 
     # An area of 50 has a radius of 4 px.
     view = seen((-3.0, 240.0), (320.0, 482.0), (20.0, 20.0))

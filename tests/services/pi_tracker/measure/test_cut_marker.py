@@ -22,14 +22,15 @@ ELSEWHERE = (("blue", 60.0, 80.0), ("lime", 90.0, 50.0))
 def track(studio, tip, colors):
     """Markers of a green tip that goes through places, and of others; and its true middles."""
 
-    def run(places, turn_rad=0.0, elsewhere=ELSEWHERE, names=("green", "blue", "lime")):
+    def run(places, turn_rad=0.0, elsewhere=ELSEWHERE, wide=WIDE, names=("green", "blue", "lime")):
         step = TrackerStep("left", colors, Tracker(), SIZE, list(names))
         found = []
         for seq, (x, y) in enumerate(places):
-            shapes = [(name, *at, WIDE) for name, *at in elsewhere] + [("green", x, y, LONG)]
+            shapes = [(name, *at, wide, wide) for name, *at in elsewhere]
+            shapes.append(("green", x, y, WIDE, LONG))
             tips = [
-                tip(name, MARGIN + x, MARGIN + y, WIDE, length, turn_rad=turn_rad)
-                for name, x, y, length in shapes
+                tip(name, MARGIN + x, MARGIN + y, width, length, turn_rad=turn_rad)
+                for name, x, y, width, length in shapes
             ]
             image, truth = studio.clean(tips, (SIZE[0] + 2 * MARGIN, SIZE[1] + 2 * MARGIN))
             image = np.ascontiguousarray(image[MARGIN:-MARGIN, MARGIN:-MARGIN])
@@ -85,12 +86,21 @@ def test_a_marker_that_comes_in_is_as_large_as_the_others(track):
         assert off <= min(2.0, 2.0 * marker.sigma_px)
 
 
-def test_where_nothing_tells_how_large_it_is_a_marker_is_as_measured_and_unsure(track):
+def test_where_no_marker_is_whole_it_is_a_disc(track):
     ((marker, truth),) = track([(0.0, 60.0)], elsewhere=(), names=("green",))
     assert marker is not None
-    assert marker.x_px > truth[0] + 2.0
-    assert marker.sigma_px > 0.4 * (marker.x_px - truth[0])
-    assert marker.quality < 0.5
+    # It is longer than wide; as measured it is 3.4 px inside.
+    assert np.abs(np.array([marker.x_px, marker.y_px]) - truth).max() <= 2.2
+    assert 1.5 < marker.sigma_px < 3.0
+    assert marker.quality < 0.6
+
+
+def test_what_is_larger_than_a_marker_can_be_is_as_measured_and_unsure(track):
+    small = (("blue", 60.0, 80.0), ("lime", 90.0, 50.0))
+    ((marker, truth),) = track([(4.0, 60.0)], elsewhere=small, wide=8.0)
+    assert marker is not None
+    assert marker.x_px > truth[0] + 1.0
+    assert marker.sigma_px > 1.5
 
 
 def test_what_a_corner_cuts_is_as_measured_and_unsure(track):
