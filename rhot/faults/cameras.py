@@ -86,6 +86,11 @@ FUSION = (
         "a marker is not seen by one camera or by all",
         "is it in view and lit? If so, its range no longer fits: `rhot calibrate colors`",
     ),
+    warning(
+        "marker_at_edge",
+        "the edge of a camera's picture cuts markers: they are placed less well, and may leave it",
+        "move the hand towards the middle of what both cameras see, or the cameras back",
+    ),
     error(
         "camera_silent",
         "no markers arrive from a camera",

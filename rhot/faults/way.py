@@ -27,7 +27,7 @@ PICTURE = (
 )
 CLOCK = ("clock_unknown", "camera_clock_off", "camera_clock_aligned")
 COLORS = ("colors_missing", "color_drifted")
-MARKERS = ("marker_not_seen",)
+MARKERS = ("marker_not_seen", "marker_at_edge")
 # Codes of fusion's of the cameras together.
 VIEWS = (
     "camera_wrong_size",

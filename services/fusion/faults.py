@@ -12,8 +12,8 @@ from rhot.files.config import RigConfig
 from rhot.process.fault_log import FaultLog
 from services.fusion.alignment.clock_alignment import Correction
 from services.fusion.monitors.camera_arrivals import CameraArrivals
+from services.fusion.monitors.markers_at_edge import at_edge_text
 from services.fusion.monitors.unseen_markers import (
-    UnseenMarker,
     unseen_action,
     unseen_hand_text,
     unseen_text,
@@ -105,23 +105,33 @@ class FusionFaults:
 
     def _report_markers(self, elapsed_s: float) -> None:
         markers, hands = self._step.unseen_markers.look(elapsed_s)
-        texts = {self._color(one): unseen_text(one, self._marker(one)) for one in markers}
-        actions = {self._color(one): unseen_action(one.unseen_by) for one in markers}
+        texts = {
+            self._color(one.landmark): unseen_text(one, self._marker(one.landmark))
+            for one in markers
+        }
+        actions = {self._color(one.landmark): unseen_action(one.unseen_by) for one in markers}
         for hand in hands:
             subject = f"{hand.hand} hand"
             texts[subject] = unseen_hand_text(hand)
             actions[subject] = unseen_action(hand.unseen_by)
         self._faults.replace("marker_not_seen", texts, actions)
+        at_edge = {
+            one.camera: at_edge_text(
+                one.camera, list(map(self._marker, one.landmarks)), one.seconds
+            )
+            for one in self._step.at_edge.look(elapsed_s)
+        }
+        self._faults.replace("marker_at_edge", at_edge)
 
-    def _color(self, found: UnseenMarker) -> str:
-        landmark = self._step.landmarks[found.landmark]
+    def _color(self, number: int) -> str:
+        landmark = self._step.landmarks[number]
         return self._config.hand[landmark.hand].marker_names[landmark.name]
 
-    def _marker(self, found: UnseenMarker) -> str:
+    def _marker(self, number: int) -> str:
         """What people call it: `lime (little tip)`, with the hand where there are two."""
-        landmark = self._step.landmarks[found.landmark]
+        landmark = self._step.landmarks[number]
         hand = f"{landmark.hand} " if len(self._config.hand) > 1 else ""
-        return f"{self._color(found)} ({hand}{landmark.name.replace('_', ' ')})"
+        return f"{self._color(number)} ({hand}{landmark.name.replace('_', ' ')})"
 
 
 def _name(pair: Pair) -> str:

@@ -32,6 +32,7 @@ from services.fusion.intake.observations import FrameRejection, Landmark, Observ
 from services.fusion.kalman.estimator import KalmanMethod
 from services.fusion.method import Method
 from services.fusion.monitors.clock_offsets import ClockOffsetEstimator
+from services.fusion.monitors.markers_at_edge import EdgeMonitor
 from services.fusion.monitors.mirrored_view import MirrorMonitor
 from services.fusion.monitors.unseen_markers import UnseenMarkerMonitor
 from services.fusion.output.hand_plausibility import hand_reach_m
@@ -94,6 +95,7 @@ class FusionStep:
         )
         self.mirrors = MirrorMonitor(self._cameras)
         self.unseen_markers = UnseenMarkerMonitor(self._cameras, self._landmarks)
+        self.at_edge = EdgeMonitor([one.name for one in self._cameras], len(self._landmarks))
         self._lag_frames = max(config.fusion.lag_frames, self.method.frames_after)
         self._admission = FrameAdmission(len(self._cameras))
         self._schedule = OutputSchedule(self._pace.shortest_s, self._lag_frames)
@@ -186,6 +188,7 @@ class FusionStep:
         """Learn from an admitted frame, whose observations have times_s (n,)."""
         self.mirrors.observe(view)
         self.unseen_markers.observe(view)
+        self.at_edge.observe(view)
         self.clocks.observe(view, times_s)
         self.levels.take(self.clocks.heights)
 

@@ -188,3 +188,33 @@ def test_a_marker_of_one_camera_says_who_sees_it():
     assert run.only.text.startswith("lime (little tip): never seen by right for ")
     assert run.only.text.endswith("; left sees it")
     assert run.only.action.endswith("the range no longer fits: `rhot calibrate colors right`")
+
+
+def at_right_edge(*colors: str) -> Callable[[MarkerFrame], MarkerFrame]:
+    """An area of 80 px has a radius of 5."""
+    return lambda frame: replace(
+        frame,
+        markers=[replace(m, x_px=637.0) if m.color in colors else m for m in frame.markers],
+    )
+
+
+def test_a_marker_that_the_edge_cuts_for_long_is_named_until_it_is_whole():
+    run = Run()
+    cut = of_right(at_right_edge("lime", "violet"), 2.0, 12.0)
+    begun = next(n for n, codes in enumerate(run.play(20, cut), 1) if "marker_at_edge" in codes)
+    assert 2 + 6 <= begun <= 2 + 8
+    assert "marker_at_edge" not in run.look(21)
+    again = Run()
+    again.play(11, of_right(at_right_edge("lime", "violet")))
+    (fault,) = (one for one in again.log.standing() if one.code == "marker_at_edge")
+    assert (fault.severity, fault.subject) == ("warning", "right")
+    assert "right's picture has cut violet (wrist), lime (little tip) for" in fault.text
+
+
+def test_a_hand_that_passes_the_edge_is_nobodys_concern():
+    run = Run()
+
+    def now_and_then(frame: MarkerFrame, at_s: float) -> MarkerFrame:
+        return at_right_edge("lime")(frame) if at_s % 4.0 < 1.5 else frame
+
+    assert not any("marker_at_edge" in codes for codes in run.play(16, now_and_then))
