@@ -27,7 +27,7 @@ _LINES = np.linspace(_FARTHEST, 1.0, 181)
 # How far a marker reaches is remembered for so long: hands turn. Then others' size is as good.
 _REMEMBERED_NS = 1_000_000_000
 # How unsure it is, as a share of itself: as remembered, and as others have it. (Pictures of six of
-# the tuning families, cut at 72 lines: .1 and .14 RMS; what is larger by a third is a tail.)
+# the tuning families, cut at 72 lines: .1 and .14 RMS, with tails.)
 _REMEMBERED_SIGMA, _OTHERS_SIGMA = 0.12, 0.2
 # The same of one that is taken for a disc, by the area of what is left: where no marker is whole.
 _DISC_SIGMA = 0.3
@@ -81,20 +81,37 @@ class CutMarkers:
         A marker that a corner cuts, or that is larger than it can be, stays as it is measured: its
         sigma says that it may be anywhere near.
         """
-        sides = {color: _cut_sides(blob, size) for color, (blob, _) in measured.items()}
+        width, height = size
+        whole = True
         for color, (blob, centroid) in measured.items():
-            if not sides[color]:
+            left, top, right, bottom = blob.rect
+            if left > 0 and top > 0 and right < width and bottom < height:
                 self._wholes[color] = _Whole(blob, centroid.area_px, stamp_ns)
-        found = []
-        for color, (_, centroid) in measured.items():
-            if len(sides[color]) == 1:
-                ((axis, ahead),) = sides[color]
-                edge_px = 2.0 * size[axis] - 0.5 if ahead > 0.0 else -0.5
-                to_edge_px = ahead * (edge_px - centroid[axis])
-                reach = self._reach(color, axis, stamp_ns) or _reach_of_disc(centroid, to_edge_px)
-                centroid = _restored(centroid, axis, ahead, to_edge_px, *reach)
-            found.append(centroid)
-        return found
+            else:
+                whole = False
+        if whole:
+            return [centroid for _, centroid in measured.values()]
+        return [
+            self._restored(color, centroid, _cut_sides(blob, size), size, stamp_ns)
+            for color, (blob, centroid) in measured.items()
+        ]
+
+    def _restored(
+        self,
+        color: int,
+        part: Centroid,
+        sides: list[tuple[int, float]],
+        size: tuple[int, int],
+        stamp_ns: int,
+    ) -> Centroid:
+        """A colour's marker, of which sides are cut."""
+        if len(sides) != 1:
+            return part
+        ((axis, ahead),) = sides
+        edge_px = 2.0 * size[axis] - 0.5 if ahead > 0.0 else -0.5
+        to_edge_px = ahead * (edge_px - part[axis])
+        reach = self._reach(color, axis, stamp_ns) or _reach_of_disc(part, to_edge_px)
+        return _restored(part, axis, ahead, to_edge_px, *reach)
 
     def _reach(self, color: int, axis: int, stamp_ns: int) -> tuple[float, float] | None:
         """How far a colour's marker reaches along an axis, px, and how unsure that is, as a share.
