@@ -38,7 +38,7 @@ LAGS, CUT_AT = (0, 2), (0.3, 0.7)
 WAYS = ("rhot", "as measured")
 # Of a disc, how much shows.
 SHOWS = ((0.9, 0.999), (0.7, 0.9), (0.5, 0.7), (0.3, 0.5), (0.1, 0.3))
-# A landmark counts as cut where a look so near is.
+# A landmark counts as cut where a look so near in time is.
 NEAR_S = 0.025
 Shots = dict[str, list[tuple[float, Frame]]]
 Figures = dict[str, float]

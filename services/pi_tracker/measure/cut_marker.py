@@ -1,7 +1,7 @@
 """Where the middle of a marker is that the picture's edge cuts, from what is left of it. Pure.
 
 Of a marker that is half outside the centre of the rest is four tenths of a radius inside: to the
-other camera, which sees it whole, that is decimetres of depth. How far the marker reached when all
+other camera, which sees it whole, that is centimetres of depth. How far the marker reached when all
 of it was seen tells how far its middle is beyond the centre of the rest.
 
 The whole counts as an ellipse: across the edge it is as a disc, whose part within a line u radii
