@@ -22,6 +22,7 @@ import msgspec
 import numpy as np
 from held_out_score import make_fusion, run
 
+from rhot.files.config import RigConfig
 from rhot.geometry.transforms import Array
 from rhot.hand import default_hand
 from rhot.messages import Marker, MarkerFrame
@@ -106,7 +107,7 @@ class Cut:
             },
         )
 
-    def _config(self, crop: Crop | None) -> object:
+    def _config(self, crop: Crop | None) -> RigConfig:
         config = self.scene.config
         if crop is None:
             return config

@@ -158,13 +158,13 @@ def _compare(
     time_s: float,
     landmarks: Ints,
     areas: Array,
-    cut: Array,
+    cut_sigmas: Array,
     rays: Array,
     out: Array,
 ) -> None:
     """Update what is seen of paint by a camera's look; to out the sigmas of its landmarks (n,).
 
-    Rays (n, 2) are moved as HiddenPaint.observe says; cut (n,): sigmas of those that the picture's
+    Rays (n, 2) are moved as HiddenPaint.observe says; cut_sigmas (n,): of those that the picture's
     edge cuts, else 0. address: of _Seen. What areas say of a hand's
     paint goes to its KnownPaint.
     """
@@ -197,7 +197,7 @@ def _compare(
             worst = math.hypot(_LEFT * worst, _LEFT_OF_SHIFT * off)
             by_pose *= _LEFT
         # How far the whole reaches stays wrong for as long as the edge cuts it.
-        worst = max(worst, cut[n])
+        worst = max(worst, cut_sigmas[n])
         if worst == 0.0 and not math.isnan(ratios[n]):
             sums = seen.ratio_sums[row, camera]
             take_look(sums, seen.usual_ratios[row], ratios[n], by_direction[n], passed_s[n])

@@ -50,6 +50,10 @@ _TO_LINE = _LINES + _SHORT
 _SQUARES = _TO_LINE**2 / _PARTS
 
 
+# An edge: across x (0) or y (1), and whether it is at the end (1) or at the beginning (-1) of that.
+_Side = tuple[int, float]
+
+
 class _Whole(NamedTuple):
     """A marker of which all was seen."""
 
@@ -81,37 +85,50 @@ class CutMarkers:
         A marker that a corner cuts, or that is larger than it can be, stays as it is measured: its
         sigma says that it may be anywhere near.
         """
-        width, height = size
-        whole = True
+        cut: dict[int, list[_Side]] = {}
         for color, (blob, centroid) in measured.items():
-            left, top, right, bottom = blob.rect
-            if left > 0 and top > 0 and right < width and bottom < height:
-                self._wholes[color] = _Whole(blob, centroid.area_px, stamp_ns)
+            if sides := _cut_sides(blob, size):
+                cut[color] = sides
             else:
-                whole = False
-        if whole:
-            return [centroid for _, centroid in measured.values()]
+                self._wholes[color] = _Whole(blob, centroid.area_px, stamp_ns)
         return [
-            self._restored(color, centroid, _cut_sides(blob, size), size, stamp_ns)
-            for color, (blob, centroid) in measured.items()
+            self._of_whole(color, one, cut[color][0], size, stamp_ns)
+            if color in cut and len(cut[color]) == 1
+            else one
+            for color, (_, one) in measured.items()
         ]
 
-    def _restored(
-        self,
-        color: int,
-        part: Centroid,
-        sides: list[tuple[int, float]],
-        size: tuple[int, int],
-        stamp_ns: int,
+    def _of_whole(
+        self, color: int, part: Centroid, side: _Side, size: tuple[int, int], stamp_ns: int
     ) -> Centroid:
-        """A colour's marker, of which sides are cut."""
-        if len(sides) != 1:
-            return part
-        ((axis, ahead),) = sides
+        """What is measured of the part of a colour's marker that a side leaves, as of the whole.
+
+        What reaches farther than the marker does, for all that is unsure, is no part of it.
+        """
+        axis, ahead = side
         edge_px = 2.0 * size[axis] - 0.5 if ahead > 0.0 else -0.5
         to_edge_px = ahead * (edge_px - part[axis])
-        reach = self._reach(color, axis, stamp_ns) or _reach_of_disc(part, to_edge_px)
-        return _restored(part, axis, ahead, to_edge_px, *reach)
+        reach_px, unsure = self._reach(color, axis, stamp_ns) or _reach_of_disc(part, to_edge_px)
+        if not reach_px * _TO_LINE[0] < to_edge_px <= (1.0 + unsure) * reach_px:
+            return part
+        line = np.interp(to_edge_px / reach_px, _TO_LINE, _LINES)
+        share, short_px = float(np.interp(line, _LINES, _PARTS)), _short_px(to_edge_px, reach_px)
+        x_px, y_px = part.x_px, part.y_px
+        if axis == 0:
+            x_px += ahead * short_px
+        else:
+            y_px += ahead * short_px
+        # Half of what two sigmas of reach add: what one adds is next to nothing of a marker that
+        # just seems whole, and may be longer.
+        farther_px = 0.5 * (_short_px(to_edge_px, (1.0 + 2.0 * unsure) * reach_px) - short_px)
+        uncut_px = part.sigma_px - CUT_SIGMA * math.sqrt(part.area_px)
+        return Centroid(
+            x_px,
+            y_px,
+            part.area_px / share,
+            math.hypot(uncut_px, farther_px),
+            part.quality / CUT_QUALITY * share,
+        )
 
     def _reach(self, color: int, axis: int, stamp_ns: int) -> tuple[float, float] | None:
         """How far a colour's marker reaches along an axis, px, and how unsure that is, as a share.
@@ -131,37 +148,19 @@ def _reach_of_disc(part: Centroid, to_edge_px: float) -> tuple[float, float]:
     return to_edge_px / float(np.interp(line, _LINES, _TO_LINE)), _DISC_SIGMA
 
 
-def _cut_sides(blob: Blob, size: tuple[int, int]) -> list[tuple[int, float]]:
-    """The picture's edges that a blob touches: along x (0) or y (1), before or behind it."""
+def _cut_sides(blob: Blob, size: tuple[int, int]) -> list[_Side]:
+    """The picture's edges that a blob touches."""
     left, top, right, bottom = blob.rect
-    sides = [(0, -1.0)] if left <= 0 else []
-    sides += [(0, 1.0)] if right >= size[0] else []
-    sides += [(1, -1.0)] if top <= 0 else []
-    return sides + ([(1, 1.0)] if bottom >= size[1] else [])
-
-
-def _restored(
-    part: Centroid, axis: int, ahead: float, to_edge_px: float, reach_px: float, unsure: float
-) -> Centroid:
-    """What is measured of a part, as of the whole; ahead: on which side of it the edge is.
-
-    What reaches farther than the marker does, for all that is unsure, is no part of it.
-    """
-    if not reach_px * _TO_LINE[0] < to_edge_px <= (1.0 + unsure) * reach_px:
-        return part
-    line = np.interp(to_edge_px / reach_px, _TO_LINE, _LINES)
-    share, short_px = float(np.interp(line, _LINES, _PARTS)), _short_px(to_edge_px, reach_px)
-    beyond_px = ahead * short_px
-    middle = (part.x_px + beyond_px, part.y_px) if axis == 0 else (part.x_px, part.y_px + beyond_px)
-    # By two sigmas: it is bent, and what may reach farther is never sure.
-    farther_px = 0.5 * (_short_px(to_edge_px, (1.0 + 2.0 * unsure) * reach_px) - short_px)
-    uncut_px = part.sigma_px - CUT_SIGMA * math.sqrt(part.area_px)
-    return Centroid(
-        *middle,
-        part.area_px / share,
-        math.hypot(uncut_px, farther_px),
-        part.quality / CUT_QUALITY * share,
-    )
+    sides: list[_Side] = []
+    if left <= 0:
+        sides.append((0, -1.0))
+    if right >= size[0]:
+        sides.append((0, 1.0))
+    if top <= 0:
+        sides.append((1, -1.0))
+    if bottom >= size[1]:
+        sides.append((1, 1.0))
+    return sides
 
 
 def _short_px(to_edge_px: float, reach_px: float) -> float:

@@ -67,7 +67,7 @@ class Marks:
 def _inside(marker: Marker, seen: SeenInPicture) -> bool:
     """Whether any of it is: the picture's edge may cut a marker."""
     width, height = seen.size_px
-    out = 0.5 + min(math.sqrt(marker.area_px / math.pi), 0.1 * width)
+    out = 0.5 + min(math.sqrt(marker.area_px / math.pi), width / 8.0)
     return -out <= marker.x_px <= width - 1.0 + out and -out <= marker.y_px <= height - 1.0 + out
 
 
